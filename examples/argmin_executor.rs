@@ -2,8 +2,8 @@
 
 use argmin::core::{CostFunction, Error, Executor, State};
 use mops::math;
+use mops::solvers::argmin_solver::ArgminSolver;
 use mops::solvers::cma_es::CmaEsOptions;
-use mops::solvers::for_argmin::Driven;
 
 /// Rastrigin's function: about `10^n` local minima, with the global minimum 0 at the origin.
 struct Rastrigin;
@@ -19,7 +19,7 @@ impl CostFunction for Rastrigin {
 
 /// Returns the best point, its cost, and the number of evaluations of the cost.
 pub fn solve() -> Result<(Vec<f64>, f64, u64), Error> {
-    let solver = Driven::new(&CmaEsOptions::default(), &[[-5.12, 4.0]; 3]).with_evaluations(20_000);
+    let solver = ArgminSolver::new(&CmaEsOptions::default(), &[[-5.12, 4.0]; 3]).with_evaluations(20_000);
     let done = Executor::new(Rastrigin, solver)
         .configure(|state| state.param(vec![3.0; 3]).target_cost(1e-8).counting(true))
         .run()?;

@@ -1,35 +1,40 @@
-//! The solver for those who do not choose one.
+//! Default solver, which chooses a method for the problem.
 
 use mops_core::{Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions, Usage};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::chaining::Chain;
 use crate::levenberg_marquardt::LevenbergMarquardtOptions;
+use crate::multimethod::Multimethod;
 use crate::multistart::Multistart;
+use crate::noise_detection::{Smoothness, detect_smoothness};
 use crate::nsga2::Nsga2Options;
 use crate::nsga3::Nsga3Options;
 use crate::pattern_search::PatternSearchOptions;
 use crate::quasi_newton::QuasiNewton;
-use crate::relay::Relay;
-use crate::second_opinion::SecondOpinion;
 use crate::sqp::SqpOptions;
-use crate::texture::{Texture, texture};
 use crate::weighted_chebyshev::WeightedChebyshevOptions;
 
-/// Looks at the problem and chooses: `levenberg-marquardt` for a sum of squares, `pattern-search` where tuners have whole
-/// numbers or lists, else `sqp`. One criterion without constraints is looked at along one to three lines near the start: where
-/// it is noisy it is `pattern-search` too, where it is smooth a BFGS method with a line search comes before `sqp`, with a
-/// pattern search from the study's own start as a second opinion on where that leads. Each begins at several starts: the
-/// study's own, and the best points of a sample of the box. Where the objective is no sum of squares a pattern
-/// search goes on from the best point after all starts, and, but where it was found smooth, from the end of the first run,
-/// because an optimum may lie on a jump (of a settling time, say), where slopes lead no further; a sum of squares is started again around the
-/// best point until nothing changes. Where every criterion counts for itself (`objective = "each"`) it is
-/// `weighted-chebyshev` for up to three criteria and 50 tuners without whole numbers or lists, else `nsga2` for two criteria
-/// and `nsga3` for more.
+/// Chooses a method from the properties of the problem.
+///
+/// - Sum of squares: `levenberg-marquardt`, restarted around the best point until nothing changes.
+/// - Tuners with whole numbers or lists: `pattern-search`.
+/// - One criterion without constraints: noise and kinks (non-differentiable points) are detected from values along one
+///   to three lines near the initial guess. With noise: `pattern-search`. Smooth: BFGS with a line search, then `sqp`;
+///   a pattern search from the same initial guess may find a better basin. With kinks: `sqp`.
+/// - All other problems with one objective: `sqp`.
+/// - A front (`objective = "each"`): `weighted-chebyshev` for up to three criteria and 50 tuners without whole numbers
+///   or lists; otherwise `nsga2` for two criteria and `nsga3` for more.
+///
+/// Every method for one objective runs from several points (multistart): the initial guess of the study and the best
+/// points of a sample of the box. Unless the objective is a sum of squares, a pattern search then continues from the
+/// best point. Unless the criterion is smooth, a pattern search also continues from the end of the first run. An
+/// optimum may lie at a discontinuity (of a settling time, for example), where gradients are of no use.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {
-    /// Number of starts, the study's own included.
+    /// Number of starting points, including the initial guess of the study.
     #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
 }
@@ -55,32 +60,32 @@ struct Auto {
 }
 
 enum Stage {
-    /// Where every criterion counts for itself.
+    /// Search for a front.
     Front(Box<dyn Solver>),
-    /// From several starts.
+    /// Multistart of the chosen method.
     Global(Multistart),
-    /// From the best point on, without slopes.
-    Polish(Box<dyn Solver>, Standing),
-    /// From several starts around the best point.
-    Around(Multistart, Standing),
+    /// Derivative-free search from the best point.
+    Polish(Box<dyn Solver>, Status),
+    /// Multistart around the best point.
+    LocalRestarts(Multistart, Status),
 }
 
-/// What is known when a stage begins.
+/// State of the search at the start of a stage.
 #[derive(Debug, Clone, Copy)]
-struct Standing {
-    /// Whether a stage before met a test of an optimum.
+struct Status {
+    /// True if a previous stage has converged.
     converged: bool,
-    /// Whether two starts have led to the same optimum.
-    agreed: bool,
-    /// The objective when the last rounds around the best point began.
-    before: f64,
+    /// True if two runs have reached the same optimum.
+    confirmed: bool,
+    /// Objective at the start of the last multistart around the best point.
+    previous_objective: f64,
 }
 
-/// Relative change of the objective that is none.
-const SAME: f64 = 1e-4;
+/// Relative change of the objective that is regarded as zero.
+const NEGLIGIBLE_CHANGE: f64 = 1e-4;
 
-/// Half the widths of the box around the best point, in turn.
-const AROUND: &[f64] = &[0.05, 0.02, 0.005];
+/// Half-widths of the box around the best point, used in turn.
+const RESTART_RADII: &[f64] = &[0.05, 0.02, 0.005];
 
 impl Solver for Auto {
     fn accepts(&self, _: &Shape) -> Result<(), String> {
@@ -89,19 +94,19 @@ impl Solver for Auto {
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         if oracle.shape().objective == Objective::Each {
-            let (mut front, method) = front(oracle.shape());
-            self.ran(&[method]);
+            let (mut front, method) = front_solver(oracle.shape());
+            self.record_methods(&[method]);
             front.begin(oracle, start)?;
             self.stage = Some(Stage::Front(front));
             return Ok(());
         }
         let Choice { first, local, methods } = choose(oracle, start)?;
-        self.ran(methods);
+        self.record_methods(methods);
         let global = Multistart::new(local, self.options.starts);
         let mut global = match first {
-            _ if oracle.shape().residuals > 0 => global.until_nothing_changes(),
-            Some(first) => global.with_first(first),
-            None => global.with_second(PatternSearchOptions::default().build()),
+            _ if oracle.shape().residuals > 0 => global.with_local_restarts(),
+            Some(first) => global.with_initial_solver(first),
+            None => global.with_continuation(PatternSearchOptions::default().build()),
         };
         global.begin(oracle, start)?;
         self.stage = Some(Stage::Global(global));
@@ -117,22 +122,26 @@ impl Solver for Auto {
                     return Ok(progress);
                 }
                 let converged = progress == Progress::Converged;
-                let standing = Standing { converged, agreed: global.agrees(SAME), before: f64::INFINITY };
-                self.polish(oracle, standing)
+                let status = Status {
+                    converged,
+                    confirmed: global.optimum_is_confirmed(NEGLIGIBLE_CHANGE),
+                    previous_objective: f64::INFINITY,
+                };
+                self.polish(oracle, status)
             }
-            Stage::Polish(pattern, standing) => {
-                let standing = *standing;
+            Stage::Polish(pattern, status) => {
+                let status = *status;
                 match pattern.step(oracle)? {
                     Progress::Continue => Ok(Progress::Continue),
-                    progress => self.settle(oracle, standing, progress),
+                    progress => self.finish_or_restart(oracle, status, progress),
                 }
             }
-            Stage::Around(around, standing) => {
-                let standing = *standing;
-                match around.step(oracle)? {
+            Stage::LocalRestarts(restarts, status) => {
+                let status = *status;
+                match restarts.step(oracle)? {
                     Progress::Continue => Ok(Progress::Continue),
-                    _ if gains(oracle, standing.before) => self.polish(oracle, standing),
-                    progress => Ok(standing.ending(progress)),
+                    _ if has_improved(oracle, status.previous_objective) => self.polish(oracle, status),
+                    progress => Ok(status.final_progress(progress)),
                 }
             }
         }
@@ -157,56 +166,70 @@ impl Solver for Auto {
     }
 }
 
-impl Standing {
-    fn ending(self, progress: Progress) -> Progress {
+impl Status {
+    fn final_progress(self, progress: Progress) -> Progress {
         if progress == Progress::Stalled && !self.converged { Progress::Stalled } else { Progress::Converged }
     }
 }
 
 impl Auto {
-    fn ran(&mut self, methods: &[&'static str]) {
+    fn record_methods(&mut self, methods: &[&'static str]) {
         let new: Vec<_> = methods.iter().filter(|method| !self.methods.contains(method)).collect();
         self.methods.extend(new);
     }
 
-    /// A pattern search from the best point.
-    fn polish(&mut self, oracle: &mut dyn Oracle, standing: Standing) -> Result<Progress, Halt> {
+    /// Starts a pattern search from the best point.
+    fn polish(&mut self, oracle: &mut dyn Oracle, status: Status) -> Result<Progress, Halt> {
         let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(Progress::Stalled) };
         let mut pattern = PatternSearchOptions { size: 0.02, ..Default::default() }.build();
-        self.ran(&[PatternSearchOptions::KIND]);
+        self.record_methods(&[PatternSearchOptions::KIND]);
         pattern.begin(oracle, &best)?;
-        self.stage = Some(Stage::Polish(pattern, standing));
+        self.stage = Some(Stage::Polish(pattern, status));
         Ok(Progress::Continue)
     }
 
-    /// The end, or, where no two starts have led to the same optimum, rounds around the best point.
-    fn settle(&mut self, oracle: &mut dyn Oracle, standing: Standing, progress: Progress) -> Result<Progress, Halt> {
-        let sloped = oracle.shape().spacing.iter().all(|&spacing| spacing == 0.0);
-        if self.options.starts < 2 || !sloped || standing.agreed || !gains(oracle, standing.before) {
-            return Ok(standing.ending(progress));
+    /// Ends the search, or starts a multistart around the best point if no optimum has been found twice.
+    fn finish_or_restart(
+        &mut self,
+        oracle: &mut dyn Oracle,
+        status: Status,
+        progress: Progress,
+    ) -> Result<Progress, Halt> {
+        let is_continuous = oracle.shape().spacing.iter().all(|&spacing| spacing == 0.0);
+        if self.options.starts < 2
+            || !is_continuous
+            || status.confirmed
+            || !has_improved(oracle, status.previous_objective)
+        {
+            return Ok(status.final_progress(progress));
         }
-        let before = oracle.best().map_or(f64::INFINITY, |best| best.merit.objective);
-        self.ran(&[SqpOptions::KIND]);
-        let mut around = Multistart::around(SqpOptions::default().build(), AROUND, SAME);
-        if !around.begin_around(oracle)? {
-            return Ok(standing.ending(progress));
+        let previous_objective = oracle.best().map_or(f64::INFINITY, |best| best.merit.objective);
+        self.record_methods(&[SqpOptions::KIND]);
+        let mut restarts =
+            Multistart::restarts_around_best(SqpOptions::default().build(), RESTART_RADII, NEGLIGIBLE_CHANGE);
+        if !restarts.begin_local_restarts(oracle)? {
+            return Ok(status.final_progress(progress));
         }
-        self.stage = Some(Stage::Around(around, Standing { before, ..standing }));
+        self.stage = Some(Stage::LocalRestarts(restarts, Status { previous_objective, ..status }));
         Ok(Progress::Continue)
     }
 }
 
-/// Whether the best objective is less than `before` by more than nothing.
-fn gains(oracle: &dyn Oracle, before: f64) -> bool {
-    oracle.best().is_some_and(|best| before.is_infinite() || before - best.merit.objective > SAME * before.abs())
+/// Returns true if the best objective has decreased from `previous_objective` by more than the negligible change.
+fn has_improved(oracle: &dyn Oracle, previous_objective: f64) -> bool {
+    oracle.best().is_some_and(|best| {
+        previous_objective.is_infinite()
+            || previous_objective - best.merit.objective > NEGLIGIBLE_CHANGE * previous_objective.abs()
+    })
 }
 
-/// Few criteria are followed along their front; crowding spreads two objectives evenly, reference directions more of them.
-fn front(shape: &Shape) -> (Box<dyn Solver>, &'static str) {
+/// Chooses the solver for a front: `weighted-chebyshev` for few criteria, otherwise `nsga2` (crowding) for two criteria
+/// and `nsga3` (reference directions) for more.
+fn front_solver(shape: &Shape) -> (Box<dyn Solver>, &'static str) {
     let objectives = shape.rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
-    let along = WeightedChebyshevOptions::default().build();
-    if objectives <= 3 && shape.dimension() <= 50 && along.accepts(shape).is_ok() {
-        return (along, WeightedChebyshevOptions::KIND);
+    let chebyshev = WeightedChebyshevOptions::default().build();
+    if objectives <= 3 && shape.dimension() <= 50 && chebyshev.accepts(shape).is_ok() {
+        return (chebyshev, WeightedChebyshevOptions::KIND);
     }
     if objectives <= 2 {
         (Nsga2Options::default().build(), Nsga2Options::KIND)
@@ -215,7 +238,7 @@ fn front(shape: &Shape) -> (Box<dyn Solver>, &'static str) {
     }
 }
 
-/// What runs from several starts, and what from the study's own where that is something else.
+/// Local solver of a multistart, and a different solver for the initial guess of the study if there is one.
 struct Choice {
     first: Option<Box<dyn Solver>>,
     local: Box<dyn Solver>,
@@ -223,35 +246,35 @@ struct Choice {
 }
 
 impl Choice {
-    fn of(local: Box<dyn Solver>, methods: &'static [&'static str]) -> Self {
+    fn new(local: Box<dyn Solver>, methods: &'static [&'static str]) -> Self {
         Self { first: None, local, methods }
     }
 }
 
-/// The local solver of a problem.
+/// Chooses the local solver of a problem.
 fn choose(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Choice, Halt> {
     let shape = oracle.shape().clone();
-    let pattern = || Choice::of(PatternSearchOptions::default().build(), &[PatternSearchOptions::KIND]);
-    // The starts are counted here, not in the chosen solver.
+    let pattern = || Choice::new(PatternSearchOptions::default().build(), &[PatternSearchOptions::KIND]);
+    // This solver counts the starting points itself.
     let least_squares = LevenbergMarquardtOptions::default().local();
     if least_squares.accepts(&shape).is_ok() {
-        return Ok(Choice::of(least_squares, &[LevenbergMarquardtOptions::KIND]));
+        return Ok(Choice::new(least_squares, &[LevenbergMarquardtOptions::KIND]));
     }
     let sqp = SqpOptions::default().build();
     if sqp.accepts(&shape).is_err() || start.is_empty() {
         return Ok(pattern());
     }
-    // Where there are several rows a kink is mostly one between them; they are not looked at.
-    let one = Box::new(QuasiNewton::default());
-    if one.accepts(&shape).is_err() {
-        return Ok(Choice::of(sqp, &[SqpOptions::KIND]));
+    // With several criteria most kinks lie where two criteria intersect, which `sqp` handles: no noise detection.
+    let quasi_newton = Box::new(QuasiNewton::default());
+    if quasi_newton.accepts(&shape).is_err() {
+        return Ok(Choice::new(sqp, &[SqpOptions::KIND]));
     }
-    Ok(match texture(oracle, start)? {
-        Texture::Noisy => pattern(),
-        Texture::Kinked => Choice::of(sqp, &[SqpOptions::KIND]),
-        Texture::Smooth => Choice {
-            first: Some(Box::new(SecondOpinion::default())),
-            local: Box::new(Relay::new(one, sqp)),
+    Ok(match detect_smoothness(oracle, start)? {
+        Smoothness::Noisy => pattern(),
+        Smoothness::Nonsmooth => Choice::new(sqp, &[SqpOptions::KIND]),
+        Smoothness::Smooth => Choice {
+            first: Some(Box::new(Multimethod::default())),
+            local: Box::new(Chain::on_stall(quasi_newton, sqp)),
             methods: &[PatternSearchOptions::KIND, "bfgs", SqpOptions::KIND],
         },
     })

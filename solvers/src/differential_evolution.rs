@@ -1,4 +1,4 @@
-//! Differential evolution that adapts its own factors (SHADE).
+//! Differential evolution with adaptive parameters (SHADE).
 
 use mops_core::math;
 use mops_core::{Halt, Merit, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
@@ -6,28 +6,30 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::population::{Generations, Next, Population, Renewal};
+use crate::population::{Next, Population, RestartRule, StagnationMonitor};
 use crate::ranking::compare;
 
-/// Differential evolution with factors that adapt to what has succeeded (SHADE): a global search without slopes, strong
-/// where tuners act separately. A whole generation is evaluated in parallel; it begins again with new members once the old
-/// ones are all alike, or nothing improves. It sees one number per point, the maximum, and the largest violation.
+/// Differential evolution with success-history based parameter adaptation (SHADE). A derivative-free global search,
+/// strong on separable problems.
 ///
-/// Source: R. Tanabe, A. Fukunaga, Success-history based parameter adaptation for differential evolution, IEEE CEC (2013)
-/// 71-78, with the memory of six of their L-SHADE, IEEE CEC (2014) 1658-1665.
+/// A whole generation is evaluated in parallel. The population is resampled once its members have converged or nothing
+/// improves. The method uses two numbers per point: the objective and the largest violation.
+///
+/// Source: R. Tanabe, A. Fukunaga, Success-history based parameter adaptation for differential evolution, IEEE CEC
+/// (2013) 71-78, with a memory of six entries as in L-SHADE, IEEE CEC (2014) 1658-1665.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct DifferentialEvolutionOptions {
-    /// Number of members; 0 for ten per tuner, at least 20 and at most 100.
+    /// Population size; 0 for ten per tuner, at least 20 and at most 100.
     #[schemars(range(max = 1_000_000))]
     pub population: usize,
-    /// Members are alike when what they are worth differs by less than this, relative to the objective.
+    /// The population has converged when the values of its members differ by less than this, relative to the objective.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
-    /// Generations without a better point after which the members are drawn anew.
+    /// Number of generations without improvement after which the population is resampled.
     #[schemars(range(min = 1))]
     pub patience: usize,
-    /// Number of times that the members are drawn anew.
+    /// Maximum number of times that the population is resampled.
     pub restarts: usize,
 }
 
@@ -45,7 +47,7 @@ impl SolverOptions for DifferentialEvolutionOptions {
     }
 }
 
-/// The solver of the kind `differential-evolution`.
+/// Solver of the kind `differential-evolution`.
 struct DifferentialEvolution {
     options: DifferentialEvolutionOptions,
     state: Option<State>,
@@ -54,12 +56,12 @@ struct DifferentialEvolution {
 struct State {
     random: Stream,
     population: Population,
-    /// Memory for the mixtures that challenge the members.
+    /// Buffer for the trial vectors.
     trials: Vec<Vec<f64>>,
-    /// Members that were replaced by better ones.
-    replaced: Vec<Vec<f64>>,
-    memory: Memory,
-    generations: Generations,
+    /// Archive of parents replaced by better trial vectors.
+    archive: Vec<Vec<f64>>,
+    history: SuccessHistory,
+    stagnation: StagnationMonitor,
 }
 
 impl Solver for DifferentialEvolution {
@@ -73,12 +75,12 @@ impl Solver for DifferentialEvolution {
             return Ok(());
         }
         let mut random = oracle.stream("differential-evolution");
-        let population = Population::sampled(oracle, self.size(start.len()), Some(start), &mut random)?;
+        let population = Population::sample(oracle, self.size(start.len()), Some(start), &mut random)?;
         let DifferentialEvolutionOptions { tolerance, patience, restarts, .. } = self.options;
-        let generations = Generations::of(&population, Renewal { tolerance, patience, restarts });
+        let stagnation = StagnationMonitor::new(&population, RestartRule { tolerance, patience, restarts });
         let trials = population.points.clone();
         self.state =
-            Some(State { random, population, trials, replaced: Vec::new(), memory: Memory::new(), generations });
+            Some(State { random, population, trials, archive: Vec::new(), history: SuccessHistory::new(), stagnation });
         Ok(())
     }
 
@@ -87,14 +89,14 @@ impl Solver for DifferentialEvolution {
         let size = self.size(n);
         let Some(state) = &mut self.state else { return Ok(Progress::Converged) };
         state.generation(oracle)?;
-        match state.generations.after(&state.population) {
+        match state.stagnation.next(&state.population) {
             Next::Generation => return Ok(Progress::Continue),
             Next::End => return Ok(Progress::Stalled),
-            Next::Members => {}
+            Next::Restart => {}
         }
-        state.population = Population::sampled(oracle, size, None, &mut state.random)?;
-        state.replaced.clear();
-        state.memory = Memory::new();
+        state.population = Population::sample(oracle, size, None, &mut state.random)?;
+        state.archive.clear();
+        state.history = SuccessHistory::new();
         Ok(Progress::Continue)
     }
 }
@@ -106,47 +108,47 @@ impl DifferentialEvolution {
 }
 
 impl State {
-    /// Every member is challenged by a mixture of others.
+    /// Evaluates one trial vector per member and selects the survivors.
     fn generation(&mut self, oracle: &mut dyn Oracle) -> Result<(), Halt> {
         let size = self.population.len();
         let order = self.population.order();
         let mut factors = Vec::with_capacity(size);
         let mut trials = std::mem::take(&mut self.trials);
         for (member, trial) in trials.iter_mut().enumerate() {
-            let drawn = self.memory.draw(&mut self.random);
-            self.mix(trial, member, &order, drawn);
+            let drawn = self.history.draw(&mut self.random);
+            self.mutate_and_cross(trial, member, &order, drawn);
             factors.push(drawn);
         }
         let answers = oracle.evaluate(&trials)?;
         let mut successes = Vec::with_capacity(size);
         for (member, (trial, answer)) in trials.iter_mut().zip(&answers).enumerate() {
             let (before, merit) = (self.population.merits[member], answer.merit);
-            let against = compare(&merit, &before);
-            if against.is_gt() {
+            let comparison = compare(&merit, &before);
+            if comparison.is_gt() {
                 continue;
             }
-            // From here on the trial is the parent.
+            // After this swap, `trial` contains the parent.
             std::mem::swap(&mut self.population.points[member], trial);
             self.population.merits[member] = merit;
-            if against.is_lt() {
-                successes.push((factors[member], gain(&before, &merit)));
-                if self.replaced.len() < size {
-                    self.replaced.push(trial.clone());
+            if comparison.is_lt() {
+                successes.push((factors[member], improvement(&before, &merit)));
+                if self.archive.len() < size {
+                    self.archive.push(trial.clone());
                 } else {
                     let slot = self.random.random_range(0..size);
-                    std::mem::swap(&mut self.replaced[slot], trial);
+                    std::mem::swap(&mut self.archive[slot], trial);
                 }
             }
         }
         self.trials = trials;
-        self.memory.learn(&successes);
+        self.history.update(&successes);
         Ok(())
     }
 
-    /// Writes `x + F (x_p - x) + F (x_1 - x_2)`, crossed with `x`, to `trial`: `x_p` is one of the best tenth or two, `x_2` may be a member that
-    /// was replaced.
+    /// Writes `x + F (x_p - x) + F (x_1 - x_2)`, crossed with `x`, to `trial`. `x_p` is drawn from the best members: a
+    /// random share of up to 20 %, at least two. `x_2` may come from the archive.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn mix(&mut self, trial: &mut [f64], member: usize, order: &[usize], [factor, rate]: [f64; 2]) {
+    fn mutate_and_cross(&mut self, trial: &mut [f64], member: usize, order: &[usize], [factor, rate]: [f64; 2]) {
         let size = self.population.len();
         let random = &mut self.random;
         let elite = 2.max((random.random_range(0.0..0.2) * size as f64) as usize);
@@ -158,58 +160,58 @@ impl State {
             }
         };
         let second = loop {
-            let drawn = random.random_range(0..size + self.replaced.len());
+            let drawn = random.random_range(0..size + self.archive.len());
             if drawn != member && drawn != first {
                 break drawn;
             }
         };
         let points = &self.population.points;
-        let other = if second < size { &points[second] } else { &self.replaced[second - size] };
+        let other = if second < size { &points[second] } else { &self.archive[second - size] };
         let x = &points[member];
-        let always = random.random_range(0..x.len());
+        let forced = random.random_range(0..x.len());
         let coordinate = |j: usize| {
-            if j != always && random.random::<f64>() >= rate {
+            if j != forced && random.random::<f64>() >= rate {
                 return x[j];
             }
-            let moved = x[j] + factor * (points[best][j] - x[j] + points[first][j] - other[j]);
-            // Halfway to the face it would cross.
-            if moved < 0.0 {
+            let mutant = x[j] + factor * (points[best][j] - x[j] + points[first][j] - other[j]);
+            // Midpoint between the parent and the violated face.
+            if mutant < 0.0 {
                 0.5 * x[j]
-            } else if moved > 1.0 {
+            } else if mutant > 1.0 {
                 0.5 * (1.0 + x[j])
             } else {
-                moved
+                mutant
             }
         };
         trial.iter_mut().zip((0..x.len()).map(coordinate)).for_each(|(place, value)| *place = value);
     }
 }
 
-/// How much better a merit is.
-fn gain(before: &Merit, after: &Merit) -> f64 {
-    let gain = if after.is_feasible() && before.is_feasible() {
+/// Returns the improvement of a merit.
+fn improvement(before: &Merit, after: &Merit) -> f64 {
+    let improvement = if after.is_feasible() && before.is_feasible() {
         before.objective - after.objective
     } else {
         before.violation - after.violation
     };
-    if gain.is_finite() && gain > 0.0 { gain } else { f64::MIN_POSITIVE }
+    if improvement.is_finite() && improvement > 0.0 { improvement } else { f64::MIN_POSITIVE }
 }
 
-/// Factors and crossover rates that succeeded.
+/// Means of the successful scale factors and crossover rates.
 #[derive(Debug, Clone)]
-struct Memory {
+struct SuccessHistory {
     means: [[f64; 2]; 6],
     next: usize,
 }
 
-impl Memory {
+impl SuccessHistory {
     fn new() -> Self {
         Self { means: [[0.5, 0.5]; 6], next: 0 }
     }
 
     fn draw(&self, random: &mut Stream) -> [f64; 2] {
         let [factor, rate] = self.means[random.random_range(0..self.means.len())];
-        // Of the Cauchy distribution around `factor`, and of the normal one around `rate`.
+        // Cauchy distribution around `factor`, normal distribution around `rate`.
         let factor = loop {
             let drawn = factor + 0.1 * math::tan(std::f64::consts::PI * random.random::<f64>());
             if drawn > 0.0 {
@@ -220,13 +222,15 @@ impl Memory {
         [factor, rate.clamp(0.0, 1.0)]
     }
 
-    /// The weighted Lehmer mean of the factors, the weighted mean of the rates.
-    fn learn(&mut self, successes: &[([f64; 2], f64)]) {
-        let largest = successes.iter().map(|(_, gain)| *gain).fold(0.0, f64::max);
+    /// Stores the weighted Lehmer mean of the successful factors and the weighted mean of the successful rates.
+    fn update(&mut self, successes: &[([f64; 2], f64)]) {
+        let largest = successes.iter().map(|(_, improvement)| *improvement).fold(0.0, f64::max);
         if successes.is_empty() || largest <= 0.0 {
             return;
         }
-        let sum = |f: &dyn Fn(&[f64; 2]) -> f64| successes.iter().map(|(s, gain)| gain / largest * f(s)).sum::<f64>();
+        let sum = |f: &dyn Fn(&[f64; 2]) -> f64| {
+            successes.iter().map(|(s, improvement)| improvement / largest * f(s)).sum::<f64>()
+        };
         let factor = sum(&|[factor, _]| factor * factor) / sum(&|[factor, _]| *factor);
         let rate = sum(&|[_, rate]| *rate) / sum(&|_| 1.0);
         self.means[self.next] = [factor, rate];

@@ -1,67 +1,67 @@
-//! The quadratic subproblem of a min-max problem in its smooth (epigraph) form, with elastic constraints.
+//! Quadratic subproblem of a min-max problem in its smooth (epigraph) form, with elastic constraints.
 //!
-//! With values and slopes of the rows at a point, find the step `d` that solves
+//! Given values and gradients of the criteria at a point, the subproblem for the step `d` is
 //! ```text
 //! min over d, t, e   1/2 d'Bd + t + penalty e
-//! subject to         f_i + g_i d <= t         every objective row
+//! subject to         f_i + g_i d <= t         every objective
 //!                    c_j + a_j d <= e         every inequality
 //!                    |h_k + b_k d| <= e       every equality
 //!                    low <= d <= high,  e >= 0
 //! ```
-//! It has a solution whatever the rows: where the linearised constraints contradict each other, `e` stays positive.
+//! A solution always exists: if the linearised constraints are inconsistent, `e` stays positive.
 
 use nalgebra::DMatrix;
 
 use crate::active_set::{ActiveSet, Constraints, dot};
-use crate::definite::cholesky;
-use crate::rows::{Linear, Multipliers, Rows};
+use crate::cholesky::factorise;
+use crate::linearised_criteria::{LinearModel, LinearisedCriteria, Multipliers};
 
-/// The solution of the subproblem.
+/// Solution of the subproblem.
 #[derive(Debug, Clone, Default)]
 pub struct Direction {
-    /// The step.
+    /// Step.
     pub step: Vec<f64>,
-    /// The largest linearised objective row after it.
+    /// Largest linearised objective after the step.
     pub level: f64,
-    /// The largest linearised violation after it.
+    /// Largest linearised violation after the step.
     pub violation: f64,
-    /// What the rows weigh.
+    /// Multipliers of the criteria.
     pub multipliers: Multipliers,
 }
 
-/// The subproblem, with its memory, which is used again from step to step.
+/// Solver for the subproblem; reuses its memory from one step to the next.
 ///
-/// Level and elastic violation have no curvature of their own. They get one that is small beside all others, about the level
-/// here and about no violation, so that it does nothing at a solution.
+/// The level `t` and the elastic violation `e` have no curvature of their own. A small curvature is added, centred at
+/// the present level and at zero violation, so that it has no influence at a solution.
 #[derive(Debug, Default)]
 pub struct Subproblem {
     method: ActiveSet,
     constraints: Constraints,
     factor: Vec<f64>,
     linear: Vec<f64>,
-    slope: Vec<f64>,
+    gradient: Vec<f64>,
     weights: Vec<f64>,
 }
 
 impl Subproblem {
-    /// Curvature of level and violation, relative to what the objective can fall by.
+    /// Curvature of level and violation, relative to the possible decrease of the objective.
     const CURVATURE: f64 = 1e-7;
 
-    /// Finds the solution with steps between `low` and `high`; `None` where the Hessian is not positive definite or rounding
-    /// keeps the method from an end.
+    /// Computes the step between `low` and `high`. Returns `None` if the Hessian is not positive definite or rounding
+    /// errors prevent convergence.
     #[must_use]
     pub fn solve(
         &mut self,
-        rows: &Rows,
+        criteria: &LinearisedCriteria,
         hessian: &DMatrix<f64>,
         [low, high]: [&[f64]; 2],
         penalty: f64,
         into: &mut Direction,
     ) -> Option<()> {
         let n = low.len();
-        let level = rows.objective();
-        let first = self.collect(rows, level, low, high);
-        self.factor(hessian, &rows.objectives[first].slope)?;
+        let level = criteria.objective();
+        let first = self.assemble_constraints(criteria, level, low, high);
+        self.factor(hessian, &criteria.objectives[first].gradient)?;
         self.linear.clear();
         self.linear.resize(n, 0.0);
         self.linear.extend([1.0, penalty]);
@@ -71,25 +71,25 @@ impl Subproblem {
         }
         into.step.clear();
         into.step.extend((0..n).map(|j| self.method.x()[j].clamp(low[j], high[j])));
-        let after = |row: &Linear| row.value + dot(&row.slope, &into.step);
-        into.level = rows.objectives.iter().map(after).fold(f64::NEG_INFINITY, f64::max);
-        let violation = rows.inequalities.iter().map(after).fold(0.0, f64::max);
-        into.violation = rows.equalities.iter().map(|row| after(row).abs()).fold(violation, f64::max);
-        self.weigh(rows, &mut into.multipliers);
+        let after = |row: &LinearModel| row.value + dot(&row.gradient, &into.step);
+        into.level = criteria.objectives.iter().map(after).fold(f64::NEG_INFINITY, f64::max);
+        let violation = criteria.inequalities.iter().map(after).fold(0.0, f64::max);
+        into.violation = criteria.equalities.iter().map(|row| after(row).abs()).fold(violation, f64::max);
+        self.read_multipliers(criteria, &mut into.multipliers);
         Some(())
     }
 
-    /// The rows as constraints on step, level and violation, in the order of `rows`, then the box, then no violation; the
-    /// index of the largest objective row.
-    fn collect(&mut self, rows: &Rows, level: f64, low: &[f64], high: &[f64]) -> usize {
+    /// Writes the criteria as constraints on step, level and violation: first the criteria in their order, then the
+    /// box, then `e >= 0`. Returns the index of the largest objective.
+    fn assemble_constraints(&mut self, criteria: &LinearisedCriteria, level: f64, low: &[f64], high: &[f64]) -> usize {
         self.constraints.clear();
-        for row in &rows.objectives {
+        for row in &criteria.objectives {
             self.push(row, -1.0, [1.0, 0.0], row.value - level);
         }
-        for row in &rows.inequalities {
+        for row in &criteria.inequalities {
             self.push(row, -1.0, [0.0, 1.0], row.value);
         }
-        for row in &rows.equalities {
+        for row in &criteria.equalities {
             self.push(row, -1.0, [0.0, 1.0], row.value);
             self.push(row, 1.0, [0.0, 1.0], -row.value);
         }
@@ -104,18 +104,18 @@ impl Subproblem {
         }
         self.constraints.normals.extend(std::iter::repeat_n(0.0, n + 1).chain([1.0]));
         self.constraints.bounds.push(0.0);
-        rows.objectives.iter().position(|row| row.value >= level).unwrap_or(0)
+        criteria.objectives.iter().position(|row| row.value >= level).unwrap_or(0)
     }
 
-    fn push(&mut self, row: &Linear, sign: f64, rest: [f64; 2], bound: f64) {
-        self.constraints.normals.extend(row.slope.iter().map(|s| sign * s));
+    fn push(&mut self, row: &LinearModel, sign: f64, rest: [f64; 2], bound: f64) {
+        self.constraints.normals.extend(row.gradient.iter().map(|s| sign * s));
         self.constraints.normals.extend(rest);
         self.constraints.bounds.push(bound);
     }
 
-    /// The Cholesky factor of the Hessian and of the small curvatures.
-    fn factor(&mut self, hessian: &DMatrix<f64>, slope: &[f64]) -> Option<()> {
-        let n = slope.len();
+    /// Computes the Cholesky factor of the Hessian, extended by the small curvatures.
+    fn factor(&mut self, hessian: &DMatrix<f64>, gradient: &[f64]) -> Option<()> {
+        let n = gradient.len();
         let size = n + 2;
         self.factor.clear();
         self.factor.resize(size * size, 0.0);
@@ -123,13 +123,13 @@ impl Subproblem {
         for k in 0..n {
             l[k * size + k..k * size + n].copy_from_slice(&hessian.as_slice()[k * n + k..(k + 1) * n]);
         }
-        if !cholesky(l, n, size) {
+        if !factorise(l, n, size) {
             return None;
         }
-        // What the first row falls by without the others: |L^-1 g|^2.
-        let y = &mut self.slope;
+        // Predicted decrease of one objective alone: |L^-1 g|^2.
+        let y = &mut self.gradient;
         y.clear();
-        y.extend_from_slice(slope);
+        y.extend_from_slice(gradient);
         for k in 0..n {
             y[k] = (y[k] - (0..k).map(|m| l[m * size + k] * y[m]).sum::<f64>()) / l[k * size + k];
         }
@@ -139,9 +139,9 @@ impl Subproblem {
         Some(())
     }
 
-    /// What the rows weigh at the solution.
-    fn weigh(&mut self, rows: &Rows, multipliers: &mut Multipliers) {
-        let (f, c, h) = (rows.objectives.len(), rows.inequalities.len(), rows.equalities.len());
+    /// Reads the multipliers of the criteria at the solution.
+    fn read_multipliers(&mut self, criteria: &LinearisedCriteria, multipliers: &mut Multipliers) {
+        let (f, c, h) = (criteria.objectives.len(), criteria.inequalities.len(), criteria.equalities.len());
         let all = &mut self.weights;
         all.clear();
         all.resize(f + c + h, 0.0);
@@ -170,48 +170,54 @@ impl Subproblem {
 mod tests {
     use super::*;
 
-    fn solve(rows: &Rows, hessian: &DMatrix<f64>, low: &[f64], high: &[f64], penalty: f64) -> Option<Direction> {
+    fn solve(
+        criteria: &LinearisedCriteria,
+        hessian: &DMatrix<f64>,
+        low: &[f64],
+        high: &[f64],
+        penalty: f64,
+    ) -> Option<Direction> {
         let mut direction = Direction::default();
-        Subproblem::default().solve(rows, hessian, [low, high], penalty, &mut direction).map(|()| direction)
+        Subproblem::default().solve(criteria, hessian, [low, high], penalty, &mut direction).map(|()| direction)
     }
 
-    fn linear(value: f64, slope: &[f64]) -> Linear {
-        Linear { value, slope: slope.to_vec() }
+    fn linear(value: f64, gradient: &[f64]) -> LinearModel {
+        LinearModel { value, gradient: gradient.to_vec() }
     }
 
     #[test]
     fn two_crossing_lines_meet_in_the_middle() {
-        // max(1 + d, 1 - 2 d) without curvature: d = 0 is the best; max(1 + d, 4 - 2 d): d = 1, level 2.
-        let rows = Rows {
+        // Without curvature, max(1 + d, 4 - 2 d) has its minimum 2 at d = 1.
+        let criteria = LinearisedCriteria {
             objectives: vec![linear(1.0, &[1.0]), linear(4.0, &[-2.0])],
             inequalities: vec![],
             equalities: vec![],
         };
-        let d = solve(&rows, &(DMatrix::identity(1, 1) * 1e-6), &[-5.0], &[5.0], 1.0).unwrap();
+        let d = solve(&criteria, &(DMatrix::identity(1, 1) * 1e-6), &[-5.0], &[5.0], 1.0).unwrap();
         assert!((d.step[0] - 1.0).abs() < 1e-8 && (d.level - 2.0).abs() < 1e-8, "{d:?}");
         assert!((d.multipliers.objectives[0] - 2.0 / 3.0).abs() < 1e-6, "{d:?}");
     }
 
     #[test]
-    fn contradicting_constraints_are_violated_as_little_as_can_be() {
-        // d <= -1 and d >= 1 cannot hold: the best is d = 0, violated by 1.
-        let rows = Rows {
+    fn inconsistent_constraints_have_the_least_possible_violation() {
+        // d <= -1 and d >= 1 are inconsistent: the best step is d = 0, with violation 1.
+        let criteria = LinearisedCriteria {
             objectives: vec![linear(0.0, &[0.1])],
             inequalities: vec![linear(1.0, &[1.0]), linear(1.0, &[-1.0])],
             equalities: vec![],
         };
-        let d = solve(&rows, &(DMatrix::identity(1, 1) * 1e-6), &[-5.0], &[5.0], 100.0).unwrap();
+        let d = solve(&criteria, &(DMatrix::identity(1, 1) * 1e-6), &[-5.0], &[5.0], 100.0).unwrap();
         assert!(d.step[0].abs() < 1e-7 && (d.violation - 1.0).abs() < 1e-7, "{d:?}");
     }
 
     #[test]
-    fn an_equality_is_met_where_it_can_be() {
-        let rows = Rows {
+    fn a_consistent_equality_is_satisfied() {
+        let criteria = LinearisedCriteria {
             objectives: vec![linear(0.0, &[1.0, 1.0])],
             inequalities: vec![],
             equalities: vec![linear(-1.0, &[1.0, -1.0])],
         };
-        let d = solve(&rows, &DMatrix::identity(2, 2), &[-5.0; 2], &[5.0; 2], 10.0).unwrap();
+        let d = solve(&criteria, &DMatrix::identity(2, 2), &[-5.0; 2], &[5.0; 2], 10.0).unwrap();
         assert!((d.step[0] - d.step[1] - 1.0).abs() < 1e-8, "{d:?}");
     }
 }

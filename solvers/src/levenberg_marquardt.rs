@@ -1,4 +1,4 @@
-//! The Levenberg-Marquardt method for sums of squares, with bounds and several starts.
+//! Levenberg-Marquardt method for sums of squares, with bounds and multistart.
 
 use mops_core::math;
 use mops_core::{Halt, Linearisation, Oracle, Progress, Shape, Solver, SolverOptions};
@@ -9,26 +9,28 @@ use serde::Deserialize;
 use crate::multistart::Multistart;
 use crate::start::usable_start;
 
-/// The Levenberg-Marquardt method: for calibrations, whose objective is a sum of squares of residuals `r`.
+/// Levenberg-Marquardt method for calibration, where the objective is a sum of squares of residuals `r`.
 /// ```text
 /// (J'J + lambda D^2) d = -J'r,   D^2 the largest diagonal of J'J so far
 /// ```
-/// Bounds are kept by an active set: tuners at a bound that the step would leave are held, and the rest solved again.
-/// Runs from the study's start, then from the best points of a sample of the box, then from points around the best one
-/// found, in rounds until two of them improve it by less than a thousandth.
+/// Bounds are handled by an active set: tuners that the step would move beyond a bound are fixed there, and the step is
+/// recomputed.
 ///
-/// Source: J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978); damping by
-/// H. B. Nielsen, report IMM-REP-1999-05, Technical University of Denmark (1999).
+/// The method runs from the initial guess of the study, then from the best points of a sample of the box. It then
+/// restarts around the best point, until two rounds in succession improve it by less than a thousandth.
+///
+/// Source: J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978); damping by H. B.
+/// Nielsen, report IMM-REP-1999-05, Technical University of Denmark (1999).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct LevenbergMarquardtOptions {
-    /// Stop when a step promises less than this part of the sum of squares.
+    /// Predicted relative decrease of the sum of squares below which the iteration stops.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
-    /// Number of starts, the study's own included.
+    /// Number of starting points, including the initial guess of the study.
     #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
-    /// Largest number of iterations from each start.
+    /// Maximum number of iterations per starting point.
     #[schemars(range(min = 1))]
     pub max_iterations: usize,
 }
@@ -44,18 +46,18 @@ impl SolverOptions for LevenbergMarquardtOptions {
 
     fn build(&self) -> Box<dyn Solver> {
         let local = self.local();
-        Box::new(LevenbergMarquardt { starts: Multistart::new(local, self.starts).until_nothing_changes() })
+        Box::new(LevenbergMarquardt { starts: Multistart::new(local, self.starts).with_local_restarts() })
     }
 }
 
 impl LevenbergMarquardtOptions {
-    /// The method itself, without further starts.
+    /// Builds the method without multistart.
     pub fn local(&self) -> Box<dyn Solver> {
         Box::new(Local { options: self.clone(), state: None })
     }
 }
 
-/// The solver of the kind `levenberg-marquardt`.
+/// Solver of the kind `levenberg-marquardt`.
 struct LevenbergMarquardt {
     starts: Multistart,
 }
@@ -76,37 +78,37 @@ impl Solver for LevenbergMarquardt {
 
 fn accepts(shape: &Shape) -> Result<(), String> {
     if shape.residuals == 0 {
-        return Err("`levenberg-marquardt` needs a sum of squares: objective = \"sum\" with `fit` or `normalised-error` criteria and simulations that succeed at the start; take `sqp`".into());
+        return Err("`levenberg-marquardt` needs a sum of squares: objective = \"sum\" with `fit` or `normalised-error` criteria and simulations that succeed at the initial guess; otherwise use `sqp`".into());
     }
     if shape.has_constraints() {
-        return Err("`levenberg-marquardt` treats bounds, but no other constraints; take `sqp`".into());
+        return Err("`levenberg-marquardt` supports bounds, but no other constraints; use `sqp`".into());
     }
     if shape.spacing.iter().any(|&spacing| spacing > 0.0) {
         return Err(
-            "`levenberg-marquardt` follows slopes and cannot treat whole numbers or lists; take `pattern-search`"
+            "`levenberg-marquardt` needs gradients, but a tuner has whole numbers or a list of values; use `pattern-search`"
                 .into(),
         );
     }
     Ok(())
 }
 
-/// The method from one start.
+/// Levenberg-Marquardt iteration from one starting point.
 struct Local {
     options: LevenbergMarquardtOptions,
     state: Option<State>,
 }
 
 struct State {
-    at: Linearisation,
+    iterate: Linearisation,
     jacobian: DMatrix<f64>,
     residuals: DVector<f64>,
-    /// Squares of the scale of every coordinate.
+    /// Squared scale of every coordinate.
     scale: DVector<f64>,
     damping: f64,
-    growth: f64,
+    damping_growth: f64,
     iterations: usize,
-    /// Steps in a row that brought almost nothing.
-    idle: usize,
+    /// Number of successive steps with negligible decrease.
+    stalled_steps: usize,
 }
 
 impl Solver for Local {
@@ -120,14 +122,23 @@ impl Solver for Local {
         let Some(at) = oracle.linearise(&start, 1.0)? else { return Ok(()) };
         let (jacobian, residuals) = matrices(&at);
         let scale = DVector::from_iterator(start.len(), jacobian.column_iter().map(|c| c.norm_squared().max(1e-30)));
-        self.state = Some(State { at, jacobian, residuals, scale, damping: 1e-3, growth: 2.0, iterations: 0, idle: 0 });
+        self.state = Some(State {
+            iterate: at,
+            jacobian,
+            residuals,
+            scale,
+            damping: 1e-3,
+            damping_growth: 2.0,
+            iterations: 0,
+            stalled_steps: 0,
+        });
         Ok(())
     }
 
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
         state.iterations += 1;
-        if state.at.at.point.is_empty() {
+        if state.iterate.at.point.is_empty() {
             return Ok(Progress::Converged);
         }
         if state.iterations > self.options.max_iterations {
@@ -135,29 +146,29 @@ impl Solver for Local {
         }
         let sum = state.residuals.norm_squared();
         let Some(step) = state.bounded_step() else { return Ok(Progress::Stalled) };
-        let promised = sum - (&state.residuals + &state.jacobian * &step).norm_squared();
-        if promised <= self.options.tolerance * sum {
-            return Ok(state.verdict());
+        let predicted = sum - (&state.residuals + &state.jacobian * &step).norm_squared();
+        if predicted <= self.options.tolerance * sum {
+            return Ok(state.termination());
         }
-        let point: Vec<f64> = state.at.at.point.iter().zip(&step).map(|(u, d)| (u + d).clamp(0.0, 1.0)).collect();
+        let point: Vec<f64> = state.iterate.at.point.iter().zip(&step).map(|(u, d)| (u + d).clamp(0.0, 1.0)).collect();
         let answer = oracle.evaluate(std::slice::from_ref(&point))?.pop().expect("one point, one answer");
-        let achieved = if answer.scaled.is_some() { sum - answer.merit.objective } else { f64::NEG_INFINITY };
-        let ratio = achieved / promised;
+        let actual = if answer.scaled.is_some() { sum - answer.merit.objective } else { f64::NEG_INFINITY };
+        let ratio = actual / predicted;
         if ratio <= 1e-4 {
-            state.damping *= state.growth;
-            state.growth *= 2.0;
-            return Ok(if state.damping > 1e12 { state.verdict() } else { Progress::Continue });
+            state.damping *= state.damping_growth;
+            state.damping_growth *= 2.0;
+            return Ok(if state.damping > 1e12 { state.termination() } else { Progress::Continue });
         }
         let Some(at) = oracle.linearise(&point, 1.0)? else { return Ok(Progress::Stalled) };
         (state.jacobian, state.residuals) = matrices(&at);
-        state.at = at;
+        state.iterate = at;
         for (scale, column) in state.scale.iter_mut().zip(state.jacobian.column_iter()) {
             *scale = scale.max(column.norm_squared());
         }
         state.damping *= (1.0 - math::powi(2.0 * ratio - 1.0, 3)).max(1.0 / 3.0);
-        state.growth = 2.0;
-        state.idle = if achieved <= 100.0 * self.options.tolerance * sum { state.idle + 1 } else { 0 };
-        Ok(if state.idle >= 3 { state.verdict() } else { Progress::Continue })
+        state.damping_growth = 2.0;
+        state.stalled_steps = if actual <= 100.0 * self.options.tolerance * sum { state.stalled_steps + 1 } else { 0 };
+        Ok(if state.stalled_steps >= 3 { state.termination() } else { Progress::Continue })
     }
 }
 
@@ -170,34 +181,35 @@ fn matrices(at: &Linearisation) -> (DMatrix<f64>, DVector<f64>) {
 }
 
 impl State {
-    /// More's test: at an optimum the residuals are orthogonal to every column of the Jacobian that can move.
-    fn verdict(&self) -> Progress {
-        /// Largest cosine that counts as orthogonal: the accuracy of slopes by differences.
+    /// Applies More's test: at an optimum the residuals are orthogonal to every column of the Jacobian of a free
+    /// coordinate.
+    fn termination(&self) -> Progress {
+        /// Largest cosine regarded as orthogonal: the accuracy of finite-difference gradients.
         const ORTHOGONAL: f64 = 1e-3;
         let norm = self.residuals.norm();
         let cosine = |j: usize| {
             let column = self.jacobian.column(j);
-            let slope = column.dot(&self.residuals);
-            let u = self.at.at.point[j];
-            let held = (u <= 0.0 && slope > 0.0) || (u >= 1.0 && slope < 0.0);
-            if held || slope == 0.0 { 0.0 } else { slope.abs() / (column.norm() * norm) }
+            let gradient = column.dot(&self.residuals);
+            let u = self.iterate.at.point[j];
+            let fixed = (u <= 0.0 && gradient > 0.0) || (u >= 1.0 && gradient < 0.0);
+            if fixed || gradient == 0.0 { 0.0 } else { gradient.abs() / (column.norm() * norm) }
         };
         let largest = (0..self.jacobian.ncols()).map(cosine).fold(0.0, f64::max);
         if largest <= ORTHOGONAL { Progress::Converged } else { Progress::Stalled }
     }
 
-    /// The damped step inside the box: coordinates that would leave it are held at their bound, one more at a time.
+    /// Computes the damped step in the box: coordinates that would leave it are fixed at their bounds, one per pass.
     fn bounded_step(&self) -> Option<DVector<f64>> {
-        let point = &self.at.at.point;
+        let point = &self.iterate.at.point;
         let n = point.len();
-        let mut held = DVector::<f64>::zeros(n);
+        let mut fixed = DVector::<f64>::zeros(n);
         let mut free = vec![true; n];
         for _ in 0..=n {
             let indices: Vec<usize> = (0..n).filter(|&j| free[j]).collect();
-            let mut step = held.clone();
+            let mut step = fixed.clone();
             if !indices.is_empty() {
                 let part = self.jacobian.select_columns(&indices);
-                let target = &self.residuals + &self.jacobian * &held;
+                let target = &self.residuals + &self.jacobian * &fixed;
                 let mut normal = part.transpose() * &part;
                 for (i, &j) in indices.iter().enumerate() {
                     normal[(i, i)] += self.damping * self.scale[j];
@@ -213,7 +225,7 @@ impl State {
                 None => return Some(step),
                 Some(j) => {
                     free[j] = false;
-                    held[j] = if step[j] > 0.0 { 1.0 - point[j] } else { -point[j] };
+                    fixed[j] = if step[j] > 0.0 { 1.0 - point[j] } else { -point[j] };
                 }
             }
         }

@@ -1,27 +1,30 @@
-//! Solvers of mops: one file each, behind one seam ([`mops_core::Solver`]).
+//! Solvers of mops, one file each, behind the trait [`mops_core::Solver`].
 
 mod active_set;
 #[cfg(feature = "argmin")]
-mod argmin_adapter;
+mod argmin_cost;
+#[cfg(feature = "argmin")]
+pub mod argmin_solver;
 pub mod auto;
+mod chaining;
+mod cholesky;
 pub mod cma_es;
-mod definite;
 pub mod differential_evolution;
-mod directions;
 pub mod epigraph;
 pub mod evolution;
-#[cfg(feature = "argmin")]
-pub mod for_argmin;
 pub mod genetic;
 #[cfg(feature = "argmin")]
 pub mod l_bfgs;
 pub mod levenberg_marquardt;
+mod linearised_criteria;
+mod local_archive;
+mod multimethod;
 mod multistart;
 #[cfg(feature = "argmin")]
 pub mod nelder_mead;
+mod noise_detection;
 pub mod nsga2;
 pub mod nsga3;
-mod own;
 mod pareto;
 #[cfg(feature = "argmin")]
 pub mod particle_swarm;
@@ -30,13 +33,10 @@ mod penalty;
 mod population;
 mod quasi_newton;
 mod ranking;
-mod relay;
-mod rows;
-mod second_opinion;
+mod simplex_lattice;
 pub mod simulated_annealing;
 pub mod sqp;
 mod start;
-mod texture;
 mod variation;
 pub mod weighted_chebyshev;
 
@@ -44,7 +44,7 @@ use mops_core::SolverKind;
 
 pub use pareto::{Certificate, certificate, certify};
 
-/// Every kind of solver, the default first. A new one is a file, and a line here.
+/// Returns every kind of solver, the default first. A new kind is one file and one line here.
 pub fn kinds() -> Vec<SolverKind> {
     vec![
         SolverKind::of::<auto::AutoOptions>(),

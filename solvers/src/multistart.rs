@@ -1,219 +1,223 @@
-//! Runs a local solver from several starts, one after the other: the study's own first, then the best of a sample of the
-//! box, then, if wanted, around the best point found, again and again until nothing changes.
+//! Multistart of a local solver.
+//!
+//! The first run starts from the initial guess of the study, the next ones from the best points of a sample of the box.
+//! If enabled, runs from points around the best one follow until nothing changes.
 
 use mops_core::{Evaluation, Halt, Merit, Oracle, Progress, Solver};
 
-use crate::own::Own;
+use crate::local_archive::LocalArchive;
 use crate::start::{best_of, latin_hypercube};
 
-/// A local solver with a list of starts.
+/// Local solver with a list of starting points.
 pub struct Multistart {
     local: Box<dyn Solver>,
-    /// What runs from the study's own start in its place.
-    first: Option<Box<dyn Solver>>,
-    /// What goes on from where the first run ends.
-    second: Option<Box<dyn Solver>>,
-    /// Whose turn it is.
-    leg: Leg,
-    /// Starts after the first.
-    extra: usize,
-    /// Starts that are left, the next one last; `None` before the first run has ended.
-    left: Option<Vec<Vec<f64>>>,
-    /// How the run ended that found the best point, and what that is worth.
+    /// Solver for the initial guess of the study, if different from the local solver.
+    initial_solver: Option<Box<dyn Solver>>,
+    /// Solver that continues from the end of the first run.
+    continuation_solver: Option<Box<dyn Solver>>,
+    /// Solver that is running.
+    phase: Phase,
+    /// Number of starting points after the first.
+    extra_starts: usize,
+    /// Remaining starting points, the next one last; `None` before the first run has ended.
+    queue: Option<Vec<Vec<f64>>>,
+    /// Merit of the best point, and the result of the run that found it.
     best: Option<(Merit, Progress)>,
-    /// Whether to go on around the best point.
-    restarts: bool,
-    /// Half the widths of the box around the best point, in turn: as many rounds may find nothing.
-    reach: &'static [f64],
-    /// Relative change of the objective that is something.
-    gain: f64,
-    /// Rounds around the best point that were begun, rounds in a row that found nothing, and the objective before.
-    round: Round,
-    /// The best that the present run has seen itself.
-    own: Option<Evaluation>,
-    /// The same of the runs that have ended.
-    ends: Vec<Merit>,
+    /// True if runs around the best point follow.
+    local_restarts: bool,
+    /// Half-widths of the box around the best point, used in turn. Rounds without gain are limited to the same number.
+    radii: &'static [f64],
+    /// Smallest relative decrease of the objective that counts as a gain.
+    min_gain: f64,
+    /// Number of rounds around the best point, number of successive rounds without gain, and the last objective.
+    restart_round: RestartRound,
+    /// Best point of the present run.
+    run_best: Option<Evaluation>,
+    /// Best merits of the completed runs.
+    final_merits: Vec<Merit>,
 }
 
-/// Which solver runs.
+/// Solver that is running.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Leg {
-    First,
-    Second,
-    Others,
+enum Phase {
+    Initial,
+    Continuation,
+    Sampled,
 }
 
-/// A round of restarts around the best point.
+/// State of the rounds of restarts around the best point.
 #[derive(Debug, Clone, Copy)]
-struct Round {
-    begun: usize,
+struct RestartRound {
+    count: usize,
     idle: usize,
     objective: f64,
 }
 
-impl Round {
-    const NONE: Self = Self { begun: 0, idle: 0, objective: f64::INFINITY };
-    /// Starts of a round.
+impl RestartRound {
+    const NONE: Self = Self { count: 0, idle: 0, objective: f64::INFINITY };
+    /// Number of starting points per round.
     const STARTS: usize = 3;
 }
 
 impl Multistart {
-    /// Runs `local` from `starts` points.
+    /// Creates a multistart of `local` from `starts` points.
     pub fn new(local: Box<dyn Solver>, starts: usize) -> Self {
         Self {
             local,
-            first: None,
-            second: None,
-            leg: Leg::First,
-            extra: starts.saturating_sub(1),
-            left: None,
+            initial_solver: None,
+            continuation_solver: None,
+            phase: Phase::Initial,
+            extra_starts: starts.saturating_sub(1),
+            queue: None,
             best: None,
-            restarts: false,
-            reach: &[0.15, 0.05],
-            gain: 1e-3,
-            round: Round::NONE,
-            own: None,
-            ends: Vec::new(),
+            local_restarts: false,
+            radii: &[0.15, 0.05],
+            min_gain: 1e-3,
+            restart_round: RestartRound::NONE,
+            run_best: None,
+            final_merits: Vec::new(),
         }
     }
 
-    /// Another solver begins at the study's own start.
+    /// Sets a different solver for the initial guess of the study.
     #[must_use]
-    pub fn with_first(self, first: Box<dyn Solver>) -> Self {
-        Self { first: Some(first), ..self }
+    pub fn with_initial_solver(self, first: Box<dyn Solver>) -> Self {
+        Self { initial_solver: Some(first), ..self }
     }
 
-    /// Another solver goes on from the best point of the first run, before the other starts.
+    /// Sets a solver that continues from the best point of the first run, before the other starting points.
     #[must_use]
-    pub fn with_second(self, second: Box<dyn Solver>) -> Self {
-        Self { second: Some(second), ..self }
+    pub fn with_continuation(self, second: Box<dyn Solver>) -> Self {
+        Self { continuation_solver: Some(second), ..self }
     }
 
-    /// Goes on around the best point until two rounds of restarts, a wide and a narrow one, improve it by less than a
-    /// thousandth.
+    /// Adds restarts around the best point until two successive rounds, one wide and one narrow, improve it by less
+    /// than a thousandth.
     #[must_use]
-    pub fn until_nothing_changes(self) -> Self {
-        Self { restarts: true, ..self }
+    pub fn with_local_restarts(self) -> Self {
+        Self { local_restarts: true, ..self }
     }
 
-    /// Rounds from the best point on, within these distances of it in turn, until none of them improves it by as much as
-    /// `gain`, relative to its size.
-    pub fn around(local: Box<dyn Solver>, reach: &'static [f64], gain: f64) -> Self {
-        Self { restarts: true, reach, gain, left: Some(Vec::new()), ..Self::new(local, 1) }
+    /// Creates rounds of restarts around the best point only, within the given distances in turn. The rounds end when
+    /// none of them improves the objective by `min_gain`, relative to its magnitude.
+    pub fn restarts_around_best(local: Box<dyn Solver>, radii: &'static [f64], min_gain: f64) -> Self {
+        Self { local_restarts: true, radii, min_gain, queue: Some(Vec::new()), ..Self::new(local, 1) }
     }
 
-    /// Begins the first run.
+    /// Starts the first run.
     ///
     /// # Errors
-    /// The run is over.
+    /// When the run ends: budget exhausted, or interrupted by the user.
     pub fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
-        self.left = None;
+        self.queue = None;
         self.best = None;
-        self.leg = Leg::First;
-        self.round = Round::NONE;
-        self.ends.clear();
-        self.begin_run(oracle, start)
+        self.phase = Phase::Initial;
+        self.restart_round = RestartRound::NONE;
+        self.final_merits.clear();
+        self.start_run(oracle, start)
     }
 
-    /// Begins the first round around the best point; `false` where there is none.
+    /// Starts the first round around the best point; returns false if there is no such point.
     ///
     /// # Errors
-    /// The run is over.
-    pub fn begin_around(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
-        self.begin_round(oracle)
+    /// When the run ends: budget exhausted, or interrupted by the user.
+    pub fn begin_local_restarts(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
+        self.start_restart_round(oracle)
     }
 
-    /// Whether two runs have ended within `accuracy` of the best, relative to its size.
-    pub fn agrees(&self, accuracy: f64) -> bool {
-        let best =
-            self.ends.iter().fold(Merit::FAILED, |best, end| if end.is_better_than(&best) { *end } else { best });
+    /// Returns true if two runs have ended within `accuracy` of the best objective, relative to its magnitude.
+    pub fn optimum_is_confirmed(&self, accuracy: f64) -> bool {
+        let best = self
+            .final_merits
+            .iter()
+            .fold(Merit::FAILED, |best, end| if end.is_better_than(&best) { *end } else { best });
         let near = |end: &&Merit| {
             end.is_feasible()
                 && end.objective - best.objective <= accuracy * best.objective.abs().max(f64::MIN_POSITIVE)
         };
-        self.ends.iter().filter(near).count() > 1
+        self.final_merits.iter().filter(near).count() > 1
     }
 
-    fn begin_run(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
-        self.own = None;
-        let first = self.first.as_mut().filter(|_| self.leg == Leg::First);
-        first.unwrap_or(&mut self.local).begin(&mut Own { oracle, best: &mut self.own }, start)
+    fn start_run(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        self.run_best = None;
+        let initial = self.initial_solver.as_mut().filter(|_| self.phase == Phase::Initial);
+        initial.unwrap_or(&mut self.local).begin(&mut LocalArchive { oracle, best: &mut self.run_best }, start)
     }
 
-    /// An iteration of the present run, or the beginning of the next.
+    /// Does one iteration of the present run, or starts the next run.
     ///
     /// # Errors
-    /// The run is over.
+    /// When the run ends: budget exhausted, or interrupted by the user.
     pub fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        let mut own = Own { oracle: &mut *oracle, best: &mut self.own };
-        let solver = match self.leg {
-            Leg::First => self.first.as_mut(),
-            Leg::Second => self.second.as_mut(),
-            Leg::Others => None,
+        let mut archive = LocalArchive { oracle: &mut *oracle, best: &mut self.run_best };
+        let solver = match self.phase {
+            Phase::Initial => self.initial_solver.as_mut(),
+            Phase::Continuation => self.continuation_solver.as_mut(),
+            Phase::Sampled => None,
         };
-        let progress = solver.unwrap_or(&mut self.local).step(&mut own)?;
+        let progress = solver.unwrap_or(&mut self.local).step(&mut archive)?;
         if progress == Progress::Continue {
             return Ok(progress);
         }
-        if self.leg == Leg::First
-            && let Some(second) = &mut self.second
-            && let Some(start) = own.best().map(|best| best.point.clone())
+        if self.phase == Phase::Initial
+            && let Some(second) = &mut self.continuation_solver
+            && let Some(start) = archive.best().map(|best| best.point.clone())
         {
-            second.begin(&mut own, &start)?;
-            self.leg = Leg::Second;
+            second.begin(&mut archive, &start)?;
+            self.phase = Phase::Continuation;
             return Ok(Progress::Continue);
         }
-        self.leg = Leg::Others;
-        self.ends.push(self.own.as_ref().map_or(Merit::FAILED, |best| best.merit));
+        self.phase = Phase::Sampled;
+        self.final_merits.push(self.run_best.as_ref().map_or(Merit::FAILED, |best| best.merit));
         let found = oracle.best().map_or(Merit::FAILED, |best| best.merit);
         if self.best.is_none_or(|(known, _)| found.is_better_than(&known)) {
             self.best = Some((found, progress));
         }
-        if self.left.is_none() {
-            self.left = Some(self.sample(oracle)?);
+        if self.queue.is_none() {
+            self.queue = Some(self.sample(oracle)?);
         }
-        match self.left.as_mut().and_then(Vec::pop) {
+        match self.queue.as_mut().and_then(Vec::pop) {
             Some(start) => {
-                self.begin_run(oracle, &start)?;
+                self.start_run(oracle, &start)?;
                 Ok(Progress::Continue)
             }
-            None if self.restarts && self.begin_round(oracle)? => Ok(Progress::Continue),
+            None if self.local_restarts && self.start_restart_round(oracle)? => Ok(Progress::Continue),
             None => Ok(self.best.map_or(Progress::Stalled, |(_, progress)| progress)),
         }
     }
 
-    /// Begins a round around the best point; `false` where the rounds before found nothing.
-    fn begin_round(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
+    /// Starts a round around the best point; returns false if the previous rounds brought no gain.
+    fn start_restart_round(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
         let Some(best) = oracle.best().map(|best| (best.point.clone(), best.merit.objective)) else { return Ok(false) };
         let (centre, objective) = best;
-        let Round { begun, idle, objective: before } = self.round;
-        let gained = before.is_infinite() || objective < before - self.gain * before.abs();
+        let RestartRound { count, idle, objective: before } = self.restart_round;
+        let gained = before.is_infinite() || objective < before - self.min_gain * before.abs();
         let idle = if gained { 0 } else { idle + 1 };
-        if idle >= self.reach.len() || centre.is_empty() {
+        if idle >= self.radii.len() || centre.is_empty() {
             return Ok(false);
         }
-        self.round = Round { begun: begun + 1, idle, objective };
+        self.restart_round = RestartRound { count: count + 1, idle, objective };
         let n = centre.len();
-        let reach = self.reach[begun % self.reach.len()];
-        let mut random = oracle.stream(&format!("restart {begun}"));
+        let radius = self.radii[count % self.radii.len()];
+        let mut random = oracle.stream(&format!("restart {count}"));
         let mut sample = latin_hypercube(2 * (n + 1), n, &mut random);
         for point in &mut sample {
-            point.iter_mut().zip(&centre).for_each(|(u, c)| *u = (c + reach * (2.0 * *u - 1.0)).clamp(0.0, 1.0));
+            point.iter_mut().zip(&centre).for_each(|(u, c)| *u = (c + radius * (2.0 * *u - 1.0)).clamp(0.0, 1.0));
         }
-        let mut starts = best_of(oracle, &sample, Round::STARTS)?;
+        let mut starts = best_of(oracle, &sample, RestartRound::STARTS)?;
         let Some(start) = starts.pop() else { return Ok(false) };
-        self.left = Some(starts);
-        self.begin_run(oracle, &start)?;
+        self.queue = Some(starts);
+        self.start_run(oracle, &start)?;
         Ok(true)
     }
 
     fn sample(&self, oracle: &mut dyn Oracle) -> Result<Vec<Vec<f64>>, Halt> {
         let n = oracle.shape().dimension();
-        if self.extra == 0 || n == 0 {
+        if self.extra_starts == 0 || n == 0 {
             return Ok(Vec::new());
         }
         let mut random = oracle.stream("multistart");
-        let sample = latin_hypercube(self.extra * 5 * (n + 1), n, &mut random);
-        best_of(oracle, &sample, self.extra)
+        let sample = latin_hypercube(self.extra_starts * 5 * (n + 1), n, &mut random);
+        best_of(oracle, &sample, self.extra_starts)
     }
 }

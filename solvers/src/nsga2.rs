@@ -1,6 +1,6 @@
-//! NSGA-II: a front by non-dominated sorting and crowding.
+//! NSGA-II: Pareto fronts by non-dominated sorting and crowding.
 
-mod thinning;
+mod pruning;
 
 use std::cmp::Ordering;
 
@@ -11,18 +11,20 @@ use serde::Deserialize;
 
 use crate::evolution::{Evolution, Pool, Survival, by_feasibility};
 use crate::variation::Variation;
-use thinning::Thinning;
+use pruning::Pruning;
 
-/// Looks for the front of designs that no other is better than in every criterion (NSGA-II): members that few dominate
-/// survive, and of those the ones in sparse places. For two criteria, or three; needs `objective = "each"`. Feasible points
-/// win over infeasible ones. The last front that fits only in part loses its most crowded members one by one.
+/// Non-dominated sorting genetic algorithm (NSGA-II) for the Pareto front of two or three criteria. Needs `objective =
+/// "each"`.
+///
+/// Members of low rank, which few others dominate, survive; among equal ranks those in sparse regions. Feasible points
+/// rank before infeasible ones. If the last rank fits only in part, its most crowded members are removed one at a time.
 ///
 /// Source: K. Deb, A. Pratap, S. Agarwal, T. Meyarivan, IEEE Transactions on Evolutionary Computation 6 (2002) 182-197;
-/// one by one: S. Kukkonen, K. Deb, IEEE CEC (2006) 1179-1186.
+/// removal one at a time: S. Kukkonen, K. Deb, IEEE CEC (2006) 1179-1186.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Nsga2Options {
-    /// Number of members.
+    /// Population size.
     #[schemars(range(min = 4, max = 1_000_000))]
     pub population: usize,
     /// Number of generations.
@@ -37,7 +39,7 @@ impl Default for Nsga2Options {
 }
 
 impl Nsga2Options {
-    /// The solver, with its members to look at.
+    /// Builds the solver with access to its members.
     pub fn search(&self) -> Evolution<Crowding> {
         let survival = Crowding { population: self.population.max(4), ..Crowding::default() };
         Evolution::new(survival, Variation::usual, self.generations)
@@ -52,24 +54,24 @@ impl SolverOptions for Nsga2Options {
     }
 }
 
-/// Survival of the lower rank, then of the sparser place.
+/// Environmental selection by rank, then by crowding distance.
 #[derive(Default)]
 pub struct Crowding {
     population: usize,
     sorter: FrontSorter,
     feasible: Vec<u32>,
-    others: Vec<u32>,
+    infeasible: Vec<u32>,
     objectives: Vec<f64>,
-    /// Rank and distance of every place of the pool.
+    /// Rank and crowding distance of every point of the pool.
     rank: Vec<u32>,
     distance: Vec<f64>,
     chosen: Vec<u32>,
-    /// Rank and distance of the chosen.
+    /// Rank and crowding distance of the survivors.
     fitness: Vec<(u32, f64)>,
-    /// Places of the feasible points by rank, and where each rank begins.
+    /// Indices of the feasible points in order of rank, and the offset of each rank.
     by_rank: Vec<u32>,
-    begins: Vec<usize>,
-    thinning: Thinning,
+    offsets: Vec<usize>,
+    pruning: Pruning,
 }
 
 impl Survival for Crowding {
@@ -78,23 +80,23 @@ impl Survival for Crowding {
     }
 
     fn survive(&mut self, pool: &Pool, keep: usize, _: &mut Stream) -> &[u32] {
-        by_feasibility(pool, &mut self.feasible, &mut self.others);
+        by_feasibility(pool, &mut self.feasible, &mut self.infeasible);
         self.sort(pool);
         self.chosen.clear();
-        for rank in 0..self.begins.len() - 1 {
-            let (from, to) = (self.begins[rank], self.begins[rank + 1]);
-            self.measure(pool, from, to);
-            let left = keep - self.chosen.len();
-            if to - from > left {
-                self.thinning.thin(pool, &mut self.by_rank[from..to], left, &mut self.distance);
+        for rank in 0..self.offsets.len() - 1 {
+            let (from, to) = (self.offsets[rank], self.offsets[rank + 1]);
+            self.crowding_distances(pool, from, to);
+            let remaining = keep - self.chosen.len();
+            if to - from > remaining {
+                self.pruning.prune(pool, &mut self.by_rank[from..to], remaining, &mut self.distance);
             }
-            self.chosen.extend(self.by_rank[from..to].iter().take(left));
+            self.chosen.extend(self.by_rank[from..to].iter().take(remaining));
             if self.chosen.len() == keep {
                 break;
             }
         }
-        let left = keep - self.chosen.len();
-        self.chosen.extend(self.others.iter().take(left));
+        let remaining = keep - self.chosen.len();
+        self.chosen.extend(self.infeasible.iter().take(remaining));
         self.fitness.clear();
         self.fitness.extend(self.chosen.iter().map(|&i| (self.rank[i as usize], self.distance[i as usize])));
         &self.chosen
@@ -107,7 +109,7 @@ impl Survival for Crowding {
 }
 
 impl Crowding {
-    /// Ranks of the feasible points by dominance; the others come after them, by violation.
+    /// Ranks the feasible points by dominance; the infeasible ones follow, ordered by violation.
     #[allow(clippy::cast_possible_truncation)]
     fn sort(&mut self, pool: &Pool) {
         self.objectives.clear();
@@ -120,31 +122,31 @@ impl Crowding {
         self.distance.resize(pool.len(), 0.0);
         let ranks = self.sorter.sort(&self.objectives, pool.m);
         let fronts = ranks.iter().max().map_or(0, |rank| *rank as usize + 1);
-        // A counting sort by rank.
-        self.begins.clear();
-        self.begins.resize(fronts + 1, 0);
-        ranks.iter().for_each(|rank| self.begins[*rank as usize + 1] += 1);
+        // Counting sort by rank.
+        self.offsets.clear();
+        self.offsets.resize(fronts + 1, 0);
+        ranks.iter().for_each(|rank| self.offsets[*rank as usize + 1] += 1);
         for rank in 0..fronts {
-            self.begins[rank + 1] += self.begins[rank];
+            self.offsets[rank + 1] += self.offsets[rank];
         }
         self.by_rank.clear();
         self.by_rank.resize(ranks.len(), 0);
         for (&i, &rank) in self.feasible.iter().zip(ranks) {
             self.rank[i as usize] = rank;
-            let place = &mut self.begins[rank as usize];
-            self.by_rank[*place] = i;
-            *place += 1;
+            let slot = &mut self.offsets[rank as usize];
+            self.by_rank[*slot] = i;
+            *slot += 1;
         }
-        self.begins.rotate_right(1);
-        self.begins[0] = 0;
-        for (later, &i) in (0_u32..).zip(&self.others) {
+        self.offsets.rotate_right(1);
+        self.offsets[0] = 0;
+        for (later, &i) in (0_u32..).zip(&self.infeasible) {
             self.rank[i as usize] = fronts as u32 + later;
         }
     }
 
-    /// The crowding distance of a front: the sum over the objectives of the gap between the neighbours, relative to the
-    /// front's range; infinite at the ends.
-    fn measure(&mut self, pool: &Pool, from: usize, to: usize) {
+    /// Computes the crowding distances of a front: the mean over the objectives of the gap between the neighbours,
+    /// relative to the range of the front; infinite at the ends.
+    fn crowding_distances(&mut self, pool: &Pool, from: usize, to: usize) {
         let front = &mut self.by_rank[from..to];
         #[allow(clippy::cast_precision_loss)]
         let share = 1.0 / pool.m as f64;

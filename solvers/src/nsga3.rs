@@ -1,6 +1,6 @@
-//! NSGA-III: a front spread along reference directions.
+//! NSGA-III: Pareto fronts spread along reference directions.
 
-mod scale;
+mod normalisation;
 
 use std::cmp::Ordering;
 
@@ -10,21 +10,24 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::directions;
 use crate::evolution::{Evolution, Pool, Survival, by_feasibility};
+use crate::simplex_lattice;
 use crate::variation::Variation;
-use scale::Scale;
+use normalisation::Normalisation;
 
-/// Looks for the front of designs that no other is better than in every criterion (NSGA-III): members that few dominate
-/// survive, and of those the ones nearest to reference directions that have few. For three criteria and more; needs
-/// `objective = "each"`. Feasible points win over infeasible ones.
+/// Reference-point based non-dominated sorting (NSGA-III) for the Pareto front of three or more criteria. Needs
+/// `objective = "each"`.
 ///
-/// Source: K. Deb, H. Jain, IEEE Transactions on Evolutionary Computation 18 (2014) 577-601; constraints: H. Jain, K. Deb,
-/// the same 602-622; reference directions: I. Das, J. E. Dennis, SIAM J. Optimization 8 (1998) 631-657.
+/// Members of low rank, which few others dominate, survive; among equal ranks those nearest to reference directions
+/// with few members. Feasible points rank before infeasible ones.
+///
+/// Source: K. Deb, H. Jain, IEEE Transactions on Evolutionary Computation 18 (2014) 577-601; constraints: H. Jain, K.
+/// Deb, ibid. 602-622; reference directions: I. Das, J. E. Dennis, SIAM J. Optimization 8 (1998) 631-657.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Nsga3Options {
-    /// Divisions of every objective between the reference directions; 0 for as many as give at most 100 directions.
+    /// Divisions per objective of the lattice of reference directions; 0 for the largest number that gives at most 100
+    /// directions.
     #[schemars(range(max = 200))]
     pub divisions: usize,
     /// Number of generations.
@@ -39,10 +42,10 @@ impl Default for Nsga3Options {
 }
 
 impl Nsga3Options {
-    /// The solver, with its members to look at.
+    /// Builds the solver with access to its members.
     pub fn search(&self) -> Evolution<Niching> {
         let survival = Niching { divisions: self.divisions, ..Niching::default() };
-        // A large index of the crossover, as in the paper: members of different niches are far apart.
+        // Large crossover index as in the paper: members of different niches are far apart.
         Evolution::new(
             survival,
             |n| Variation { crossover: 1.0, crossover_index: 30.0, ..Variation::usual(n) },
@@ -59,39 +62,40 @@ impl SolverOptions for Nsga3Options {
     }
 }
 
-/// Survival of the lower rank, then of the rarer niche.
+/// Environmental selection by rank, then by niche count.
 #[derive(Default)]
 pub struct Niching {
     divisions: usize,
     directions: Vec<Vec<f64>>,
-    scale: Scale,
+    normalisation: Normalisation,
     sorter: FrontSorter,
     feasible: Vec<u32>,
-    others: Vec<u32>,
+    infeasible: Vec<u32>,
     objectives: Vec<f64>,
     chosen: Vec<u32>,
     violations: Vec<f64>,
 }
 
-/// A candidate of the last front: its place, its direction and how far it is from that.
+/// Candidate of the last front: index in the pool, nearest reference direction, and squared distance from that
+/// direction.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
-    place: u32,
+    member: u32,
     direction: usize,
     distance: f64,
 }
 
 impl Survival for Niching {
     fn begin(&mut self, m: usize) -> usize {
-        let divisions = if self.divisions > 0 { self.divisions } else { directions::divisions_for(m, 100) };
-        self.directions = directions::spread(m, divisions);
-        self.scale = Scale::new(m);
-        // A multiple of four.
+        let divisions = if self.divisions > 0 { self.divisions } else { simplex_lattice::max_divisions(m, 100) };
+        self.directions = simplex_lattice::reference_directions(m, divisions);
+        self.normalisation = Normalisation::new(m);
+        // Round up to a multiple of four.
         self.directions.len().div_ceil(4).max(2) * 4
     }
 
     fn survive(&mut self, pool: &Pool, keep: usize, random: &mut Stream) -> &[u32] {
-        by_feasibility(pool, &mut self.feasible, &mut self.others);
+        by_feasibility(pool, &mut self.feasible, &mut self.infeasible);
         self.objectives.clear();
         for &i in &self.feasible {
             self.objectives.extend_from_slice(pool.row(i as usize));
@@ -99,84 +103,84 @@ impl Survival for Niching {
         let ranks = self.sorter.sort(&self.objectives, pool.m);
         let mut order: Vec<usize> = (0..ranks.len()).collect();
         order.sort_by_key(|&i| ranks[i]);
-        let wanted = keep.min(order.len());
+        let target = keep.min(order.len());
         self.chosen.clear();
-        if wanted > 0 {
-            self.scale.update(&self.objectives, ranks);
-            let last = ranks[order[wanted - 1]];
-            let sure = order.partition_point(|&i| ranks[i] < last);
-            let reach = order.partition_point(|&i| ranks[i] <= last);
-            self.chosen.extend(order[..sure].iter().map(|&i| self.feasible[i]));
-            if reach > wanted {
+        if target > 0 {
+            self.normalisation.update(&self.objectives, ranks);
+            let last = ranks[order[target - 1]];
+            let complete = order.partition_point(|&i| ranks[i] < last);
+            let candidates_end = order.partition_point(|&i| ranks[i] <= last);
+            self.chosen.extend(order[..complete].iter().map(|&i| self.feasible[i]));
+            if candidates_end > target {
                 let mut counts = vec![0_usize; self.directions.len()];
-                order[..sure].iter().for_each(|&i| counts[self.nearest(pool, i).direction] += 1);
-                let candidates = order[sure..reach].iter().map(|&i| self.nearest(pool, i)).collect();
-                fill(&mut self.chosen, wanted, candidates, &mut counts, random);
+                order[..complete].iter().for_each(|&i| counts[self.associate(pool, i).direction] += 1);
+                let candidates = order[complete..candidates_end].iter().map(|&i| self.associate(pool, i)).collect();
+                fill_niches(&mut self.chosen, target, candidates, &mut counts, random);
             } else {
-                self.chosen.extend(order[sure..wanted].iter().map(|&i| self.feasible[i]));
+                self.chosen.extend(order[complete..target].iter().map(|&i| self.feasible[i]));
             }
         }
-        let left = keep - self.chosen.len();
-        self.chosen.extend(self.others.iter().take(left));
+        let remaining = keep - self.chosen.len();
+        self.chosen.extend(self.infeasible.iter().take(remaining));
         self.violations.clear();
         self.violations.extend(self.chosen.iter().map(|&i| pool.violations[i as usize]));
         &self.chosen
     }
 
-    /// Only constraints decide a tournament.
+    /// Compares violations only.
     fn prefers(&self, a: usize, b: usize) -> Ordering {
         self.violations[a].total_cmp(&self.violations[b])
     }
 }
 
 impl Niching {
-    /// The direction nearest to the `i`-th feasible point.
-    fn nearest(&self, pool: &Pool, i: usize) -> Candidate {
-        let place = self.feasible[i];
-        let row = pool.row(place as usize);
-        let mut best = Candidate { place, direction: 0, distance: f64::INFINITY };
+    /// Finds the reference direction nearest to the `i`-th feasible point.
+    fn associate(&self, pool: &Pool, i: usize) -> Candidate {
+        let member = self.feasible[i];
+        let row = pool.row(member as usize);
+        let mut best = Candidate { member, direction: 0, distance: f64::INFINITY };
         for (direction, d) in self.directions.iter().enumerate() {
             let (mut along, mut square) = (0.0, 0.0);
             for k in 0..row.len() {
-                let value = self.scale.normalised(k, row[k]);
+                let value = self.normalisation.normalised(k, row[k]);
                 along += value * d[k];
                 square += value * value;
             }
             let distance = square - along * along;
             if distance < best.distance {
-                best = Candidate { place, direction, distance };
+                best = Candidate { member, direction, distance };
             }
         }
         best
     }
 }
 
-/// Takes candidates of the directions with the fewest members until there are `wanted`: the nearest where there is none yet,
-/// else any.
-fn fill(
+/// Adds candidates until `target` points are chosen, always from a direction with the fewest members: the nearest
+/// candidate if that direction is empty, otherwise a random one.
+fn fill_niches(
     chosen: &mut Vec<u32>,
-    wanted: usize,
+    target: usize,
     mut candidates: Vec<Candidate>,
     counts: &mut [usize],
     random: &mut Stream,
 ) {
-    let (mut rare, mut here): (Vec<usize>, Vec<usize>) = Default::default();
-    while chosen.len() < wanted {
+    let (mut rarest, mut niche): (Vec<usize>, Vec<usize>) = Default::default();
+    while chosen.len() < target {
         let fewest = candidates.iter().map(|c| counts[c.direction]).min().expect("more candidates than places");
-        rare.clear();
-        rare.extend(candidates.iter().map(|c| c.direction).filter(|&direction| counts[direction] == fewest));
-        rare.sort_unstable();
-        rare.dedup();
-        let direction = rare[random.random_range(0..rare.len())];
-        here.clear();
-        here.extend((0..candidates.len()).filter(|&i| candidates[i].direction == direction));
-        let taken = if fewest == 0 {
+        rarest.clear();
+        rarest.extend(candidates.iter().map(|c| c.direction).filter(|&direction| counts[direction] == fewest));
+        rarest.sort_unstable();
+        rarest.dedup();
+        let direction = rarest[random.random_range(0..rarest.len())];
+        niche.clear();
+        niche.extend((0..candidates.len()).filter(|&i| candidates[i].direction == direction));
+        let chosen_candidate = if fewest == 0 {
             let nearer = |a: &usize, b: &usize| candidates[*a].distance.total_cmp(&candidates[*b].distance);
-            here.iter().copied().min_by(nearer).expect("the direction has candidates")
+            niche.iter().copied().min_by(nearer).expect("the direction has candidates")
         } else {
-            here[random.random_range(0..here.len())]
+            niche[random.random_range(0..niche.len())]
         };
         counts[direction] += 1;
-        chosen.push(candidates.swap_remove(taken).place);
+        chosen.push(candidates.swap_remove(chosen_candidate).member);
     }
 }

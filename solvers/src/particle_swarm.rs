@@ -1,4 +1,4 @@
-//! The particle swarm of argmin.
+//! Particle swarm optimisation of argmin.
 
 use argmin::core::Executor;
 use argmin::solver::particleswarm::ParticleSwarm;
@@ -6,10 +6,10 @@ use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::argmin_adapter::Cost;
+use crate::argmin_cost::Cost;
 
-/// Particle swarm optimisation, by argmin: a global search without slopes. It sees one number per point, the penalised
-/// maximum. Ends after a number of iterations.
+/// Particle swarm optimisation (argmin), a derivative-free global search. It minimises one number per point, the
+/// penalised objective, and ends after a number of iterations.
 ///
 /// Source: M. Zambrano-Bigiarini, M. Clerc, R. Rojas, Standard Particle Swarm Optimisation 2011, IEEE CEC (2013).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -50,14 +50,14 @@ impl Solver for Swarm {
         Ok(())
     }
 
-    /// argmin runs to its end in one step.
+    /// Runs argmin to its end in one step.
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let n = oracle.shape().dimension();
         if n == 0 {
             return Ok(Progress::Converged);
         }
         let random = oracle.stream("particle-swarm");
-        // The factors that argmin has by itself, but from a logarithm whose last digit depends on the processor.
+        // argmin's default factors, without its logarithm, whose last digit depends on the processor.
         let attraction = 0.5 + std::f64::consts::LN_2;
         let Ok(method) = ParticleSwarm::new((vec![0.0; n], vec![1.0; n]), self.options.particles)
             .with_rng_generator(random)
@@ -71,7 +71,7 @@ impl Solver for Swarm {
         let run = Executor::new(&cost, method).configure(|state| state.max_iters(self.options.max_iterations)).run();
         match (cost.halt(), run) {
             (Some(halt), _) => Err(halt),
-            // A swarm has no test of an optimum.
+            // A swarm has no optimality test.
             _ => Ok(Progress::Stalled),
         }
     }

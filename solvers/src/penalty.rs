@@ -1,8 +1,8 @@
-//! One number for solvers that can only compare numbers.
+//! Exact penalty function, for solvers that compare scalars only.
 
 use mops_core::{Evaluation, Merit};
 
-/// The objective plus ten times the violation: an exact penalty as long as no multiplier exceeds 10. Infinite for a
+/// Returns the objective plus ten times the violation, an exact penalty if no multiplier exceeds 10. Infinite for a
 /// failed point.
 pub fn penalised(evaluation: &Evaluation) -> f64 {
     let Merit { objective, violation } = evaluation.merit;

@@ -1,4 +1,4 @@
-//! Members of a population, in one array, and when there is nothing left to expect of it.
+//! Population of points and its stagnation test.
 
 use mops_core::{Evaluation, Halt, Merit, Oracle, Stream};
 
@@ -8,18 +8,18 @@ use crate::start::latin_hypercube;
 /// Points of the unit box with their merits.
 #[derive(Debug, Clone)]
 pub struct Population {
-    /// The points.
+    /// Points.
     pub points: Vec<Vec<f64>>,
-    /// What they are worth.
+    /// Merits of the points.
     pub merits: Vec<Merit>,
 }
 
 impl Population {
-    /// A sample of the box whose first member is `start`, where there is one, evaluated.
+    /// Samples and evaluates a population; its first member is `start`, if given.
     ///
     /// # Errors
-    /// The run is over.
-    pub fn sampled(
+    /// When the run ends: budget exhausted, or interrupted by the user.
+    pub fn sample(
         oracle: &mut dyn Oracle,
         size: usize,
         start: Option<&[f64]>,
@@ -33,20 +33,20 @@ impl Population {
         Ok(Self { points, merits })
     }
 
-    /// Number of members.
+    /// Returns the number of members.
     pub fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// Indices, the best first.
+    /// Returns the indices of the members, the best first.
     pub fn order(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.len()).collect();
         order.sort_by(|&a, &b| compare(&self.merits[a], &self.merits[b]));
         order
     }
 
-    /// Keeps so many of the best, these in order, and gives the others' points, as memory for children.
-    pub fn keep_best(&mut self, size: usize) -> impl Iterator<Item = Vec<f64>> + use<> {
+    /// Keeps the `size` best members, in order, and returns the points of the others as memory for children.
+    pub fn truncate(&mut self, size: usize) -> impl Iterator<Item = Vec<f64>> + use<> {
         let order = self.order();
         let (mut points, merits) = (std::mem::take(&mut self.points), std::mem::take(&mut self.merits));
         self.points = order[..size].iter().map(|&i| std::mem::take(&mut points[i])).collect();
@@ -54,83 +54,83 @@ impl Population {
         points.into_iter().filter(|point| !point.is_empty())
     }
 
-    /// Whether the members no longer differ: in what they are worth, relative to `unit`, or in where they are.
-    fn has_collapsed(&self, tolerance: f64, unit: f64) -> bool {
+    /// Returns true if the members no longer differ, in merit relative to `unit`, or in position.
+    fn has_converged(&self, tolerance: f64, unit: f64) -> bool {
         let order = self.order();
         let (best, worst) = (self.merits[order[0]], self.merits[order[self.len() - 1]]);
-        let flat = |a: f64, b: f64, unit: f64| (b - a).abs() <= tolerance * a.abs().max(unit);
-        let equal = best.is_feasible() == worst.is_feasible()
+        let is_flat = |a: f64, b: f64, unit: f64| (b - a).abs() <= tolerance * a.abs().max(unit);
+        let merits_equal = best.is_feasible() == worst.is_feasible()
             && (best == worst
-                || (flat(best.objective, worst.objective, unit)
-                    && (best.is_feasible() || flat(best.violation, worst.violation, 1.0))));
+                || (is_flat(best.objective, worst.objective, unit)
+                    && (best.is_feasible() || is_flat(best.violation, worst.violation, 1.0))));
         let spread = |j: usize| {
             let (low, high) = self.points.iter().fold((1.0_f64, 0.0_f64), |(l, h), p| (l.min(p[j]), h.max(p[j])));
             high - low
         };
-        equal || (0..self.points[0].len()).all(|j| spread(j) < 1e-12)
+        merits_equal || (0..self.points[0].len()).all(|j| spread(j) < 1e-12)
     }
 }
 
-/// The merits of evaluations.
+/// Returns the merits of evaluations.
 pub fn merits(evaluations: &[Evaluation]) -> Vec<Merit> {
     evaluations.iter().map(|evaluation| evaluation.merit).collect()
 }
 
-/// When the members of a population are drawn anew.
+/// Rule for resampling a population.
 #[derive(Debug, Clone, Copy)]
-pub struct Renewal {
-    /// Members are alike when what they are worth differs by less than this, relative to the objective.
+pub struct RestartRule {
+    /// Difference of the members' values, relative to the objective, below which the population has converged.
     pub tolerance: f64,
-    /// Generations without a better point that are too many.
+    /// Number of generations without improvement before a restart.
     pub patience: usize,
-    /// Number of times that members may be drawn anew.
+    /// Maximum number of restarts.
     pub restarts: usize,
 }
 
-/// What comes after a generation.
+/// Continuation after a generation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Next {
-    /// Another one.
+    /// Next generation.
     Generation,
     /// New members.
-    Members,
-    /// Nothing.
+    Restart,
+    /// End of the search.
     End,
 }
 
-/// Watches a population from generation to generation.
+/// Monitor of convergence and stagnation over the generations.
 #[derive(Debug, Clone)]
-pub struct Generations {
-    rules: Renewal,
-    /// Size of an objective that counts as one.
+pub struct StagnationMonitor {
+    rule: RestartRule,
+    /// Magnitude of the objective below which differences count absolutely.
     unit: f64,
     best: Merit,
-    idle: usize,
-    renewed: usize,
+    stalled: usize,
+    restarts: usize,
 }
 
-impl Generations {
-    /// From the first members on, the start in front.
-    pub fn of(members: &Population, rules: Renewal) -> Self {
+impl StagnationMonitor {
+    /// Creates the monitor from the first members, of which the first is the starting point.
+    pub fn new(members: &Population, rule: RestartRule) -> Self {
         let unit = members.merits[0].objective.abs().min(1.0);
-        Self { rules, unit, best: Merit::FAILED, idle: 0, renewed: 0 }
+        Self { rule, unit, best: Merit::FAILED, stalled: 0, restarts: 0 }
     }
 
-    /// What comes after a generation with these members.
-    pub fn after(&mut self, members: &Population) -> Next {
+    /// Returns the continuation after a generation with these members.
+    pub fn next(&mut self, members: &Population) -> Next {
         let best = members.merits[members.order()[0]];
-        self.idle = if best.is_better_than(&self.best) { 0 } else { self.idle + 1 };
-        if self.idle == 0 {
+        self.stalled = if best.is_better_than(&self.best) { 0 } else { self.stalled + 1 };
+        if self.stalled == 0 {
             self.best = best;
         }
-        if self.idle < self.rules.patience && !members.has_collapsed(self.rules.tolerance, self.unit) {
+        if self.stalled < self.rule.patience && !members.has_converged(self.rule.tolerance, self.unit) {
             return Next::Generation;
         }
-        if self.renewed >= self.rules.restarts {
+        if self.restarts >= self.rule.restarts {
             return Next::End;
         }
-        self.renewed += 1;
-        (self.best, self.idle) = (Merit::FAILED, 0);
-        Next::Members
+        self.restarts += 1;
+        (self.best, self.stalled) = (Merit::FAILED, 0);
+        Next::Restart
     }
 }

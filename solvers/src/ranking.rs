@@ -1,10 +1,10 @@
-//! The order of points by merit: feasible ones by their objective, then the others by their violation, failures last.
+//! Order of points by merit: feasible points by objective, then infeasible points by violation, failures last.
 
 use std::cmp::Ordering;
 
 use mops_core::{Evaluation, Merit};
 
-/// The better merit is the lesser.
+/// Compares two merits; the better one is less.
 ///
 /// Source: K. Deb, Computer Methods in Applied Mechanics and Engineering 186 (2000) 311-338 (feasibility first).
 pub fn compare(a: &Merit, b: &Merit) -> Ordering {
@@ -13,7 +13,7 @@ pub fn compare(a: &Merit, b: &Merit) -> Ordering {
     (first_a + 0.0).total_cmp(&first_b).then(second_a.total_cmp(&second_b))
 }
 
-/// Indices of the evaluations, the best first; equals keep their order.
+/// Returns the indices of the evaluations, the best first; equal merits keep their order.
 pub fn ranked(evaluations: &[Evaluation]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..evaluations.len()).collect();
     order.sort_by(|&a, &b| compare(&evaluations[a].merit, &evaluations[b].merit));

@@ -1,13 +1,14 @@
-//! Points to start from.
+//! Starting points and samples of the box.
 
 use mops_core::{Halt, Oracle, Stream};
 use rand::Rng;
 use rand::seq::SliceRandom;
 
-/// The start itself if its simulations succeed; else the best of a sample of the box; `None` if all of it fails.
+/// Returns `start` if its simulations succeed, otherwise the best point of a sample of the box; `None` if all points
+/// fail.
 ///
 /// # Errors
-/// The run is over.
+/// When the run ends: budget exhausted, or interrupted by the user.
 pub fn usable_start(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Option<Vec<f64>>, Halt> {
     let at = oracle.evaluate(&[start.to_vec()])?.pop().expect("one point, one answer");
     if at.scaled.is_some() {
@@ -18,10 +19,10 @@ pub fn usable_start(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Option<Vec
     Ok(best_of(oracle, &sample, 1)?.pop())
 }
 
-/// The `count` best points of a sample that do not fail, the best last.
+/// Returns the `count` best points of a sample that do not fail, the best last.
 ///
 /// # Errors
-/// The run is over.
+/// When the run ends: budget exhausted, or interrupted by the user.
 pub fn best_of(oracle: &mut dyn Oracle, sample: &[Vec<f64>], count: usize) -> Result<Vec<Vec<f64>>, Halt> {
     let mut answers = oracle.evaluate(sample)?;
     answers.retain(|answer| answer.scaled.is_some());
@@ -31,7 +32,7 @@ pub fn best_of(oracle: &mut dyn Oracle, sample: &[Vec<f64>], count: usize) -> Re
     Ok(answers.drain(from..).map(|answer| answer.point).collect())
 }
 
-/// `count` points of the unit box, one in each of `count` slices along every coordinate.
+/// Returns `count` points of the unit box, one in each of `count` slices along every coordinate.
 ///
 /// Source: M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245.
 #[allow(clippy::cast_precision_loss)]

@@ -4,27 +4,28 @@ use mops_core::Stream;
 use mops_core::math;
 use rand::Rng;
 
-/// Simulated binary crossover and polynomial mutation, the mutation within the bounds. N.B.: a density of the crossover that
-/// ends at the bounds (Deb, Agrawal 1999) never gives a child on them: of DTLZ6, whose front lies on ten of them, nothing was
-/// found within 250 generations.
+/// Simulated binary crossover and polynomial mutation, the latter within the bounds.
 ///
-/// Source: K. Deb, R. B. Agrawal, Complex Systems 9 (1995) 115-148; K. Deb, M. Goyal, Computer Science and Informatics 26
-/// (1996) 30-45; bounded as of K. Deb, S. Agrawal, A niched-penalty approach for constraint handling in genetic algorithms
-/// (1999).
+/// N.B.: a crossover density bounded at the faces (Deb, Agrawal 1999) never creates children on them. The front of
+/// DTLZ6 lies on ten faces; with that density, no point of it was found within 250 generations.
+///
+/// Source: K. Deb, R. B. Agrawal, Complex Systems 9 (1995) 115-148; K. Deb, M. Goyal, Computer Science and Informatics
+/// 26 (1996) 30-45; bounded mutation: K. Deb, S. Agrawal, A niched-penalty approach for constraint handling in genetic
+/// algorithms (1999).
 #[derive(Debug, Clone, Copy)]
 pub struct Variation {
     /// Probability that a pair is crossed.
     pub crossover: f64,
-    /// Distribution index of the crossover: large keeps children near their parents.
+    /// Distribution index of the crossover; large values keep children near their parents.
     pub crossover_index: f64,
     /// Probability that a coordinate is mutated.
     pub mutation: f64,
-    /// Distribution index of the mutation: large takes small steps.
+    /// Distribution index of the mutation; large values give small steps.
     pub mutation_index: f64,
 }
 
 impl Variation {
-    /// The customary choice for `n` coordinates: 0.9, 15, `1 / n`, 20.
+    /// Creates the usual settings for `n` coordinates: 0.9, 15, `1 / n`, 20.
     #[allow(clippy::cast_precision_loss)]
     pub fn usual(n: usize) -> Self {
         Self { crossover: 0.9, crossover_index: 15.0, mutation: 1.0 / n.max(1) as f64, mutation_index: 20.0 }
@@ -46,7 +47,7 @@ impl Variation {
             let share = 2.0 * u;
             let spread =
                 if share <= 1.0 { math::powf(share, 1.0 / power) } else { math::powf(2.0 - share, -1.0 / power) };
-            // Children that leave the box end on its face: a face is where an optimum often lies.
+            // Children outside the box are moved to its face, where optima often lie.
             let first = (middle - half * spread).clamp(0.0, 1.0);
             let second = (middle + half * spread).clamp(0.0, 1.0);
             (*a, *b) = if random.random::<bool>() { (first, second) } else { (second, first) };

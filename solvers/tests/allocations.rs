@@ -1,12 +1,12 @@
-//! Memory that solvers ask for between evaluations.
+//! Memory allocations of solvers between evaluations.
 
 use mops_core::{Budget, Evaluation, Halt, Linearisation, Oracle, Progress, Run, Shape, Stream};
 use mops_problems::{Posed, Slope, suites};
 
-/// An oracle whose own memory does not count.
-struct Aside<'a>(&'a mut dyn Oracle);
+/// Oracle whose own allocations are not counted.
+struct UncountedOracle<'a>(&'a mut dyn Oracle);
 
-impl Oracle for Aside<'_> {
+impl Oracle for UncountedOracle<'_> {
     fn shape(&self) -> &Shape {
         self.0.shape()
     }
@@ -31,11 +31,11 @@ impl Oracle for Aside<'_> {
 fn uncounted<T>(ask: impl FnOnce() -> T) -> T {
     let mut answer = None;
     allocation_counter::opt_out(|| answer = Some(ask()));
-    answer.expect("it was asked")
+    answer.expect("the closure has run")
 }
 
-/// Blocks of memory per evaluation of the budget that a solver of a kind asks for while it solves a problem of a suite, the
-/// first few generations left out.
+/// Returns the number of allocated blocks per evaluation of the budget, for a solver of some kind on a problem of a
+/// suite. The first few steps do not count.
 fn blocks(kind: &str, suite: &str, name: &str, budget: usize) -> f64 {
     let suite = suites().into_iter().find(|known| known.name == suite).expect("the suite is registered");
     let problems = (suite.problems)();
@@ -45,18 +45,21 @@ fn blocks(kind: &str, suite: &str, name: &str, budget: usize) -> f64 {
     let kind = mops_solvers::kinds().into_iter().find(|known| known.name == kind).expect("the kind is registered");
     let mut solver = kind.default_choice().make();
     solver.begin(&mut run, &posed.start()).expect("the budget is larger");
-    // Room that is made once is made by then.
+    // Buffers that are allocated once exist by then.
     for _ in 0..3 {
-        solver.step(&mut Aside(&mut run)).expect("the budget is larger");
+        solver.step(&mut UncountedOracle(&mut run)).expect("the budget is larger");
     }
-    let told = allocation_counter::measure(|| while let Ok(Progress::Continue) = solver.step(&mut Aside(&mut run)) {});
+    let measured =
+        allocation_counter::measure(
+            || while let Ok(Progress::Continue) = solver.step(&mut UncountedOracle(&mut run)) {},
+        );
     #[allow(clippy::cast_precision_loss)]
     {
-        told.count_total as f64 / budget as f64
+        measured.count_total as f64 / budget as f64
     }
 }
 
-/// Asserts that each kind asks for less than so many blocks per evaluation while it solves a problem of a suite.
+/// Asserts that each kind allocates fewer than the given number of blocks per evaluation on a problem of a suite.
 fn assert_fewer(cases: &[(&str, &str, &str, f64)]) {
     for (kind, suite, problem, most) in cases {
         let blocks = blocks(kind, suite, problem, 5000);
@@ -64,9 +67,9 @@ fn assert_fewer(cases: &[(&str, &str, &str, f64)]) {
     }
 }
 
-/// A generation asks for a few blocks, whatever the number of its members: of 100 of them here, eight in `cma-es`.
+/// A generation allocates a few blocks for any population size: here for 100 members, or eight in `cma-es`.
 #[test]
-fn no_member_of_a_generation_asks_for_memory() {
+fn no_member_of_a_generation_allocates_memory() {
     assert_fewer(&[
         ("genetic", "bbob", "f8 i1 n5", 0.25),
         ("differential-evolution", "bbob", "f8 i1 n5", 0.25),
@@ -76,10 +79,10 @@ fn no_member_of_a_generation_asks_for_memory() {
     ]);
 }
 
-/// Steps of `sqp` and of `pattern-search` use the same memory again. What they ask for is room that grows with the pieces and the
-/// points that they keep, a few blocks where a pattern shrinks, and an `sqp` of its own where `pattern-search` meets a kink.
+/// Steps of `sqp` and `pattern-search` reuse their memory. Allocations grow with the number of stored cuts and points.
+/// A pattern needs a few blocks to shrink, and `pattern-search` creates an `sqp` solver at a kink.
 #[test]
-fn steps_ask_for_next_to_no_memory() {
+fn steps_allocate_almost_no_memory() {
     assert_fewer(&[
         ("sqp", "minimax", "Polak3", 0.05),
         ("sqp", "minimax", "EQUIL", 0.05),

@@ -1,10 +1,10 @@
-//! What is shown of points whose optimality is known.
+//! Certificates of points whose optimality is known.
 
 use mops_core::math;
 use mops_core::{Budget, Evaluation, Evaluator, Objective, Pareto, Run, Shape, Usage};
 use mops_solvers::certify;
 
-/// Two rows to be minimised over the unit cube; slopes come from differences.
+/// Two criteria to be minimised over the unit cube, with finite-difference gradients.
 struct Two {
     shape: Shape,
     rows: fn(&[f64]) -> [f64; 2],
@@ -21,8 +21,8 @@ impl Two {
         Self { shape, rows }
     }
 
-    /// What is shown of a point.
-    fn shown(&self, point: [f64; 3]) -> Pareto {
+    /// Returns the certificate of a point.
+    fn certificate(&self, point: [f64; 3]) -> Pareto {
         certify(&mut Run::new(self, Budget { evaluations: usize::MAX }, &()), &point)
     }
 }
@@ -55,12 +55,12 @@ impl Evaluator for Two {
     }
 }
 
-/// How far a point is from a bent sheet, which is a kink of both rows and holds their front.
+/// Distance from a curved surface, which is a kink of both criteria and contains their front.
 fn off(x: &[f64]) -> f64 {
     (x[1] - 0.5 - 4.0 * math::powi(x[0] - 0.5, 2) - math::powi(x[2] - 0.4, 2)).abs()
 }
 
-/// On the sheet the rows are squared distances to two points: the front is what lies between them.
+/// On the surface the criteria are squared distances to two points; the front lies between them.
 fn kinked(x: &[f64]) -> [f64; 2] {
     let distance = |x1: f64| math::powi(x[0] - x1, 2) + math::powi(x[2] - 0.4, 2);
     [distance(0.3) + 2.0 * off(x), distance(0.7) + 0.5 * off(x)]
@@ -73,23 +73,23 @@ fn on_the_sheet(x1: f64) -> [f64; 3] {
 #[test]
 fn points_of_a_front_on_a_bent_kink_are_certified() {
     for x1 in [0.35, 0.4, 0.45, 0.55, 0.6, 0.65] {
-        assert_eq!(Two::new(kinked).shown(on_the_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
+        assert_eq!(Two::new(kinked).certificate(on_the_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
     }
 }
 
 #[test]
 fn a_point_of_the_kink_that_both_rows_can_leave_behind_is_not_certified() {
     for x1 in [0.2, 0.25, 0.75, 0.8] {
-        assert_ne!(Two::new(kinked).shown(on_the_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
+        assert_ne!(Two::new(kinked).certificate(on_the_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
     }
-    // Beside the kink as well.
+    // Also beside the kink.
     for x1 in [0.35, 0.5, 0.65] {
         let [a, b, c] = on_the_sheet(x1);
-        assert_ne!(Two::new(kinked).shown([a, b + 0.01, c]), Pareto::CertifiedLocal, "{x1}");
+        assert_ne!(Two::new(kinked).certificate([a, b + 0.01, c]), Pareto::CertifiedLocal, "{x1}");
     }
 }
 
-/// A steep kink of the first row alone, oblique and strongly bent: steps along it leave it, or see the mean of both sides.
+/// Steep, oblique and strongly curved kink of the first criterion: steps along it leave it, or average both sides.
 fn steep(x: &[f64]) -> [f64; 2] {
     let off = x[1] - 0.5 - BENT * math::powi(x[0] - 0.5, 2) - (x[2] - 0.4);
     let distance = |x1: f64| math::powi(x[0] - x1, 2) + math::powi(x[2] - 0.4, 2);
@@ -105,19 +105,19 @@ fn on_the_steep_sheet(x1: f64) -> [f64; 3] {
 #[test]
 fn a_steep_kink_is_seen_from_both_sides() {
     for x1 in [0.32, 0.35, 0.4, 0.45, 0.55, 0.6, 0.65, 0.68] {
-        assert_eq!(Two::new(steep).shown(on_the_steep_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
+        assert_eq!(Two::new(steep).certificate(on_the_steep_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
     }
     for x1 in [0.2, 0.25, 0.75, 0.8] {
-        assert_ne!(Two::new(steep).shown(on_the_steep_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
+        assert_ne!(Two::new(steep).certificate(on_the_steep_sheet(x1)), Pareto::CertifiedLocal, "{x1}");
     }
 }
 
 #[test]
 fn a_jump_nearby_certifies_nothing() {
-    // Up to the jump both rows fall along the second coordinate.
+    // Below the discontinuity both criteria decrease along the second coordinate.
     let jump = |x: &[f64]| {
         let beyond = if x[1] > 0.5002 { 10.0 } else { 0.0 };
         [beyond - x[1] + math::powi(x[0] - 0.4, 2), beyond - 2.0 * x[1] + math::powi(x[0] - 0.6, 2)]
     };
-    assert_ne!(Two::new(jump).shown([0.5, 0.5, 0.5]), Pareto::CertifiedLocal);
+    assert_ne!(Two::new(jump).certificate([0.5, 0.5, 0.5]), Pareto::CertifiedLocal);
 }

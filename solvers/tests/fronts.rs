@@ -1,4 +1,4 @@
-//! Fronts found by `weighted-chebyshev`, `nsga2` and `nsga3`, against fronts that are known.
+//! Fronts computed by `weighted-chebyshev`, `nsga2` and `nsga3`, compared with known fronts.
 
 use mops_core::front::{hypervolume, inverted_generational_distance, thinned};
 use mops_core::math;
@@ -8,7 +8,7 @@ use mops_solvers::evolution::{Evolution, Survival};
 use mops_solvers::nsga2::Nsga2Options;
 use mops_solvers::nsga3::Nsga3Options;
 
-/// Share of the known hypervolume that the run's whole front has, for every problem of a suite.
+/// Hypervolume of the whole front of a run, relative to the known hypervolume, for every problem of a suite.
 fn shares<S: Survival>(suite: &str, search: impl Fn() -> Evolution<S>) -> Vec<(String, f64)> {
     let suite = mops_problems::suites().into_iter().find(|s| s.name == suite).unwrap();
     let share = |problem: mops_problems::Problem| {
@@ -23,7 +23,7 @@ fn shares<S: Survival>(suite: &str, search: impl Fn() -> Evolution<S>) -> Vec<(S
     (suite.problems)().into_iter().map(share).collect()
 }
 
-/// A known volume of a sampled front is short by what lies between its points.
+/// Sampling error of the known hypervolume of a front.
 const SAMPLING: f64 = 1e-3;
 
 #[test]
@@ -38,8 +38,8 @@ fn nsga2_comes_near_the_fronts_of_two_objectives_and_finds_nothing_beyond() {
 #[test]
 fn nsga3_comes_near_the_fronts_of_three_objectives_and_finds_nothing_beyond() {
     for (name, share) in shares("dtlz", || Nsga3Options::default().search()) {
-        // The bias of DTLZ6 towards bad points outlasts 250 generations; on DTLZ4 the members may gather on one edge, as they
-        // do in the worst of the runs of K. Deb, H. Jain (2014), Table III.
+        // The bias of DTLZ6 outlasts 250 generations. On DTLZ4 the members may gather on one edge, as in the worst runs
+        // of K. Deb, H. Jain (2014), Table III.
         let least = match name.as_str() {
             "DTLZ6" => 0.0,
             "DTLZ4" => 0.5,
@@ -49,7 +49,7 @@ fn nsga3_comes_near_the_fronts_of_three_objectives_and_finds_nothing_beyond() {
     }
 }
 
-/// The points of a known front, so many of them that are spread evenly, and the whole.
+/// Returns evenly spread points of a known front, and all of its points.
 fn known_front(problem: &mops_problems::Problem, count: usize) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
     let Answer::Front { points, .. } = &problem.answer else { panic!("{}", problem.name) };
     let all = points(4000);
@@ -75,7 +75,7 @@ fn weighted_chebyshev_spreads_thirty_exact_points_over_fronts_of_two_objectives(
             let (even, all) = known_front(&problem, rows.len());
             let share = hypervolume(&rows.concat(), reference) / hypervolume(&even.concat(), reference);
             assert!((0.99..1.01).contains(&share), "{}: {share}", problem.name);
-            // As far from the front as its own points are from each other.
+            // The distance to the front is about the spacing of its points.
             let off = inverted_generational_distance(&all.concat(), 2, &rows);
             let size = all[0].iter().zip(&all[all.len() - 1]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(off < 5e-3 * size, "{}: {off}", problem.name);
@@ -95,7 +95,7 @@ fn weighted_chebyshev_spreads_points_over_a_sphere() {
     for row in &rows {
         assert!((row.iter().map(|f| f * f).sum::<f64>() - 1.0).abs() < 1e-4, "{row:?}");
     }
-    // No direction of the octant is without a point near it: the mesh of 28 weights has triangles with sides of up to 0.4.
+    // Every direction of the octant has a point nearby: the triangles of 28 weights have sides of up to 0.4.
     let (_, all) = known_front(&problem, 1);
     let far = |at: &Vec<f64>| {
         let square = |row: &Vec<f64>| row.iter().zip(at).map(|(a, b)| math::powi(a - b, 2)).sum::<f64>();

@@ -1,4 +1,4 @@
-//! Solvers on problems whose answers are published.
+//! Solvers on problems with published answers.
 
 use mops_problems::{Answer, Measured, Posed, Problem, Slope, measure, suites};
 
@@ -42,7 +42,7 @@ fn problems_with_constraints_are_solved() {
     check("hock-schittkowski", &names, 1e-6);
 }
 
-/// Equalities, curved constraints, and starts that violate them; no slopes.
+/// Equality constraints, nonlinear constraints, and infeasible initial guesses, without gradients.
 #[test]
 fn pattern_search_keeps_constraints() {
     for name in ["HS7", "HS9", "HS29", "HS43", "HS56", "HS62", "HS71", "HS76", "HS100"] {
@@ -51,7 +51,7 @@ fn pattern_search_keeps_constraints() {
     }
 }
 
-/// What a user writes down from `mops describe` is accepted.
+/// Defaults shown by `mops describe` are valid settings.
 #[test]
 fn every_default_is_within_its_range() {
     let mut ranges = 0;
@@ -71,17 +71,17 @@ fn every_default_is_within_its_range() {
     assert!(ranges > 20, "{ranges}");
 }
 
-/// From these starts slopes lead to where exponentials are flat (Osborne 1), or to the minimum 6.50395e-3 that the literature
-/// lists (Chebyquad of ten variables); models of a wider neighbourhood lead to less.
+/// Gradients lead to a flat region of the exponentials (Osborne 1), or to the minimum 6.50395e-3 listed in the
+/// literature (Chebyquad with ten variables). Models of a wider neighbourhood lead to lower minima.
 #[test]
-fn a_second_opinion_leads_past_the_first_minimum() {
+fn the_multimethod_finds_a_lower_minimum() {
     for (name, least) in [("17 n5 m33", 5.46489e-5), ("15 n10 m10", 4.77271e-3)] {
         let found = solve("auto", &named("more-wild", name), Slope::Differences, 100).best.objective;
-        assert!(found < least + 1e-3, "{name}: {found} beside {least}");
+        assert!(found < least + 1e-3, "{name}: {found} instead of {least}");
     }
 }
 
-/// Rastrigin's function and Bueche's have ten basins and more along each of five axes, and tuners act apart from each other.
+/// Rastrigin's function and Bueche's have at least ten basins along each of five axes, and are separable.
 #[test]
 fn basins_along_the_axes_are_searched_one_axis_at_a_time() {
     for name in ["f3 i1 n5", "f4 i1 n5"] {
@@ -90,22 +90,22 @@ fn basins_along_the_axes_are_searched_one_axis_at_a_time() {
     }
 }
 
-/// The sum of absolute residuals has kinks that no row shows. All residuals vanish at the solutions of these problems.
+/// The sum of absolute residuals has kinks inside a criterion. All residuals vanish at the solutions of these problems.
 #[test]
-fn a_pattern_search_follows_kinks_inside_a_row() {
+fn pattern_search_follows_kinks_inside_a_criterion() {
     for name in ["5 n3 m3", "15 n6 m6"] {
         let found = solve("pattern-search", &named("more-wild-piecewise", name), Slope::Differences, 100);
         assert!(found.best.objective < 1e-4, "{name}: {:?}", found.best);
     }
 }
 
-/// A definition with a wrong number in it has another optimum than the published one.
+/// A wrong constant in a definition would change the optimum.
 #[test]
 fn every_definition_has_its_published_optimum() {
     for suite in ["minimax", "hock-schittkowski"] {
         for problem in problems(suite) {
             let found = sqp(&problem, Slope::Exact);
-            // No constraint qualification holds at the solution of HS13: there are no multipliers to converge to.
+            // At the solution of HS13 no constraint qualification holds, so that multipliers do not exist.
             let accuracy = if problem.name == "HS13" { 1e-4 } else { 1e-5 };
             assert!(found.evaluations_to(accuracy).is_some(), "{}: {:?} {:?}", problem.name, found.best, found.target);
         }
@@ -122,7 +122,7 @@ fn no_success_is_claimed_where_a_constraint_is_violated() {
     }
 }
 
-/// The box of a variable without bounds is an invention: a solution at its edge would be another problem's.
+/// The box of an unbounded variable is arbitrary: a solution on its face would belong to another problem.
 #[test]
 fn solutions_lie_inside_boxes_that_are_not_the_problems_own() {
     for suite in ["minimax", "hock-schittkowski"] {

@@ -1,12 +1,14 @@
-//! A dual active-set method for strictly convex quadratic programs.
+//! Dual active-set method for strictly convex quadratic programs.
 //!
 //! ```text
 //! min over x   1/2 x'Hx + c'x    subject to   a_i x >= b_i
 //! ```
-//! Every iterate is the minimum over its active constraints, with multipliers that are not negative; a violated constraint
-//! is added at a time, and those whose multiplier falls to 0 on the way are dropped. With `H = L L'`, `J = L^-T Q` and the
-//! triangle `R` from the normals `N` of the active constraints, `L^-1 N = Q [R; 0]`: both are updated by plane rotations. The
-//! last iterate is computed anew from its active set, so that no rounding of the way there stays in it.
+//! Every iterate is the minimiser over its active constraints, with non-negative multipliers. One violated constraint
+//! is added at a time; constraints whose multiplier reaches 0 during the step are dropped.
+//!
+//! With `H = L L'` and the normals `N` of the active constraints, `L^-1 N = Q [R; 0]` and `J = L^-T Q`. Plane rotations
+//! update `J` and the upper triangular `R`. The last iterate is recomputed from its active set to remove accumulated
+//! rounding errors.
 //!
 //! Source: D. Goldfarb, A. Idnani, A numerically stable dual method for solving strictly convex quadratic programs,
 //! Mathematical Programming 27 (1983) 1-33.
@@ -14,89 +16,90 @@
 /// Linear constraints `a_i x >= b_i`.
 #[derive(Debug, Default)]
 pub struct Constraints {
-    /// The rows `a_i`, one after the other.
+    /// Normals `a_i`, concatenated.
     pub normals: Vec<f64>,
-    /// The numbers `b_i`.
+    /// Right-hand sides `b_i`.
     pub bounds: Vec<f64>,
 }
 
 impl Constraints {
-    /// Forgets all of them.
+    /// Removes all constraints.
     pub fn clear(&mut self) {
         self.normals.clear();
         self.bounds.clear();
     }
 }
 
-/// The method, with its memory, which is used again from program to program.
+/// Solver for quadratic programs; reuses its memory from one program to the next.
 #[derive(Debug, Default)]
 pub struct ActiveSet {
     /// Number of variables.
     n: usize,
-    /// `J`, by columns.
+    /// Matrix `J`, column-major.
     j: Vec<f64>,
-    /// `R`, by columns.
+    /// Matrix `R`, column-major.
     r: Vec<f64>,
-    /// The active constraints, by index.
+    /// Indices of the active constraints.
     active: Vec<usize>,
-    /// Those of the last program.
-    likely: Vec<usize>,
-    /// The multipliers of the active ones.
+    /// Indices of the constraints active in the previous program (warm start).
+    previous_active: Vec<usize>,
+    /// Multipliers of the active constraints.
     multipliers: Vec<f64>,
-    /// The iterate.
+    /// Iterate.
     x: Vec<f64>,
-    /// `J'a` of the constraint that is added.
-    along: Vec<f64>,
-    /// The step of the iterate.
+    /// Projection `J'a` of the constraint to be added.
+    projected_normal: Vec<f64>,
+    /// Step of the iterate.
     step: Vec<f64>,
-    /// The step of the multipliers.
-    change: Vec<f64>,
+    /// Step of the multipliers.
+    multiplier_step: Vec<f64>,
 }
 
-/// Relative size of what is left of a normal below which it depends on the active ones.
+/// Relative norm of the projected normal below which the normal is linearly dependent on the active ones.
 const DEPENDENT: f64 = 1e-13;
 
 impl ActiveSet {
-    /// Solves a program whose Hessian has the Cholesky factor `l`, by columns; `first` are constraints that are active with
-    /// multipliers above 0 at the minimum over them, or none. Constraints that were active the last time are looked at before
-    /// all others. `false` where the constraints contradict each other, or
-    /// rounding keeps the method from an end.
+    /// Solves a program whose Hessian has the Cholesky factor `l` (column-major).
+    ///
+    /// `first` lists constraints that are active with positive multipliers at the minimum over them; it may be empty.
+    /// Constraints active in the previous program are tested for violation before all others. Returns false if the
+    /// constraints are inconsistent or if rounding errors prevent convergence.
     pub fn solve(&mut self, l: &[f64], c: &[f64], constraints: &Constraints, first: &[usize]) -> bool {
-        self.likely.clone_from(&self.active);
-        self.likely.retain(|p| *p < constraints.bounds.len());
-        self.begin(l, c.len());
+        self.previous_active.clone_from(&self.active);
+        self.previous_active.retain(|p| *p < constraints.bounds.len());
+        self.reset(l, c.len());
         for &p in first {
-            self.project(row(constraints, p, self.n));
+            self.project_normal(row(constraints, p, self.n));
             if !self.add(p) {
                 return false;
             }
         }
-        self.minimise(c, constraints);
-        let most = 50 + 20 * (self.n + constraints.bounds.len());
+        self.minimise_over_active_set(c, constraints);
+        let max_steps = 50 + 20 * (self.n + constraints.bounds.len());
         let mut steps = 0;
         while let Some((p, mut slack)) = self.most_violated(constraints) {
             let mut multiplier = 0.0;
             loop {
                 steps += 1;
-                if steps > most {
+                if steps > max_steps {
                     return false;
                 }
                 let normal = row(constraints, p, self.n);
-                self.project(normal);
-                let curvature = self.directions();
-                let (length, drop) = self.first_to_leave();
+                self.project_normal(normal);
+                let curvature = self.step_directions();
+                let (length, drop) = self.ratio_test();
                 let full = if curvature > 0.0 { -slack / curvature } else { f64::INFINITY };
-                let taken = length.min(full);
-                if taken.is_infinite() {
+                let step_length = length.min(full);
+                if step_length.is_infinite() {
                     return false;
                 }
-                for (u, change) in self.multipliers.iter_mut().zip(&self.change) {
-                    *u -= taken * change;
+                for (u, multiplier_step) in self.multipliers.iter_mut().zip(&self.multiplier_step) {
+                    *u -= step_length * multiplier_step;
                 }
-                multiplier += taken;
+                multiplier += step_length;
                 if full.is_finite() {
                     for (x, step) in self.x.iter_mut().zip(&self.step) {
-                        *x += taken * step;
+                        *x += step_length * step;
                     }
                     slack = dot(normal, &self.x) - constraints.bounds[p];
                 }
@@ -110,32 +113,32 @@ impl ActiveSet {
                 self.drop(drop);
             }
         }
-        self.minimise(c, constraints);
+        self.minimise_over_active_set(c, constraints);
         self.x.iter().all(|x| x.is_finite())
     }
 
-    /// The solution.
+    /// Returns the solution.
     pub fn x(&self) -> &[f64] {
         &self.x
     }
 
-    /// The active constraints, by index, with their multipliers.
+    /// Iterates over the indices and multipliers of the active constraints.
     pub fn active(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.active.iter().copied().zip(self.multipliers.iter().copied())
     }
 
-    /// `J = L^-T`, and nothing active.
-    fn begin(&mut self, l: &[f64], n: usize) {
+    /// Resets the method to `J = L^-T` and an empty active set.
+    fn reset(&mut self, l: &[f64], n: usize) {
         self.n = n;
         self.active.clear();
         self.multipliers.clear();
         self.j.clear();
         self.j.resize(n * n, 0.0);
-        for buffer in [&mut self.x, &mut self.along, &mut self.step] {
+        for buffer in [&mut self.x, &mut self.projected_normal, &mut self.step] {
             buffer.clear();
             buffer.resize(n, 0.0);
         }
-        self.change.clear();
+        self.multiplier_step.clear();
         self.r.clear();
         self.r.resize(n * n, 0.0);
         // Column k of L^-T by back substitution: L' J = I.
@@ -147,33 +150,33 @@ impl ActiveSet {
         }
     }
 
-    /// `along = J'a`.
-    fn project(&mut self, normal: &[f64]) {
-        for (along, column) in self.along.iter_mut().zip(self.j.chunks_exact(self.n)) {
-            *along = dot(column, normal);
+    /// Computes the projected normal `J'a`.
+    fn project_normal(&mut self, normal: &[f64]) {
+        for (projected_normal, column) in self.projected_normal.iter_mut().zip(self.j.chunks_exact(self.n)) {
+            *projected_normal = dot(column, normal);
         }
     }
 
-    /// The steps of the iterate and of the multipliers per unit of the new one; the curvature along the first, 0 where the
-    /// normal depends on the active ones.
-    fn directions(&mut self) -> f64 {
+    /// Computes the steps of the iterate and of the multipliers per unit of the new multiplier. Returns the curvature
+    /// along the step of the iterate: 0 if the normal is linearly dependent on the active ones.
+    fn step_directions(&mut self) -> f64 {
         let (n, q) = (self.n, self.active.len());
-        self.change.clear();
-        self.change.extend_from_slice(&self.along[..q]);
+        self.multiplier_step.clear();
+        self.multiplier_step.extend_from_slice(&self.projected_normal[..q]);
         for i in (0..q).rev() {
-            self.change[i] /= self.r[i * n + i];
-            let known = self.change[i];
+            self.multiplier_step[i] /= self.r[i * n + i];
+            let known = self.multiplier_step[i];
             for k in 0..i {
-                self.change[k] -= known * self.r[i * n + k];
+                self.multiplier_step[k] -= known * self.r[i * n + k];
             }
         }
-        let free: f64 = self.along[q..].iter().map(|d| d * d).sum();
-        let all: f64 = self.along.iter().map(|d| d * d).sum();
+        let free: f64 = self.projected_normal[q..].iter().map(|d| d * d).sum();
+        let all: f64 = self.projected_normal.iter().map(|d| d * d).sum();
         if free <= DEPENDENT * DEPENDENT * all {
             return 0.0;
         }
         self.step.fill(0.0);
-        for (d, column) in self.along[q..].iter().zip(self.j.chunks_exact(n).skip(q)) {
+        for (d, column) in self.projected_normal[q..].iter().zip(self.j.chunks_exact(n).skip(q)) {
             for (step, j) in self.step.iter_mut().zip(column) {
                 *step += d * j;
             }
@@ -181,30 +184,32 @@ impl ActiveSet {
         free
     }
 
-    /// How far the multipliers can go until the first of them is 0, and which.
-    fn first_to_leave(&self) -> (f64, usize) {
-        let ratios = self.multipliers.iter().zip(&self.change).enumerate();
-        let ratios = ratios.filter(|(_, (_, change))| **change > 0.0).map(|(i, (u, change))| (u.max(0.0) / change, i));
+    /// Returns the largest step that keeps all multipliers non-negative, and the position of the blocking constraint.
+    fn ratio_test(&self) -> (f64, usize) {
+        let ratios = self.multipliers.iter().zip(&self.multiplier_step).enumerate();
+        let ratios = ratios
+            .filter(|(_, (_, multiplier_step))| **multiplier_step > 0.0)
+            .map(|(i, (u, multiplier_step))| (u.max(0.0) / multiplier_step, i));
         ratios.fold((f64::INFINITY, 0), |best, next| if next.0 < best.0 { next } else { best })
     }
 
-    /// Adds the constraint that was projected; `false` where rounding leaves nothing of it.
+    /// Adds the projected constraint; returns false if rounding errors cancel its normal.
     fn add(&mut self, p: usize) -> bool {
         let (n, q) = (self.n, self.active.len());
         if q == n {
             return false;
         }
         for k in (q + 1..n).rev() {
-            let (cos, sin, length) = rotation(self.along[k - 1], self.along[k]);
+            let (cos, sin, length) = rotation(self.projected_normal[k - 1], self.projected_normal[k]);
             if sin != 0.0 {
-                (self.along[k - 1], self.along[k]) = (length, 0.0);
+                (self.projected_normal[k - 1], self.projected_normal[k]) = (length, 0.0);
                 self.rotate(k - 1, cos, sin);
             }
         }
-        self.r[q * n..q * n + q + 1].copy_from_slice(&self.along[..=q]);
+        self.r[q * n..q * n + q + 1].copy_from_slice(&self.projected_normal[..=q]);
         self.active.push(p);
         self.multipliers.push(0.0);
-        self.along[q] != 0.0
+        self.projected_normal[q] != 0.0
     }
 
     /// Drops the active constraint at `position`.
@@ -235,22 +240,22 @@ impl ActiveSet {
         }
     }
 
-    /// The minimum over the active constraints, and their multipliers: `x = J y`, `R'y_1 = b`, `y_2 = -J_2'c`,
-    /// `R u = y_1 + J_1'c`.
-    fn minimise(&mut self, c: &[f64], constraints: &Constraints) {
+    /// Computes the minimiser over the active constraints and their multipliers: `x = J y`, `R'y_1 = b`, `y_2 =
+    /// -J_2'c`, `R u = y_1 + J_1'c`.
+    fn minimise_over_active_set(&mut self, c: &[f64], constraints: &Constraints) {
         let (n, q) = (self.n, self.active.len());
         self.x.fill(0.0);
         for k in 0..n {
-            let slope = dot(&self.j[k * n..(k + 1) * n], c);
+            let gradient = dot(&self.j[k * n..(k + 1) * n], c);
             let y = if k < q {
-                let known: f64 = (0..k).map(|i| self.r[k * n + i] * self.along[i]).sum();
+                let known: f64 = (0..k).map(|i| self.r[k * n + i] * self.projected_normal[i]).sum();
                 (constraints.bounds[self.active[k]] - known) / self.r[k * n + k]
             } else {
-                -slope
+                -gradient
             };
-            self.along[k] = y;
+            self.projected_normal[k] = y;
             if k < q {
-                self.multipliers[k] = y + slope;
+                self.multipliers[k] = y + gradient;
             }
             for (x, j) in self.x.iter_mut().zip(&self.j[k * n..(k + 1) * n]) {
                 *x += y * j;
@@ -265,11 +270,12 @@ impl ActiveSet {
         }
     }
 
-    /// A violated constraint and its slack: the worst of the likely ones, else the worst of all.
+    /// Returns the most violated constraint and its slack: among those active in the previous program, otherwise among
+    /// all.
     fn most_violated(&self, constraints: &Constraints) -> Option<(usize, f64)> {
         let largest = self.x.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
         let worst = |candidates: &mut dyn Iterator<Item = usize>| {
-            let (mut worst, mut most) = (None, -ROUNDING);
+            let (mut worst, mut max_steps) = (None, -ROUNDING);
             for p in candidates {
                 let normal = row(constraints, p, self.n);
                 let slack = dot(normal, &self.x) - constraints.bounds[p];
@@ -278,24 +284,24 @@ impl ActiveSet {
                 }
                 let size = normal.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
                 let relative = slack / (size * (1.0 + largest) + constraints.bounds[p].abs());
-                if relative < most && !self.active.contains(&p) {
-                    (worst, most) = (Some((p, slack)), relative);
+                if relative < max_steps && !self.active.contains(&p) {
+                    (worst, max_steps) = (Some((p, slack)), relative);
                 }
             }
             worst
         };
-        worst(&mut self.likely.iter().copied()).or_else(|| worst(&mut (0..constraints.bounds.len())))
+        worst(&mut self.previous_active.iter().copied()).or_else(|| worst(&mut (0..constraints.bounds.len())))
     }
 }
 
-/// Violation that is none, relative to the terms of a constraint.
+/// Violation regarded as zero, relative to the terms of a constraint.
 const ROUNDING: f64 = 1e-12;
 
 fn row(constraints: &Constraints, p: usize, n: usize) -> &[f64] {
     &constraints.normals[p * n..(p + 1) * n]
 }
 
-/// The inner product, in four sums, which do not wait for one another.
+/// Inner product with four independent partial sums, which the processor can compute in parallel.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
     let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
@@ -308,7 +314,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
-/// Cosine and sine of the rotation that takes `(a, b)` to `(length, 0)`.
+/// Cosine and sine of the rotation that maps `(a, b)` to `(length, 0)`, and the length.
 fn rotation(a: f64, b: f64) -> (f64, f64, f64) {
     if b == 0.0 {
         return (1.0, 0.0, a);

@@ -1,4 +1,4 @@
-//! Programs whose solutions are known, or known to be solutions.
+//! Programs with known solutions, and random programs checked by their optimality conditions.
 
 use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
@@ -10,20 +10,20 @@ fn factor(hessian: &DMatrix<f64>) -> Vec<f64> {
     hessian.clone().cholesky().unwrap().l().as_slice().to_vec()
 }
 
-/// Largest error of the conditions of Karush, Kuhn and Tucker, which a strictly convex program meets at its solution alone.
+/// Largest error of the Karush-Kuhn-Tucker conditions, which hold only at the solution of a strictly convex program.
 fn error(method: &ActiveSet, hessian: &DMatrix<f64>, c: &[f64], constraints: &Constraints) -> f64 {
     let n = c.len();
     let x = DVector::from_column_slice(method.x());
-    let mut slope = hessian * &x + DVector::from_column_slice(c);
+    let mut gradient = hessian * &x + DVector::from_column_slice(c);
     let mut worst = 0.0_f64;
     for (p, multiplier) in method.active() {
         let normal = DVector::from_column_slice(row(constraints, p, n));
         worst = worst.max((normal.dot(&x) - constraints.bounds[p]).abs()).max(-multiplier);
-        slope -= normal * multiplier;
+        gradient -= normal * multiplier;
     }
     let slacks =
         (0..constraints.bounds.len()).map(|p| dot(row(constraints, p, n), x.as_slice()) - constraints.bounds[p]);
-    slacks.fold(worst.max(slope.amax()), |worst, slack| worst.max(-slack))
+    slacks.fold(worst.max(gradient.amax()), |worst, slack| worst.max(-slack))
 }
 
 #[test]
@@ -35,7 +35,7 @@ fn random_programs_are_solved_to_rounding() {
         let a = DMatrix::from_fn(n, n, |_, _| draw());
         let hessian = &a * a.transpose() + DMatrix::identity(n, n) * 0.1;
         let c: Vec<f64> = (0..n).map(|_| 5.0 * draw()).collect();
-        // Feasible at a point that is drawn too, some of them with equality there.
+        // The constraints are feasible at a random point; every third one is an equality there.
         let inside = DVector::from_fn(n, |_, _| draw());
         let mut constraints = Constraints::default();
         for p in 0..m {
@@ -51,14 +51,14 @@ fn random_programs_are_solved_to_rounding() {
 }
 
 #[test]
-fn constraints_that_contradict_each_other_are_seen() {
+fn inconsistent_constraints_are_detected() {
     let hessian = DMatrix::identity(1, 1);
     let constraints = Constraints { normals: vec![1.0, -1.0], bounds: vec![1.0, 0.0] };
     assert!(!ActiveSet::default().solve(&factor(&hessian), &[0.0], &constraints, &[]));
 }
 
 #[test]
-fn constraints_that_repeat_each_other_do_no_harm() {
+fn duplicate_constraints_do_no_harm() {
     let hessian = DMatrix::identity(2, 2);
     let constraints = Constraints { normals: [1.0, 1.0].repeat(6), bounds: vec![2.0; 6] };
     let mut method = ActiveSet::default();

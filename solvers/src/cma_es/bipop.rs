@@ -1,73 +1,74 @@
-//! Restarts with two regimes of population: ever larger, and small with steps of every size.
+//! BIPOP restarts: runs with ever larger populations alternate with runs with small populations and random step sizes.
 
 use mops_core::Stream;
 use mops_core::math;
 use rand::Rng;
 
-/// What the next run begins with.
+/// Settings of a run.
 #[derive(Debug, Clone, Copy)]
 pub struct Plan {
-    /// Members of a generation.
+    /// Population size.
     pub population: usize,
-    /// First standard deviation.
+    /// Initial standard deviation.
     pub sigma: f64,
-    /// Evaluations after which the run is broken off.
+    /// Number of evaluations after which the run is stopped.
     pub evaluations: usize,
-    large: bool,
+    is_large: bool,
 }
 
-/// The bookkeeping of both regimes.
+/// Evaluation counts of both restart regimes.
 ///
 /// Source: N. Hansen, Benchmarking a BI-population CMA-ES on the BBOB-2009 function testbed, GECCO (2009) 2389-2396.
 #[derive(Debug, Clone)]
 pub struct Bipop {
     population: usize,
     sigma: f64,
-    /// Runs with a doubled population.
+    /// Number of runs with a doubled population.
     doublings: usize,
-    spent_large: usize,
-    spent_small: usize,
-    /// Evaluations of the last run with a large population.
-    last_large: usize,
+    evaluations_large: usize,
+    evaluations_small: usize,
+    /// Number of evaluations of the last run with a large population.
+    last_large_evaluations: usize,
 }
 
 impl Bipop {
-    /// Before the first run, with the usual population and step.
+    /// Creates the schedule from the default population size and initial standard deviation.
     pub fn new(population: usize, sigma: f64) -> Self {
-        Self { population, sigma, doublings: 0, spent_large: 0, spent_small: 0, last_large: 0 }
+        Self { population, sigma, doublings: 0, evaluations_large: 0, evaluations_small: 0, last_large_evaluations: 0 }
     }
 
-    /// The first run.
-    pub fn first(&self) -> Plan {
-        Plan { population: self.population, sigma: self.sigma, evaluations: usize::MAX, large: true }
+    /// Returns the settings of the first run.
+    pub fn first_run(&self) -> Plan {
+        Plan { population: self.population, sigma: self.sigma, evaluations: usize::MAX, is_large: true }
     }
 
-    /// A run with the usual population that begins with a small step, near a point that is good already.
-    pub fn small(&self, sigma: f64) -> Plan {
-        Plan { sigma, ..self.first() }
+    /// Returns the settings of a run with the default population and a small initial step, near a good point.
+    pub fn small_run(&self, sigma: f64) -> Plan {
+        Plan { sigma, ..self.first_run() }
     }
 
-    /// Notes what a run has cost, and plans the next; `None` after `restarts` doublings.
+    /// Adds the evaluations used by the last run and returns the settings of the next; `None` after `restarts`
+    /// doublings.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub fn next(&mut self, last: &Plan, spent: usize, restarts: usize, random: &mut Stream) -> Option<Plan> {
-        // The first run counts for neither regime.
-        match (last.large, self.doublings) {
-            (true, 0) => self.last_large = spent,
-            (true, _) => (self.spent_large, self.last_large) = (self.spent_large + spent, spent),
-            (false, _) => self.spent_small += spent,
+    pub fn next(&mut self, last: &Plan, used: usize, restarts: usize, random: &mut Stream) -> Option<Plan> {
+        // The first run counts towards neither regime.
+        match (last.is_large, self.doublings) {
+            (true, 0) => self.last_large_evaluations = used,
+            (true, _) => (self.evaluations_large, self.last_large_evaluations) = (self.evaluations_large + used, used),
+            (false, _) => self.evaluations_small += used,
         }
-        if self.doublings > 0 && self.spent_small < self.spent_large {
+        if self.doublings > 0 && self.evaluations_small < self.evaluations_large {
             let u: f64 = random.random();
             let ratio = 0.5 * (1usize << self.doublings) as f64;
             let population = (self.population as f64 * math::powf(ratio, u * u)) as usize;
             let sigma = self.sigma * math::powf(10.0, -2.0 * random.random::<f64>());
-            return Some(Plan { population, sigma, evaluations: self.last_large / 2, large: false });
+            return Some(Plan { population, sigma, evaluations: self.last_large_evaluations / 2, is_large: false });
         }
         if self.doublings >= restarts {
             return None;
         }
         self.doublings += 1;
         let population = self.population << self.doublings;
-        Some(Plan { population, sigma: self.sigma, evaluations: usize::MAX, large: true })
+        Some(Plan { population, sigma: self.sigma, evaluations: usize::MAX, is_large: true })
     }
 }

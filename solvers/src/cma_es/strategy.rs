@@ -2,47 +2,47 @@
 
 use mops_core::math;
 
-/// Constants that follow from the dimension `n` and the size of the population.
+/// Constants that follow from the dimension `n` and the population size.
 ///
 /// Source: N. Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772, equations 49 to 58 and Table 1.
 #[derive(Debug, Clone)]
 pub struct Strategy {
-    /// Members of a generation.
+    /// Population size.
     pub population: usize,
-    /// Members that move the mean.
+    /// Number of parents, which determine the mean.
     pub parents: usize,
-    /// A weight per rank: positive and summing to 1 for the parents, negative for the rest.
+    /// Recombination weight per rank: positive with sum 1 for the parents, at most 0 for the rest.
     pub weights: Vec<f64>,
-    /// Variance effective number of parents, `1 / sum w^2`.
+    /// Variance-effective number of parents, `1 / sum w^2`.
     pub effective: f64,
-    /// Learning rate of the path of the step size.
+    /// Learning rate of the evolution path of the step size.
     pub c_sigma: f64,
     /// Damping of the step size.
     pub d_sigma: f64,
-    /// Learning rate of the path of the covariance.
+    /// Learning rate of the evolution path of the covariance.
     pub c_c: f64,
     /// Learning rate of the rank-one update.
     pub c_1: f64,
     /// Learning rate of the rank-mu update.
     pub c_mu: f64,
-    /// Expected length of a standard normal vector.
+    /// Expected norm of a standard normal vector.
     pub chi: f64,
 }
 
 impl Strategy {
-    /// The fewest members.
-    pub const LEAST: usize = 4;
+    /// Minimum population size.
+    pub const MIN_POPULATION: usize = 4;
 
-    /// The usual number of members, `4 + 3 ln n`.
+    /// Returns the default population size, `4 + 3 ln n`.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub fn usual_population(n: usize) -> usize {
+    pub fn default_population(n: usize) -> usize {
         4 + (3.0 * math::ln(n.max(1) as f64)) as usize
     }
 
-    /// The constants.
+    /// Computes the constants.
     #[allow(clippy::cast_precision_loss)]
     pub fn new(n: usize, population: usize) -> Self {
-        let population = population.max(Self::LEAST);
+        let population = population.max(Self::MIN_POPULATION);
         let parents = population / 2;
         let nf = n as f64;
         let raw: Vec<f64> =
@@ -84,15 +84,15 @@ mod tests {
             let s = Strategy::new(n, population);
             assert!((s.weights[..s.parents].iter().sum::<f64>() - 1.0).abs() < 1e-12);
             assert!(s.weights.windows(2).all(|w| w[0] >= w[1]) && s.weights.last().unwrap() <= &0.0);
-            let kept = 1.0 - s.c_1 - s.c_mu * s.weights.iter().sum::<f64>();
-            assert!(kept >= -1e-12 && s.c_1 + s.c_mu <= 1.0 + 1e-12, "{n} {population} {kept}");
+            let remaining = 1.0 - s.c_1 - s.c_mu * s.weights.iter().sum::<f64>();
+            assert!(remaining >= -1e-12 && s.c_1 + s.c_mu <= 1.0 + 1e-12, "{n} {population} {remaining}");
         }
     }
 
-    /// Values of the reference implementation's defaults for n = 10: population 10, effective number of parents 3.167.
+    /// Defaults of the reference implementation for n = 10: population 10, effective number of parents 3.167.
     #[test]
     fn ten_dimensions_have_the_published_constants() {
-        let s = Strategy::new(10, Strategy::usual_population(10));
+        let s = Strategy::new(10, Strategy::default_population(10));
         assert_eq!((s.population, s.parents), (10, 5));
         assert!((s.effective - 3.1673).abs() < 1e-4, "{}", s.effective);
         assert!((s.chi - 3.0847).abs() < 1e-4, "{}", s.chi);

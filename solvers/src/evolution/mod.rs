@@ -1,5 +1,6 @@
-//! The loop that evolutionary searches for fronts share: parents win tournaments, children are crossed and mutated, and of
-//! both the fittest survive. What is fit is the [`Survival`]'s to say. Memory is reused from generation to generation.
+//! Main loop of the evolutionary solvers for Pareto fronts: tournament selection, crossover, mutation, and survival of
+//! the fittest among parents and children. The trait [`Survival`] defines fitness. Memory is reused between
+//! generations.
 
 mod mating;
 
@@ -10,36 +11,36 @@ use mops_core::{Evaluation, FEASIBLE, Halt, Objective, Oracle, Progress, Shape, 
 use crate::start::latin_hypercube;
 use crate::variation::Variation;
 
-/// Points, with objectives and violations.
+/// Points with objectives and violations.
 #[derive(Debug, Clone, Default)]
 pub struct Pool {
     /// Number of objectives.
     pub m: usize,
     /// Points of the unit box.
     pub points: Vec<Vec<f64>>,
-    /// Weighted scaled values to be minimised, `m` per point; infinite for a failed one.
+    /// Weighted scaled values to be minimised, `m` per point; infinite for a failed point.
     pub objectives: Vec<f64>,
-    /// The largest violation of a constraint; 0 for a feasible point, infinite for a failed one.
+    /// Largest constraint violation; 0 for a feasible point, infinite for a failed one.
     pub violations: Vec<f64>,
 }
 
 impl Pool {
-    /// Number of points.
+    /// Returns the number of points.
     pub fn len(&self) -> usize {
         self.violations.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no points.
     pub fn is_empty(&self) -> bool {
         self.violations.is_empty()
     }
 
-    /// Objectives of a point.
+    /// Returns the objectives of a point.
     pub fn row(&self, i: usize) -> &[f64] {
         &self.objectives[i * self.m..(i + 1) * self.m]
     }
 
-    /// Takes the values of evaluations; their points are already here.
+    /// Appends the values of evaluations whose points are already in the pool.
     fn append(&mut self, shape: &Shape, answers: &[Evaluation]) {
         for answer in answers {
             let violation = answer.merit.violation;
@@ -54,19 +55,19 @@ impl Pool {
     }
 }
 
-/// Who survives.
+/// Environmental selection and tournament preference.
 pub trait Survival: Send {
-    /// Before the first generation; `m` objectives. Returns the number of members.
+    /// Prepares for `m` objectives, before the first generation, and returns the population size.
     fn begin(&mut self, m: usize) -> usize;
 
-    /// Chooses `keep` of the pool, the fittest first where they have an order.
+    /// Selects `keep` points of the pool, the fittest first if they are ordered.
     fn survive(&mut self, pool: &Pool, keep: usize, random: &mut Stream) -> &[u32];
 
-    /// Which of two survivors, by their places among those chosen, wins a tournament.
+    /// Compares two survivors, given by their positions in the selection, for a tournament.
     fn prefers(&self, a: usize, b: usize) -> Ordering;
 }
 
-/// An evolutionary search for a front.
+/// Evolutionary search for a Pareto front.
 pub struct Evolution<S> {
     survival: S,
     variation: fn(usize) -> Variation,
@@ -80,13 +81,13 @@ struct State {
     size: usize,
     members: Pool,
     children: Vec<Vec<f64>>,
-    /// Memory for the next generation.
+    /// Buffer for the next generation.
     next: Pool,
     generation: usize,
 }
 
 impl<S: Survival> Evolution<S> {
-    /// A search of so many generations.
+    /// Creates a search with a number of generations.
     pub fn new(survival: S, variation: fn(usize) -> Variation, generations: usize) -> Self {
         Self { survival, variation, generations, state: None }
     }
@@ -98,7 +99,7 @@ impl<S: Survival> Solver for Evolution<S> {
         if shape.objective == Objective::Each && objectives > 0 {
             return Ok(());
         }
-        Err("it looks for a front: say `objective = \"each\"` in the study and minimise a criterion, or take `cma-es`"
+        Err("`nsga2` and `nsga3` search for a Pareto front: set objective = \"each\" in [study] and minimise a criterion, or use `cma-es`"
             .into())
     }
 
@@ -123,7 +124,7 @@ impl<S: Survival> Solver for Evolution<S> {
             members,
             generation: 0,
         });
-        self.keep_fittest();
+        self.select_survivors();
         Ok(())
     }
 
@@ -137,25 +138,25 @@ impl<S: Survival> Solver for Evolution<S> {
         let answers = oracle.evaluate(&state.children)?;
         state.members.points.append(&mut state.children);
         state.members.append(oracle.shape(), &answers);
-        self.keep_fittest();
+        self.select_survivors();
         Ok(Progress::Continue)
     }
 
-    /// Those of the last whole generation.
+    /// Returns the last complete generation.
     fn members(&self) -> &[Vec<f64>] {
         self.state.as_ref().map_or(&[], |state| &state.members.points)
     }
 }
 
 impl<S: Survival> Evolution<S> {
-    /// Lets the fittest survive; what is left over becomes memory for children.
-    fn keep_fittest(&mut self) {
+    /// Selects the survivors; the memory of the other points is reused for children.
+    fn select_survivors(&mut self) {
         let Some(state) = &mut self.state else { return };
-        let chosen = self.survival.survive(&state.members, state.size, &mut state.random);
+        let survivors = self.survival.survive(&state.members, state.size, &mut state.random);
         let (all, next) = (&mut state.members, &mut state.next);
         next.objectives.clear();
         next.violations.clear();
-        for &i in chosen {
+        for &i in survivors {
             let i = i as usize;
             next.objectives.extend_from_slice(&all.objectives[i * all.m..(i + 1) * all.m]);
             next.violations.push(all.violations[i]);
@@ -166,12 +167,12 @@ impl<S: Survival> Evolution<S> {
     }
 }
 
-/// Places of the feasible points and of the others, those by their violation.
-pub fn by_feasibility(pool: &Pool, feasible: &mut Vec<u32>, others: &mut Vec<u32>) {
+/// Splits the pool into feasible and infeasible points, the latter in order of violation.
+pub fn by_feasibility(pool: &Pool, feasible: &mut Vec<u32>, infeasible: &mut Vec<u32>) {
     feasible.clear();
-    others.clear();
+    infeasible.clear();
     for (i, &violation) in (0_u32..).zip(&pool.violations) {
-        if violation == 0.0 { feasible.push(i) } else { others.push(i) }
+        if violation == 0.0 { feasible.push(i) } else { infeasible.push(i) }
     }
-    others.sort_by(|&a, &b| pool.violations[a as usize].total_cmp(&pool.violations[b as usize]));
+    infeasible.sort_by(|&a, &b| pool.violations[a as usize].total_cmp(&pool.violations[b as usize]));
 }

@@ -1,33 +1,33 @@
-//! Which points a search may move to where constraints count: a progressive barrier.
+//! Progressive barrier: acceptance of points under constraints.
 
 use mops_core::{FEASIBLE, Merit};
 
-/// A violation up to which a constraint holds for the search: well below what the user is granted, so that a point that spends
-/// some of that is not the best feasible one.
-const HOLDS: f64 = 1e-9;
+/// Violation up to which a constraint counts as satisfied. Far below the tolerance granted to the user, so that a point
+/// that exploits that tolerance is not the best feasible one.
+const FEASIBILITY_TOLERANCE: f64 = 1e-9;
 
-/// Share of what was promised that a step must keep.
-const SHARE: f64 = 0.1;
+/// Smallest ratio of actual to predicted reduction.
+const MIN_RATIO: f64 = 0.1;
 
-/// The least that a step which lessens the violation leaves of the limit, and of the way between both violations.
-const LEFT: f64 = 0.5;
+/// Lower bound of the new limit, as a fraction of the old limit and of the distance between both violations.
+const REDUCTION: f64 = 0.5;
 
-/// The first limit where less is violated at the start.
-const FIRST: f64 = 0.1;
+/// Minimum of the initial limit.
+const INITIAL_LIMIT: f64 = 0.1;
 
-/// By how much a step of the models lessens objective and violation; negative where it raises them.
+/// Reduction of objective and violation that the models predict for a step; negative for an increase.
 #[derive(Debug, Clone, Copy)]
-pub struct Promise {
-    /// Of the objective.
+pub struct PredictedReduction {
+    /// Reduction of the objective.
     pub objective: f64,
-    /// Of the violation.
+    /// Reduction of the violation.
     pub violation: f64,
 }
 
-impl Promise {
-    /// The share of it that a step has kept: of the violation, where with a given weight more was promised of it than of the
-    /// objective, else of the objective.
-    pub fn kept(&self, from: &Merit, to: &Merit, weight: f64) -> f64 {
+impl PredictedReduction {
+    /// Returns the ratio of actual to predicted reduction: of the violation if it dominates with the given weight,
+    /// otherwise of the objective.
+    pub fn reduction_ratio(&self, from: &Merit, to: &Merit, weight: f64) -> f64 {
         if weight * self.violation > self.objective {
             (violation(from) - violation(to)) / self.violation
         } else {
@@ -36,62 +36,69 @@ impl Promise {
     }
 }
 
-/// Violations above a limit are not admitted; the limit falls as the search goes on. Below it, objective and violation are
-/// judged apart, without a weight between them. The search moves to where the violation falls; where the objective falls and
-/// the violation does not rise; and, at the end of a step of the models that promised it, where the objective falls. It does
-/// not move to a feasible point that is no better than the best one.
+/// Progressive barrier. Points whose violation exceeds a limit are rejected; the limit decreases during the search.
 ///
-/// Source: C. Audet, J. E. Dennis, SIAM J. Optimization 20 (2009) 445-472 (progressive barrier); the third case: N. I. M.
-/// Gould, Ph. L. Toint, Mathematical Programming 122 (2010) 155-196, and for models without slopes Ph. R. Sampaio, Ph. L.
-/// Toint, Computational Optimization and Applications 61 (2015) 25-49 (funnel).
+/// Below the limit, objective and violation are compared separately, without a weight. A point is accepted in three
+/// cases:
+/// - The violation decreases.
+/// - The objective decreases and the violation does not increase.
+/// - The objective decreases after a model step that predicted it.
+///
+/// A feasible point is rejected if it is no better than the best feasible one.
+///
+/// Source: C. Audet, J. E. Dennis, SIAM J. Optimization 20 (2009) 445-472 (progressive barrier); third case: N. I. M.
+/// Gould, Ph. L. Toint, Mathematical Programming 122 (2010) 155-196, and, for derivative-free models, Ph. R. Sampaio,
+/// Ph. L. Toint, Computational Optimization and Applications 61 (2015) 25-49 (funnel).
 #[derive(Debug, Clone)]
 pub struct Barrier {
-    /// The largest violation that is admitted; never less than what the user is granted.
+    /// Largest accepted violation; at least the tolerance granted to the user.
     limit: f64,
-    /// The least objective of a feasible point.
-    feasible: f64,
+    /// Smallest objective of a feasible point.
+    best_feasible: f64,
 }
 
 impl Barrier {
-    /// The barrier of a search that begins at a point.
-    pub fn at(start: &Merit) -> Self {
-        let mut barrier = Self { limit: (1.5 * start.violation).max(FIRST), feasible: f64::INFINITY };
-        barrier.saw(start);
+    /// Creates the barrier of a search from the merit of its starting point.
+    pub fn new(start: &Merit) -> Self {
+        let mut barrier = Self { limit: (1.5 * start.violation).max(INITIAL_LIMIT), best_feasible: f64::INFINITY };
+        barrier.record(start);
         barrier
     }
 
-    /// Keeps the best feasible objective.
-    pub fn saw(&mut self, merit: &Merit) {
+    /// Updates the best feasible objective.
+    pub fn record(&mut self, merit: &Merit) {
         if violation(merit) == 0.0 {
-            self.feasible = self.feasible.min(merit.objective);
+            self.best_feasible = self.best_feasible.min(merit.objective);
         }
     }
 
-    /// Whether the search may move from one point to another, to which a step of the models has led that promised something.
-    pub fn admits(&self, from: &Merit, to: &Merit, promise: Option<Promise>) -> bool {
+    /// Returns true if the search may move from one point to another. `predicted` is the predicted reduction of a model
+    /// step.
+    pub fn accepts(&self, from: &Merit, to: &Merit, predicted: Option<PredictedReduction>) -> bool {
         let (before, after) = (violation(from), violation(to));
-        let fell = from.objective - to.objective;
-        if !(after <= self.limit && to.objective.is_finite()) || (after == 0.0 && to.objective >= self.feasible) {
+        let decrease = from.objective - to.objective;
+        if !(after <= self.limit && to.objective.is_finite()) || (after == 0.0 && to.objective >= self.best_feasible) {
             return false;
         }
         if after <= before {
-            return fell > 0.0 || after < before;
+            return decrease > 0.0 || after < before;
         }
-        promise.is_some_and(|promise| promise.objective > 0.0 && fell >= SHARE * promise.objective)
+        predicted.is_some_and(|predicted| predicted.objective > 0.0 && decrease >= MIN_RATIO * predicted.objective)
     }
 
-    /// Lowers the limit after a step that lessened the violation.
-    pub fn lower(&mut self, from: &Merit, to: &Merit) {
+    /// Lowers the limit after a step that reduced the violation.
+    pub fn tighten(&mut self, from: &Merit, to: &Merit) {
         let (before, after) = (violation(from), violation(to));
         if after < before {
-            self.limit = self.limit.min((LEFT * self.limit).max(after + LEFT * (before - after)).max(FEASIBLE));
+            self.limit =
+                self.limit.min((REDUCTION * self.limit).max(after + REDUCTION * (before - after)).max(FEASIBLE));
         }
     }
 }
 
-/// The violation, 0 where constraints hold.
+/// Returns the violation, 0 if all constraints are satisfied.
 pub fn violation(merit: &Merit) -> f64 {
-    if merit.violation <= HOLDS { 0.0 } else { merit.violation }
+    if merit.violation <= FEASIBILITY_TOLERANCE { 0.0 } else { merit.violation }
 }
 
 #[cfg(test)]
@@ -103,42 +110,45 @@ mod tests {
     }
 
     #[test]
-    fn a_feasible_search_stays_feasible_unless_the_models_promise_more() {
+    fn a_feasible_search_stays_feasible_unless_the_models_predict_more() {
         let start = merit(0.0, 1.0);
-        let barrier = Barrier::at(&start);
-        assert!(barrier.admits(&start, &merit(0.0, 0.9), None));
-        assert!(!barrier.admits(&start, &merit(0.0, 1.0), None));
-        assert!(!barrier.admits(&start, &merit(0.01, 0.5), None));
-        let promise = Some(Promise { objective: 0.6, violation: 0.0 });
-        assert!(barrier.admits(&start, &merit(0.01, 0.5), promise));
-        assert!(!barrier.admits(&start, &merit(0.01, 0.95), promise), "less than a tenth of the promise");
-        assert!(!barrier.admits(&start, &merit(0.2, 0.5), promise), "beyond the barrier");
-        assert!(!barrier.admits(&start, &Merit::FAILED, promise));
+        let barrier = Barrier::new(&start);
+        assert!(barrier.accepts(&start, &merit(0.0, 0.9), None));
+        assert!(!barrier.accepts(&start, &merit(0.0, 1.0), None));
+        assert!(!barrier.accepts(&start, &merit(0.01, 0.5), None));
+        let predicted = Some(PredictedReduction { objective: 0.6, violation: 0.0 });
+        assert!(barrier.accepts(&start, &merit(0.01, 0.5), predicted));
+        assert!(
+            !barrier.accepts(&start, &merit(0.01, 0.95), predicted),
+            "less than a tenth of the predicted reduction"
+        );
+        assert!(!barrier.accepts(&start, &merit(0.2, 0.5), predicted), "beyond the barrier");
+        assert!(!barrier.accepts(&start, &Merit::FAILED, predicted));
     }
 
     #[test]
-    fn less_violation_is_better_whatever_the_objective_but_not_than_what_is_feasible() {
-        let mut barrier = Barrier::at(&merit(0.0, 5.0));
-        let here = merit(0.05, 1.0);
-        assert!(barrier.admits(&here, &merit(0.04, 9.0), None));
-        assert!(barrier.admits(&here, &merit(0.0, 4.0), None));
-        assert!(!barrier.admits(&here, &merit(0.0, 5.0), None));
-        barrier.saw(&merit(0.0, 3.0));
-        assert!(!barrier.admits(&here, &merit(0.0, 4.0), None));
+    fn less_violation_is_better_for_any_objective_but_not_than_a_feasible_point() {
+        let mut barrier = Barrier::new(&merit(0.0, 5.0));
+        let current = merit(0.05, 1.0);
+        assert!(barrier.accepts(&current, &merit(0.04, 9.0), None));
+        assert!(barrier.accepts(&current, &merit(0.0, 4.0), None));
+        assert!(!barrier.accepts(&current, &merit(0.0, 5.0), None));
+        barrier.record(&merit(0.0, 3.0));
+        assert!(!barrier.accepts(&current, &merit(0.0, 4.0), None));
     }
 
     #[test]
-    fn the_barrier_falls_with_the_violation_and_ends_at_what_is_granted() {
-        let (start, promise) = (merit(4.0, 0.0), Some(Promise { objective: 1.0, violation: 0.0 }));
-        let mut barrier = Barrier::at(&start);
-        assert!(barrier.admits(&start, &merit(5.0, -1.0), promise));
-        barrier.lower(&start, &merit(0.0, 1.0));
-        assert!(!barrier.admits(&start, &merit(5.0, -1.0), promise));
+    fn the_barrier_falls_with_the_violation_down_to_the_tolerance() {
+        let (start, predicted) = (merit(4.0, 0.0), Some(PredictedReduction { objective: 1.0, violation: 0.0 }));
+        let mut barrier = Barrier::new(&start);
+        assert!(barrier.accepts(&start, &merit(5.0, -1.0), predicted));
+        barrier.tighten(&start, &merit(0.0, 1.0));
+        assert!(!barrier.accepts(&start, &merit(5.0, -1.0), predicted));
         for _ in 0..40 {
-            barrier.lower(&merit(2.0 * FEASIBLE, 0.0), &merit(0.0, 1.0));
+            barrier.tighten(&merit(2.0 * FEASIBLE, 0.0), &merit(0.0, 1.0));
         }
         let feasible = merit(0.0, 1.0);
-        assert!(barrier.admits(&feasible, &merit(FEASIBLE, 0.0), promise));
-        assert!(!barrier.admits(&feasible, &merit(2.0 * FEASIBLE, 0.0), promise));
+        assert!(barrier.accepts(&feasible, &merit(FEASIBLE, 0.0), predicted));
+        assert!(!barrier.accepts(&feasible, &merit(2.0 * FEASIBLE, 0.0), predicted));
     }
 }

@@ -1,11 +1,11 @@
-//! Pattern search: polls a pattern of points around the best one, and shrinks it where nothing is better.
+//! Pattern search: polls a pattern of points around the best one and shrinks it after an unsuccessful poll.
 
 mod barrier;
-mod known;
-mod least;
-mod models;
 mod pattern;
-mod points;
+mod point_buffer;
+mod quadratic_models;
+mod sample_set;
+mod trust_region_subproblem;
 
 use mops_core::math;
 use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
@@ -13,48 +13,51 @@ use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::definite::factored;
-use crate::rows::Rows;
+use crate::cholesky::with_cholesky;
+use crate::linearised_criteria::LinearisedCriteria;
+use crate::noise_detection::{Smoothness, detect_smoothness};
 use crate::sqp::SqpOptions;
 use crate::start::usable_start;
-use crate::texture::{Texture, texture};
-use barrier::{Barrier, Promise};
-use known::Known;
-use least::{Aim, Least};
-use models::Models;
+use barrier::{Barrier, PredictedReduction};
 use pattern::Pattern;
-use points::Points;
+use point_buffer::PointBuffer;
+use quadratic_models::QuadraticModels;
+use sample_set::SampleSet;
+use trust_region_subproblem::{PenalisedObjective, TrustRegionSubproblem};
 
-/// Mesh-adaptive direct search on the unit box: points of a pattern are polled around the best one, those first that look
-/// best; a better one is taken, else the pattern shrinks and turns. Ends at a mesh size. Needs no slopes: for criteria that
-/// jump, for noise, and for tuners with whole numbers or lists.
+/// Mesh-adaptive direct search (MADS) with quadratic models. Needs no gradients: for discontinuous or noisy criteria
+/// and for tuners with whole numbers or lists.
 ///
-/// Before it polls, it searches: every row has a quadratic model of its own through the points around the best one, and the
-/// point where the largest of the models is least is tried, inside a trust region. So the kink where two criteria meet is
-/// seen. Constraints are kept by a progressive barrier: objective and violation are judged apart, and what may be violated
-/// falls as the search goes on.
+/// Poll: the points of a pattern around the best point are evaluated, the most promising first. A better point is
+/// accepted; otherwise the pattern shrinks and changes its orientation. The search ends at a given pattern size.
 ///
-/// Where neither models nor pattern lead on although the models promise much, a row has kinks of its own: unless its values
-/// are noise, slopes by differences are followed from there (as `sqp` does), as long as they lead on.
+/// Search: before each poll, every criterion has a quadratic model of its own through the points around the best one.
+/// The point that minimises the largest model in a trust region is evaluated. So the search resolves the kinks
+/// (non-differentiable points) where two criteria intersect. A progressive barrier handles constraints: objective and
+/// violation are compared separately, and the permitted violation decreases.
 ///
-/// Source: C. Audet, J. E. Dennis, SIAM J. Optimization 17 (2006) 188-217 (MADS); turned patterns: M. A. Abramson, C. Audet,
-/// J. E. Dennis, S. Le Digabel, SIAM J. Optimization 20 (2009) 948-966; models: A. R. Conn, K. Scheinberg, L. N. Vicente,
-/// Introduction to Derivative-Free Optimization (SIAM 2009), chapters 5 and 10; one for every row: J. Larson, M. Menickelly,
-/// S. M. Wild, SIAM J. Optimization 26 (2016) 2540-2563; barrier: C. Audet, J. E. Dennis, SIAM J. Optimization 20 (2009)
-/// 445-472.
+/// Kinks inside a criterion: neither models nor polls succeed although the models predict a large decrease. Unless the
+/// values are noisy, the search then follows finite-difference gradients (as `sqp` does) as long as they give progress.
+///
+/// Source: C. Audet, J. E. Dennis, SIAM J. Optimization 17 (2006) 188-217 (MADS); rotated patterns: M. A. Abramson, C.
+/// Audet, J. E. Dennis, S. Le Digabel, SIAM J. Optimization 20 (2009) 948-966; models: A. R. Conn, K. Scheinberg, L. N.
+/// Vicente, Introduction to Derivative-Free Optimization (SIAM 2009), chapters 5 and 10; one model per criterion: J.
+/// Larson, M. Menickelly, S. M. Wild, SIAM J. Optimization 26 (2016) 2540-2563; barrier: C. Audet, J. E. Dennis, SIAM
+/// J. Optimization 20 (2009) 445-472.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct PatternSearchOptions {
-    /// First distance of the pattern's points, in the unit box.
+    /// Initial size of the pattern, in the unit box.
     #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub size: f64,
-    /// Distance at which the search ends.
+    /// Pattern size at which the search ends, in the unit box.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
-    /// Factor of the pattern's size where nothing in it is better. Less leads to the end sooner; more polls more often.
+    /// Factor of the pattern size after an unsuccessful poll. Smaller values end the search sooner; larger values poll
+    /// more often.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub shrink: f64,
-    /// Points that are evaluated at once: of a pattern, and beside a step of the models; 0 for whole patterns.
+    /// Number of points evaluated at once, in a poll and together with a model step; 0 for the whole pattern.
     #[schemars(range(max = 10_000))]
     pub batch: usize,
 }
@@ -69,79 +72,79 @@ impl SolverOptions for PatternSearchOptions {
     const KIND: &'static str = "pattern-search";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(PatternSearch { options: self.clone(), state: None, room: Room::default() })
+        Box::new(PatternSearch { options: self.clone(), state: None, workspace: Workspace::default() })
     }
 }
 
-/// The solver of the kind `pattern-search`.
+/// Solver of the kind `pattern-search`.
 struct PatternSearch {
     options: PatternSearchOptions,
     state: Option<State>,
-    room: Room,
+    workspace: Workspace,
 }
 
-/// Models of the rows, and memory that is used again from step to step.
+/// Models of the criteria and buffers that are reused between steps.
 #[derive(Default)]
-struct Room {
-    models: Models,
-    least: Least,
-    /// The known points around the best one, with their distances.
-    near: Vec<(f64, usize)>,
-    /// The trust region inside the box, in steps of the models.
+struct Workspace {
+    models: QuadraticModels,
+    subproblem: TrustRegionSubproblem,
+    /// Known points around the best one, with their distances.
+    neighbours: Vec<(f64, usize)>,
+    /// Trust region intersected with the box, in steps of the models.
     low: Vec<f64>,
     high: Vec<f64>,
-    /// Unknown points of the pattern, and their order: what looks best first.
-    pattern: Points,
+    /// Points of the pattern, and their order by model value, without the points already known.
+    pattern: PointBuffer,
     order: Vec<(f64, usize)>,
-    /// Points to ask for.
-    asked: Points,
+    /// Points to be evaluated next.
+    trial_points: PointBuffer,
     step: Vec<f64>,
     values: Vec<f64>,
-    /// Where the search stood.
-    before: Vec<f64>,
+    /// Previous position of the search.
+    previous: Vec<f64>,
     spread: Vec<f64>,
 }
 
 struct State {
     best: Evaluation,
-    known: Known,
-    /// Size of the pattern and of the trust region.
+    samples: SampleSet,
+    /// Size of the pattern and radius of the trust region.
     radius: f64,
-    /// What the models promised at last.
-    promised: f64,
-    /// Times that the search began again because of a kink.
-    restarts: i32,
-    /// Times that the search went back from an infeasible end.
-    returns: usize,
-    /// Steps of the models in a row that led nowhere.
-    failures: usize,
-    /// The best point at the last turn of the pattern.
-    turned_at: Option<Vec<f64>>,
-    /// Weight of the violation in the models' objective.
+    /// Last predicted reduction of the penalised objective.
+    predicted: f64,
+    /// Number of restarts because of a kink.
+    kink_restarts: i32,
+    /// Number of restarts after an infeasible end.
+    feasibility_restarts: usize,
+    /// Number of successive model steps without success.
+    model_failures: usize,
+    /// Best point at the last reorientation of the pattern.
+    point_at_last_reorientation: Option<Vec<f64>>,
+    /// Weight of the violation in the penalised objective of the models.
     penalty: f64,
-    /// What may be moved to.
+    /// Acceptance of points under constraints.
     barrier: Barrier,
-    unit: f64,
+    objective_scale: f64,
     pattern: Pattern,
-    /// Points that are evaluated at once; 0 for whole patterns.
+    /// Number of points evaluated at once; 0 for the whole pattern.
     batch: usize,
     random: Stream,
     spacing: Vec<f64>,
-    /// Whether the first pattern has been polled.
-    polled: bool,
-    /// What follows a kink inside a row, while it does.
-    slopes: Option<Box<dyn Solver>>,
-    /// What the best point was worth when slopes were last followed; infinite while they were not.
-    followed_from: f64,
-    /// What the rows are like; `None` while nobody wanted to know.
-    texture: Option<Texture>,
+    /// True after the first poll.
+    has_polled: bool,
+    /// Gradient-based solver, while it follows a kink inside a criterion.
+    gradient_solver: Option<Box<dyn Solver>>,
+    /// Penalised objective at the last start of the gradient-based solver; infinite before the first.
+    gradient_start_value: f64,
+    /// Smoothness of the criteria; `None` before it is needed.
+    smoothness: Option<Smoothness>,
 }
 
-impl Room {
-    /// Adds up to `count` points of the pattern to what is asked, in their order, from the one at `first` on.
-    fn ask(&mut self, first: usize, count: usize) {
+impl Workspace {
+    /// Adds up to `count` points of the ranked pattern to the trial points, starting at rank `first`.
+    fn push_pattern_points(&mut self, first: usize, count: usize) {
         for &(_, i) in self.order.iter().skip(first).take(count) {
-            self.asked.push(self.pattern.as_slice()[i].iter().copied());
+            self.trial_points.push(self.pattern.as_slice()[i].iter().copied());
         }
     }
 }
@@ -157,70 +160,71 @@ impl Solver for PatternSearch {
         let best = oracle.evaluate(&[start])?.pop().expect("one point, one answer");
         let n = best.point.len();
         let scaled = best.scaled.as_ref().expect("the start is usable");
-        let mut known = Known::new(n, scaled.len());
-        known.remember(&best.point, scaled);
-        self.room = Room { models: Models::new(n, scaled.len()), ..Room::default() };
+        let mut samples = SampleSet::new(n, scaled.len());
+        samples.insert(&best.point, scaled);
+        self.workspace = Workspace { models: QuadraticModels::new(n, scaled.len()), ..Workspace::default() };
         self.state = Some(State {
-            unit: Rows::of_values(oracle.shape(), scaled).unit(),
-            known,
-            turned_at: None,
+            objective_scale: LinearisedCriteria::from_values(oracle.shape(), scaled).objective_scale(),
+            samples,
+            point_at_last_reorientation: None,
             radius: self.options.size,
-            failures: 0,
-            promised: 0.0,
-            restarts: 0,
-            returns: 0,
+            model_failures: 0,
+            predicted: 0.0,
+            kink_restarts: 0,
+            feasibility_restarts: 0,
             penalty: 10.0,
-            barrier: Barrier::at(&best.merit),
-            pattern: Pattern::straight(n),
+            barrier: Barrier::new(&best.merit),
+            pattern: Pattern::coordinate_axes(n),
             batch: self.options.batch,
             random: oracle.stream("pattern-search"),
             spacing: oracle.shape().spacing.clone(),
-            polled: false,
-            slopes: None,
-            followed_from: f64::INFINITY,
-            texture: None,
+            has_polled: false,
+            gradient_solver: None,
+            gradient_start_value: f64::INFINITY,
+            smoothness: None,
             best,
         });
         Ok(())
     }
 
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        let Self { options, state, room } = self;
+        let Self { options, state, workspace } = self;
         let Some(state) = state else { return Ok(Progress::Stalled) };
         if state.best.point.is_empty() {
             return Ok(Progress::Converged);
         }
-        if state.slopes.is_some() {
-            state.follow(oracle)?;
+        if state.gradient_solver.is_some() {
+            state.gradient_step(oracle)?;
             return Ok(Progress::Continue);
         }
-        state.forget();
-        if state.polled && state.search(oracle, room)? {
+        state.drop_oldest();
+        if state.has_polled && state.search(oracle, workspace)? {
             return Ok(Progress::Continue);
         }
-        let better = state.poll(oracle, room)?;
-        state.polled = true;
-        if better || state.meets_kink(oracle)? {
+        let better = state.poll(oracle, workspace)?;
+        state.has_polled = true;
+        if better || state.start_gradient_phase(oracle)? {
             return Ok(Progress::Continue);
         }
         if state.radius > options.tolerance && !state.is_on_finest_grid() {
             state.shrink(options.shrink);
             return Ok(Progress::Continue);
         }
-        // The models still promise what the problem does not keep: a kink inside a row. Again, with more turns on the way.
-        let worth = state.worth(oracle.shape(), &state.best);
-        if state.promised > KEPT * worth.abs() && state.restarts < RESTARTS {
-            state.restarts += 1;
+        // The predicted reduction is not achieved: a kink inside a criterion. Restart with a slower shrinkage and more
+        // orientations.
+        let penalised_value = state.penalised_value(oracle.shape(), &state.best);
+        if state.predicted > FINAL_KINK_THRESHOLD * penalised_value.abs() && state.kink_restarts < MAX_KINK_RESTARTS {
+            state.kink_restarts += 1;
             state.radius = options.shrink * options.size;
             return Ok(Progress::Continue);
         }
-        // An infeasible end: on from the best feasible point, or with a wide pattern from here.
-        if !state.best.merit.is_feasible() && state.returns < RETURNS {
-            state.returns += 1;
+        // Infeasible end: continue from the best feasible point, or with a wide pattern from here.
+        if !state.best.merit.is_feasible() && state.feasibility_restarts < MAX_FEASIBILITY_RESTARTS {
+            state.feasibility_restarts += 1;
             if let Some(best) = oracle.best().filter(|best| best.merit.is_feasible()) {
-                state.adopt(best);
+                state.move_to(best);
             }
-            state.followed_from = f64::INFINITY;
+            state.gradient_start_value = f64::INFINITY;
             state.radius = options.size;
             return Ok(Progress::Continue);
         }
@@ -228,209 +232,214 @@ impl Solver for PatternSearch {
     }
 }
 
-/// A promise at the end, relative to what the best point is worth, that tells of a kink.
-const KEPT: f64 = 1e-10;
+/// Predicted reduction at the end of the search, relative to the penalised objective, that indicates a kink.
+const FINAL_KINK_THRESHOLD: f64 = 1e-10;
 
-/// The same while the search goes on.
-const BROKEN: f64 = 1e-4;
+/// Predicted reduction during the search, relative to the penalised objective, that indicates a kink.
+const KINK_THRESHOLD: f64 = 1e-4;
 
-/// First radius of the steps along slopes, in those of the pattern.
-const FOLLOWED: f64 = 3.0;
+/// Initial trust-region radius of the gradient-based solver, in pattern sizes.
+const GRADIENT_RADIUS_FACTOR: f64 = 3.0;
 
-/// Times that the search begins again because of a kink.
-const RESTARTS: i32 = 4;
+/// Maximum number of restarts because of a kink.
+const MAX_KINK_RESTARTS: i32 = 4;
 
-/// Times that the search goes back from an infeasible end.
-const RETURNS: usize = 3;
+/// Maximum number of restarts after an infeasible end.
+const MAX_FEASIBILITY_RESTARTS: usize = 3;
 
-/// Steps of the models in a row that lead nowhere before the pattern is polled.
-const FAILURES: usize = 2;
+/// Number of successive model steps without success before a poll.
+const MAX_MODEL_FAILURES: usize = 2;
 
 impl State {
-    fn aim<'a>(&self, shape: &'a Shape) -> Aim<'a> {
-        Aim { shape, unit: self.unit, penalty: self.penalty }
+    fn penalised_objective<'a>(&self, shape: &'a Shape) -> PenalisedObjective<'a> {
+        PenalisedObjective { shape, objective_scale: self.objective_scale, penalty: self.penalty }
     }
 
-    fn worth(&self, shape: &Shape, evaluation: &Evaluation) -> f64 {
-        evaluation.scaled.as_ref().map_or(f64::INFINITY, |scaled| self.aim(shape).worth(scaled))
+    fn penalised_value(&self, shape: &Shape, evaluation: &Evaluation) -> f64 {
+        evaluation.scaled.as_ref().map_or(f64::INFINITY, |scaled| self.penalised_objective(shape).value(scaled))
     }
 
-    /// Evaluates points, keeps their values, and moves to the best if the barrier admits it; `true` when it moved. What is
-    /// promised is promised of the first point.
-    fn visit(&mut self, oracle: &mut dyn Oracle, points: &[Vec<f64>], promise: Option<Promise>) -> Result<bool, Halt> {
-        let before = self.best.merit;
+    /// Evaluates and stores points, and moves to the best one that the barrier accepts; returns true after a move. The
+    /// predicted reduction applies to the first point.
+    fn evaluate_and_move(
+        &mut self,
+        oracle: &mut dyn Oracle,
+        points: &[Vec<f64>],
+        predicted: Option<PredictedReduction>,
+    ) -> Result<bool, Halt> {
+        let previous = self.best.merit;
         let mut moved = false;
         for (index, answer) in oracle.evaluate(points)?.into_iter().enumerate() {
-            self.remember(&answer);
-            if self.barrier.admits(&self.best.merit, &answer.merit, promise.filter(|_| index == 0)) {
-                self.barrier.saw(&answer.merit);
+            self.record(&answer);
+            if self.barrier.accepts(&self.best.merit, &answer.merit, predicted.filter(|_| index == 0)) {
+                self.barrier.record(&answer.merit);
                 self.best = answer;
                 moved = true;
             }
         }
         if moved {
-            self.barrier.lower(&before, &self.best.merit);
+            self.barrier.tighten(&previous, &self.best.merit);
         }
         Ok(moved)
     }
 
-    fn remember(&mut self, answer: &Evaluation) {
+    fn record(&mut self, answer: &Evaluation) {
         if let Some(scaled) = &answer.scaled {
-            self.known.remember(&answer.point, scaled);
+            self.samples.insert(&answer.point, scaled);
         }
     }
 
-    /// Goes on from a point that others have found.
-    fn adopt(&mut self, best: &Evaluation) {
+    /// Continues from a point found by another solver.
+    fn move_to(&mut self, best: &Evaluation) {
         self.best = best.clone();
-        self.barrier.saw(&best.merit);
-        self.remember(best);
+        self.barrier.record(&best.merit);
+        self.record(best);
     }
 
-    /// Forgets the oldest points where there are many.
-    fn forget(&mut self) {
-        if self.known.forget()
+    /// Drops the oldest points if there are many.
+    fn drop_oldest(&mut self) {
+        if self.samples.drop_oldest()
             && let Some(scaled) = &self.best.scaled
         {
-            self.known.remember(&self.best.point, scaled);
+            self.samples.insert(&self.best.point, scaled);
         }
     }
 
-    /// Tries where the models are least, and beside it as much of the pattern as fills a batch; `true` while that is worth
-    /// going on with, `false` when it is time to poll.
-    fn search(&mut self, oracle: &mut dyn Oracle, room: &mut Room) -> Result<bool, Halt> {
-        if self.spacing.iter().all(|&spacing| spacing > 0.0) || !self.fit(room) {
+    /// Evaluates the minimiser of the models, and points of the pattern to fill a batch. Returns false when a poll is
+    /// due.
+    fn search(&mut self, oracle: &mut dyn Oracle, workspace: &mut Workspace) -> Result<bool, Halt> {
+        if self.spacing.iter().all(|&spacing| spacing > 0.0) || !self.fit(workspace) {
             return Ok(false);
         }
         let shape = oracle.shape();
-        let mut aim = self.aim(shape);
-        let found = self.least(&mut aim, room);
-        if aim.penalty > self.penalty {
-            self.penalty = aim.penalty;
-            // Nothing is worth what it was.
-            self.followed_from = f64::INFINITY;
+        let mut objective = self.penalised_objective(shape);
+        let found = self.solve_subproblem(&mut objective, workspace);
+        if objective.penalty > self.penalty {
+            self.penalty = objective.penalty;
+            // A new penalty makes earlier values incomparable.
+            self.gradient_start_value = f64::INFINITY;
         }
         if !found {
-            self.promised = 0.0;
-            return self.mend(oracle, room);
+            self.predicted = 0.0;
+            return self.improve_geometry(oracle, workspace);
         }
-        let promise = aim.promise(room.models.constants(), room.least.values());
-        let weight = aim.weight();
-        self.promised = aim.worth_of(&promise);
-        let y = room.least.step();
+        let reduction = objective.predicted_reduction(workspace.models.constants(), workspace.subproblem.values());
+        let relative_penalty = objective.relative_penalty();
+        self.predicted = objective.penalised_reduction(&reduction);
+        let y = workspace.subproblem.step();
         let length = self.radius * y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
-        let floor = 1e-14 * self.worth(shape, &self.best).abs();
-        room.asked.clear();
-        room.asked.push(self.at(y));
-        if self.promised <= floor || room.asked.as_slice()[0] == self.best.point {
-            return self.mend(oracle, room);
+        let floor = 1e-14 * self.penalised_value(shape, &self.best).abs();
+        workspace.trial_points.clear();
+        workspace.trial_points.push(self.point_at(y));
+        if self.predicted <= floor || workspace.trial_points.as_slice()[0] == self.best.point {
+            return self.improve_geometry(oracle, workspace);
         }
-        self.fill(shape, room);
-        let before = self.best.merit;
-        let moved = self.visit(oracle, room.asked.as_slice(), Some(promise))?;
-        let ratio = if moved { promise.kept(&before, &self.best.merit, weight) } else { 0.0 };
+        self.fill_batch(shape, workspace);
+        let previous = self.best.merit;
+        let moved = self.evaluate_and_move(oracle, workspace.trial_points.as_slice(), Some(reduction))?;
+        let ratio = if moved { reduction.reduction_ratio(&previous, &self.best.merit, relative_penalty) } else { 0.0 };
         if moved {
-            self.failures = 0;
-        } else if self.mend(oracle, room)? {
-            // The models were wrong for want of points.
+            self.model_failures = 0;
+        } else if self.improve_geometry(oracle, workspace)? {
+            // The models were inaccurate because of too few points.
             return Ok(true);
         } else {
-            self.failures += 1;
+            self.model_failures += 1;
         }
         if ratio >= 0.7 {
             self.radius = self.radius.max((2.0 * length).min(0.5));
         } else if ratio < 0.1 {
             self.radius = self.radius.min(length).max(0.1 * self.radius);
         }
-        Ok(self.failures < FAILURES)
+        Ok(self.model_failures < MAX_MODEL_FAILURES)
     }
 
-    /// Lays models through the known points around the best one; `false` where these do not determine them.
-    fn fit(&self, room: &mut Room) -> bool {
-        self.known.near(&self.best.point, self.radius, &mut room.near);
-        room.models.fit(&self.known, &room.near, &self.best.point, self.radius)
+    /// Fits the models to the known points around the best one; returns false if these do not determine them.
+    fn fit(&self, workspace: &mut Workspace) -> bool {
+        self.samples.neighbours(&self.best.point, self.radius, &mut workspace.neighbours);
+        workspace.models.fit(&self.samples, &workspace.neighbours, &self.best.point, self.radius)
     }
 
-    /// Finds where the models are least, in the trust region and inside the box.
-    fn least(&self, aim: &mut Aim, room: &mut Room) -> bool {
-        room.low.clear();
-        room.low.extend(self.best.point.iter().map(|u| (-u / self.radius).max(-1.0)));
-        room.high.clear();
-        room.high.extend(self.best.point.iter().map(|u| ((1.0 - u) / self.radius).min(1.0)));
-        room.least.find(aim, &room.models, &room.low, &room.high)
+    /// Minimises the models in the trust region, inside the box.
+    fn solve_subproblem(&self, objective: &mut PenalisedObjective, workspace: &mut Workspace) -> bool {
+        workspace.low.clear();
+        workspace.low.extend(self.best.point.iter().map(|u| (-u / self.radius).max(-1.0)));
+        workspace.high.clear();
+        workspace.high.extend(self.best.point.iter().map(|u| ((1.0 - u) / self.radius).min(1.0)));
+        workspace.subproblem.solve(objective, &workspace.models, &workspace.low, &workspace.high)
     }
 
-    /// Adds a point in the direction in which those that the models go through tell least; `false` where they tell enough.
-    fn mend(&mut self, oracle: &mut dyn Oracle, room: &mut Room) -> Result<bool, Halt> {
-        let Room { models, step, values, spread, .. } = &mut *room;
-        if !find_unknown(models, self.best.point.len(), spread, step) {
+    /// Evaluates a point in the direction that the interpolation points cover least; returns false if their geometry is
+    /// adequate.
+    fn improve_geometry(&mut self, oracle: &mut dyn Oracle, workspace: &mut Workspace) -> Result<bool, Halt> {
+        let Workspace { models, step, values, spread, .. } = &mut *workspace;
+        if !least_sampled_direction(models, self.best.point.len(), spread, step) {
             return Ok(false);
         }
-        let aim = self.aim(oracle.shape());
-        let mut worth = |step: &[f64]| {
+        let objective = self.penalised_objective(oracle.shape());
+        let mut penalised_value = |step: &[f64]| {
             models.values(step, values);
-            aim.worth(values)
+            objective.value(values)
         };
-        let there = worth(step);
+        let there = penalised_value(step);
         step.iter_mut().for_each(|d| *d = -*d);
-        if there <= worth(step) {
+        if there <= penalised_value(step) {
             step.iter_mut().for_each(|d| *d = -*d);
         }
-        room.asked.clear();
-        room.asked.push(self.at(&room.step));
-        if self.known.contains(&room.asked.as_slice()[0]) {
+        workspace.trial_points.clear();
+        workspace.trial_points.push(self.point_at(&workspace.step));
+        if self.samples.contains(&workspace.trial_points.as_slice()[0]) {
             return Ok(false);
         }
-        let count = self.known.len();
-        self.fill(oracle.shape(), room);
-        self.visit(oracle, room.asked.as_slice(), None)?;
-        Ok(self.known.len() > count)
+        let count = self.samples.len();
+        self.fill_batch(oracle.shape(), workspace);
+        self.evaluate_and_move(oracle, workspace.trial_points.as_slice(), None)?;
+        Ok(self.samples.len() > count)
     }
 
-    /// Polls the pattern, what looks best first; `true` when a point was better.
-    fn poll(&mut self, oracle: &mut dyn Oracle, room: &mut Room) -> Result<bool, Halt> {
-        self.failures = 0;
-        self.fit(room);
-        self.lay_pattern(oracle.shape(), room);
-        let count = room.order.len();
-        // The first pattern is what the first models go through.
-        let batch = if self.polled && self.batch > 0 { self.batch } else { count.max(1) };
+    /// Polls the pattern, the most promising points first; returns true if a point was accepted.
+    fn poll(&mut self, oracle: &mut dyn Oracle, workspace: &mut Workspace) -> Result<bool, Halt> {
+        self.model_failures = 0;
+        self.fit(workspace);
+        self.rank_pattern(oracle.shape(), workspace);
+        let count = workspace.order.len();
+        // The first models interpolate the whole first pattern.
+        let batch = if self.has_polled && self.batch > 0 { self.batch } else { count.max(1) };
         for first in (0..count).step_by(batch) {
-            room.asked.clear();
-            room.ask(first, batch);
-            room.before.clone_from(&self.best.point);
-            if self.visit(oracle, room.asked.as_slice(), None)? {
-                self.run_on(oracle, room)?;
+            workspace.trial_points.clear();
+            workspace.push_pattern_points(first, batch);
+            workspace.previous.clone_from(&self.best.point);
+            if self.evaluate_and_move(oracle, workspace.trial_points.as_slice(), None)? {
+                self.extrapolate(oracle, workspace)?;
                 return Ok(true);
             }
         }
         Ok(false)
     }
 
-    /// Adds as much of the pattern to what is asked as fills a batch, what looks best first.
-    fn fill(&self, shape: &Shape, room: &mut Room) {
-        if room.asked.len() < self.batch {
-            self.lay_pattern(shape, room);
-            room.ask(0, self.batch - room.asked.len());
+    /// Fills the batch with the most promising points of the pattern.
+    fn fill_batch(&self, shape: &Shape, workspace: &mut Workspace) {
+        if workspace.trial_points.len() < self.batch {
+            self.rank_pattern(shape, workspace);
+            workspace.push_pattern_points(0, self.batch - workspace.trial_points.len());
         }
     }
 
-    /// Collects the unknown points of the pattern around the best one, in the order in which they look best to the models, if
-    /// these were fitted.
-    fn lay_pattern(&self, shape: &Shape, room: &mut Room) {
-        let Room { models, pattern, order, step, values, .. } = room;
+    /// Collects the unknown points of the pattern around the best one, ranked by the models if these are fitted.
+    fn rank_pattern(&self, shape: &Shape, workspace: &mut Workspace) {
+        let Workspace { models, pattern, order, step, values, .. } = workspace;
         self.pattern.points(&self.best.point, self.radius, &self.spacing, pattern);
-        let aim = self.aim(shape);
+        let objective = self.penalised_objective(shape);
         order.clear();
         for (i, point) in pattern.as_slice().iter().enumerate() {
-            if self.known.contains(point) {
+            if self.samples.contains(point) {
                 continue;
             }
-            if models.are_fitted() {
+            if models.is_fitted() {
                 step.clear();
                 step.extend(point.iter().zip(&self.best.point).map(|(a, b)| (a - b) / self.radius));
                 models.values(step, values);
-                order.push((aim.worth(values), i));
+                order.push((objective.value(values), i));
             } else {
                 order.push((0.0, i));
             }
@@ -438,82 +447,85 @@ impl State {
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     }
 
-    /// Goes on in the direction of a success, twice as far each time, while that is better.
-    fn run_on(&mut self, oracle: &mut dyn Oracle, room: &mut Room) -> Result<(), Halt> {
+    /// Continues in the direction of a successful poll, doubling the step as long as points are accepted.
+    fn extrapolate(&mut self, oracle: &mut dyn Oracle, workspace: &mut Workspace) -> Result<(), Halt> {
         loop {
             let here = &self.best.point;
-            room.step.clear();
-            room.step.extend(here.iter().zip(&room.before).map(|(here, before)| 2.0 * (here - before) / self.radius));
-            room.asked.clear();
+            workspace.step.clear();
+            workspace.step.extend(
+                here.iter().zip(&workspace.previous).map(|(here, previous)| 2.0 * (here - previous) / self.radius),
+            );
+            workspace.trial_points.clear();
             for _ in 0..self.batch.max(1) {
-                let is_new = |point: &[f64], before: &[Vec<f64>]| {
-                    point != here && before.last().is_none_or(|last| point != last)
+                let is_new = |point: &[f64], previous: &[Vec<f64>]| {
+                    point != here && previous.last().is_none_or(|last| point != last)
                 };
-                room.asked.push_if(self.at(&room.step), is_new);
-                room.step.iter_mut().for_each(|step| *step *= 2.0);
+                workspace.trial_points.push_if(self.point_at(&workspace.step), is_new);
+                workspace.step.iter_mut().for_each(|step| *step *= 2.0);
             }
-            if room.asked.len() == 0 {
+            if workspace.trial_points.len() == 0 {
                 return Ok(());
             }
-            room.before.clone_from(here);
-            // At the edge of the box few are left.
-            if room.asked.len() < self.batch {
-                self.fit(room);
-                self.fill(oracle.shape(), room);
+            workspace.previous.clone_from(here);
+            // Near the boundary of the box few points remain.
+            if workspace.trial_points.len() < self.batch {
+                self.fit(workspace);
+                self.fill_batch(oracle.shape(), workspace);
             }
-            if !self.visit(oracle, room.asked.as_slice(), None)? {
+            if !self.evaluate_and_move(oracle, workspace.trial_points.as_slice(), None)? {
                 return Ok(());
             }
         }
     }
 
-    /// Begins to follow slopes where the models promise what the problem does not keep; `false` where that is not so, where
-    /// slopes led nowhere the last time, and where they would tell of noise.
-    fn meets_kink(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
-        let worth = self.worth(oracle.shape(), &self.best);
-        let promising = self.promised > BROKEN * worth.abs();
-        let led_on = self.followed_from - worth > BROKEN * worth.abs();
-        if !promising || !led_on || self.spacing.iter().any(|&spacing| spacing > 0.0) {
+    /// Starts the gradient-based solver if the predicted reduction is not achieved. Returns false otherwise, if the
+    /// last start gave no progress, or if the criteria are noisy.
+    fn start_gradient_phase(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
+        let penalised_value = self.penalised_value(oracle.shape(), &self.best);
+        let promising = self.predicted > KINK_THRESHOLD * penalised_value.abs();
+        let was_useful = self.gradient_start_value - penalised_value > KINK_THRESHOLD * penalised_value.abs();
+        if !promising || !was_useful || self.spacing.iter().any(|&spacing| spacing > 0.0) {
             return Ok(false);
         }
-        if self.texture.is_none() {
-            self.texture = Some(texture(oracle, &self.best.point)?);
+        if self.smoothness.is_none() {
+            self.smoothness = Some(detect_smoothness(oracle, &self.best.point)?);
         }
-        if self.texture == Some(Texture::Noisy) {
+        if self.smoothness == Some(Smoothness::Noisy) {
             return Ok(false);
         }
-        let mut slopes = SqpOptions { radius: FOLLOWED * self.radius, ..Default::default() }.build();
-        slopes.begin(oracle, &self.best.point)?;
-        self.slopes = Some(slopes);
-        self.followed_from = worth;
+        let mut gradient_solver =
+            SqpOptions { radius: GRADIENT_RADIUS_FACTOR * self.radius, ..Default::default() }.build();
+        gradient_solver.begin(oracle, &self.best.point)?;
+        self.gradient_solver = Some(gradient_solver);
+        self.gradient_start_value = penalised_value;
         Ok(true)
     }
 
-    /// A step along slopes.
-    fn follow(&mut self, oracle: &mut dyn Oracle) -> Result<(), Halt> {
-        let Some(slopes) = &mut self.slopes else { return Ok(()) };
-        if slopes.step(oracle)? != Progress::Continue {
-            self.slopes = None;
+    /// Does one step of the gradient-based solver.
+    fn gradient_step(&mut self, oracle: &mut dyn Oracle) -> Result<(), Halt> {
+        let Some(gradient_solver) = &mut self.gradient_solver else { return Ok(()) };
+        if gradient_solver.step(oracle)? != Progress::Continue {
+            self.gradient_solver = None;
         }
         let shape = oracle.shape();
         if let Some(best) = oracle.best()
-            && self.worth(shape, best) < self.worth(shape, &self.best)
+            && self.penalised_value(shape, best) < self.penalised_value(shape, &self.best)
         {
-            self.adopt(best);
+            self.move_to(best);
         }
         Ok(())
     }
 
-    /// Shrinks and turns the pattern; by less after every restart.
+    /// Shrinks and reorients the pattern; the shrinkage is weaker after every restart.
     fn shrink(&mut self, factor: f64) {
-        self.radius *= math::powf(factor, math::powi(0.5, self.restarts));
-        // Where the search went tells where it may go on.
-        match self.turned_at.replace(self.best.point.clone()) {
-            Some(before) if before != self.best.point => {
-                let went = DVector::from_fn(before.len(), |j, _| self.best.point[j] - before[j]);
-                self.pattern.align(&went);
+        self.radius *= math::powf(factor, math::powi(0.5, self.kink_restarts));
+        // Align the pattern with the last displacement.
+        match self.point_at_last_reorientation.replace(self.best.point.clone()) {
+            Some(previous) if previous != self.best.point => {
+                let displacement = DVector::from_fn(previous.len(), |j, _| self.best.point[j] - previous[j]);
+                self.pattern.align(&displacement);
             }
-            _ => self.pattern.turn(&mut self.random),
+            _ => self.pattern.reorient_randomly(&mut self.random),
         }
     }
 
@@ -521,8 +533,8 @@ impl State {
         self.spacing.iter().all(|&spacing| spacing > 0.0 && self.radius < 0.5 * spacing)
     }
 
-    /// The point after a step of the models, inside the box and on the grids.
-    fn at(&self, y: &[f64]) -> impl Iterator<Item = f64> {
+    /// Returns the point after a step of the models, inside the box and on the grids.
+    fn point_at(&self, y: &[f64]) -> impl Iterator<Item = f64> {
         let coordinate = |j: usize| {
             let u = (self.best.point[j] + self.radius * y[j]).clamp(0.0, 1.0);
             let spacing = self.spacing[j];
@@ -532,14 +544,21 @@ impl State {
     }
 }
 
-/// Finds the direction in which the points that the models go through are least spread, by inverse iteration; `false` where
-/// they are spread in all. It begins along no coordinate, and where two directions are spread about as little finds one between
+/// Computes, by inverse iteration, the direction in which the interpolation points are least spread. Returns false if
+/// they are spread in all directions.
+///
+/// The iteration does not start along a coordinate. For two directions with almost equal spread the result lies between
 /// them.
 ///
 /// Source: G. H. Golub, C. F. Van Loan, Matrix Computations, 4th edition (2013), section 7.6.1.
-fn find_unknown(models: &Models, n: usize, memory: &mut Vec<f64>, direction: &mut Vec<f64>) -> bool {
+fn least_sampled_direction(
+    models: &QuadraticModels,
+    n: usize,
+    memory: &mut Vec<f64>,
+    direction: &mut Vec<f64>,
+) -> bool {
     let spread = |spread: &mut DMatrix<f64>| {
-        spread.fill_diagonal(REGULARISED);
+        spread.fill_diagonal(REGULARISATION);
         for y in models.steps() {
             let length = y.iter().fold(1.0_f64, |most, y| most.max(y.abs()));
             let y = DVectorView::from_slice(y, n);
@@ -549,43 +568,43 @@ fn find_unknown(models: &Models, n: usize, memory: &mut Vec<f64>, direction: &mu
     direction.clear();
     direction.extend((0..n).map(|j| 1.0 / (1.0 + j as f64)));
     let mut direction = DVectorViewMut::from_slice(direction, n);
-    let least = factored(memory, n, spread, |factor| {
-        let mut least = f64::INFINITY;
+    let smallest = with_cholesky(memory, n, spread, |factor| {
+        let mut smallest = f64::INFINITY;
         for _ in 0..INVERSE_ITERATIONS {
             factor.solve_mut(&mut direction);
-            least = 1.0 / direction.norm();
-            direction *= least;
+            smallest = 1.0 / direction.norm();
+            direction *= smallest;
         }
-        least
+        smallest
     });
-    least.is_some_and(|least| least < SPREAD)
+    smallest.is_some_and(|smallest| smallest < MIN_SPREAD)
 }
 
-/// Inverse iterations for an unknown direction: enough where the next spread is twice as large, for six figures.
+/// Number of inverse iterations: gives six digits if the next larger spread is at least twice the smallest.
 const INVERSE_ITERATIONS: usize = 20;
 
-/// What is added to all sums of squared steps, so that their matrix has an inverse.
-const REGULARISED: f64 = 1e-9;
+/// Regularisation added to the sums of squared steps, so that their matrix is invertible.
+const REGULARISATION: f64 = 1e-9;
 
-/// A sum of squared steps along a direction below which that direction is unknown.
-const SPREAD: f64 = 0.3;
+/// Sum of squared steps along a direction below which that direction is not covered.
+const MIN_SPREAD: f64 = 0.3;
 
 #[cfg(test)]
 mod tests {
-    use super::models::tests::through;
+    use super::quadratic_models::tests::through;
     use super::*;
 
     #[test]
-    fn the_direction_across_points_near_a_line_is_unknown() {
+    fn the_direction_across_points_near_a_line_is_not_covered() {
         let flat = |_: &[f64; 2]| vec![1.0];
         let along = through(&[[0.0, 0.0], [1.0, 0.5], [-1.0, -0.5], [0.5, 0.3]], flat);
         let (mut memory, mut direction) = (Vec::new(), Vec::new());
-        assert!(find_unknown(&along, 2, &mut memory, &mut direction));
+        assert!(least_sampled_direction(&along, 2, &mut memory, &mut direction));
         assert!(
             (2.0 * direction[0] + direction[1]).abs() < 0.1 && math::hypot(direction[0], direction[1]) > 0.999,
             "{direction:?}"
         );
         let around = through(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], flat);
-        assert!(!find_unknown(&around, 2, &mut memory, &mut direction));
+        assert!(!least_sampled_direction(&around, 2, &mut memory, &mut direction));
     }
 }

@@ -1,25 +1,25 @@
-//! The pattern that is polled around the best point.
+//! Pattern of poll points around the best point.
 
 use mops_core::Stream;
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 
-use super::points::Points;
+use super::point_buffer::PointBuffer;
 
-/// Directions of a pattern, one per column, turned at random.
+/// Directions of the pattern, one per column, randomly oriented.
 #[derive(Debug, Clone)]
 pub struct Pattern {
     basis: DMatrix<f64>,
 }
 
 impl Pattern {
-    /// Along the coordinates.
-    pub fn straight(n: usize) -> Self {
+    /// Creates a pattern along the coordinate axes.
+    pub fn coordinate_axes(n: usize) -> Self {
         Self { basis: DMatrix::identity(n, n) }
     }
 
-    /// Turns the pattern by a random reflection `I - 2 v v'`.
-    pub fn turn(&mut self, random: &mut Stream) {
+    /// Reorients the pattern by a random reflection `I - 2 v v'`.
+    pub fn reorient_randomly(&mut self, random: &mut Stream) {
         let n = self.basis.nrows();
         let v = DVector::from_fn(n, |_, _| random.random_range(-1.0..1.0));
         if v.norm_squared() > 1e-6 {
@@ -27,36 +27,36 @@ impl Pattern {
         }
     }
 
-    /// Turns the pattern so that its first direction is the given one.
+    /// Reorients the pattern so that its first direction is the given one.
     pub fn align(&mut self, direction: &DVector<f64>) {
         let mut v = direction / direction.norm();
         v[0] += v[0].signum();
         self.reflect(&v);
     }
 
-    /// Becomes `I - 2 v v' / v'v`.
+    /// Sets the basis to `I - 2 v v' / v'v`.
     fn reflect(&mut self, v: &DVector<f64>) {
         self.basis.fill_with_identity();
         self.basis.ger(-2.0 / v.norm_squared(), v, v, 1.0);
     }
 
-    /// Collects points both ways along every direction, `size` away from `centre`, inside the box; at least one value of a grid
-    /// away.
-    pub fn points(&self, centre: &[f64], size: f64, spacing: &[f64], points: &mut Points) {
+    /// Collects the points at distance `radius` from `centre` on both sides along every direction, inside the box. On a
+    /// grid, the distance is at least one value.
+    pub fn points(&self, centre: &[f64], radius: f64, spacing: &[f64], points: &mut PointBuffer) {
         let n = centre.len();
         points.clear();
         for j in 0..n {
             for side in [1.0, -1.0] {
                 let at = |i: usize| {
-                    let by = if spacing[i] == 0.0 {
-                        side * size * self.basis[(i, j)]
+                    let offset = if spacing[i] == 0.0 {
+                        side * radius * self.basis[(i, j)]
                     } else if i == j {
-                        // Along a grid the pattern keeps to its own coordinate, by whole steps.
-                        side * (size / spacing[i]).round().max(1.0) * spacing[i]
+                        // On a grid, the direction is the coordinate itself, with a whole number of steps.
+                        side * (radius / spacing[i]).round().max(1.0) * spacing[i]
                     } else {
                         0.0
                     };
-                    (centre[i] + by).clamp(0.0, 1.0)
+                    (centre[i] + offset).clamp(0.0, 1.0)
                 };
                 points.push_if((0..n).map(at), |point, _| point != centre);
             }

@@ -1,50 +1,53 @@
-//! Pieces of criteria beyond their kinks.
+//! Bundle of linear models (cuts) beyond the kinks of criteria.
 
-use crate::rows::Rows;
+use crate::linearised_criteria::LinearisedCriteria;
 
-/// Points beyond kinks, with the rows there; what a criterion of several pieces needs besides the rows here.
+/// Criteria linearised at points beyond kinks, which complement the linearisation at the iterate.
 ///
-/// Source: K. C. Kiwiel, Methods of Descent for Nondifferentiable Optimization, Lecture Notes in Mathematics 1133 (1985).
+/// Source: K. C. Kiwiel, Methods of Descent for Nondifferentiable Optimization, Lecture Notes in Mathematics 1133
+/// (1985).
 #[derive(Debug, Default)]
 pub(super) struct Bundle {
-    pieces: Vec<(Vec<f64>, Rows)>,
-    /// Memory of those that are forgotten.
-    spare: Vec<(Vec<f64>, Rows)>,
-    /// The way from a piece to here.
-    back: Vec<f64>,
+    cuts: Vec<(Vec<f64>, LinearisedCriteria)>,
+    /// Memory of removed cuts, for reuse.
+    unused: Vec<(Vec<f64>, LinearisedCriteria)>,
+    /// Buffer for the distance from a cut to the iterate.
+    offset: Vec<f64>,
 }
 
 impl Bundle {
     pub fn is_empty(&self) -> bool {
-        self.pieces.is_empty()
+        self.cuts.is_empty()
     }
 
     pub fn clear(&mut self) {
-        self.spare.append(&mut self.pieces);
+        self.unused.append(&mut self.cuts);
     }
 
-    /// Keeps a piece; where there are many, the oldest one gives way.
-    pub fn remember(&mut self, point: &[f64], rows: &Rows) {
-        let most = 2 * (point.len() + 1);
-        if self.pieces.len() == most {
-            self.pieces.rotate_left(1);
+    /// Adds a cut; replaces the oldest one if the bundle is full.
+    pub fn insert(&mut self, point: &[f64], criteria: &LinearisedCriteria) {
+        let capacity = 2 * (point.len() + 1);
+        if self.cuts.len() == capacity {
+            self.cuts.rotate_left(1);
         } else {
-            self.pieces.push(self.spare.pop().unwrap_or_default());
+            self.cuts.push(self.unused.pop().unwrap_or_default());
         }
-        let (at, piece) = self.pieces.last_mut().expect("there is room for one");
+        let (at, cut) = self.cuts.last_mut().expect("the bundle has at least one cut");
         at.clear();
         at.extend_from_slice(point);
-        piece.clone_from(rows);
+        cut.clone_from(criteria);
     }
 
-    /// Forgets pieces farther away than `reach`: they describe nothing here.
-    pub fn keep_near(&mut self, here: &[f64], reach: f64) {
-        let is_far = |(point, _): &mut (Vec<f64>, Rows)| point.iter().zip(here).any(|(a, b)| (*a - b).abs() > reach);
-        self.spare.extend(self.pieces.extract_if(.., is_far));
+    /// Removes cuts farther away than `radius`, which do not describe the criteria here.
+    pub fn retain_near(&mut self, here: &[f64], radius: f64) {
+        let is_far = |(point, _): &mut (Vec<f64>, LinearisedCriteria)| {
+            point.iter().zip(here).any(|(a, b)| (*a - b).abs() > radius)
+        };
+        self.unused.extend(self.cuts.extract_if(.., is_far));
     }
 
-    /// Adds the pieces, as they extend to here, to the rows here.
-    pub fn add_to(&mut self, rows: &Rows, here: &[f64], all: &mut Rows) {
-        all.gather(rows, here, &self.pieces, &mut self.back);
+    /// Combines the criteria at the iterate with the cuts, extrapolated to the iterate.
+    pub fn add_to(&mut self, criteria: &LinearisedCriteria, here: &[f64], all: &mut LinearisedCriteria) {
+        all.assign_with_cuts(criteria, here, &self.cuts, &mut self.offset);
     }
 }

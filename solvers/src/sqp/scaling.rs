@@ -1,8 +1,8 @@
-//! Factors that bring the slopes of all rows to the order of 1.
+//! Scaling of the gradients of all criteria to the order of 1.
 
-use crate::rows::{Linear, Rows};
+use crate::linearised_criteria::{LinearModel, LinearisedCriteria};
 
-/// One factor for the objective, one for every constraint; those of constraints shrink only.
+/// One scale factor for the objective and one for every constraint; the latter are at most 1.
 ///
 /// Source: A. Waechter, L. T. Biegler, Mathematical Programming 106 (2006) 25-57, section 3.8.
 #[derive(Debug)]
@@ -13,50 +13,50 @@ pub(super) struct Scaling {
 }
 
 impl Scaling {
-    pub fn of(rows: &Rows) -> Self {
-        let slope = rows.objectives.iter().map(steepest).fold(0.0, f64::max);
-        let usable = slope > 1e-100 && slope.is_finite();
+    pub fn new(criteria: &LinearisedCriteria) -> Self {
+        let norm = criteria.objectives.iter().map(gradient_norm).fold(0.0, f64::max);
+        let usable = norm > 1e-100 && norm.is_finite();
         Self {
-            objective: if usable { 1.0 / slope } else { 1.0 },
-            inequalities: rows.inequalities.iter().map(|row| shrink(steepest(row))).collect(),
-            equalities: rows.equalities.iter().map(|row| shrink(steepest(row))).collect(),
+            objective: if usable { 1.0 / norm } else { 1.0 },
+            inequalities: criteria.inequalities.iter().map(|row| shrinking_factor(gradient_norm(row))).collect(),
+            equalities: criteria.equalities.iter().map(|row| shrinking_factor(gradient_norm(row))).collect(),
         }
     }
 
-    /// The factor of the objective.
+    /// Returns the scale factor of the objective.
     pub fn objective(&self) -> f64 {
         self.objective
     }
 
-    /// Renews the factors of constraints whose slopes have changed by much.
-    pub fn renew(&mut self, rows: &mut Rows) {
-        let renew = |(row, factor): (&mut Linear, &mut f64)| {
-            let change = shrink(steepest(row) / *factor) / *factor;
+    /// Updates the scale factors of constraints whose gradients have changed substantially.
+    pub fn update(&mut self, criteria: &mut LinearisedCriteria) {
+        let update = |(row, factor): (&mut LinearModel, &mut f64)| {
+            let change = shrinking_factor(gradient_norm(row) / *factor) / *factor;
             if !(0.01..=30.0).contains(&change) {
                 *factor *= change;
-                times(row, change);
+                scale_by(row, change);
             }
         };
-        rows.inequalities.iter_mut().zip(&mut self.inequalities).for_each(renew);
-        rows.equalities.iter_mut().zip(&mut self.equalities).for_each(renew);
+        criteria.inequalities.iter_mut().zip(&mut self.inequalities).for_each(update);
+        criteria.equalities.iter_mut().zip(&mut self.equalities).for_each(update);
     }
 
-    pub fn apply(&self, rows: &mut Rows) {
-        rows.objectives.iter_mut().for_each(|row| times(row, self.objective));
-        rows.inequalities.iter_mut().zip(&self.inequalities).for_each(|(row, &factor)| times(row, factor));
-        rows.equalities.iter_mut().zip(&self.equalities).for_each(|(row, &factor)| times(row, factor));
+    pub fn apply(&self, criteria: &mut LinearisedCriteria) {
+        criteria.objectives.iter_mut().for_each(|row| scale_by(row, self.objective));
+        criteria.inequalities.iter_mut().zip(&self.inequalities).for_each(|(row, &factor)| scale_by(row, factor));
+        criteria.equalities.iter_mut().zip(&self.equalities).for_each(|(row, &factor)| scale_by(row, factor));
     }
 }
 
-fn steepest(row: &Linear) -> f64 {
-    row.slope.iter().fold(0.0, |most, s| most.max(s.abs()))
+fn gradient_norm(row: &LinearModel) -> f64 {
+    row.gradient.iter().fold(0.0, |most, s| most.max(s.abs()))
 }
 
-fn shrink(slope: f64) -> f64 {
-    1.0 / slope.max(1.0)
+fn shrinking_factor(norm: f64) -> f64 {
+    1.0 / norm.max(1.0)
 }
 
-fn times(row: &mut Linear, factor: f64) {
+fn scale_by(row: &mut LinearModel, factor: f64) {
     row.value *= factor;
-    row.slope.iter_mut().for_each(|s| *s *= factor);
+    row.gradient.iter_mut().for_each(|s| *s *= factor);
 }

@@ -1,4 +1,4 @@
-//! Where the iteration stands: the rows at the best point, their curvature, the trust region and the penalty.
+//! State of the iteration: linearised criteria, Hessian, trust region and penalty.
 
 use mops_core::{Evaluation, Halt, Linearisation, Oracle, Shape};
 
@@ -6,203 +6,211 @@ use super::bundle::Bundle;
 use super::hessian::Hessian;
 use super::scaling::Scaling;
 use crate::epigraph::{Direction, Subproblem};
-use crate::rows::Rows;
+use crate::linearised_criteria::LinearisedCriteria;
 
 pub(super) struct State {
-    /// Values and slopes at the iterate.
-    pub at: Linearisation,
-    /// Its rows.
-    pub rows: Rows,
+    /// Values and gradients at the iterate.
+    pub iterate: Linearisation,
+    /// Scaled criteria at the iterate.
+    pub criteria: LinearisedCriteria,
     pub scaling: Scaling,
-    /// Pieces beyond kinks.
+    /// Cuts beyond kinks.
     pub bundle: Bundle,
     pub hessian: Hessian,
     /// Radius of the trust region, in the unit box.
     pub radius: f64,
-    /// Factor of the violation in the exact penalty function.
+    /// Weight of the violation in the exact penalty function.
     pub penalty: f64,
     pub iterations: usize,
-    /// Steps in a row that brought nothing.
-    pub rejected: usize,
-    /// Steps in a row that changed almost nothing.
-    pub idle: usize,
-    /// Objective and violation of the two iterates before.
-    before: [Option<[f64; 2]>; 2],
-    /// Merit at which the memory was last thrown away.
-    pub fresh_at: Option<f64>,
+    /// Number of successive rejected steps.
+    pub rejected_steps: usize,
+    /// Number of successive steps with negligible change.
+    pub stalled_steps: usize,
+    /// Objective and violation of the two previous iterates.
+    previous: [Option<[f64; 2]>; 2],
+    /// Penalty function at the last reset of bundle and Hessian.
+    pub merit_at_reset: Option<f64>,
     subproblem: Subproblem,
-    room: Room,
+    workspace: Workspace,
 }
 
-/// Memory that is used again from step to step.
+/// Buffers that are reused between steps.
 #[derive(Default)]
-struct Room {
+struct Workspace {
     low: Vec<f64>,
     high: Vec<f64>,
-    /// The rows here with the pieces of the bundle.
-    all: Rows,
-    corrected: Rows,
-    /// The point that is tried.
+    /// Criteria at the iterate with the cuts of the bundle.
+    all_criteria: LinearisedCriteria,
+    corrected: LinearisedCriteria,
+    /// Trial point.
     point: Vec<f64>,
     step: Vec<f64>,
-    /// Slopes of the Lagrangian before and after a step.
-    slopes: [Vec<f64>; 2],
-    /// The step where nothing but the constraints counts.
-    most: Direction,
+    /// Gradients of the Lagrangian before and after a step.
+    gradients: [Vec<f64>; 2],
+    /// Step that minimises the violation alone.
+    feasibility_direction: Direction,
 }
 
 impl State {
     pub fn new(shape: &Shape, at: Linearisation, radius: f64) -> Self {
         let n = at.at.point.len();
-        let mut rows = Rows::of(shape, &at);
-        let scaling = Scaling::of(&rows);
-        let hessian = Hessian::new(n, rows.objectives.len());
-        scaling.apply(&mut rows);
+        let mut criteria = LinearisedCriteria::from_linearisation(shape, &at);
+        let scaling = Scaling::new(&criteria);
+        let hessian = Hessian::new(n, criteria.objectives.len());
+        scaling.apply(&mut criteria);
         Self {
-            rows,
+            criteria,
             scaling,
             bundle: Bundle::default(),
-            at,
+            iterate: at,
             hessian,
             radius,
             penalty: 10.0,
             iterations: 0,
-            rejected: 0,
-            idle: 0,
-            before: [None; 2],
-            fresh_at: None,
+            rejected_steps: 0,
+            stalled_steps: 0,
+            previous: [None; 2],
+            merit_at_reset: None,
             subproblem: Subproblem::default(),
-            room: Room::default(),
+            workspace: Workspace::default(),
         }
     }
 
-    /// Brings constraints whose slopes have changed by much back to the order of 1.
-    pub fn rescale(&mut self) {
-        self.scaling.renew(&mut self.rows);
+    /// Rescales constraints whose gradients have changed substantially to the order of 1.
+    pub fn update_scaling(&mut self) {
+        self.scaling.update(&mut self.criteria);
     }
 
-    /// The exact penalty function.
-    pub fn merit(&self, rows: &Rows) -> f64 {
-        rows.objective() + self.penalty * rows.violation()
+    /// Returns the exact penalty function.
+    pub fn merit(&self, criteria: &LinearisedCriteria) -> f64 {
+        criteria.objective() + self.penalty * criteria.violation()
     }
 
-    /// The largest merit of this iterate and the two before.
-    pub fn reference(&self) -> f64 {
-        let before = self.before.iter().flatten().map(|[objective, violation]| objective + self.penalty * violation);
-        before.fold(self.merit(&self.rows), f64::max)
+    /// Returns the largest penalty function of this iterate and the two before.
+    pub fn reference_merit(&self) -> f64 {
+        let previous =
+            self.previous.iter().flatten().map(|[objective, violation]| objective + self.penalty * violation);
+        previous.fold(self.merit(&self.criteria), f64::max)
     }
 
-    /// Finds the step of the subproblem; the penalty grows until the violation falls as far as the trust region allows.
+    /// Computes the step of the subproblem; the penalty grows until the violation falls as far as the trust region
+    /// permits.
     #[must_use]
     pub fn direction(&mut self, into: &mut Direction) -> Option<()> {
-        let violation = self.rows.violation();
+        let violation = self.criteria.violation();
         self.solve(self.penalty, into)?;
-        if into.violation > SATISFIED {
-            // What can be reached if nothing but the constraints counts.
-            let mut most = std::mem::take(&mut self.room.most);
-            let found = self.solve(LARGEST_PENALTY, &mut most);
-            let least = most.violation;
-            self.room.most = most;
+        if into.violation > FEASIBILITY_TOLERANCE {
+            // The smallest violation in the trust region.
+            let mut feasibility_direction = std::mem::take(&mut self.workspace.feasibility_direction);
+            let found = self.solve(LARGEST_PENALTY, &mut feasibility_direction);
+            let least = feasibility_direction.violation;
+            self.workspace.feasibility_direction = feasibility_direction;
             found?;
-            let wanted = least + 0.1 * (violation - least).max(0.0) + SATISFIED;
-            while into.violation > wanted && self.penalty < LARGEST_PENALTY {
+            let target = least + 0.1 * (violation - least).max(0.0) + FEASIBILITY_TOLERANCE;
+            while into.violation > target && self.penalty < LARGEST_PENALTY {
                 self.penalty *= 10.0;
                 self.solve(self.penalty, into)?;
             }
         }
         // Exactness: the penalty must exceed the sum of the multipliers.
-        let sum = into.multipliers.of_constraints();
-        if into.violation <= SATISFIED && 1.5 * sum > self.penalty {
+        let sum = into.multipliers.constraint_sum();
+        if into.violation <= FEASIBILITY_TOLERANCE && 1.5 * sum > self.penalty {
             self.penalty = 2.0 * sum;
         }
         Some(())
     }
 
-    /// Finds the step to where the same slopes lead from the values at a point that was tried.
+    /// Computes the second-order correction: the gradients at the iterate with the values at the trial point.
     #[must_use]
-    pub fn correction(&mut self, tried: &Rows, step: &[f64], into: &mut Direction) -> Option<()> {
-        let mut corrected = std::mem::take(&mut self.room.corrected);
-        corrected.correct(&self.rows, tried, step);
-        std::mem::swap(&mut corrected, &mut self.rows);
+    pub fn correction(&mut self, trial: &LinearisedCriteria, step: &[f64], into: &mut Direction) -> Option<()> {
+        let mut corrected = std::mem::take(&mut self.workspace.corrected);
+        corrected.assign_second_order_correction(&self.criteria, trial, step);
+        std::mem::swap(&mut corrected, &mut self.criteria);
         let found = self.solve(self.penalty, into);
-        std::mem::swap(&mut corrected, &mut self.rows);
-        self.room.corrected = corrected;
+        std::mem::swap(&mut corrected, &mut self.criteria);
+        self.workspace.corrected = corrected;
         found
     }
 
-    /// Finds the step for the rows.
+    /// Solves the subproblem for the criteria and the bundle.
     fn solve(&mut self, penalty: f64, into: &mut Direction) -> Option<()> {
-        let Self { at, rows, bundle, hessian, subproblem, radius, room, .. } = self;
-        let here = &at.at.point;
-        room.low.clear();
-        room.low.extend(here.iter().map(|u| (-u).max(-*radius)));
-        room.high.clear();
-        room.high.extend(here.iter().map(|u| (1.0 - u).min(*radius)));
+        let Self { iterate, criteria, bundle, hessian, subproblem, radius, workspace, .. } = self;
+        let here = &iterate.at.point;
+        workspace.low.clear();
+        workspace.low.extend(here.iter().map(|u| (-u).max(-*radius)));
+        workspace.high.clear();
+        workspace.high.extend(here.iter().map(|u| (1.0 - u).min(*radius)));
         if bundle.is_empty() {
-            return subproblem.solve(rows, hessian.matrix(), [&room.low, &room.high], penalty, into);
+            return subproblem.solve(criteria, hessian.matrix(), [&workspace.low, &workspace.high], penalty, into);
         }
-        bundle.add_to(rows, here, &mut room.all);
-        subproblem.solve(&room.all, hessian.matrix(), [&room.low, &room.high], penalty, into)
+        bundle.add_to(criteria, here, &mut workspace.all_criteria);
+        subproblem.solve(&workspace.all_criteria, hessian.matrix(), [&workspace.low, &workspace.high], penalty, into)
     }
 
-    /// Reads the rows of a linearisation.
-    pub fn linearise(&self, shape: &Shape, at: &Linearisation, rows: &mut Rows) {
-        rows.linearise(shape, at);
-        self.scaling.apply(rows);
+    /// Sets scaled criteria from a linearisation.
+    pub fn linearise(&self, shape: &Shape, at: &Linearisation, criteria: &mut LinearisedCriteria) {
+        criteria.linearise(shape, at);
+        self.scaling.apply(criteria);
     }
 
-    /// Evaluates the point after a step, and reads its rows, which have no slopes; `None` where the point fails.
+    /// Evaluates the point after a step and sets its scaled criteria, without gradients; `None` if the point fails.
     pub fn try_step(
         &mut self,
         oracle: &mut dyn Oracle,
         step: &[f64],
-        rows: &mut Rows,
+        criteria: &mut LinearisedCriteria,
     ) -> Result<Option<Evaluation>, Halt> {
-        let point = &mut self.room.point;
+        let point = &mut self.workspace.point;
         point.clear();
-        point.extend(self.at.at.point.iter().zip(step).map(|(u, d)| (u + d).clamp(0.0, 1.0)));
+        point.extend(self.iterate.at.point.iter().zip(step).map(|(u, d)| (u + d).clamp(0.0, 1.0)));
         let evaluation = oracle.evaluate(std::slice::from_ref(point))?.pop().expect("one point, one answer");
         let Some(scaled) = &evaluation.scaled else { return Ok(None) };
-        rows.evaluate(oracle.shape(), scaled);
-        self.scaling.apply(rows);
+        criteria.evaluate(oracle.shape(), scaled);
+        self.scaling.apply(criteria);
         Ok(Some(evaluation))
     }
 
-    /// Takes in what the slopes at another point say of the curvature.
-    pub fn learn(&mut self, point: &[f64], rows: &Rows, direction: &Direction) {
-        let Room { step, slopes: [before, after], .. } = &mut self.room;
+    /// Updates the Hessian with the gradients at another point.
+    pub fn update_hessian(&mut self, point: &[f64], criteria: &LinearisedCriteria, direction: &Direction) {
+        let Workspace { step, gradients: [previous, after], .. } = &mut self.workspace;
         step.clear();
-        step.extend(point.iter().zip(&self.at.at.point).map(|(there, here)| there - here));
-        self.rows.lagrangian_slope(&direction.multipliers, before);
-        rows.lagrangian_slope(&direction.multipliers, after);
-        after.iter_mut().zip(before).for_each(|(after, before)| *after -= *before);
-        self.hessian.learn(step, after);
+        step.extend(point.iter().zip(&self.iterate.at.point).map(|(there, here)| there - here));
+        self.criteria.lagrangian_gradient(&direction.multipliers, previous);
+        criteria.lagrangian_gradient(&direction.multipliers, after);
+        after.iter_mut().zip(previous).for_each(|(after, previous)| *after -= *previous);
+        self.hessian.update(step, after);
     }
 
-    /// Moves to another point; its rows change places with those here.
-    pub fn move_to(&mut self, at: Linearisation, rows: &mut Rows, direction: &Direction) {
-        self.learn(&at.at.point, rows, direction);
-        self.before = [Some([self.rows.objective(), self.rows.violation()]), self.before[0]];
-        // What was here is a piece too as long as kinks are near.
+    /// Moves to another point and swaps its criteria with those of the iterate.
+    pub fn move_to(&mut self, at: Linearisation, criteria: &mut LinearisedCriteria, direction: &Direction) {
+        self.update_hessian(&at.at.point, criteria, direction);
+        self.previous = [Some([self.criteria.objective(), self.criteria.violation()]), self.previous[0]];
+        // While kinks are near, the old iterate becomes a cut, too.
         if !self.bundle.is_empty() {
-            self.bundle.remember(&self.at.at.point, &self.rows);
+            self.bundle.insert(&self.iterate.at.point, &self.criteria);
         }
-        self.bundle.keep_near(&at.at.point, 10.0 * self.radius);
-        self.at = at;
-        std::mem::swap(&mut self.rows, rows);
+        self.bundle.retain_near(&at.at.point, 10.0 * self.radius);
+        self.iterate = at;
+        std::mem::swap(&mut self.criteria, criteria);
     }
 
-    /// How far the slope of the Lagrangian is from 0 where no bound is in the way.
-    pub fn residual(&mut self, direction: &Direction) -> f64 {
-        let slope = &mut self.room.slopes[0];
-        self.rows.lagrangian_slope(&direction.multipliers, slope);
-        let held = |(u, s): &(&f64, &f64)| (**u <= 0.0 && **s > 0.0) || (**u >= 1.0 && **s < 0.0);
-        self.at.at.point.iter().zip(&*slope).filter(|pair| !held(pair)).fold(0.0, |most, (_, s)| most.max(s.abs()))
+    /// Returns the largest entry of the Lagrangian's gradient among the coordinates not fixed at a bound.
+    pub fn stationarity_residual(&mut self, direction: &Direction) -> f64 {
+        let gradient = &mut self.workspace.gradients[0];
+        self.criteria.lagrangian_gradient(&direction.multipliers, gradient);
+        let is_fixed = |(u, s): &(&f64, &f64)| (**u <= 0.0 && **s > 0.0) || (**u >= 1.0 && **s < 0.0);
+        self.iterate
+            .at
+            .point
+            .iter()
+            .zip(&*gradient)
+            .filter(|pair| !is_fixed(pair))
+            .fold(0.0, |largest, (_, s)| largest.max(s.abs()))
     }
 }
 
-/// Violation in scaled rows that counts as none.
-pub(super) const SATISFIED: f64 = 1e-10;
+/// Violation of scaled constraints regarded as zero.
+pub(super) const FEASIBILITY_TOLERANCE: f64 = 1e-10;
 
-/// Beyond it the objective counts nothing.
+/// Maximum penalty; above it the objective would have no influence.
 const LARGEST_PENALTY: f64 = 1e8;

@@ -1,55 +1,59 @@
-//! Weighted Chebyshev: a front, point by point, each the solution of a min-max problem of its own.
+//! Weighted Chebyshev method: computes a Pareto front point by point, each as the solution of a min-max problem.
 
-mod aim;
-mod gaps;
-mod known;
-mod rays;
+mod archive;
+mod rectangles;
+mod reference_directions;
+mod scalarisation;
 mod subproblem;
 
 use mops_core::{Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions, Usage};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use gaps::Gaps;
-use known::Place;
-use rays::Rays;
+use archive::Candidate;
+use rectangles::Rectangles;
+use reference_directions::ReferenceDirections;
 use subproblem::Subproblems;
 
-/// Points of the front of designs that no other is better than in every criterion, spread evenly, each the solution of a
-/// weighted min-max problem; needs `objective = "each"`. First every criterion is minimised alone (from several starts; then
-/// the others as far as they go without loss), which gives the ends of the front and the range of every criterion.
+/// Weighted Chebyshev method for evenly spread points of the Pareto front (non-dominated designs). Each point solves a
+/// weighted min-max problem. Needs `objective = "each"`.
 ///
-/// Two criteria: between the two neighbours `p`, `q` that are farthest apart, the point is found that lies deepest in the
-/// rectangle of the two,
+/// First every criterion is minimised alone (multistart), and then the others as far as possible without loss. The
+/// results are the ends of the front and define the range of every criterion.
+///
+/// Two criteria: the two neighbours `p`, `q` with the largest distance define a rectangle. The next point is the
+/// deepest one in it,
 ///
 /// ```text
 /// min over x of max((f1(x) - p1) / (q1 - p1), (f2(x) - q2) / (p2 - q2))
 /// ```
-/// by `sqp` from between the two, from both of them, and from what is known in the rectangle. Where nothing lies in it, the
-/// front has a gap, and the rectangle is closed. More criteria: `min max_i (f_i - ideal_i) / (range_i w_i)` for weights `w`
-/// spread evenly over the simplex, each from the nearest point known.
+/// computed by `sqp` from the midpoint, from both neighbours and from known points in the rectangle. An empty rectangle
+/// is a gap in the front and is closed.
 ///
-/// One more point meets the demands best: its largest scaled value is least, as in a design.
+/// Three and more criteria: `min max_i (f_i - ideal_i) / (range_i w_i)` for weights `w` spread evenly over the simplex,
+/// each from the nearest known point.
 ///
-/// A point where some criterion has slack is pushed on until none can be lowered alone. Everything that was evaluated on the
-/// way is compared with the points found, and it is looked a step beyond each of them; what is better than one of them is a
-/// new start. Subproblems that fail are left out.
+/// One more point minimises the largest scaled value, as in a single design; it meets the demands best.
 ///
-/// For criteria with slopes almost everywhere and few tuners: far fewer points than `nsga2` needs, and those of the front are
-/// exact. Fronts of many basins that lie apart from each other are `nsga2`'s.
+/// If a criterion has slack, it is lowered further while the others stay. All evaluated points are compared with the
+/// front, and an optimality test is made at each of its points; a dominating point is a new starting point. Subproblems
+/// that fail are omitted.
 ///
-/// Source: V. J. Bowman, in Multiple Criteria Decision Making, Lecture Notes in Economics and Mathematical Systems 130 (1976)
-/// 76-86 (weighted Chebyshev); H. W. Hamacher, C. R. Pedersen, S. Ruzika, Operations Research Letters 35 (2007) 336-344
-/// (rectangles); I. Das, J. E. Dennis, SIAM J. Optimization 8 (1998) 631-657 (weights); H. P. Benson, Journal of Optimization
-/// Theory and Applications 26 (1978) 569-580 (slack).
+/// For few tuners and criteria that are differentiable almost everywhere: needs far fewer evaluations than `nsga2`, and
+/// its points are exact. For fronts with many separate basins use `nsga2`.
+///
+/// Source: V. J. Bowman, in Multiple Criteria Decision Making, Lecture Notes in Economics and Mathematical Systems 130
+/// (1976) 76-86 (weighted Chebyshev); H. W. Hamacher, C. R. Pedersen, S. Ruzika, Operations Research Letters 35 (2007)
+/// 336-344 (rectangles); I. Das, J. E. Dennis, SIAM J. Optimization 8 (1998) 631-657 (weights); H. P. Benson, Journal
+/// of Optimization Theory and Applications 26 (1978) 569-580 (slack).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct WeightedChebyshevOptions {
-    /// Number of points; 0 for as many as the study asks for, else 30. Three criteria and more take the largest number of
-    /// evenly spread weights that is not above it.
+    /// Number of points; 0 for the number requested by the study, or 30. For three and more criteria, the largest
+    /// number of evenly spread weights that does not exceed it.
     #[schemars(range(max = 10_000))]
     pub points: usize,
-    /// Starts of the search for the least of each criterion, the study's own included.
+    /// Number of starting points for the minimum of each criterion, including the initial guess of the study.
     #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
 }
@@ -68,7 +72,7 @@ impl SolverOptions for WeightedChebyshevOptions {
     }
 }
 
-/// The solver of the kind `weighted-chebyshev`.
+/// Solver of the kind `weighted-chebyshev`.
 struct WeightedChebyshev {
     options: WeightedChebyshevOptions,
     state: Option<State>,
@@ -78,35 +82,36 @@ struct State {
     start: Vec<f64>,
     subproblems: Subproblems,
     /// Points of the front.
-    front: Vec<Place>,
+    front: Vec<Candidate>,
     stage: Stage,
-    /// Whether it was looked beyond every point.
-    looked: bool,
+    /// True after the optimality test of every point.
+    optimality_checked: bool,
 }
 
 enum Stage {
-    /// The least of this criterion alone.
-    Least(usize),
-    /// Between neighbours of two criteria.
-    Gaps(Gaps),
-    /// Along the rays of more criteria.
-    Rays(Rays),
-    /// The point that meets the demands best.
-    Demands,
-    /// What is known to be better than a point of the front.
-    Better(usize),
+    /// Minimisation of one criterion alone, by index.
+    SingleCriterion(usize),
+    /// Rectangles between neighbouring points, for two criteria.
+    Rectangles(Rectangles),
+    /// Reference directions, for three and more criteria.
+    ReferenceDirections(ReferenceDirections),
+    /// Point that meets the demands best.
+    MeetDemands,
+    /// Replacement of dominated points of the front, with the number of the round.
+    ReplaceDominated(usize),
 }
 
 impl Solver for WeightedChebyshev {
     fn accepts(&self, shape: &Shape) -> Result<(), String> {
         if shape.objective != Objective::Each {
             return Err(
-                "`weighted-chebyshev` looks for a front; set objective = \"each\" in [study], or take `sqp`".into()
+                "`weighted-chebyshev` computes a Pareto front: set objective = \"each\" in [study], or use `sqp`"
+                    .into(),
             );
         }
         if shape.spacing.iter().any(|&spacing| spacing > 0.0) {
             return Err(
-                "`weighted-chebyshev` follows slopes and cannot treat tuners with whole numbers or lists; take `nsga2`"
+                "`weighted-chebyshev` needs gradients, but a tuner has whole numbers or a list of values; use `nsga2`"
                     .into(),
             );
         }
@@ -120,8 +125,8 @@ impl Solver for WeightedChebyshev {
             start: start.to_vec(),
             subproblems: Subproblems::new(self.options.starts),
             front: Vec::new(),
-            stage: Stage::Least(0),
-            looked: false,
+            stage: Stage::SingleCriterion(0),
+            optimality_checked: false,
         });
         Ok(())
     }
@@ -133,64 +138,64 @@ impl Solver for WeightedChebyshev {
         }
         let points = match (self.options.points, oracle.shape().points) {
             (0, 0) => 30,
-            (0, asked) => asked,
+            (0, requested) => requested,
             (points, _) => points,
         };
         let criteria = oracle.shape().rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
         match &mut state.stage {
-            Stage::Least(k) => {
+            Stage::SingleCriterion(k) => {
                 let k = *k;
                 if k < criteria {
-                    if let Some(place) = state.subproblems.least(oracle, &state.start, k, criteria)? {
-                        state.front.push(place);
+                    if let Some(candidate) = state.subproblems.minimise_single(oracle, &state.start, k, criteria)? {
+                        state.front.push(candidate);
                     }
-                    state.stage = Stage::Least(k + 1);
+                    state.stage = Stage::SingleCriterion(k + 1);
                     return Ok(Progress::Continue);
                 }
                 if criteria == 0 {
-                    return state.subproblems.feasible(oracle, &state.start);
+                    return state.subproblems.find_feasible(oracle, &state.start);
                 }
                 if state.front.is_empty() {
                     return Ok(Progress::Stalled);
                 }
-                state.subproblems.measure(&state.front);
+                state.subproblems.set_ranges(&state.front);
                 state.stage = match criteria {
-                    1 => Stage::Better(0),
-                    2 => Stage::Gaps(Gaps::default()),
-                    _ => Stage::Rays(Rays::new(criteria, points)),
+                    1 => Stage::ReplaceDominated(0),
+                    2 => Stage::Rectangles(Rectangles::default()),
+                    _ => Stage::ReferenceDirections(ReferenceDirections::new(criteria, points)),
                 };
                 Ok(Progress::Continue)
             }
-            Stage::Gaps(gaps) => {
-                let more = gaps.bisect(oracle, &mut state.subproblems, &mut state.front, points)?;
+            Stage::Rectangles(rectangles) => {
+                let more = rectangles.bisect(oracle, &mut state.subproblems, &mut state.front, points)?;
                 if !more {
-                    state.stage = Stage::Demands;
+                    state.stage = Stage::MeetDemands;
                 }
                 Ok(Progress::Continue)
             }
-            Stage::Rays(rays) => {
-                if !rays.follow(oracle, &mut state.subproblems, &mut state.front)? {
-                    state.stage = Stage::Demands;
+            Stage::ReferenceDirections(reference_directions) => {
+                if !reference_directions.solve_next(oracle, &mut state.subproblems, &mut state.front)? {
+                    state.stage = Stage::MeetDemands;
                 }
                 Ok(Progress::Continue)
             }
-            Stage::Demands => {
-                let place = state.subproblems.demands(oracle, criteria)?;
-                insert(&mut state.front, place);
-                state.stage = Stage::Better(0);
+            Stage::MeetDemands => {
+                let candidate = state.subproblems.solve_for_demands(oracle, criteria)?;
+                insert(&mut state.front, candidate);
+                state.stage = Stage::ReplaceDominated(0);
                 Ok(Progress::Continue)
             }
-            Stage::Better(round) => {
+            Stage::ReplaceDominated(round) => {
                 *round += 1;
-                if *round <= MOST_ROUNDS && state.subproblems.better(oracle, &mut state.front)? {
+                if *round <= MAX_ROUNDS && state.subproblems.replace_dominated(oracle, &mut state.front)? {
                     return Ok(Progress::Continue);
                 }
-                if state.looked {
+                if state.optimality_checked {
                     return Ok(Progress::Converged);
                 }
-                state.looked = true;
-                state.stage = Stage::Better(0);
-                state.subproblems.look_beyond(oracle, &state.front);
+                state.optimality_checked = true;
+                state.stage = Stage::ReplaceDominated(0);
+                state.subproblems.check_optimality(oracle, &state.front);
                 Ok(Progress::Continue)
             }
         }
@@ -198,25 +203,26 @@ impl Solver for WeightedChebyshev {
 
     fn front(&self) -> Vec<Vec<f64>> {
         let Some(state) = &self.state else { return Vec::new() };
-        // Cut short before the ends were known: all that was evaluated is worth more.
-        if matches!(state.stage, Stage::Least(_)) {
+        // Without the ends of the front, all evaluated points are a better result.
+        if matches!(state.stage, Stage::SingleCriterion(_)) {
             return Vec::new();
         }
-        state.front.iter().map(|place| place.point.clone()).collect()
+        state.front.iter().map(|candidate| candidate.point.clone()).collect()
     }
 }
 
-/// Rounds in which points known to be better replace those of the front.
-const MOST_ROUNDS: usize = 5;
+/// Maximum number of rounds that replace dominated points.
+const MAX_ROUNDS: usize = 5;
 
-/// Keeps a point of the front, and no point that it is better than; whether it is one.
-fn insert(front: &mut Vec<Place>, place: Place) -> bool {
-    let range = vec![1.0; place.criteria.len()];
-    let beaten = |other: &Place| other.criteria == place.criteria || other.dominates(&place, &range, 0.0);
-    if front.iter().any(beaten) {
+/// Inserts a point into the front and removes points that it dominates; returns false if the point is dominated itself.
+fn insert(front: &mut Vec<Candidate>, candidate: Candidate) -> bool {
+    let range = vec![1.0; candidate.criteria.len()];
+    let is_dominated =
+        |other: &Candidate| other.criteria == candidate.criteria || other.dominates(&candidate, &range, 0.0);
+    if front.iter().any(is_dominated) {
         return false;
     }
-    front.retain(|other| !place.dominates(other, &range, 0.0));
-    front.push(place);
+    front.retain(|other| !candidate.dominates(other, &range, 0.0));
+    front.push(candidate);
     true
 }

@@ -1,54 +1,55 @@
-//! Short names for what formulas of test problems are made of.
+//! Short names for arithmetic in the formulas of test problems.
 
 use mops_core::Scalar;
 use mops_core::math;
 
-/// A constant.
+/// Returns a constant.
 pub(crate) fn c<S: Scalar>(value: f64) -> S {
     S::from(value)
 }
 
-/// Square.
+/// Returns the square.
 pub(crate) fn sq<S: Scalar>(x: S) -> S {
     x * x
 }
 
-/// Cube.
+/// Returns the cube.
 pub(crate) fn cube<S: Scalar>(x: S) -> S {
     x * x * x
 }
 
-/// Fourth power.
+/// Returns the fourth power.
 pub(crate) fn fourth<S: Scalar>(x: S) -> S {
     sq(sq(x))
 }
 
-/// Sum.
+/// Returns the sum.
 pub(crate) fn sum<S: Scalar>(terms: impl IntoIterator<Item = S>) -> S {
     terms.into_iter().fold(c(0.0), |sum, term| sum + term)
 }
 
-/// Inner product with constants; what has none counts nothing.
+/// Returns the inner product with constants; variables without a constant do not count.
 pub(crate) fn dot<S: Scalar>(coefficients: &[f64], x: &[S]) -> S {
     sum(coefficients.iter().zip(x).map(|(&a, &x)| x * a))
 }
 
-/// Arc tangent.
+/// Returns the arc tangent.
 pub(crate) fn atan<S: Scalar>(x: S) -> S {
     x.chain(math::atan(x.value()), 1.0 / (1.0 + math::powi(x.value(), 2)))
 }
 
-/// Hyperbolic sine.
+/// Returns the hyperbolic sine.
 pub(crate) fn sinh<S: Scalar>(x: S) -> S {
     x.chain(math::sinh(x.value()), math::cosh(x.value()))
 }
 
-/// A power with an exponent that varies, of a positive number.
+/// Returns the power of a positive number with a variable exponent.
 pub(crate) fn power<S: Scalar>(x: S, exponent: S) -> S {
     (x.ln() * exponent).exp()
 }
 
-/// Rows of an exact penalty function: the objective, and the objective plus `weight` times each constraint.
+/// Returns the criteria of an exact penalty function: the objective, and the objective plus `weight` times each
+/// constraint.
 ///
 /// Source: A. R. Conn, A. Wright; L. Luksan, J. Vlcek, report V-798 (2000), section 2.
 pub(crate) fn penalised<S: Scalar>(weight: f64, outputs: &[S]) -> Vec<S> {
@@ -56,7 +57,7 @@ pub(crate) fn penalised<S: Scalar>(weight: f64, outputs: &[S]) -> Vec<S> {
     std::iter::once(f).chain(constraints.iter().map(|&g| f + g * weight)).collect()
 }
 
-/// The standard normal distribution function: a series near 0, a continued fraction far from it.
+/// Returns the standard normal distribution function: a series near 0, a continued fraction elsewhere.
 ///
 /// Source: NIST Handbook of Mathematical Functions (2010), equations 7.6.2 and 7.9.2.
 pub(crate) fn normal<S: Scalar>(x: S) -> S {

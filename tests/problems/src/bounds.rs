@@ -1,12 +1,13 @@
-//! The box of a problem whose variables are not bounded.
+//! Box of a problem with unbounded variables.
 
-/// Half the width of the box around the start where a variable has no bound of its own, in units of max(1, |start|). Wide
-/// enough for every problem that says nothing else, and narrow enough that a tenth of it is a sensible first step.
+/// Half-width of the box around the initial guess for unbounded variables, in units of max(1, |initial guess|). Wide
+/// enough for every problem without a width of its own; a tenth of it is a sensible first step.
 pub(crate) const REACH: f64 = 10.0;
 
-/// Bounds in place of the infinite ones: `reach` times max(1, |start|) away from the start.
+/// Replaces infinite bounds by finite ones: `reach` times max(1, |initial guess|) away from the initial guess.
 ///
-/// N.B.: not symmetric, so that a start or an optimum of small whole numbers is not the middle of the box by accident.
+/// N.B.: the box is not symmetric, so that initial guesses or optima with small integers do not lie at its centre by
+/// accident.
 pub(crate) fn finite(start: &[f64], bounds: &[[f64; 2]], reach: f64) -> Vec<[f64; 2]> {
     let free = [f64::NEG_INFINITY, f64::INFINITY];
     let of = |j: usize| {

@@ -1,19 +1,19 @@
-//! The functions of a problem, for numbers of both kinds.
+//! Functions of a problem, for plain and dual numbers.
 
 use mops_core::{Along, Scalar};
 
-/// A function of a problem's variables, written once for every kind of number. For functions that carry data; those that
-/// carry none are plain functions ([`Functions::of`]).
+/// Function of a problem's variables, written once for every kind of number. For functions that carry data; functions
+/// without data are plain functions ([`Functions::of`]).
 pub trait Formula: Send + Sync + 'static {
-    /// What it gives at `x`, in the order that [`crate::Problem`] states.
+    /// Returns the outputs at `x`, in the order defined by [`crate::Problem`].
     fn at<S: Scalar>(&self, x: &[S]) -> Vec<S>;
 }
 
-/// The same for a given kind of number.
+/// Function of a problem's variables, for plain and dual numbers.
 pub trait Outputs: Send + Sync {
-    /// Values.
+    /// Returns the outputs.
     fn values(&self, x: &[f64]) -> Vec<f64>;
-    /// Values with their derivatives along some directions.
+    /// Returns the outputs with their derivatives along some directions.
     fn along(&self, x: &[Along]) -> Vec<Along>;
 }
 
@@ -27,7 +27,7 @@ impl<F: Formula> Outputs for F {
     }
 }
 
-/// A plain function, for numbers of both kinds.
+/// Plain function, for both kinds of number.
 #[derive(Clone, Copy)]
 struct Plain {
     values: fn(&[f64]) -> Vec<f64>,
@@ -44,11 +44,11 @@ impl Outputs for Plain {
     }
 }
 
-/// The functions of a problem.
+/// Functions of a problem.
 pub struct Functions(Box<dyn Outputs>);
 
 impl Functions {
-    /// A plain generic function, named twice: once for each kind of number.
+    /// Creates the functions from a plain generic function, named twice: once for each kind of number.
     ///
     /// ```
     /// use mops_core::Scalar;
@@ -62,17 +62,17 @@ impl Functions {
         Self(Box::new(Plain { values, along }))
     }
 
-    /// A function that carries data.
+    /// Creates the functions from a function that carries data.
     pub fn with(formula: impl Formula) -> Self {
         Self(Box::new(formula))
     }
 
-    /// Values at `x`.
+    /// Returns the outputs at `x`.
     pub fn values(&self, x: &[f64]) -> Vec<f64> {
         self.0.values(x)
     }
 
-    /// The derivative of every output along every coordinate: `[output][coordinate]`.
+    /// Returns the derivative of every output along every coordinate: `[output][coordinate]`.
     pub fn slopes(&self, x: &[f64]) -> Vec<Vec<f64>> {
         let mut slopes: Vec<Vec<f64>> = Vec::new();
         for first in (0..x.len()).step_by(Along::DIRECTIONS) {

@@ -1,7 +1,8 @@
-//! Problems with known answers, to measure solvers with: for tests, for `mops-bench`, and to read.
+//! Problems with known answers to measure solvers: for tests, for `mops-bench` and as a reference.
 //!
-//! Every problem is written once, over [`mops_core::Scalar`]: values come from plain numbers, exact slopes from dual ones.
-//! A run ([`mops_core::Run`]) solves it as it solves a study: same budget, same cache, same slopes by differences.
+//! Every problem is written once, over [`mops_core::Scalar`]: plain numbers give values, dual numbers exact gradients.
+//! A run ([`mops_core::Run`]) solves a problem as it solves a study, with the same budget, cache and finite
+//! differences.
 
 mod arithmetic;
 pub mod bbob;
@@ -20,24 +21,24 @@ pub use measure::{FrontFound, Measured, Truth, measure};
 pub use posed::{Posed, Slope};
 pub use problem::{Answer, Problem, Sense};
 
-/// A suite: problems that belong together.
+/// Suite of related problems.
 #[derive(Debug, Clone, Copy)]
 pub struct Suite {
     /// Name on the command line.
     pub name: &'static str,
-    /// What it holds, in one sentence.
+    /// Contents, in one sentence.
     pub about: &'static str,
-    /// Where its definitions come from.
+    /// Source of the definitions.
     pub source: &'static str,
-    /// Accuracy that counts as solved, relative to the larger of 1 and the size of the optimum.
+    /// Accuracy that counts as solved, relative to the larger of 1 and the magnitude of the optimum.
     pub accuracy: f64,
-    /// Points a run may evaluate, for so many variables.
+    /// Maximum number of evaluated points, as a function of the number of variables.
     pub budget: fn(usize) -> usize,
-    /// Its problems.
+    /// Problems of the suite.
     pub problems: fn() -> Vec<Problem>,
 }
 
-/// Every suite. A new one is a file, and a line here.
+/// Returns every suite. A new suite is one file and one line here.
 pub fn suites() -> Vec<Suite> {
     vec![
         hock_schittkowski::SUITE,

@@ -1,43 +1,43 @@
-//! How a solver does on a problem.
+//! Measurement of a solver on a problem.
 
 use mops_core::front::{hypervolume, inverted_generational_distance, non_dominated};
 use mops_core::{Budget, Evaluator, FEASIBLE, Merit, Oracle, Record, Run, Solver, Stop};
 
 use crate::problem::Answer;
 
-/// What a solver made of a problem.
+/// Result of a solver on a problem.
 #[derive(Debug, Clone)]
 pub struct Measured {
-    /// Why it stopped.
+    /// Reason for termination.
     pub stop: Stop,
-    /// What the best point is worth.
+    /// Merit of the best point.
     pub best: Merit,
-    /// The known minimum nearest to it.
+    /// Known minimum nearest to the best point.
     pub target: Option<f64>,
-    /// What every point is worth, in the order of evaluation.
+    /// Merit of every point, in the order of evaluation.
     pub history: Vec<Merit>,
-    /// Number of times that exact slopes were taken.
+    /// Number of exact linearisations.
     pub linearisations: usize,
-    /// The front, where the answer is one.
+    /// Quality of the front, if the answer is a front.
     pub front: Option<FrontFound>,
 }
 
-/// How good a front is that was found.
+/// Quality of a computed front.
 #[derive(Debug, Clone, Copy)]
 pub struct FrontFound {
-    /// Hypervolume of the solver's members, of all points where it has none.
+    /// Hypervolume of the solver's members, or of all points if it has none.
     pub hypervolume: f64,
-    /// Inverted generational distance of the same, to 1000 points of the true front.
+    /// Inverted generational distance of the members, or of all points, to 1000 points of the true front.
     pub distance: f64,
-    /// Hypervolume of all points that were evaluated.
+    /// Hypervolume of all evaluated points.
     pub archive: f64,
     /// Hypervolume of the true front.
     pub known: f64,
 }
 
 impl Measured {
-    /// Number of points until one met every constraint and lay at most `accuracy` above the target, relative to the larger
-    /// of 1 and its size.
+    /// Returns the number of points until one satisfied every constraint and was at most `accuracy` above the target.
+    /// `accuracy` is relative to the larger of 1 and the magnitude of the target.
     pub fn evaluations_to(&self, accuracy: f64) -> Option<usize> {
         let target = self.target?;
         let limit = target + accuracy * target.abs().max(1.0);
@@ -45,17 +45,17 @@ impl Measured {
         self.history.iter().position(reached).map(|index| index + 1)
     }
 
-    /// Whether the solver says it has an optimum at a point that violates a constraint.
+    /// Returns true if the solver claims an optimum at a point that violates a constraint.
     pub fn claims_what_is_violated(&self) -> bool {
         self.stop == Stop::Converged && self.best.violation > FEASIBLE
     }
 }
 
-/// What a point is worth without noise, by the values of its tuners.
+/// Merit of a point without noise, as a function of its tuners.
 pub type Truth<'a> = &'a (dyn Fn(&[f64]) -> Merit + Sync);
 
-/// Solves a problem with this answer from a point of the unit box with at most `budget` points. Where there is noise, `truth`
-/// judges: every point counts as the best one that was seen until then.
+/// Solves a problem from a point of the unit box, with at most `budget` evaluated points. For a noisy problem, `truth`
+/// assesses the results: every point counts as the best one seen so far.
 pub fn measure<E: Evaluator>(
     answer: &Answer,
     posed: &E,
@@ -86,7 +86,7 @@ fn front<E: Evaluator>(answer: &Answer, run: &mut Run<'_, E>, solver: &dyn Solve
     let Answer::Front { reference, hypervolume: known, points } = answer else { return None };
     let m = reference.len();
     let all: Vec<f64> = run.front().into_iter().flat_map(|i| run.archive()[i].objectives.clone()).collect();
-    // Every member has been evaluated: asking again costs nothing.
+    // Every member has been evaluated: evaluating it again costs nothing.
     let members = run.evaluate(solver.members()).unwrap_or_default();
     let shape = run.shape();
     let feasible = members.iter().filter(|member| member.merit.is_feasible());

@@ -1,4 +1,4 @@
-//! A problem as solvers see it: variables in the unit box, rows of scaled values.
+//! Problem as seen by solvers: variables in the unit box, criteria as scaled values.
 
 use mops_core::{Evaluation, Evaluator, Merit, Objective, Shape, Slopes, Usage, stream};
 use rand::Rng;
@@ -6,18 +6,19 @@ use rand::Rng;
 use crate::bounds::finite;
 use crate::problem::{Problem, Sense};
 
-/// Where slopes come from.
+/// Source of the gradients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Slope {
     /// Dual numbers.
     Exact,
-    /// Differences.
+    /// Finite differences.
     Differences,
 }
 
-/// A problem over the unit box.
+/// Problem over the unit box.
 ///
-/// A row to be minimised is its own scaled value; a constraint's is one more than its value, so that 1 is its limit.
+/// The scaled value of a minimised function is the function itself. The scaled value of a constraint is one more than
+/// the constraint, so that its limit is 1.
 pub struct Posed<'a> {
     problem: &'a Problem,
     shape: Shape,
@@ -28,14 +29,16 @@ pub struct Posed<'a> {
 }
 
 impl<'a> Posed<'a> {
-    /// The problem over its box.
+    /// Creates the problem over its box.
     ///
     /// # Panics
-    /// If the functions are not defined at the start or give fewer outputs than there are constraints: a problem is
-    /// written wrongly.
+    /// If the functions are undefined at the initial guess or give fewer outputs than there are constraints: the
+    /// problem definition is wrong.
     pub fn new(problem: &'a Problem, slope: Slope) -> Self {
         let outputs = problem.functions.values(&problem.start).len();
-        let minimised = outputs.checked_sub(problem.inequalities + problem.equalities).expect("outputs are counted");
+        let minimised = outputs
+            .checked_sub(problem.inequalities + problem.equalities)
+            .expect("there are at least as many outputs as constraints");
         let (objectives, residuals) = match problem.sense {
             Sense::Max | Sense::Each => (minimised, 0),
             Sense::MaxAbs => (2 * minimised, 0),
@@ -54,34 +57,34 @@ impl<'a> Posed<'a> {
         Self { problem, shape, bounds, slope, noise: 0.0, seed: 1 }
     }
 
-    /// Multiplies every output by 1 + `noise` times a number between -1 and 1 that the point decides.
+    /// Multiplies every output by 1 + `noise` times a number between -1 and 1 that depends on the point.
     #[must_use]
     pub fn with_noise(self, noise: f64) -> Self {
         Self { noise, ..self }
     }
 
-    /// Under another seed: other random streams, another noise.
+    /// Sets the seed of the random streams and of the noise.
     #[must_use]
     pub fn with_seed(self, seed: u64) -> Self {
         Self { seed, ..self }
     }
 
-    /// The problem.
+    /// Returns the problem.
     pub fn problem(&self) -> &'a Problem {
         self.problem
     }
 
-    /// The box, finite.
+    /// Returns the finite box.
     pub fn bounds(&self) -> &[[f64; 2]] {
         &self.bounds
     }
 
-    /// The start as a point of the unit box.
+    /// Returns the initial guess as a point of the unit box.
     pub fn start(&self) -> Vec<f64> {
         self.point_of(&self.problem.start)
     }
 
-    /// The point of the unit box where the variables have these values; at a bound where they lie beyond it.
+    /// Returns the point of the unit box for values of the variables; values beyond a bound are moved to it.
     pub fn point_of(&self, x: &[f64]) -> Vec<f64> {
         let position = |(x, [low, high]): (&f64, &[f64; 2])| {
             if high > low { ((x - low) / (high - low)).clamp(0.0, 1.0) } else { 0.0 }
@@ -99,7 +102,8 @@ impl<'a> Posed<'a> {
         outputs
     }
 
-    /// Rows from outputs, or the slopes of rows from the slopes of outputs; `limit` is what a constraint's row is more.
+    /// Computes scaled values from outputs, or their gradients from gradients of outputs; `limit` is added to
+    /// constraints.
     fn rows(&self, outputs: &[f64], squares: impl Fn(&[f64]) -> f64, limit: f64) -> Vec<f64> {
         let constraints = self.problem.inequalities + self.problem.equalities;
         let (minimised, constraints) = outputs.split_at(outputs.len() - constraints);
@@ -155,7 +159,7 @@ impl Evaluator for Posed<'_> {
         finite.then_some(Slopes { rows, residuals })
     }
 
-    /// What rounding leaves, or the noise that was added.
+    /// Returns the noise level: that of rounding, or the added noise.
     fn noise(&self) -> f64 {
         self.noise.max(1e-16)
     }

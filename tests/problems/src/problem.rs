@@ -1,75 +1,76 @@
-//! A problem with a known answer.
+//! Problem with a known answer.
 
 use crate::bounds::REACH;
 use crate::formula::Functions;
 
-/// A problem with a known answer, in its own variables.
+/// Problem with a known answer, in its own variables.
 ///
-/// Its functions give, in this order: what is to be minimised (for [`Sense::Squares`] the residuals), the inequalities,
-/// satisfied where at most 0, and the equalities, satisfied where 0. What is to be minimised is one row or many: a solver
-/// sees every row on its own ([`mops_core::Evaluation::scaled`]), whatever [`Sense`] makes of them.
+/// Its functions give, in this order: the functions to be minimised (for [`Sense::Squares`] the residuals); the
+/// inequalities, satisfied if at most 0; and the equalities, satisfied if 0. There are one or more functions to be
+/// minimised. A solver sees each of them on its own ([`mops_core::Evaluation::scaled`]), for any [`Sense`].
 #[derive(Debug)]
 pub struct Problem {
     /// Name in the literature.
     pub name: String,
-    /// Source of this one, where it is not that of the suite.
+    /// Source of this problem, if different from that of the suite.
     pub source: &'static str,
-    /// Where solvers start.
+    /// Initial guess.
     pub start: Vec<f64>,
-    /// Smallest and largest value of every variable, infinite where there is none; empty where no variable has bounds.
+    /// Lower and upper bound of every variable, infinite if there is none; empty if no variable has bounds.
     pub bounds: Vec<[f64; 2]>,
-    /// Half the width of the box around the start for variables without bounds, in units of max(1, |start|).
+    /// Half-width of the box around the initial guess for unbounded variables, in units of max(1, |initial guess|).
     pub reach: f64,
-    /// What the rows to be minimised are together.
+    /// Combination of the functions to be minimised.
     pub sense: Sense,
     /// Number of inequalities.
     pub inequalities: usize,
     /// Number of equalities.
     pub equalities: usize,
-    /// What is known of the solution.
+    /// Known solution.
     pub answer: Answer,
-    /// Accuracy that counts as solved, where it is not that of the suite.
+    /// Accuracy that counts as solved, if different from that of the suite.
     pub accuracy: Option<f64>,
-    /// The functions.
+    /// Functions of the problem.
     pub functions: Functions,
 }
 
-/// What the rows to be minimised are together.
+/// Combination of the functions to be minimised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Sense {
-    /// The largest of them counts.
+    /// Maximum.
     #[default]
     Max,
-    /// The largest absolute value counts: every row and its negative is minimised.
+    /// Largest absolute value: every function and its negative is minimised.
     MaxAbs,
-    /// Their sum of squares counts: one row, and a residual vector.
+    /// Sum of squares: one criterion, and a residual vector.
     Squares,
-    /// Each counts for itself. A run orders its points by the largest; solvers for many objectives look at all rows.
+    /// Separate objectives. A run orders its points by the largest; multi-objective solvers use all of them.
     Each,
 }
 
-/// What is known of the solution.
+/// Known solution of a problem.
 #[derive(Debug, Clone, Default)]
 pub enum Answer {
-    /// Nothing.
+    /// No known solution.
     #[default]
     Unknown,
-    /// Values of local minima; the first is the smallest known. A solver that ends in any of them has solved the problem.
+    /// Values of local minima; the first is the smallest known. A solver that ends in any of them has solved the
+    /// problem.
     Minima(Vec<f64>),
-    /// The Pareto front: a point that no front point is worse than in any objective, and the volume between it and the front.
+    /// Pareto front, with the hypervolume between the front and a reference point that no front point is worse than.
     Front {
-        /// The reference point.
+        /// Reference point.
         reference: Vec<f64>,
-        /// The hypervolume of the true front.
+        /// Hypervolume of the true front.
         hypervolume: f64,
-        /// That many points spread over the front.
+        /// Returns the given number of points spread over the front.
         points: fn(usize) -> Vec<Vec<f64>>,
     },
 }
 
 impl Answer {
-    /// The known minimum that an objective belongs to: a local one where it is that to 1e-4, relative to the larger of 1 and
-    /// its size; else the smallest. `None` where none is known.
+    /// Returns the known minimum for an objective: a local one if it agrees to 1e-4, relative to the larger of 1 and
+    /// its magnitude; otherwise the smallest. `None` if no minimum is known.
     pub fn nearest_minimum(&self, objective: f64) -> Option<f64> {
         let Self::Minima(minima) = self else { return None };
         let is = |minimum: &&f64| (objective - **minimum).abs() <= 1e-4 * minimum.abs().max(1.0);
@@ -90,7 +91,7 @@ impl<const N: usize> From<[f64; N]> for Answer {
 }
 
 impl Problem {
-    /// A problem without constraints or bounds, whose largest row counts.
+    /// Creates a problem without constraints or bounds whose largest function counts.
     pub fn new(name: &str, start: &[f64], answer: impl Into<Answer>, functions: Functions) -> Self {
         Self {
             name: name.to_owned(),
@@ -107,17 +108,18 @@ impl Problem {
         }
     }
 
-    /// Number of variables.
+    /// Returns the number of variables.
     pub fn dimension(&self) -> usize {
         self.start.len()
     }
 
-    /// The known minimum that an objective belongs to ([`Answer::nearest_minimum`]).
+    /// Returns the known minimum for an objective ([`Answer::nearest_minimum`]).
     pub fn nearest_minimum(&self, objective: f64) -> Option<f64> {
         self.answer.nearest_minimum(objective)
     }
 
-    /// How far an objective lies above the minimum it belongs to, relative to the larger of 1 and its size; negative below.
+    /// Returns the distance of an objective to its known minimum, relative to the larger of 1 and the magnitude of that
+    /// minimum; negative below.
     pub fn gap(&self, objective: f64) -> Option<f64> {
         self.nearest_minimum(objective).map(|minimum| (objective - minimum) / minimum.abs().max(1.0))
     }

@@ -1,6 +1,8 @@
-//! Writes cases into a folder: `generate FOLDER [COUNT] [SEED]` draws a mix; `generate FOLDER one SEED PLANT EFFECTS SIZE`
-//! writes a case that a benchmark named, with the effects joined by `+`; `generate FOLDER all SEED` writes nothing, and shows
-//! which sizes every effect reaches in every plant.
+//! Writes simulated cases into a folder.
+//!
+//! - `generate FOLDER [COUNT] [SEED]` draws a mix.
+//! - `generate FOLDER one SEED PLANT EFFECTS SIZE` writes a case named by a benchmark, with the effects joined by `+`.
+//! - `generate FOLDER all SEED` writes nothing, and prints the sizes that every effect reaches in every plant.
 
 use std::path::Path;
 use std::time::Instant;
@@ -21,7 +23,7 @@ fn main() -> std::io::Result<()> {
     }
 }
 
-/// What a mix asks for, one after the other.
+/// Draws and writes a mix of cases.
 fn mix(folder: &Path, count: usize, seed: u64) -> std::io::Result<()> {
     let mut draw = Draw::new(seed, "mix");
     let (mut written, mut tried) = (0, 0);
@@ -49,9 +51,11 @@ fn mix(folder: &Path, count: usize, seed: u64) -> std::io::Result<()> {
     Ok(())
 }
 
-/// The case of a seed.
+/// Writes the case of a seed.
 fn one(folder: &Path, seed: u64, of: &[String]) -> std::io::Result<()> {
-    let [plant, effects, size] = of else { return Err(std::io::Error::other("PLANT EFFECTS SIZE are missing")) };
+    let [plant, effects, size] = of else {
+        return Err(std::io::Error::other("expected PLANT EFFECTS SIZE after the seed"));
+    };
     let names: Vec<&str> = effects.split('+').collect();
     let missing = match names[..] {
         ["none"] => Missing::Nothing,
@@ -59,13 +63,14 @@ fn one(folder: &Path, seed: u64, of: &[String]) -> std::io::Result<()> {
         _ => Missing::Effects(&names),
     };
     let size = size.parse().map_err(std::io::Error::other)?;
-    let trial = generate(plant, missing, size, seed).ok_or_else(|| std::io::Error::other("there is no such case"))?;
+    let trial = generate(plant, missing, size, seed)
+        .ok_or_else(|| std::io::Error::other("this case cannot be generated: check plant, effects and size"))?;
     trial.write(&folder.join(&trial.name))?;
     println!("{:60} reached {:.3}", trial.name, trial.truth.size);
     Ok(())
 }
 
-/// A table of what can be reached.
+/// Prints a table of the sizes reached.
 fn all(seed: u64) -> std::io::Result<()> {
     for plant in plants() {
         for (effect, beyond) in

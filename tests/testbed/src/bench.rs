@@ -1,4 +1,4 @@
-//! A plant with drawn parameters, experiments and noise: where effects are put in and data come out.
+//! Plant with random parameters, experiments and noise, to which effects are added and which produces data.
 
 use std::fmt::Write;
 
@@ -17,21 +17,21 @@ use crate::strength::find;
 pub const EXPERIMENTS: [(&str, &str); 3] =
     [("calibration", "calibration"), ("validation_1", "selection"), ("validation_2", "selection")];
 
-/// Parameters and start values where a fit ended.
+/// Parameters and initial states at the end of a fit.
 pub type Fitted = Option<(Vec<f64>, Vec<f64>)>;
 
-/// Effects at their places with open strengths.
+/// Effects at their places, with free magnitudes.
 pub type Choice<'a> = [(&'a Effect, Spot, Family)];
 
-/// What the experiments leave behind.
+/// Data recorded in the experiments.
 pub struct Recorded {
     /// Names and contents of the data files.
     pub files: Vec<(String, String)>,
-    /// Root mean square of the noise drawn, in units of what is declared, by experiment.
+    /// Root mean square of the noise realisation, relative to the declared noise level, by experiment.
     pub floors: Vec<(String, f64)>,
 }
 
-/// A plant with drawn parameters, experiments and noise.
+/// Plant with random parameters, experiments and noise.
 pub struct Bench {
     pub plant: &'static Plant,
     seed: u64,
@@ -41,19 +41,19 @@ pub struct Bench {
     pub setups: Vec<Setup>,
     /// Standard deviation of the white noise, by output.
     white: Vec<f64>,
-    /// The same with quantisation.
+    /// Standard deviation of the noise including quantisation, by output.
     pub total: Vec<f64>,
     /// White noise, by experiment, output and sample.
     noise: Vec<Series>,
 }
 
 impl Bench {
-    /// Draws everything but effects.
+    /// Draws everything except effects.
     pub fn draw(plant: &'static Plant, seed: u64, label: &str) -> Option<Self> {
         let draw = |what: &str| Draw::new(seed, &format!("{label} {what}"));
         let mut numbers = draw("parameters");
         let p: Vec<f64> = plant.parameters.iter().map(|p| p.nominal * math::exp(numbers.between(-0.3, 0.3))).collect();
-        // Guesses are 20 to 60 % off, either way; bounds are a factor of 10 to 40 away from them.
+        // Initial guesses are 20 to 60 % too high or too low; bounds are a factor of 10 to 40 away from them.
         let mut off = draw("guesses");
         let guesses = p.iter().map(|p| {
             let guess = rounded(p * (1.0 + off.sign() * off.between(0.2, 0.6)));
@@ -73,7 +73,7 @@ impl Bench {
         Some(Self { plant, seed, label: label.to_owned(), p, guesses, setups, white, total, noise })
     }
 
-    /// An effect by name, at a place where it fits.
+    /// Returns an effect by name, at a place where it fits.
     pub fn choose(&self, among: &[&'static Effect], name: &str) -> Option<(&'static Effect, Spot)> {
         let (name, at) = name.split_once('@').map_or((name, None), |(name, at)| (name, Some(at)));
         let fitting = among.iter().filter(|effect| effect.name == name);
@@ -83,7 +83,7 @@ impl Bench {
         (!choices.is_empty()).then(|| choices[draw.below(choices.len())])
     }
 
-    /// What perfect sensors would show.
+    /// Returns the outputs of ideal sensors.
     pub fn clean(&self, e: usize, families: &Choice<'_>, strengths: &[f64]) -> Option<Series> {
         let installed = families.iter().zip(strengths);
         let installed: Vec<Installed> =
@@ -96,7 +96,7 @@ impl Bench {
         y.iter().flatten().all(|v| v.is_finite()).then_some(y)
     }
 
-    /// What the sensors show.
+    /// Returns the outputs of the sensors with noise and quantisation.
     pub fn measured(&self, e: usize, clean: &Series) -> Series {
         let show = |o: usize, y: f64| {
             let lsb = self.plant.outputs[o].lsb;
@@ -106,7 +106,8 @@ impl Bench {
         noisy.map(|(o, (y, n))| y.iter().zip(n).map(|(y, n)| show(o, y + n)).collect()).collect()
     }
 
-    /// Error of the base model refitted to the calibration experiment. Begins where the last fit ended, or at the truth.
+    /// Returns the error of the baseline model refitted to the calibration experiment. The fit starts from the last
+    /// fit, or from the true values.
     pub fn error(&self, families: &Choice<'_>, strengths: &[f64], last: &mut Fitted) -> Option<f64> {
         let measured = self.measured(0, &self.clean(0, families, strengths)?);
         let setup = &self.setups[0];
@@ -120,7 +121,8 @@ impl Bench {
         Some(best.error)
     }
 
-    /// Strengths at which the size is reached, and where the last fit ended; with two effects each alone has an equal share.
+    /// Returns the magnitudes at which the size is reached, and the end of the last fit. Of two effects, each
+    /// contributes an equal share on its own.
     pub fn strengths(&self, families: &Choice<'_>, size: f64) -> Option<(Vec<f64>, Fitted)> {
         let mut last = None;
         let floor = self.error(&[], &[], &mut last)?;
@@ -146,13 +148,13 @@ impl Bench {
         Some((scaled(factor), last))
     }
 
-    /// The data files, and how large the noise in them is.
+    /// Returns the data files and the noise in them.
     pub fn record(&self, families: &Choice<'_>, strengths: &[f64]) -> Option<Recorded> {
         let (mut files, mut floors) = (Vec::new(), Vec::new());
         for (e, (name, _)) in EXPERIMENTS.iter().enumerate() {
             let clean = self.clean(e, families, strengths)?;
             let measured = self.measured(e, &clean);
-            // An effect may throw another experiment far off: that would be no experiment.
+            // An effect may drive another experiment far away: such an experiment would not be realistic.
             let base = base_outputs(self.plant, &self.p, &self.setups[e].start, &self.setups[e], 4)?;
             let span = |y: &[f64]| y.iter().fold(0.0_f64, |m, v| m.max((v - y[0]).abs()));
             if measured.iter().zip(&base).any(|(y, b)| span(y) > 20.0 * span(b)) {
@@ -176,12 +178,12 @@ impl Bench {
         let digits: Vec<usize> = self.white.iter().map(|s| (3.0 - math::log10(*s)).ceil().max(0.0) as usize).collect();
         for k in 0..setup.samples {
             let t = (k as f64 * setup.dt * 1e9).round() / 1e9;
-            write!(s, "{t}").expect("a string takes everything");
+            write!(s, "{t}").expect("writing to a string cannot fail");
             for u in &setup.inputs {
-                write!(s, ",{:.6}", u[k]).expect("a string takes everything");
+                write!(s, ",{:.6}", u[k]).expect("writing to a string cannot fail");
             }
             for (y, digits) in measured.iter().zip(&digits) {
-                write!(s, ",{:.*}", *digits, y[k]).expect("a string takes everything");
+                write!(s, ",{:.*}", *digits, y[k]).expect("writing to a string cannot fail");
             }
             s.push('\n');
         }
@@ -189,7 +191,7 @@ impl Bench {
     }
 }
 
-/// Three digits.
+/// Rounds to three digits.
 fn rounded(value: f64) -> f64 {
-    format!("{value:.2e}").parse().expect("it was just written")
+    format!("{value:.2e}").parse().expect("a formatted number is valid")
 }

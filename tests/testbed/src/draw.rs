@@ -1,15 +1,15 @@
-//! Random numbers of a trial: streams by label, so that one draw more in one place changes nothing elsewhere.
+//! Random numbers of a trial, in streams by label: an additional draw in one place changes nothing elsewhere.
 
 use mops_math as math;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// A stream of random numbers.
+/// Stream of random numbers.
 #[derive(Debug, Clone)]
 pub struct Draw(Xoshiro256PlusPlus);
 
 impl Draw {
-    /// The stream of a seed and a label.
+    /// Creates the stream of a seed and a label.
     pub fn new(seed: u64, label: &str) -> Self {
         // FNV-1a; seed_from_u64 spreads it over the state.
         let hash =
@@ -19,32 +19,32 @@ impl Draw {
         Self(Xoshiro256PlusPlus::seed_from_u64(hash))
     }
 
-    /// Uniform between two numbers.
+    /// Draws from the uniform distribution between two numbers.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.0.random::<f64>()
     }
 
-    /// Uniform in the logarithm between two positive numbers.
+    /// Draws from the log-uniform distribution between two positive numbers.
     pub fn log_between(&mut self, low: f64, high: f64) -> f64 {
         math::exp(self.between(math::ln(low), math::ln(high)))
     }
 
-    /// Standard normal.
+    /// Draws from the standard normal distribution.
     pub fn normal(&mut self) -> f64 {
         math::normal(&mut self.0)
     }
 
-    /// 1 or -1.
+    /// Draws 1 or -1.
     pub fn sign(&mut self) -> f64 {
         if self.0.random::<bool>() { 1.0 } else { -1.0 }
     }
 
-    /// True with a probability.
+    /// Returns true with the given probability.
     pub fn chance(&mut self, probability: f64) -> bool {
         self.0.random::<f64>() < probability
     }
 
-    /// A whole number below `n`, which must be positive.
+    /// Draws an integer below `n`, which must be positive.
     pub fn below(&mut self, n: usize) -> usize {
         self.0.random_range(0..n)
     }

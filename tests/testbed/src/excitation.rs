@@ -1,4 +1,4 @@
-//! Signals that drive the inputs of experiments; values as they stand in the data file, six digits after the point.
+//! Excitation signals of experiments, rounded to the six decimal places of the data file.
 
 use std::f64::consts::TAU;
 
@@ -6,12 +6,13 @@ use mops_math as math;
 
 use crate::draw::Draw;
 
-/// Rounds to what the data file shows.
+/// Rounds to the resolution of the data file.
 fn shown(values: impl Iterator<Item = f64>) -> Vec<f64> {
     values.map(|v| (v * 1e6).round() / 1e6).collect()
 }
 
-/// Sum of `n` sines with random phases, frequencies (Hz) spread between two, rms `rms`.
+/// Multisine of four to seven sines with random phases and frequencies (Hz) between two limits, with root mean square
+/// `rms`.
 pub fn multisine(draw: &mut Draw, samples: usize, dt: f64, (low, high): (f64, f64), rms: f64) -> Vec<f64> {
     let n = 4 + draw.below(4);
     let lines: Vec<_> = (0..n).map(|_| (TAU * draw.log_between(low, high), draw.between(0.0, TAU))).collect();
@@ -19,7 +20,7 @@ pub fn multisine(draw: &mut Draw, samples: usize, dt: f64, (low, high): (f64, f6
     shown((0..samples).map(|k| lines.iter().map(|(w, phase)| amplitude * math::sin(w * k as f64 * dt + phase)).sum()))
 }
 
-/// Levels between two values, each kept for a time between two, s.
+/// Random levels between two values, each with a random duration between two times, s.
 pub fn steps(draw: &mut Draw, samples: usize, dt: f64, (short, long): (f64, f64), (low, high): (f64, f64)) -> Vec<f64> {
     let (mut level, mut left) = (draw.between(low, high), 0.0);
     shown((0..samples).map(|_| {
@@ -32,7 +33,7 @@ pub fn steps(draw: &mut Draw, samples: usize, dt: f64, (short, long): (f64, f64)
     }))
 }
 
-/// A sine whose frequency rises from one to another, Hz.
+/// Sine with linearly increasing frequency, Hz.
 pub fn chirp(draw: &mut Draw, samples: usize, dt: f64, (low, high): (f64, f64), amplitude: f64) -> Vec<f64> {
     let (phase, end) = (draw.between(0.0, TAU), samples as f64 * dt);
     shown((0..samples).map(|k| {
@@ -41,7 +42,7 @@ pub fn chirp(draw: &mut Draw, samples: usize, dt: f64, (low, high): (f64, f64), 
     }))
 }
 
-/// One of multisine, steps and chirp, with values of about `size`.
+/// Multisine, steps or chirp, with values of about `size`.
 pub fn any(draw: &mut Draw, samples: usize, dt: f64, band: (f64, f64), size: f64) -> Vec<f64> {
     match draw.below(3) {
         0 => multisine(draw, samples, dt, band, size * 0.7),
@@ -50,7 +51,7 @@ pub fn any(draw: &mut Draw, samples: usize, dt: f64, band: (f64, f64), size: f64
     }
 }
 
-/// A slow wander about a mean, such as a temperature outdoors over days: a daily wave and a random walk.
+/// Slow variation about a mean, such as an outdoor temperature over days: a daily sine and a random walk.
 pub fn weather(draw: &mut Draw, samples: usize, dt: f64, mean: f64, swing: f64) -> Vec<f64> {
     let (phase, mut walk) = (draw.between(0.0, TAU), 0.0);
     let kick = 0.15 * swing * (dt / 3600.0).sqrt();

@@ -1,4 +1,4 @@
-//! Least squares of the base model: Levenberg and Marquardt, slopes by differences.
+//! Least-squares fit of the baseline model: Levenberg-Marquardt with finite differences.
 
 use mops_math as math;
 
@@ -8,22 +8,24 @@ use crate::simulate::base_outputs;
 /// Measured outputs of one experiment, by output and sample.
 pub type Series = Vec<Vec<f64>>;
 
-/// Steps per sample of the base model in fits.
+/// Integration steps per sample of the baseline model in fits.
 const STEPS: usize = 2;
 
-/// Where a fit ended.
+/// Result of a fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// Parameters.
     pub parameters: Vec<f64>,
-    /// Start values of the states.
+    /// Initial states.
     pub start: Vec<f64>,
     /// `sqrt(mean over samples and outputs of ((y - yhat)/noise)^2)`.
     pub error: f64,
 }
 
-/// Fits parameters (in their logarithm: they are positive) and start values to one experiment. `noise` is the standard
-/// deviation of each output, `from` where the search begins. `None` where the model diverges at the start.
+/// Fits the logarithms of the (positive) parameters and the initial states to one experiment.
+///
+/// `noise` is the standard deviation of each output, `from` the initial guess. `None` if the model diverges at the
+/// initial guess.
 pub fn fit(plant: &Plant, setup: &Setup, measured: &Series, noise: &[f64], from: (&[f64], &[f64])) -> Option<Fit> {
     let (np, nx) = (from.0.len(), from.1.len());
     let n = np + nx;
@@ -40,7 +42,8 @@ pub fn fit(plant: &Plant, setup: &Setup, measured: &Series, noise: &[f64], from:
     let mut best = cost(&r);
     let mut damping = 1e-4;
     for _ in 0..25 {
-        // Slopes; steps are small beside what the noise resolves and large beside rounding.
+        // Finite differences; steps are small compared with the resolution of the noise and large compared with
+        // rounding errors.
         let mut slopes = Vec::with_capacity(n);
         for j in 0..n {
             let step = 1e-6 * if j < np { 1.0 } else { at[j].abs().max(0.1) };
@@ -58,7 +61,7 @@ pub fn fit(plant: &Plant, setup: &Setup, measured: &Series, noise: &[f64], from:
                 damping *= 10.0;
                 continue;
             };
-            // A factor of 2 in a parameter is as far as a linear view carries.
+            // The linearisation is trusted for changes of a parameter by up to a factor of 2.
             let longest = step[..np].iter().fold(0.0_f64, |m, s| m.max(s.abs()));
             let short = (0.7 / longest).min(1.0);
             let next: Vec<f64> = at.iter().zip(&step).map(|(a, s)| a + short * s).collect();
@@ -79,7 +82,8 @@ pub fn fit(plant: &Plant, setup: &Setup, measured: &Series, noise: &[f64], from:
     Some(Fit { parameters, start: at[np..].to_vec(), error: (best / r.len() as f64).sqrt() })
 }
 
-/// Solves `(A + damping diag(A)) x = b` by Cholesky in units of the diagonal; `None` where it is not definite.
+/// Solves `(A + damping diag(A)) x = b` by Cholesky in units of the diagonal; `None` if the matrix is not positive
+/// definite.
 fn solve(a: &[Vec<f64>], b: &[f64], damping: f64) -> Option<Vec<f64>> {
     let n = b.len();
     let unit: Vec<f64> = (0..n).map(|i| a[i][i].sqrt().max(1e-150)).collect();

@@ -1,4 +1,4 @@
-//! From a plant, what is missing, a size and a seed to a trial.
+//! Generation of a trial from a plant, the missing effects, a size and a seed.
 
 use crate::bench::{Bench, EXPERIMENTS, Recorded};
 use crate::draw::Draw;
@@ -11,32 +11,40 @@ use crate::span::{Frame, cosine};
 use crate::study::{self, Declared, TASK};
 use crate::trial::{Trial, TrueEffect, Truth};
 
-/// Sizes of a benchmark: errors of the refitted base model in units of the noise.
+/// Sizes of a benchmark: errors of the refitted baseline model in units of the noise.
 pub const SIZES: [f64; 4] = [20.0, 5.0, 2.0, 1.3];
 
-/// Relative difference from the wanted size that is accepted.
+/// Accepted relative deviation from the requested size.
 const CLOSE: f64 = 0.05;
 
-/// Two effects whose outputs, beyond what the base model absorbs, point more alike than this count as one.
+/// Cosine similarity, orthogonal to the baseline model's sensitivities, above which the outputs of two effects count as
+/// indistinguishable.
 const ALIKE: f64 = 0.9;
 
-/// Error that a few effects of the catalogue must leave of one outside, in units of the noise that was drawn.
+/// Smallest residual of an effect outside the catalogue after a fit of a few catalogue effects, in units of the noise
+/// realisation.
 const BEYOND: f64 = 1.12;
 
-/// What the base model lacks.
+/// Missing part of the baseline model.
 #[derive(Debug, Clone, Copy)]
 pub enum Missing<'a> {
-    /// Nothing.
+    /// Nothing is missing.
     Nothing,
     /// One or two effects by name, each at a place where it fits: `coulomb-friction`, or `coulomb-friction@joint:q`.
     Effects(&'a [&'a str]),
-    /// Something that no catalogue has, by name.
+    /// Effect outside every catalogue, by name.
     Outside(&'a str),
 }
 
-/// A trial; `None` where the plant or the effect is not known, the effect does not fit the plant, or the size cannot be
-/// reached with a strength that makes sense. Nor is there one where two effects show alike, or where effects of the
-/// catalogue together come close to one outside. Nothing missing has no size.
+/// Generates a trial.
+///
+/// Returns `None` in these cases:
+/// - The plant or the effect is unknown, or the effect does not fit the plant.
+/// - The size cannot be reached with a plausible magnitude.
+/// - Two effects are indistinguishable.
+/// - Effects of the catalogue together approximate an effect outside it.
+///
+/// The size has no meaning if nothing is missing.
 pub fn generate(plant: &str, missing: Missing<'_>, size: f64, seed: u64) -> Option<Trial> {
     let plant = plants().iter().copied().find(|p| p.name == plant)?;
     let label = match missing {
@@ -64,7 +72,7 @@ pub fn generate(plant: &str, missing: Missing<'_>, size: f64, seed: u64) -> Opti
     let families: Vec<(&Effect, Spot, Family)> = families.collect::<Option<_>>()?;
     let (strengths, mut last) = bench.strengths(&families, size)?;
     let Recorded { files, floors } = bench.record(&families, &strengths)?;
-    // A fit may have ended in a valley of its own: the better of two counts.
+    // A fit may have ended in a local minimum: the better of two counts.
     let mut cold = None;
     let mut reached = bench.error(&families, &strengths, &mut last)?;
     if let Some(error) = bench.error(&families, &strengths, &mut cold)

@@ -1,8 +1,8 @@
-//! Simulated experiments with an effect in them that the study does not declare: what the discrepancy search is tested
-//! with. Shares no code with what it tests: own plants, own formulas, own integrator, own fit.
+//! Simulated experiments with an effect that the study does not declare, to test the discrepancy search. Shares no code
+//! with the search: own plants, formulas, integrator and fit.
 //!
-//! A [`Trial`] is a study file, its data files and the truth. [`generate`] makes one from a plant, what is missing in its
-//! base model, a size and a seed; the same four give the same bits.
+//! A [`Trial`] is a study file, its data files and the truth. [`generate`] creates one from a plant, the effects
+//! missing in its baseline model, a size and a seed; the same four arguments give identical bits.
 
 mod bench;
 mod draw;

@@ -1,4 +1,4 @@
-//! Effects that no catalogue has: their shapes have features that no sum of a few named effects follows.
+//! Effects outside every catalogue: no sum of a few catalogue effects reproduces their shapes.
 
 use std::f64::consts::TAU;
 
@@ -8,18 +8,18 @@ use crate::draw::Draw;
 use crate::effects::{Effect, Family, Scene, any_joint, any_place, any_sensor, processes};
 use crate::law::{At, Law};
 
-/// A force or flow.
+/// Creates a force or flow.
 fn force(f: impl Fn(&At<'_>) -> f64 + Send + Sync + 'static) -> Law {
     Law { force: Some(Box::new(f)), ..Law::default() }
 }
 
-/// Bumps `sum +-exp(-((q - c)/w)^2)` at random places over a range widened by a fifth.
+/// Bumps `sum +-exp(-((q - c)/w)^2)` at random positions over a range widened by a fifth.
 fn bumps(s: &Scene<'_>, n: usize, width: f64) -> impl Fn(f64) -> f64 + Send + Sync + Clone + 'static {
     let width = width * s.reach();
     let mut sign = s.sign();
     let shapes: Vec<(f64, f64)> = (0..n)
         .map(|i| {
-            // Spread over the range, signs in no order, sizes of 0.5 to 1.
+            // Spread over the range, with irregular signs and amplitudes of 0.5 to 1.
             if s.chance(0.65) {
                 sign = -sign;
             }
@@ -30,7 +30,7 @@ fn bumps(s: &Scene<'_>, n: usize, width: f64) -> impl Fn(f64) -> f64 + Send + Sy
     move |q| shapes.iter().map(|(c, a)| a * math::exp(-math::powi((q - c) / width, 2))).sum()
 }
 
-/// A signal that jumps between -1 and 1 after random times of a mean length, other ones in every experiment.
+/// Random telegraph signal between -1 and 1 with exponentially distributed times, different in every experiment.
 fn telegraph(s: &Scene<'_>, mean: f64) -> [Vec<f64>; 3] {
     let end = 2.0 * s.setup.duration();
     [0, 1, 2].map(|experiment| {
@@ -46,7 +46,7 @@ fn telegraph(s: &Scene<'_>, mean: f64) -> [Vec<f64>; 3] {
     })
 }
 
-/// Effects outside of every catalogue.
+/// Returns the effects outside every catalogue.
 pub fn outside() -> Vec<&'static Effect> {
     ALL.iter().collect()
 }
@@ -56,7 +56,7 @@ const ALL: &[Effect] = &[
         name: "short-range-magnet",
         fits: any_joint,
         build: |s| {
-            // -A r exp(-r^2), r the distance in widths.
+            // -A r exp(-r^2), with r the distance in widths.
             let (centre, width) = (s.within(0.35, 0.65), s.reach() * s.between(0.06, 0.15));
             Family::up_to(8.0 * s.force, move |a| {
                 let pull = move |at: &At<'_>| {
@@ -96,7 +96,7 @@ const ALL: &[Effect] = &[
         name: "negative-damping-band",
         fits: any_joint,
         build: |s| {
-            // Pushes along with the motion within a band of positions, brakes beyond it.
+            // Drives the motion within a band of positions and brakes it outside.
             let (centre, width) = (s.within(0.25, 0.75), s.reach() * s.between(0.12, 0.3));
             Family::up_to(6.0 * s.force / s.speed, move |d| {
                 let push = move |at: &At<'_>| {
@@ -111,7 +111,7 @@ const ALL: &[Effect] = &[
         name: "chirping-force",
         fits: any_place,
         build: |s| {
-            // A frequency that wanders, so that no sine and no pulse follows it.
+            // A wandering frequency, which no sine and no pulse can follow.
             let (base, sway) = (s.omega * s.between(0.5, 1.5), s.between(2.0, 4.0));
             let (slow, end) = (TAU * s.between(1.5, 3.5), s.setup.duration());
             let phases = [s.between(-3.0, 3.0), s.between(-3.0, 3.0), s.between(-3.0, 3.0)];

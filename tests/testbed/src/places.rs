@@ -1,10 +1,10 @@
-//! How places are spelt, and which answers are right.
+//! Names of places, and the places accepted as correct answers.
 
 use crate::law::Spot;
 use crate::plant::{Place, Plant};
 use crate::trial::TrueEffect;
 
-/// The place, as results spell it.
+/// Returns the name of a place, as in results.
 pub fn place(plant: &Plant, spot: Spot) -> String {
     match spot {
         Spot::Place(j) => {
@@ -16,7 +16,7 @@ pub fn place(plant: &Plant, spot: Spot) -> String {
     }
 }
 
-/// Places that are right answers: the equation under any of its names, and both sides of a coupling.
+/// Returns the places accepted as correct: the equation under any of its names, and both sides of a coupling.
 pub fn accepted(plant: &Plant, effect: &str, spot: Spot) -> Vec<String> {
     let equation = |j: usize| {
         let name = plant.states[plant.places[j].state()].0;
@@ -32,18 +32,19 @@ pub fn accepted(plant: &Plant, effect: &str, spot: Spot) -> Vec<String> {
     }
 }
 
-/// What is the same up to parameters and start values of the base model, by its equations.
+/// Returns the effects that equal the true one up to parameters and initial states of the baseline model, by its
+/// equations.
 pub fn equivalents(plant: &Plant, effects: &[TrueEffect]) -> Vec<(String, String)> {
     let [effect] = effects else { return Vec::new() };
     let groups: &[&[(&str, &str)]] = match plant.name {
-        // A shift of x is a force k x; with one input and one output, it does not matter which of them is late.
+        // A shift of x equals a force k x; with one input and one output, a delay of either is the same.
         "spring" => &[
             &[("sensor-bias", "sensor:x"), ("constant-force", "joint:x"), ("input-bias", "actuator:u")],
             &[("input-delay", "actuator:u"), ("sensor-delay", "sensor:x")],
             &[("actuator-lag", "actuator:u"), ("sensor-lag", "sensor:x")],
         ],
         "torsion" => &[&[("sensor-bias", "sensor:q"), ("constant-force", "joint:q")]],
-        // Seen from a drifting sensor, viscous friction is a constant force.
+        // For a drifting sensor, viscous friction appears as a constant force.
         "axis" => &[
             &[("constant-force", "joint:x"), ("input-bias", "actuator:u"), ("sensor-drift", "sensor:x")],
             &[("input-delay", "actuator:u"), ("sensor-delay", "sensor:x")],
@@ -55,7 +56,7 @@ pub fn equivalents(plant: &Plant, effects: &[TrueEffect]) -> Vec<(String, String
             &[("actuator-lag", "actuator:i"), ("sensor-lag", "sensor:q")],
         ],
         "crane" => &[&[("constant-force", "joint:x"), ("input-bias", "actuator:u"), ("sensor-drift", "sensor:x")]],
-        // A wrong scale is a wrong gravity.
+        // A wrong sensor gain appears as a wrong gravity.
         "ball" => &[&[("constant-force", "joint:y"), ("sensor-drift", "sensor:y"), ("sensor-gain", "sensor:y")]],
         "drive" => &[&[("constant-force", "joint:q1"), ("input-bias", "actuator:u")]],
         "furuta-driven" => &[&[("constant-force", "joint:ph"), ("input-bias", "actuator:u")]],

@@ -1,4 +1,4 @@
-//! What can stand in for what: outputs as vectors, with all that the base model can absorb taken out.
+//! Substitution between effects: outputs as vectors, orthogonal to the sensitivities of the baseline model.
 
 use mops_math as math;
 
@@ -9,27 +9,27 @@ use crate::law::{Installed, Law, Spot};
 use crate::plant::Setup;
 use crate::simulate::{base_outputs, outputs};
 
-/// Steps per sample of the base model here.
+/// Integration steps per sample of the baseline model.
 const STEPS: usize = 4;
-/// Shapes drawn of every effect of the catalogue.
+/// Number of random shapes per effect of the catalogue.
 const SHAPES: usize = 2;
-/// Shares of the largest strength at which they are looked at.
+/// Examined magnitudes, relative to the largest one.
 const STRENGTHS: [f64; 2] = [0.02, 0.2];
-/// Effects that may stand in together.
+/// Maximum number of effects that substitute for another together.
 const TOGETHER: usize = 3;
 
-/// The calibration outputs about a base model, in units of the noise.
+/// Calibration outputs around a baseline model, in units of the noise.
 pub struct Frame<'a> {
     bench: &'a Bench,
     p: &'a [f64],
     setup: Setup,
     base: Vec<f64>,
-    /// Orthonormal directions of parameters and start values.
+    /// Orthonormal basis of the sensitivities with respect to parameters and initial states.
     absorbed: Vec<Vec<f64>>,
 }
 
 impl<'a> Frame<'a> {
-    /// About given parameters and start values; `None` where the model diverges.
+    /// Linearises the baseline model around parameters and initial states; `None` if it diverges.
     pub fn new(bench: &'a Bench, p: &'a [f64], start: &[f64]) -> Option<Self> {
         let setup = Setup { start: start.to_vec(), ..bench.setups[0].clone() };
         let run = |p: &[f64], start: &[f64]| Some(weigh(bench, &base_outputs(bench.plant, p, start, &setup, STEPS)?));
@@ -44,16 +44,18 @@ impl<'a> Frame<'a> {
         Some(Self { bench, p, setup, base, absorbed })
     }
 
-    /// How an effect moves the outputs, in a direction that the base model cannot follow; `None` where it diverges.
+    /// Returns the change of the outputs due to an effect, orthogonal to the baseline sensitivities; `None` if it
+    /// diverges.
     pub fn shift(&self, law: Law, spot: Spot) -> Option<Vec<f64>> {
         let y = outputs(self.bench.plant, self.p, &self.setup, 0, &[Installed { law, spot }])?;
         let shift = off(&self.absorbed, minus(&weigh(self.bench, &y), &self.base));
         shift.iter().all(|v| v.is_finite()).then_some(shift)
     }
 
-    /// Root mean square, in units of the noise, of what the best few effects of the catalogue leave of a measurement:
-    /// orthogonal matching pursuit over all effects at all places, with shapes drawn at random and strengths that enter
-    /// linearly.
+    /// Returns the root mean square residual, in units of the noise, after the best few catalogue effects are fitted to
+    /// a measurement.
+    ///
+    /// Orthogonal matching pursuit over all effects at all places, with random shapes and linear magnitudes.
     pub fn left_by_catalogue(&self, measured: &[Vec<f64>]) -> f64 {
         let mut rest = off(&self.absorbed, minus(&weigh(self.bench, measured), &self.base));
         let mut candidates = self.catalogue();
@@ -91,7 +93,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Cosine between two vectors.
+/// Returns the cosine between two vectors.
 pub fn cosine(a: &[f64], b: &[f64]) -> f64 {
     dot(a, b) / (dot(a, a) * dot(b, b)).sqrt().max(1e-300)
 }
@@ -108,7 +110,7 @@ fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
-/// A vector without its parts along orthonormal directions, which are taken out twice against rounding.
+/// Removes the components along orthonormal directions, twice to reduce rounding errors.
 fn off(directions: &[Vec<f64>], mut v: Vec<f64>) -> Vec<f64> {
     for direction in directions.iter().chain(directions) {
         let along = dot(direction, &v);
@@ -117,7 +119,7 @@ fn off(directions: &[Vec<f64>], mut v: Vec<f64>) -> Vec<f64> {
     v
 }
 
-/// Adds the direction of a vector to orthonormal ones, unless it is one of them.
+/// Adds the direction of a vector to an orthonormal basis, unless it is contained in its span.
 fn add(directions: &mut Vec<Vec<f64>>, v: Vec<f64>) {
     let before = dot(&v, &v);
     let v = off(directions, v);

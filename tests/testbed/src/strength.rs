@@ -1,13 +1,15 @@
-//! The strength at which the refitted base model has a wanted error.
+//! Magnitude at which the refitted baseline model has a given error.
 
 use mops_math as math;
 
-/// Relative error that is good enough.
+/// Sufficient relative accuracy of the error.
 const CLOSE: f64 = 0.04;
 
-/// Finds `e` in the bounds with `error(e)` near `size`, from below; `floor` is the error without the effect. Above the
-/// floor the error grows about in proportion with the strength, in root sums of squares: a secant in logarithms, held by
-/// a bracket. `None` where the size is not reached, or `error` is `None` on the way.
+/// Finds `e` within the bounds such that `error(e)` is near `size`, from below; `floor` is the error without the
+/// effect.
+///
+/// Above the floor, the error (root difference of squares) is about proportional to the magnitude. The method is a
+/// bracketed secant method in logarithms. `None` if the size is not reached, or if `error` returns `None` on the way.
 pub fn find(
     (low, high): (f64, f64),
     start: f64,
@@ -35,7 +37,7 @@ pub fn find(
                 above = Some(point);
             }
         } else {
-            // It diverges: as good as too strong.
+            // Divergence counts as too large a magnitude.
             above = Some((math::ln(e), f64::INFINITY));
         }
         e = match (below, above) {

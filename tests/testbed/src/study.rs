@@ -1,4 +1,4 @@
-//! The study file of a trial.
+//! Study file of a trial.
 
 use std::fmt::Write;
 
@@ -7,28 +7,28 @@ use crate::plant::Plant;
 /// Task of the study files.
 pub const TASK: &str = "diagnosis";
 
-/// What a study says beside the plant.
+/// Entries of a study besides the plant.
 pub struct Declared<'a> {
     /// Name of the study.
     pub name: &'a str,
     /// Task.
     pub task: &'a str,
-    /// First guess, smallest and largest value of each parameter.
+    /// Initial guess, lower and upper bound of each parameter.
     pub tuners: &'a [(f64, f64, f64)],
     /// Standard deviation of each output's noise, quantisation included.
     pub noise: &'a [f64],
-    /// Names and roles of the experiments; the files are called like them.
+    /// Names and roles of the experiments; the files have the same names.
     pub experiments: &'a [(&'a str, &'a str)],
 }
 
-/// The study file.
+/// Returns the study file.
 pub fn text(plant: &Plant, declared: &Declared<'_>) -> String {
     let mut s = String::new();
     let table = |pairs: &[(&str, &str)]| {
         let entries: Vec<String> = pairs.iter().map(|(name, unit)| format!("{name} = \"{unit}\"")).collect();
         format!("{{ {} }}", entries.join(", "))
     };
-    let mut line = |text: String| writeln!(s, "{text}").expect("a string takes everything");
+    let mut line = |text: String| writeln!(s, "{text}").expect("writing to a string cannot fail");
     line(format!("[study]\nname = \"{}\"\ntask = \"{}\"\n", declared.name, declared.task));
     line("[models.plant.equations]".to_owned());
     line(format!("states     = {}", table(plant.states)));

@@ -1,57 +1,58 @@
-//! A simulated case: what a tool is given, and the truth.
+//! Simulated case: the input of a tool, and the truth.
 
 use std::fmt::Write;
 use std::path::Path;
 
-/// One case.
+/// Simulated case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
-    /// Name, from the plant, what is missing, the size and the seed.
+    /// Name, from the plant, the missing effects, the size and the seed.
     pub name: String,
     /// Name of the plant.
     pub plant: String,
-    /// The study file, `study.toml`.
+    /// Study file, `study.toml`.
     pub study: String,
     /// Names and contents of the data files.
     pub files: Vec<(String, String)>,
-    /// What a tool is not told.
+    /// Truth, hidden from the tool.
     pub truth: Truth,
 }
 
-/// What is missing in the base model.
+/// Missing part of the baseline model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Truth {
-    /// The effects; none where nothing is missing.
+    /// Missing effects; empty if nothing is missing.
     pub effects: Vec<TrueEffect>,
     /// `effect`, `none` or `unexplained`.
     pub verdict: &'static str,
-    /// Error of the base model refitted to the calibration experiment, 1 = noise.
+    /// Error of the baseline model refitted to the calibration experiment; 1 is the noise level.
     pub size: f64,
-    /// Root mean square of the noise that was drawn, quantisation included, by experiment; in units of what is declared.
+    /// Root mean square of the noise realisation, quantisation included, by experiment, relative to the declared noise
+    /// level.
     pub noise_floor: Vec<(String, f64)>,
-    /// True parameters of the base model.
+    /// True parameters of the baseline model.
     pub base_parameters: Vec<(String, f64)>,
-    /// Effects and places that no data of this plant could tell from the true one, where it is single.
+    /// Effects and places that no data of this plant could distinguish from the true effect, if it is a single one.
     pub equivalents: Vec<(String, String)>,
 }
 
-/// An effect that is missing.
+/// Missing effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrueEffect {
-    /// Class: its name, in kebab case; `unknown` for one outside of every catalogue.
+    /// Class: name of the effect, in kebab case; `unknown` for an effect outside every catalogue.
     pub class: String,
-    /// Name of the formula, which says more than the class where that is `unknown`.
+    /// Name of the formula, more specific than the class if that is `unknown`.
     pub formula: String,
     /// Place, such as `joint:q`.
     pub place: String,
-    /// Places that are right answers.
+    /// Places accepted as correct.
     pub accepted_places: Vec<String>,
-    /// Names and values of the strengths.
+    /// Names and values of the effect's parameters.
     pub strengths: Vec<(String, f64)>,
 }
 
 impl Trial {
-    /// Writes study.toml, the data files and truth.json into a folder, which is made where it does not exist.
+    /// Writes study.toml, the data files and truth.json into a folder, which is created if necessary.
     ///
     /// # Errors
     /// When the folder or a file cannot be written.
@@ -64,7 +65,7 @@ impl Trial {
 }
 
 impl Truth {
-    /// The truth as JSON.
+    /// Returns the truth as JSON.
     pub fn json(&self, name: &str, plant: &str) -> String {
         let texts = |texts: &[String]| {
             let quoted: Vec<String> = texts.iter().map(|t| format!("\"{t}\"")).collect();
@@ -75,7 +76,7 @@ impl Truth {
             format!("{{ {} }}", entries.join(", "))
         };
         let mut s = String::new();
-        let mut line = |text: String| writeln!(s, "{text}").expect("a string takes everything");
+        let mut line = |text: String| writeln!(s, "{text}").expect("writing to a string cannot fail");
         line(format!("{{ \"case\": \"{name}\", \"plant\": \"{plant}\", \"verdict\": \"{}\",", self.verdict));
         line("  \"effects\": [".to_owned());
         for (i, effect) in self.effects.iter().enumerate() {

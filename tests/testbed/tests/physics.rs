@@ -1,20 +1,20 @@
-//! The simulator against closed forms.
+//! The simulator compared with closed forms.
 
 use mops_math as math;
 
 use mops_testbed::{Dry, Installed, Law, Plant, Setup, Spot, base_states, outputs, plants};
 
 fn plant(name: &str) -> &'static Plant {
-    plants().iter().find(|plant| plant.name == name).expect("it is one of them")
+    plants().iter().find(|plant| plant.name == name).expect("the plant exists")
 }
 
-/// An experiment of 1 s or so with one held input.
+/// Returns an experiment of about 1 s with one held input.
 fn setup(dt: f64, samples: usize, start: &[f64], input: impl Fn(usize) -> f64) -> Setup {
     Setup { dt, samples, start: start.to_vec(), inputs: vec![(0..samples).map(input).collect()] }
 }
 
 fn run(plant: &Plant, p: &[f64], setup: &Setup, law: Law, spot: Spot) -> Vec<f64> {
-    outputs(plant, p, setup, 0, &[Installed { law, spot }]).expect("it does not diverge").remove(0)
+    outputs(plant, p, setup, 0, &[Installed { law, spot }]).expect("the simulation does not diverge").remove(0)
 }
 
 fn dry(slide: f64, hold: f64) -> Law {
@@ -50,31 +50,31 @@ fn a_shaft_with_dry_friction_stops_where_its_energy_is_used_up_and_rests_to_the_
     }
     assert!((q[99] - angle).abs() < 1e-10);
     let rest = (stop / 0.01).ceil() as usize + 1;
-    assert!(q[rest..].iter().all(|&at| at == q[99]), "it creeps");
+    assert!(q[rest..].iter().all(|&at| at == q[99]), "the shaft creeps");
 }
 
 #[test]
-fn stiction_holds_up_to_its_level_and_lets_go_to_the_lower_one() {
-    // 0.052 N m/A: 0.1 A is below the hold level of 0.006 N m, 0.12 A above it.
+fn stiction_breaks_away_at_its_level_and_slides_at_the_lower_one() {
+    // 0.052 N m/A: 0.1 A is below the breakaway level of 0.006 N m, 0.12 A above it.
     let (inertia, slide, hold) = (0.002, 0.003, 0.006);
     let current = |k: usize| if k < 50 { 0.1 } else { 0.12 };
     let q =
         run(plant("servo"), &[inertia, 0.0], &setup(0.01, 81, &[0.2, 0.0], current), dry(slide, hold), Spot::Place(0));
-    assert!(q[..=50].iter().all(|&q| q == 0.2), "it moves under the level");
+    assert!(q[..=50].iter().all(|&q| q == 0.2), "the joint moves below the breakaway level");
     let exact = 0.2 + 0.5 * (0.052 * 0.12 - slide) / inertia * math::powi(0.3, 2);
-    assert!((q[80] - exact).abs() < 1e-10, "{} and not {exact}", q[80]);
+    assert!((q[80] - exact).abs() < 1e-10, "{} instead of {exact}", q[80]);
 }
 
 #[test]
 fn a_spring_with_dry_friction_loses_the_same_amplitude_in_every_half_swing() {
-    // m x'' = -k x - c sgn v: each half swing ends 2 c/k nearer; it ends within the band where c holds k x.
+    // m x'' = -k x - c sgn v: the amplitude decreases by 2 c/k per half swing, until c balances k x.
     let (m, k, c, start) = (1.0, 100.0_f64, 0.5, 0.0473);
     let half = std::f64::consts::PI * (m / k).sqrt();
     let x =
         run(plant("spring"), &[m, 0.0, k], &setup(half / 50.0, 401, &[start, 0.0], |_| 0.0), dry(c, c), Spot::Place(0));
     let turns = [start, -(start - 2.0 * c / k), start - 4.0 * c / k, -(start - 6.0 * c / k), start - 8.0 * c / k];
     for (i, turn) in turns.iter().enumerate().take(5) {
-        assert!((x[50 * i] - turn).abs() < 1e-7, "half swing {i}: {} and not {turn}", x[50 * i]);
+        assert!((x[50 * i] - turn).abs() < 1e-7, "half swing {i}: {} instead of {turn}", x[50 * i]);
     }
     assert_eq!(x[300], x[400]);
 }
@@ -129,7 +129,7 @@ fn pendulums_on_arms_and_trolleys_keep_their_energy_without_friction() {
 }
 
 #[test]
-fn a_delay_that_is_no_whole_number_of_samples_ends_a_step_where_the_command_changes() {
+fn a_fractional_delay_ends_a_step_where_the_command_changes() {
     let (inertia, delay) = (0.002, 0.0234);
     let step = setup(0.01, 60, &[0.0, 0.0], |k| if k < 10 { 0.0 } else { 0.3 });
     let q = run(plant("servo"), &[inertia, 0.0], &step, Law { delay, ..Law::default() }, Spot::Actuator(0));
@@ -140,10 +140,10 @@ fn a_delay_that_is_no_whole_number_of_samples_ends_a_step_where_the_command_chan
 }
 
 #[test]
-fn a_late_sensor_shows_what_was_there_before() {
+fn a_delayed_sensor_shows_earlier_values() {
     let fall = setup(0.01, 80, &[5.0, 3.0], |_| 0.0);
     let y = run(plant("ball"), &[0.0], &fall, Law { delay: 0.0377, ..Law::default() }, Spot::Sensor(0));
-    // The flight began a delay before the first sample.
+    // The flight starts one delay before the first sample.
     for (k, y) in y.iter().enumerate() {
         let t = 0.01 * k as f64;
         assert!((y - (5.0 + 3.0 * t - 0.5 * 9.81 * t * t)).abs() < 1e-5);
@@ -151,14 +151,14 @@ fn a_late_sensor_shows_what_was_there_before() {
 }
 
 #[test]
-fn a_mass_that_leaks_is_accelerated_as_the_logarithm_of_what_is_left() {
+fn a_leaking_mass_accelerates_with_the_logarithm_of_the_remaining_mass() {
     let (mass, rate, force) = (3.0, 0.8, 5.0);
     let law = Law { parameters: Some(Box::new(move |t, p| p[0] -= rate * t)), ..Law::default() };
     let x = run(plant("axis"), &[mass, 0.0], &setup(0.01, 201, &[0.0, 0.0], |_| force), law, Spot::Place(0));
     // v = F/r ln(m0/m), x its integral.
     let left = mass - rate * 2.0;
     let exact = force / (rate * rate) * (rate * 2.0 + left * math::ln(left / mass));
-    assert!((x[200] - exact).abs() < 1e-9, "{} and not {exact}", x[200]);
+    assert!((x[200] - exact).abs() < 1e-9, "{} instead of {exact}", x[200]);
 }
 
 #[test]

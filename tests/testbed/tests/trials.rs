@@ -1,18 +1,18 @@
-//! What trials promise.
+//! Properties that trials guarantee.
 
 use mops_math as math;
 
 use mops_testbed::{Missing, SIZES, Trial, effects, generate, outside, plants};
 
-/// The first trial that there is, over a few seeds.
+/// Returns the first trial that can be generated, over a few seeds.
 fn first(plant: &str, missing: Missing<'_>, size: f64) -> Trial {
-    (1..20).find_map(|seed| generate(plant, missing, size, seed)).expect("some seed makes one")
+    (1..20).find_map(|seed| generate(plant, missing, size, seed)).expect("a seed that gives a trial")
 }
 
-/// Column of a data file, by name.
+/// Returns a column of a data file, by name.
 fn column(trial: &Trial, file: usize, name: &str) -> Vec<f64> {
     let mut lines = trial.files[file].1.lines();
-    let at = lines.next().unwrap().split(',').position(|column| column == name).expect("it has the column");
+    let at = lines.next().unwrap().split(',').position(|column| column == name).expect("the file has the column");
     lines.map(|line| line.split(',').nth(at).unwrap().parse().unwrap()).collect()
 }
 
@@ -28,7 +28,7 @@ fn there_are_ten_plants_and_thirty_effects_and_all_fit_somewhere() {
 }
 
 #[test]
-fn the_size_that_is_asked_for_is_met_to_five_percent() {
+fn the_requested_size_is_met_to_five_percent() {
     for (plant, effect) in [
         ("servo", "coulomb-friction"),
         ("pendulum", "cogging"),
@@ -52,7 +52,7 @@ fn the_same_request_gives_the_same_bits_and_another_seed_other_ones() {
 }
 
 #[test]
-fn where_nothing_is_missing_the_refitted_base_model_is_as_good_as_the_noise_in_every_plant() {
+fn without_missing_effects_the_refitted_baseline_model_reaches_the_noise_level_in_every_plant() {
     for plant in plants() {
         let trial = first(plant.name, Missing::Nothing, 0.0);
         assert_eq!((trial.truth.verdict, trial.truth.effects.len()), ("none", 0));
@@ -60,7 +60,7 @@ fn where_nothing_is_missing_the_refitted_base_model_is_as_good_as_the_noise_in_e
         let close = 4.0 / (2.0 * plant.outputs.len() as f64 * (trial.files[0].1.lines().count() - 1) as f64).sqrt();
         let floor = trial.truth.noise_floor[0].1;
         assert!((floor - 1.0).abs() < close, "{}: noise of {floor}", trial.name);
-        // The fit takes away what its few parameters can follow, no more.
+        // The fit removes only the part that its few parameters can follow.
         assert!(
             trial.truth.size <= floor + 1e-6 && trial.truth.size > floor - 0.02,
             "{}: {}",
@@ -72,7 +72,7 @@ fn where_nothing_is_missing_the_refitted_base_model_is_as_good_as_the_noise_in_e
 
 #[test]
 fn the_noise_between_neighbours_in_the_file_is_the_one_declared() {
-    // Third differences of a slow level leave 20 times the variance of white noise.
+    // Third differences of a slow level have 20 times the variance of white noise.
     let trial = first("tanks", Missing::Nothing, 0.0);
     let line = trial.study.lines().find(|line| line.starts_with("channels")).unwrap();
     let declared: f64 = line.split("noise = ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
@@ -80,7 +80,10 @@ fn the_noise_between_neighbours_in_the_file_is_the_one_declared() {
     let squares: f64 = h.windows(4).map(|w| math::powi(w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0], 2)).sum();
     let seen = (squares / (20.0 * (h.len() - 3) as f64)).sqrt();
     assert!((seen / declared - 1.0).abs() < 0.12, "{seen}, declared {declared}");
-    assert!(h.iter().all(|h| (h / 0.02 - (h / 0.02).round()).abs() < 1e-6), "steps of the quantisation");
+    assert!(
+        h.iter().all(|h| (h / 0.02 - (h / 0.02).round()).abs() < 1e-6),
+        "values are multiples of the quantisation step"
+    );
 }
 
 #[test]
@@ -119,25 +122,25 @@ fn guesses_are_20_to_60_percent_off_and_the_truth_is_within_the_bounds() {
 }
 
 #[test]
-fn two_effects_are_both_told_and_do_not_show_alike() {
+fn two_effects_are_both_reported_and_distinguishable() {
     let trial = first("axis", Missing::Effects(&["coulomb-friction", "input-delay"]), 5.0);
     let told: Vec<&str> = trial.truth.effects.iter().map(|effect| effect.class.as_str()).collect();
     assert_eq!(told, ["coulomb-friction", "input-delay"]);
-    // A constant force and an offset of the command are one: there is no such trial.
+    // A constant force and an input bias are indistinguishable: such a trial does not exist.
     let alike = Missing::Effects(&["constant-force", "input-bias"]);
     assert!((1..6).all(|seed| generate("axis", alike, 5.0, seed).is_none()));
 }
 
 #[test]
-fn an_effect_outside_the_catalogue_is_unknown_and_its_place_is_told() {
+fn an_effect_outside_the_catalogue_is_unknown_and_its_place_is_reported() {
     let trial = first("pendulum", Missing::Outside("short-range-magnet"), 2.0);
     assert_eq!((trial.truth.verdict, trial.truth.effects[0].class.as_str()), ("unexplained", "unknown"));
     assert!(trial.truth.effects[0].accepted_places.contains(&"process:th".to_owned()));
 }
 
 #[test]
-fn what_the_base_model_absorbs_makes_no_trial() {
-    // A shift of an angle that nothing depends on, a delay of a free swing, a factor of a length whose mass is open.
+fn effects_absorbed_by_the_baseline_model_give_no_trial() {
+    // A shift of an angle without influence, a delay of a free swing, a gain of a length whose mass is unknown.
     for (plant, effect) in [("servo", "sensor-bias"), ("pendulum", "sensor-delay"), ("axis", "sensor-gain")] {
         assert!((1..5).all(|seed| generate(plant, Missing::Effects(&[effect]), 2.0, seed).is_none()), "{effect}");
     }

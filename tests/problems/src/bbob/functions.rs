@@ -1,4 +1,4 @@
-//! The 24 functions, above their least value.
+//! The 24 functions, relative to their minimum.
 //!
 //! `z` is the transformed point, `R` and `Q` are rotations, `i` counts from 0 and `s_i = i / (n - 1)`.
 
@@ -51,7 +51,7 @@ impl Instance {
         rotated(&self.r, &shifted(x, &self.optimum))
     }
 
-    /// The function's value above its least one.
+    /// Returns the value of the function above its minimum.
     pub(crate) fn height<S: Scalar>(&self, x: &[S]) -> S {
         match self.function {
             1 => sum(shifted(x, &self.optimum).into_iter().map(|z| z * z)),

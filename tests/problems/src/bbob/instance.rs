@@ -1,4 +1,4 @@
-//! The random numbers, shifts and rotations that make an instance of a function.
+//! Random numbers, shifts and rotations that define an instance of a function.
 //!
 //! Source: N. Hansen, S. Finck, R. Ros, A. Auger, Real-Parameter Black-Box Optimization Benchmarking 2009: Noiseless
 //! Functions Definitions, INRIA RR-6829 (2009), with the generators of the accompanying reference code (COCO).
@@ -6,11 +6,11 @@
 use mops_core::math;
 use std::f64::consts::PI;
 
-/// A square matrix, by rows.
+/// Square matrix, by rows.
 pub(crate) type Matrix = Vec<Vec<f64>>;
 
-/// Uniform numbers in (0, 1): the minimal standard generator of Park and Miller (by Schrage's factorisation), shuffled by a
-/// table of 32 as of Bays and Durham.
+/// Returns uniform numbers in (0, 1): the minimal standard generator of Park and Miller (with Schrage's factorisation),
+/// shuffled by a table of 32 entries as proposed by Bays and Durham.
 pub(crate) fn uniform(count: usize, seed: i64) -> Vec<f64> {
     const MODULUS: i64 = 2_147_483_647;
     let mut state = seed.abs().max(1);
@@ -40,14 +40,14 @@ pub(crate) fn uniform(count: usize, seed: i64) -> Vec<f64> {
     (0..count).map(|_| draw()).collect()
 }
 
-/// Normal numbers, by the method of Box and Muller.
+/// Returns normal numbers by the Box-Muller method.
 pub(crate) fn normal(count: usize, seed: i64) -> Vec<f64> {
     let u = uniform(2 * count, seed);
     let of = |i: usize| (-2.0 * math::ln(u[i])).sqrt() * math::cos(2.0 * PI * u[count + i]);
     (0..count).map(of).map(|g| if g == 0.0 { 1e-99 } else { g }).collect()
 }
 
-/// A rotation: normal numbers by columns, made orthonormal by Gram and Schmidt.
+/// Returns a rotation: normal numbers by columns, made orthonormal by the Gram-Schmidt process.
 pub(crate) fn rotation(n: usize, seed: i64) -> Matrix {
     let g = normal(n * n, seed);
     let mut columns: Vec<Vec<f64>> = g.chunks(n).map(<[f64]>::to_vec).collect();
@@ -63,13 +63,13 @@ pub(crate) fn rotation(n: usize, seed: i64) -> Matrix {
     (0..n).map(|row| (0..n).map(|column| columns[column][row]).collect()).collect()
 }
 
-/// Where the optimum lies: on a grid of 8e-4 in [-4, 4].
+/// Returns the position of the optimum, on a grid of 8e-4 in [-4, 4].
 pub(crate) fn optimum(n: usize, seed: i64) -> Vec<f64> {
     let on_grid = |u: f64| 8.0 * (1e4 * u).floor() / 1e4 - 4.0;
     uniform(n, seed).into_iter().map(on_grid).map(|x| if x == 0.0 { -1e-5 } else { x }).collect()
 }
 
-/// The value at the optimum: the ratio of two normal numbers, within 1000.
+/// Returns the value at the optimum: the ratio of two normal numbers, limited to 1000.
 pub(crate) fn least_value(seed: i64) -> f64 {
     let ratio = normal(1, seed)[0] / normal(1, seed + 1)[0];
     ((100.0 * 100.0 * ratio + 0.5).floor() / 100.0).clamp(-1000.0, 1000.0)

@@ -1,5 +1,5 @@
-//! `bbob`: 24 noiseless functions, shifted and turned: separable (1 to 5), moderate (6 to 9), ill-conditioned (10 to 14),
-//! multimodal with a global structure (15 to 19) and without (20 to 24).
+//! `bbob`: 24 noiseless functions, shifted and rotated: separable (1 to 5), moderate (6 to 9), ill-conditioned (10 to
+//! 14), multimodal with a global structure (15 to 19) and without (20 to 24).
 
 mod functions;
 mod instance;
@@ -16,15 +16,17 @@ use instance::Matrix;
 
 pub(crate) const SUITE: Suite = Suite {
     name: "bbob",
-    about: "the 24 noiseless functions of BBOB in 5 dimensions, five instances each, as heights above the least value",
+    about: "the 24 noiseless functions of BBOB in 5 dimensions, five instances each, relative to their minimum",
     source: "N. Hansen, S. Finck, R. Ros, A. Auger, INRIA RR-6829 (2009)",
     accuracy: 1e-8,
     budget: |n| 5000 * n,
     problems: || (1..=24).flat_map(|function| (1..=5).map(move |i| bbob(function, i, 5))).collect(),
 };
 
-/// Function `function` (1 to 24), instance `instance`, in `n` dimensions (2 to 40), over [-5, 5]^n. The start is uniform in
-/// [-4, 4]^n. Its least value is 0: what the original adds to it ([`offset`]) would only cost digits.
+/// Creates function `function` (1 to 24), instance `instance`, in `n` dimensions (2 to 40), over [-5, 5]^n.
+///
+/// The initial guess is uniform in [-4, 4]^n. The minimum is 0: the [`offset`] of the original definition would only
+/// cost digits.
 ///
 /// # Panics
 /// If there is no such function, or fewer than two dimensions.
@@ -36,12 +38,12 @@ pub fn bbob(function: u32, instance: u32, n: usize) -> Problem {
     Problem { bounds: vec![[-5.0, 5.0]; n], ..Problem::new(&name, &start, 0.0, Functions::with(formula)) }
 }
 
-/// What the original definition adds to a function: its least value.
+/// Returns the offset of a function in the original definition: its minimum.
 pub fn offset(function: u32, instance: u32) -> f64 {
     instance::least_value(seed(function, instance))
 }
 
-/// Two functions share the seed of another.
+/// Returns the seed of a function; two functions share the seed of another.
 fn seed(function: u32, instance: u32) -> i64 {
     let shared = match function {
         4 => 3,
@@ -51,17 +53,18 @@ fn seed(function: u32, instance: u32) -> i64 {
     i64::from(shared) + 10_000 * i64::from(instance)
 }
 
-/// The data of an instance.
+/// Data of an instance.
 struct Instance {
     function: u32,
     optimum: Vec<f64>,
-    /// The rotation next to the function, and the one next to the point. A function with one rotation has either.
+    /// Rotations on the side of the function and on the side of the point. A function with a single rotation has
+    /// either.
     r: Matrix,
     q: Matrix,
     peaks: Vec<Peak>,
 }
 
-/// A peak of Gallagher's functions, in turned coordinates.
+/// Peak of Gallagher's functions, in rotated coordinates.
 struct Peak {
     height: f64,
     at: Vec<f64>,
@@ -70,7 +73,7 @@ struct Peak {
 
 impl Instance {
     fn new(function: u32, instance: u32, n: usize) -> Self {
-        assert!((1..=24).contains(&function) && n >= 2, "functions 1 to 24, at least two dimensions");
+        assert!((1..=24).contains(&function) && n >= 2, "expected a function from 1 to 24 and at least two dimensions");
         let seed = seed(function, instance);
         let q = instance::rotation(n, seed);
         let signs = |size: f64, draws: Vec<f64>, middle: f64| -> Vec<f64> {
@@ -96,7 +99,7 @@ impl Instance {
     }
 }
 
-/// Indices that sort random numbers.
+/// Returns the indices that sort random numbers.
 fn permutation(count: usize, seed: i64) -> Vec<usize> {
     let draws = instance::uniform(count, seed);
     let mut order: Vec<usize> = (0..count).collect();
@@ -104,7 +107,7 @@ fn permutation(count: usize, seed: i64) -> Vec<usize> {
     order
 }
 
-/// Peaks of heights from 1.1 to 9.1 and one of 10, with conditions up to 1000, in random order.
+/// Returns peaks of heights from 1.1 to 9.1 and one of 10, with condition numbers up to 1000, in random order.
 #[allow(clippy::cast_precision_loss)]
 fn peaks(count: usize, q: &Matrix, seed: i64) -> Vec<Peak> {
     let n = q.len();

@@ -1,13 +1,14 @@
-//! Values that the reference implementation gives.
+//! Values published for the reference implementation.
 
 /// Function, instance, point, value.
 ///
-/// Source: COCO (N. Hansen, A. Auger, R. Ros, O. Mersmann, T. Tusar, D. Brockhoff, Optimization Methods and Software 36 (2021)
-/// 114-144), regression data of the suite bbob, rows of the first five instances.
+/// Source: COCO (N. Hansen, A. Auger, R. Ros, O. Mersmann, T. Tusar, D. Brockhoff, Optimization Methods and Software 36
+/// (2021) 114-144), regression data of the suite bbob, rows of the first five instances.
 ///
-/// N.B.: of the rows looked at, one is not here because it does not agree: function 10, instance 3, n = 3 at (0.21128720030087789,
-/// 2.1260343430227158, -1.6946622457322055) is 6370665.3429 there and 6370505.1024 here, 2.5e-5 apart. Two independent programs
-/// of the definition give the latter, and function 10 agrees to 1e-11 in instance 4. The cause is not known.
+/// N.B.: one of the examined rows is omitted because it does not agree: function 10, instance 3, n = 3 at
+/// (0.21128720030087789, 2.1260343430227158, -1.6946622457322055). The published value is 6370665.3429, ours
+/// 6370505.1024, a relative difference of 2.5e-5. Two independent implementations of the definition give our value, and
+/// function 10 agrees to 1e-11 in instance 4. The cause is unknown.
 pub(super) const PUBLISHED: &[(u32, u32, &[f64], f64)] = &[
     (
         1,

@@ -1,4 +1,4 @@
-//! The transformations that the functions share.
+//! Transformations shared by the functions.
 
 use mops_core::Scalar;
 use mops_core::math;
@@ -16,7 +16,7 @@ pub(crate) fn rotated<S: Scalar>(r: &Matrix, z: &[S]) -> Vec<S> {
     r.iter().map(row).collect()
 }
 
-/// Position of coordinate `i` of `n`, from 0 to 1.
+/// Relative position of coordinate `i` of `n`, from 0 to 1.
 #[allow(clippy::cast_precision_loss)]
 pub(crate) fn share(i: usize, n: usize) -> f64 {
     i as f64 / (n.max(2) - 1) as f64
@@ -28,7 +28,7 @@ pub(crate) fn conditioned<S: Scalar>(z: &[S], alpha: f64) -> Vec<S> {
     z.iter().enumerate().map(|(i, z)| *z * math::powf(alpha, 0.5 * share(i, n))).collect()
 }
 
-/// `T_osz` of a number: smooth, small, self-similar waves.
+/// `T_osz` of a number: smooth, small, self-similar oscillations.
 pub(crate) fn wavy<S: Scalar>(x: S) -> S {
     let value = x.value();
     if value == 0.0 {
@@ -54,7 +54,7 @@ pub(crate) fn asymmetric<S: Scalar>(z: &[S], beta: f64) -> Vec<S> {
     z.iter().enumerate().map(of).collect()
 }
 
-/// How far the point lies outside [-5, 5]^n, squared.
+/// Squared distance of the point to [-5, 5]^n.
 pub(crate) fn outside<S: Scalar>(x: &[S]) -> S {
     let beyond = x.iter().map(|x| x.abs() - 5.0).filter(|d| d.value() > 0.0);
     beyond.fold(S::from(0.0), |sum, d| sum + d * d)
@@ -65,7 +65,7 @@ pub(crate) fn sum<S: Scalar>(terms: impl Iterator<Item = S>) -> S {
     terms.fold(S::from(0.0), |sum, term| sum + term)
 }
 
-/// The nearest whole number, halves upwards, as a constant.
+/// Nearest integer, halves upwards, as a constant.
 pub(crate) fn rounded<S: Scalar>(x: S) -> S {
     S::from((x.value() + 0.5).floor())
 }

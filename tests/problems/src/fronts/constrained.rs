@@ -29,7 +29,7 @@ pub(crate) const SUITE: Suite = Suite {
     },
 };
 
-/// Two objectives, then what must be at most 0.
+/// Two objectives, then the constraints, satisfied if at most 0.
 fn bnh<S: Scalar>(x: &[S]) -> Vec<S> {
     let square = |a: S, at: f64| (a - at) * (a - at);
     vec![
@@ -55,8 +55,8 @@ fn srn<S: Scalar>(x: &[S]) -> Vec<S> {
     ]
 }
 
-/// Along the edge of the second constraint from the least of the first objective, `x_1 = -5/2`, then along the circle to the
-/// least of the second objective.
+/// Front in two parts. The first follows the boundary of the second constraint from the minimum of the first objective,
+/// `x_1 = -5/2`; the second follows the circle to the minimum of the second objective.
 fn srn_front(count: usize) -> Vec<Vec<f64>> {
     let top = (225.0_f64 - 6.25).sqrt();
     let pieces =
@@ -73,7 +73,7 @@ fn tnk<S: Scalar>(x: &[S]) -> Vec<S> {
     vec![x[0], x[1], -x[0] * x[0] - x[1] * x[1] + 1.0 + wave, (a * a + b * b) * 2.0 - 1.0]
 }
 
-/// Of the first constraint's edge, what the second allows and nothing dominates.
+/// Part of the boundary of the first constraint that the second permits and that is non-dominated.
 fn tnk_front(count: usize) -> Vec<Vec<f64>> {
     let edge = |angle: f64| {
         let radius = (1.0 + 0.1 * math::cos(16.0 * angle)).sqrt();
@@ -100,7 +100,7 @@ fn osy<S: Scalar>(x: &[S]) -> Vec<S> {
     ]
 }
 
-/// Five pieces, with `x_4 = x_6 = 0`, of which nothing is kept that another dominates.
+/// Five segments with `x_4 = x_6 = 0`, without dominated points.
 fn osy_front(count: usize) -> Vec<Vec<f64>> {
     let root = 3.0_f64.sqrt();
     let values = |x: [f64; 5]| osy(&[x[0], x[1], x[2], 0.0, x[4], 0.0])[..2].to_vec();

@@ -1,4 +1,4 @@
-//! `dtlz`: three objectives, whose front is a plane, a sphere, a curve or in pieces.
+//! `dtlz`: three objectives; the front is a plane, a sphere, a curve or disconnected.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -17,7 +17,7 @@ pub(crate) const SUITE: Suite = Suite {
     budget: |_| 40_000,
     problems: || {
         let unit = |n: usize| vec![[0.0, 1.0]; n];
-        // The box less what lies below the plane, or inside the sphere.
+        // Volume of the box minus the volume below the plane, or inside the sphere.
         let plane = known(&[0.55; 3], math::powi(0.55, 3) - math::powi(0.5, 3) / 6.0, plane_front);
         let sphere = || known(&[1.1; 3], math::powi(1.1, 3) - PI / 6.0, sphere_front);
         let curve = || sampled(&[1.1; 3], 20_000, curve_front);
@@ -50,7 +50,7 @@ fn smooth<S: Scalar>(x: &[S]) -> S {
     sum(x.iter().map(|x| (*x - 0.5) * (*x - 0.5)))
 }
 
-/// A point of the sphere of radius `1 + g` at two angles.
+/// Returns the point of the sphere of radius `1 + g` at two angles.
 fn on_sphere<S: Scalar>(g: S, a: S, b: S) -> Vec<S> {
     let r = g + 1.0;
     let ((sa, ca), (sb, cb)) = ((a * FRAC_PI_2).sin_cos(), (b * FRAC_PI_2).sin_cos());
@@ -74,7 +74,7 @@ fn dtlz4<S: Scalar>(x: &[S]) -> Vec<S> {
     on_sphere(smooth(&x[2..]), x[0].powf(100.0), x[1].powf(100.0))
 }
 
-/// The second angle is squeezed towards the middle as the point nears the front.
+/// Compresses the second angle towards its centre near the front.
 fn squeezed<S: Scalar>(g: S, x: &[S]) -> Vec<S> {
     on_sphere(g, x[0], (g * x[1] * 2.0 + 1.0) / ((g + 1.0) * 2.0))
 }
@@ -94,7 +94,7 @@ fn dtlz7<S: Scalar>(x: &[S]) -> Vec<S> {
     vec![x[0], x[1], g * 3.0 - waves]
 }
 
-/// Points of the triangle, on a lattice.
+/// Returns lattice points of the triangle.
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn lattice(count: usize) -> Vec<Vec<f64>> {
     let d = (2.0 * count as f64).sqrt() as usize;
@@ -118,11 +118,11 @@ fn curve_front(count: usize) -> Vec<Vec<f64>> {
     evenly(0.0, 1.0, count).map(|a| on_sphere(0.0, a, 0.5)).collect()
 }
 
-/// Of the surface over a grid, what is not dominated.
+/// Returns the non-dominated points of the surface over a grid.
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn pieces_front(count: usize) -> Vec<Vec<f64>> {
     let side = (3.0 * count as f64).sqrt() as usize;
-    // Along each coordinate only what lies on the one-dimensional front can lie on this one.
+    // A coordinate of this front also lies on the one-dimensional front.
     let line = |f: &f64| vec![*f, -f * (1.0 + math::sin(3.0 * PI * f))];
     let coarse: Vec<f64> = evenly(0.0, 0.86, 2 * side).collect();
     let kept: Vec<f64> = best_of(&coarse.iter().map(line).collect::<Vec<_>>()).into_iter().map(|p| p[0]).collect();

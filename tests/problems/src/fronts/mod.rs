@@ -1,5 +1,5 @@
-//! Problems with a front: `zdt`, `dtlz`, `wfg` and `constrained-fronts`. Hypervolumes are computed here, from closed forms or from a
-//! front of many points.
+//! Problems with a front: `zdt`, `dtlz`, `wfg` and `constrained-fronts`. Hypervolumes follow from closed forms or from
+//! a front of many points.
 
 mod constrained;
 mod dtlz;
@@ -16,35 +16,35 @@ pub(crate) use dtlz::SUITE as DTLZ;
 pub(crate) use wfg::SUITE as WFG;
 pub(crate) use zdt::SUITE as ZDT;
 
-/// A plain generic function, for each kind of number.
+/// Plain generic function, for each kind of number.
 type Plain = (fn(&[f64]) -> Vec<f64>, fn(&[Along]) -> Vec<Along>);
 
 /// Points of a front.
 type Points = fn(usize) -> Vec<Vec<f64>>;
 
-/// A problem over its bounds, starting in their middle.
+/// Creates a problem over its bounds, with the initial guess at their centre.
 fn problem(name: &str, bounds: Vec<[f64; 2]>, functions: Plain, front: Answer) -> Problem {
     let start: Vec<f64> = bounds.iter().map(|[low, high]| 0.5 * (low + high)).collect();
     Problem { sense: Sense::Each, bounds, ..Problem::new(name, &start, front, Functions::of(functions.0, functions.1)) }
 }
 
-/// A front whose hypervolume is known.
+/// Creates a front of known hypervolume.
 fn known(reference: &[f64], hypervolume: f64, points: Points) -> Answer {
     Answer::Front { reference: reference.to_vec(), hypervolume, points }
 }
 
-/// A front whose hypervolume is that of many of its points.
+/// Creates a front whose hypervolume is that of many of its points.
 fn sampled(reference: &[f64], count: usize, points: Points) -> Answer {
     known(reference, hypervolume(&points(count).concat(), reference), points)
 }
 
-/// What no other of the points dominates.
+/// Returns the non-dominated points.
 fn best_of(points: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let m = points.first().map_or(0, Vec::len);
     non_dominated(&points.concat(), m).into_iter().map(|i| points[i].clone()).collect()
 }
 
-/// `count` numbers from `low` to `high`, evenly.
+/// Returns `count` equidistant numbers from `low` to `high`.
 #[allow(clippy::cast_precision_loss)]
 fn evenly(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> {
     (0..count).map(move |i| low + (high - low) * i as f64 / (count.max(2) - 1) as f64)

@@ -1,5 +1,5 @@
-//! `wfg`: two objectives made of a shape and of transformations that hide it: bias, flat regions, deception, many basins,
-//! dependence of variables on each other.
+//! `wfg`: two objectives that combine a shape with transformations: bias, flat regions, deception, many basins,
+//! dependence between variables.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -15,7 +15,7 @@ pub(crate) const SUITE: Suite = Suite {
     accuracy: 0.05,
     budget: |_| 30_000,
     problems: || {
-        // The box less a quarter of an ellipse, or a triangle.
+        // Area of the box minus a quarter of an ellipse, or a triangle.
         let ellipse = || known(&REFERENCE, BOX - 2.0 * PI, concave_front);
         let many = |points: Points| sampled(&REFERENCE, 20_000, points);
         let named = |name: &str, functions, front| -> Problem {
@@ -37,13 +37,13 @@ pub(crate) const SUITE: Suite = Suite {
     },
 };
 
-/// Variables that say where along the front.
+/// Number of variables that determine the position along the front.
 const POSITION: usize = 2;
 
-/// Variables that say how far from it.
+/// Number of variables that determine the distance from the front.
 const DISTANCE: usize = 20;
 
-/// A tenth beyond the ends of the fronts.
+/// Reference point, a tenth beyond the ends of the fronts.
 const REFERENCE: [f64; 2] = [2.2, 4.4];
 
 const BOX: f64 = 2.2 * 4.4;
@@ -73,18 +73,18 @@ fn concave<S: Scalar>(x: S) -> [S; 2] {
     [sin, cos]
 }
 
-/// The first of the convex shapes.
+/// First of the convex shapes.
 fn convex<S: Scalar>(x: S) -> S {
     -(x * FRAC_PI_2).cos() + 1.0
 }
 
-/// Variables over their ranges: `y_i = z_i / (2 i)`.
+/// Variables divided by their ranges: `y_i = z_i / (2 i)`.
 #[allow(clippy::cast_precision_loss)]
 fn unit<S: Scalar>(z: &[S]) -> Vec<S> {
     z.iter().enumerate().map(|(i, z)| within(*z / (2.0 * (i + 1) as f64))).collect()
 }
 
-/// Rounding leads out of `[0, 1]`.
+/// Limits a number to `[0, 1]`, which rounding errors may violate.
 fn within<S: Scalar>(y: S) -> S {
     if y.value() < 0.0 {
         S::from(0.0)
@@ -102,7 +102,7 @@ fn flat<S: Scalar>(y: S, a: f64, b: f64, c: f64) -> S {
     within((-y + b) * (below * a / b) - (y - c) * (above * (1.0 - a) / (1.0 - c)) + a)
 }
 
-/// `b_param`: a power that another parameter decides, with the constants of all problems.
+/// `b_param`: a power that depends on another parameter, with the constants used by all problems.
 fn dependent<S: Scalar>(y: S, u: S) -> S {
     const A: f64 = 0.98 / 49.98;
     const B: f64 = 0.02;
@@ -111,13 +111,13 @@ fn dependent<S: Scalar>(y: S, u: S) -> S {
     if y.value() > 0.0 { within((y.ln() * (v * (C - B) + B)).exp()) } else { S::from(0.0) }
 }
 
-/// `s_linear`: 0 at `a`, rising to both sides.
+/// `s_linear`: 0 at `a`, increasing to both sides.
 fn shifted<S: Scalar>(y: S) -> S {
     const A: f64 = 0.35;
     within((y - A).abs() / ((A - y.value()).floor() + A).abs())
 }
 
-/// `s_decept`: 0 at `a` within a narrow valley of width `2 b`; elsewhere the slope leads to the value `c` at the ends.
+/// `s_decept`: 0 at `a` in a narrow valley of width `2 b`; elsewhere descent leads to the value `c` at the ends.
 fn deceptive<S: Scalar>(y: S) -> S {
     const A: f64 = 0.35;
     const B: f64 = 0.001;
@@ -127,7 +127,7 @@ fn deceptive<S: Scalar>(y: S) -> S {
     within(((y - A).abs() - B) * (low + high + 1.0 / B) + 1.0)
 }
 
-/// `s_multi`: 0 at 0.35, with `a` basins, the less deep the larger `b`.
+/// `s_multi`: 0 at 0.35, with `a` basins, shallower for larger `b`.
 fn rough<S: Scalar>(y: S, a: f64, b: f64) -> S {
     const C: f64 = 0.35;
     let d = (y - C).abs() / (2.0 * ((C - y.value()).floor() + C));
@@ -161,12 +161,12 @@ fn entangled<S: Scalar>(y: &[S], a: usize) -> S {
     within(sum / (n as f64 / a as f64 * half * (1.0 + 2.0 * a as f64 - 2.0 * half)))
 }
 
-/// Changes the variables that say how far from the front.
+/// Transforms the variables that determine the distance from the front.
 fn distances<S: Scalar>(y: &mut [S], f: impl Fn(S) -> S) {
     y[POSITION..].iter_mut().for_each(|y| *y = f(*y));
 }
 
-/// Both groups of variables, each reduced to one.
+/// Reduces each of the two groups of variables to one number.
 fn reduced<S: Scalar>(y: &[S], f: impl Fn(&[S]) -> S) -> [S; 2] {
     [f(&y[..POSITION]), f(&y[POSITION..])]
 }
@@ -175,7 +175,7 @@ fn wfg1<S: Scalar>(z: &[S]) -> Vec<S> {
     biased(unit(z))
 }
 
-/// The first problem over the unit ranges.
+/// First problem, over the unit ranges.
 #[allow(clippy::cast_precision_loss)]
 fn biased<S: Scalar>(mut y: Vec<S>) -> Vec<S> {
     distances(&mut y, |y| flat(shifted(y), 0.8, 0.75, 0.85));
@@ -187,7 +187,7 @@ fn biased<S: Scalar>(mut y: Vec<S>) -> Vec<S> {
     objectives(t, mixed)
 }
 
-/// The transformations of the second and the third problem.
+/// Transformations of the second and third problem.
 fn in_pairs<S: Scalar>(z: &[S]) -> [S; 2] {
     let mut y = unit(z);
     distances(&mut y, shifted);
@@ -244,7 +244,7 @@ fn wfg9<S: Scalar>(z: &[S]) -> Vec<S> {
     objectives(reduced(&y, |y| entangled(y, y.len())), concave)
 }
 
-/// Points of a shape, at no distance from it.
+/// Returns points of a shape, at zero distance from it.
 fn along(shape: fn(f64) -> [f64; 2], count: usize) -> Vec<Vec<f64>> {
     evenly(0.0, 1.0, count).map(|x| objectives([x, 0.0], shape)).collect()
 }
@@ -261,7 +261,7 @@ fn concave_front(count: usize) -> Vec<Vec<f64>> {
     along(concave, count)
 }
 
-/// Of the curve, what is not dominated.
+/// Returns the non-dominated points of the curve.
 fn disconnected_front(count: usize) -> Vec<Vec<f64>> {
     best_of(&along(disconnected, 4 * count))
 }
@@ -271,13 +271,13 @@ mod tests {
     use super::*;
     use mops_core::math;
 
-    /// The power by which [`dependent`] raises a parameter.
+    /// Power to which [`dependent`] raises a parameter.
     fn power(u: f64) -> f64 {
         0.02 + 49.98 * (0.98 / 49.98 - (1.0 - 2.0 * u) * ((0.5 - u).floor() + 0.98 / 49.98).abs())
     }
 
-    /// Variables over the unit ranges on the front, from those that say where, as the source
-    /// gives them for each problem.
+    /// Variables on the front over the unit ranges, from those that determine the position, as the source gives them
+    /// for each problem.
     fn optimal(name: &str, position: [f64; POSITION]) -> Vec<f64> {
         let n = POSITION + DISTANCE;
         let mut y = vec![0.35; n];
@@ -291,9 +291,9 @@ mod tests {
         y
     }
 
-    /// The objectives at variables over the unit ranges.
+    /// Objectives at variables over the unit ranges.
     fn at(problem: &Problem, y: &[f64]) -> Vec<f64> {
-        // Rounding in the ranges would count: the first problem makes 0.5 of 1e-16.
+        // Rounding errors of the ranges matter: the first problem turns 1e-16 into 0.5.
         if problem.name == "WFG1" {
             return biased(y.to_vec());
         }
@@ -308,7 +308,7 @@ mod tests {
                 let a = f64::from(i) / 20.0;
                 let f = at(&problem, &optimal(&problem.name, [a, 0.3 + 0.4 * a]));
                 let off = match problem.name.as_str() {
-                    // x_1 from the first objective, and the second at it.
+                    // x_1 from the first objective, and the second objective there.
                     "WFG1" | "WFG2" => {
                         let x = math::acos(1.0 - 0.5 * f[0]) / FRAC_PI_2;
                         let shape = if problem.name == "WFG1" { mixed(x) } else { disconnected(x) };

@@ -1,4 +1,4 @@
-//! `zdt`: two objectives, of which the second trades against the first.
+//! `zdt`: two conflicting objectives.
 
 use std::f64::consts::PI;
 
@@ -34,7 +34,7 @@ pub(crate) const SUITE: Suite = Suite {
 
 const REFERENCE: [f64; 2] = [1.1, 1.1];
 
-/// The least of `1 - exp(-4 x) sin(6 pi x)^6`.
+/// Minimum of `1 - exp(-4 x) sin(6 pi x)^6`.
 const LEAST_F1: f64 = 0.280_775_318_806_163_1;
 
 #[allow(clippy::cast_precision_loss)]
@@ -83,7 +83,7 @@ fn biased(count: usize) -> Vec<Vec<f64>> {
     evenly(LEAST_F1, 1.0, count).map(|f| vec![f, 1.0 - f * f]).collect()
 }
 
-/// Of the curve, what is not dominated: about a third.
+/// Returns the non-dominated points of the curve, about a third.
 fn disconnected(count: usize) -> Vec<Vec<f64>> {
     let curve = |f: f64| vec![f, 1.0 - f.sqrt() - f * math::sin(10.0 * PI * f)];
     best_of(&evenly(0.0, 0.852, 3 * count).map(curve).collect::<Vec<_>>())

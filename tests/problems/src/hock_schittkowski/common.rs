@@ -1,4 +1,4 @@
-//! Problems that come back as min-max problems, as objective and inequalities.
+//! Problems that are also used as min-max problems: objective and inequalities.
 
 use mops_core::Scalar;
 
@@ -15,7 +15,7 @@ pub(crate) fn hs43<S: Scalar>(x: &[S]) -> Vec<S> {
     ]
 }
 
-/// Asaadi 2, known as Wong 1.
+/// Asaadi 2, also known as Wong 1.
 pub(crate) fn hs100<S: Scalar>(x: &[S]) -> Vec<S> {
     let f = sq(x[0] - 10.0)
         + sq(x[1] - 12.0) * 5.0
@@ -36,7 +36,7 @@ pub(crate) fn hs100<S: Scalar>(x: &[S]) -> Vec<S> {
     ]
 }
 
-/// The objective of [`hs113`].
+/// Objective of [`hs113`].
 fn wong2<S: Scalar>(x: &[S]) -> S {
     sq(x[0]) + sq(x[1]) + x[0] * x[1] - x[0] * 14.0 - x[1] * 16.0
         + sq(x[2] - 10.0)
@@ -50,7 +50,7 @@ fn wong2<S: Scalar>(x: &[S]) -> S {
         + 45.0
 }
 
-/// The constraints of [`hs113`]: those that are not linear, and those that are.
+/// Constraints of [`hs113`]: the nonlinear ones and the linear ones.
 pub(crate) fn wong2_constraints<S: Scalar>(x: &[S]) -> [Vec<S>; 2] {
     let curved = vec![
         sq(x[0] - 2.0) * 3.0 + sq(x[1] - 3.0) * 4.0 + sq(x[2]) * 2.0 - x[3] * 7.0 - 120.0,
@@ -67,12 +67,12 @@ pub(crate) fn wong2_constraints<S: Scalar>(x: &[S]) -> [Vec<S>; 2] {
     [curved, linear]
 }
 
-/// Asaadi 3, known as Wong 2.
+/// Asaadi 3, also known as Wong 2.
 pub(crate) fn hs113<S: Scalar>(x: &[S]) -> Vec<S> {
     [vec![wong2(x)], wong2_constraints(x).concat()].concat()
 }
 
-/// Asaadi's problem in 20 variables, known as Wong 3: the objective, and the constraints that are not linear and are.
+/// Asaadi's problem in 20 variables, also known as Wong 3: the objective, and the nonlinear and linear constraints.
 pub(crate) fn wong3<S: Scalar>(x: &[S]) -> (S, [Vec<S>; 2]) {
     let f = wong2(x)
         + sq(x[10] - 9.0)

@@ -117,7 +117,7 @@ fn hs50<S: Scalar>(x: &[S]) -> Vec<S> {
     vec![sq(x[0] - x[1]) + sq(x[1] - x[2]) + fourth(x[2] - x[3]) + sq(x[3] - x[4]), line(0), line(1), line(2)]
 }
 
-/// Objective and constraints of the problems 51 to 53, which differ in two factors and a constant.
+/// Objective and constraints of problems 51 to 53, which differ in two factors and a constant.
 fn linear_quadratic<S: Scalar>(x: &[S], factor: f64, constant: f64) -> Vec<S> {
     vec![
         sq(x[0] * factor - x[1]) + sq(x[1] + x[2] - 2.0) + sq(x[3] - 1.0) + sq(x[4] - 1.0),

@@ -64,8 +64,8 @@ fn hs66<S: Scalar>(x: &[S]) -> Vec<S> {
     vec![x[2] * 0.2 - x[0] * 0.8, x[0].exp() - x[1], x[1].exp() - x[2]]
 }
 
-/// Alkylation with its two loops solved: the book stops them at 0.001, here they are followed to their fixed point, so that
-/// the functions are smooth.
+/// Alkylation with both iteration loops solved to their fixed points, so that the functions are smooth; the book stops
+/// the loops at 0.001.
 fn hs67<S: Scalar>(x: &[S]) -> Vec<S> {
     let mut y2 = x[0] * 1.6;
     let (mut y3, mut y6) = (x[0], x[0]);
@@ -95,7 +95,7 @@ fn hs67<S: Scalar>(x: &[S]) -> Vec<S> {
     std::iter::once(f).chain(limits.into_iter().flat_map(|(y, low, high)| [-y + low, y - high])).collect()
 }
 
-/// Inspection at the least cost.
+/// Inspection at minimum cost.
 fn inspection<S: Scalar>(x: &[S], a: f64, b: f64, n: f64) -> Vec<S> {
     let growth = x[0].exp() - 1.0;
     vec![

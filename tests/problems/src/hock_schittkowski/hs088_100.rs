@@ -33,8 +33,8 @@ pub(super) fn problems() -> Vec<(u32, Problem)> {
     all
 }
 
-/// The least control energy that heats a rod to within 1e-4, with switching times `x^2`: mean square deviation of a Fourier
-/// series of 30 terms, whose frequencies solve `mu tan mu = 1`.
+/// Minimum control energy that heats a rod to within 1e-4, with switching times `x^2`. The constraint is the mean
+/// square deviation of a Fourier series of 30 terms, whose frequencies solve `mu tan mu = 1`.
 #[allow(clippy::cast_precision_loss)]
 fn heating<S: Scalar>(x: &[S]) -> Vec<S> {
     let terms: Vec<(f64, f64, S)> = (0..30)
@@ -57,7 +57,7 @@ fn heating<S: Scalar>(x: &[S]) -> Vec<S> {
     vec![sum(x.iter().map(|&x| sq(x))), deviation - 1e-4]
 }
 
-/// The solution of `mu tan mu = 1` between `k pi` and `k pi + pi/2`.
+/// Solution of `mu tan mu = 1` between `k pi` and `k pi + pi/2`.
 fn frequency(k: f64) -> f64 {
     let mut mu = k * std::f64::consts::PI + if k == 0.0 { 0.86 } else { 1.0 / (k * std::f64::consts::PI) };
     for _ in 0..20 {
@@ -126,7 +126,7 @@ fn hs98<S: Scalar>(x: &[S]) -> Vec<S> {
     mixture(x, [32.97, 25.12, -124.08, -173.02])
 }
 
-/// A rocket that must be at 100000 with a speed of 1000 after 380 s, as far away as it can be: thrust angles of seven stages.
+/// Rocket that must reach altitude 100000 with speed 1000 after 380 s, at maximum range: thrust angles of seven stages.
 fn hs99<S: Scalar>(x: &[S]) -> Vec<S> {
     const THRUST: [f64; 7] = [50.0, 50.0, 75.0, 75.0, 75.0, 100.0, 100.0];
     const LASTS: [f64; 7] = [25.0, 25.0, 50.0, 50.0, 50.0, 90.0, 90.0];

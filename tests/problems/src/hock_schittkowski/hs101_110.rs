@@ -50,13 +50,13 @@ pub(super) fn problems() -> Vec<(u32, Problem)> {
     ]
 }
 
-/// A monomial: the product of powers.
+/// Monomial: the product of powers.
 fn power<S: Scalar>(factor: f64, x: &[S], exponents: &[f64]) -> S {
     let used = x.iter().zip(exponents).filter(|(_, e)| **e != 0.0);
     used.fold(S::from(factor), |product, (x, &e)| product * x.powf(e))
 }
 
-/// A geometric program; the problems differ in one exponent.
+/// Geometric program; the problems differ in one exponent.
 fn geometric<S: Scalar>(x: &[S], a: f64) -> Vec<S> {
     let p = |factor: f64, exponents: [f64; 7]| power(factor, x, &exponents);
     let third = 1.0 / 3.0;
@@ -101,7 +101,7 @@ fn hs103<S: Scalar>(x: &[S]) -> Vec<S> {
     geometric(x, 0.5)
 }
 
-/// Two reactors in a row.
+/// Two reactors in series.
 fn hs104<S: Scalar>(x: &[S]) -> Vec<S> {
     let f = (x[0] / x[6]).powf(0.67) * 0.4 + (x[1] / x[7]).powf(0.67) * 0.4 - x[0] - x[1] + 10.0;
     let reactor =
@@ -147,7 +147,7 @@ fn hs107<S: Scalar>(x: &[S]) -> Vec<S> {
     ]
 }
 
-/// The largest hexagon of diameter 1; one corner is the origin.
+/// Largest hexagon of diameter 1; one vertex is the origin.
 fn hs108<S: Scalar>(x: &[S]) -> Vec<S> {
     let apart = |a: S, b: S| sq(a) + sq(b) - 1.0;
     let (t1, t2, t3, t4) = (x[0] * x[3] - x[1] * x[2], x[2] * x[8], -x[4] * x[8], x[4] * x[7] - x[5] * x[6]);

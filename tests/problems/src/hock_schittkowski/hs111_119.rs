@@ -45,7 +45,7 @@ pub(super) fn problems() -> Vec<(u32, Problem)> {
 /// Free energies of ten substances made of three elements.
 const ENERGY: [f64; 10] = [-6.089, -17.164, -34.054, -5.914, -24.721, -14.986, -24.1, -10.708, -26.662, -22.179];
 
-/// The balance of the elements.
+/// Balance of the elements.
 fn elements<S: Scalar>(n: &[S]) -> [S; 3] {
     [
         dot(&[1.0, 2.0, 2.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], n) - 2.0,
@@ -54,7 +54,7 @@ fn elements<S: Scalar>(n: &[S]) -> [S; 3] {
     ]
 }
 
-/// Chemical equilibrium in logarithms.
+/// Chemical equilibrium in logarithmic variables.
 fn hs111<S: Scalar>(x: &[S]) -> Vec<S> {
     let n: Vec<S> = x.iter().map(|x| x.exp()).collect();
     let total = sum(n.iter().copied()).ln();
@@ -86,7 +86,7 @@ fn hs114<S: Scalar>(x: &[S]) -> Vec<S> {
     [vec![f], inequalities.map(|g| -g).to_vec(), equalities.to_vec()].concat()
 }
 
-/// Start, smallest and largest value.
+/// Initial guess, lower and upper bound.
 const MEMBRANE: [[f64; 3]; 13] = [
     [0.5, 0.1, 1.0],
     [0.8, 0.1, 1.0],
@@ -128,7 +128,7 @@ fn hs116<S: Scalar>(x: &[S]) -> Vec<S> {
     [vec![f], inequalities.map(|g| -g).to_vec()].concat()
 }
 
-/// The dual of problem 86.
+/// Dual of problem 86.
 fn hs117<S: Scalar>(x: &[S]) -> Vec<S> {
     let (y, z) = x.split_at(10);
     let quadratic = sum(colville::C.iter().zip(z).map(|(row, &z_i)| z_i * dot(row, z)));
@@ -163,7 +163,7 @@ fn hs118<S: Scalar>(x: &[S]) -> Vec<S> {
     rows
 }
 
-/// Pairs of variables that meet in the objective of problem 119, counted from 1, besides each with itself.
+/// Pairs of variables whose terms are multiplied in the objective of problem 119, counted from 1, besides the squares.
 const PAIRS: [(usize, usize); 30] = [
     (1, 4),
     (1, 7),
@@ -197,7 +197,7 @@ const PAIRS: [(usize, usize); 30] = [
     (13, 14),
 ];
 
-/// Colville's seventh.
+/// Colville's seventh problem.
 fn hs119<S: Scalar>(x: &[S]) -> Vec<S> {
     const B: [[f64; 8]; 8] = [
         [0.22, 0.20, 0.19, 0.25, 0.15, 0.11, 0.12, 0.13],
@@ -213,7 +213,7 @@ fn hs119<S: Scalar>(x: &[S]) -> Vec<S> {
     let p: Vec<S> = x.iter().map(|&x| sq(x) + x + 1.0).collect();
     let pairs = sum(PAIRS.iter().map(|&(i, j)| p[i - 1] * p[j - 1]));
     let f = sum(p.iter().map(|&p| sq(p))) + pairs;
-    // Every equality has a variable of its own, with coefficient 1; the seventh one more.
+    // Every equality has a variable of its own, with coefficient 1; the seventh has a further one.
     let extra = |k: usize| if k == 6 { x[8] * -0.36 } else { c(0.0) };
     let row = |k: usize| dot(&B[k], &x[..8]) + x[8 + k] + extra(k) - LEVEL[k];
     std::iter::once(f).chain((0..8).map(row)).collect()

@@ -1,4 +1,4 @@
-//! The problems that fit a curve: 25, 57, 70 and 105.
+//! Curve-fitting problems: 25, 57, 70 and 105.
 
 use mops_core::Scalar;
 use mops_core::math;
@@ -11,7 +11,7 @@ use crate::problem::{Problem, Sense};
 pub(super) fn problems() -> Vec<(u32, Problem)> {
     let squares = |(number, problem): (u32, Problem)| (number, Problem { sense: Sense::Squares, ..problem });
     vec![
-        // The start lies where all slopes vanish.
+        // At the initial guess all derivatives vanish.
         squares(within(
             &[[0.1, 100.0], [0.0, 25.6], [0.0, 5.0]],
             hs(25, &[100.0, 12.5, 3.0], [0, 0], 0.0, Functions::of(hs25, hs25)),
@@ -46,7 +46,7 @@ pub(super) fn problems() -> Vec<(u32, Problem)> {
     ]
 }
 
-/// A Weibull curve at 99 points.
+/// Weibull curve at 99 points.
 fn hs25<S: Scalar>(x: &[S]) -> Vec<S> {
     let at = |i: u32| {
         let share = 0.01 * f64::from(i);
@@ -58,7 +58,7 @@ fn hs25<S: Scalar>(x: &[S]) -> Vec<S> {
 
 /// Available chlorine over time.
 fn hs57<S: Scalar>(x: &[S]) -> Vec<S> {
-    // Time in weeks, and how often it was measured then; the shares in the same order.
+    // Time in weeks and number of measurements; the measured values are in the same order.
     const WEEKS: [(f64, usize); 18] = [
         (8.0, 2),
         (10.0, 4),
@@ -91,15 +91,15 @@ fn hs57<S: Scalar>(x: &[S]) -> Vec<S> {
     rows
 }
 
-/// Two gamma densities through 19 concentrations. N.B.: the optimum in the book belongs to Stirling's factor in the
-/// denominator and 7.658 throughout; the formula printed there has other signs and digits.
+/// Two gamma densities fitted to 19 concentrations. N.B.: the optimum in the book corresponds to Stirling's factor in
+/// the denominator and 7.658 throughout; the formula printed there has other signs and digits.
 fn hs70<S: Scalar>(x: &[S]) -> Vec<S> {
     const Y: [f64; 19] = [
         0.00189, 0.1038, 0.268, 0.506, 0.577, 0.604, 0.725, 0.898, 0.947, 0.845, 0.702, 0.528, 0.385, 0.257, 0.159,
         0.0869, 0.0453, 0.01509, 0.00189,
     ];
     let b = x[2] + (-x[2] + 1.0) * x[3];
-    // 2 pi to the digits of the book.
+    // 2 pi with the digits of the book.
     #[allow(clippy::approx_constant)]
     let density = |weight: S, shape: S, rate: S, time: f64| {
         let t = time / 7.658;
@@ -116,7 +116,7 @@ fn hs70<S: Scalar>(x: &[S]) -> Vec<S> {
     rows
 }
 
-/// The likelihood of a mixture of three normal distributions, for 235 weights.
+/// Likelihood of a mixture of three normal distributions, for 235 weights.
 fn hs105<S: Scalar>(x: &[S]) -> Vec<S> {
     const COUNT: [(f64, f64); 30] = [
         (95.0, 1.0),

@@ -1,7 +1,7 @@
 //! Smooth problems with bounds, inequalities and equalities.
 //!
-//! N.B.: a start outside the bounds is moved to the nearest bound. Optima were compared with newer computations, because
-//! some in the book, or in files that came from it, are wrong or are one of several.
+//! N.B.: an initial guess outside the bounds is moved to the nearest bound. Optima were compared with newer
+//! computations, because some in the book, or in files derived from it, are wrong or are one of several.
 
 pub(crate) mod common;
 mod hs001_020;
@@ -47,7 +47,7 @@ fn problems() -> Vec<Problem> {
     all.into_iter().map(|(_, problem)| problem).collect()
 }
 
-/// A problem by its number, with its count of inequalities and of equalities.
+/// Creates a problem from its number and its counts of inequalities and equalities.
 fn hs(
     number: u32,
     start: &[f64],
@@ -59,7 +59,7 @@ fn hs(
     (number, Problem { inequalities, equalities, ..Problem::new(&format!("HS{number}"), start, answer, functions) })
 }
 
-/// The same with bounds.
+/// Adds bounds to a problem.
 fn within(bounds: &[[f64; 2]], (number, problem): (u32, Problem)) -> (u32, Problem) {
     (number, Problem { bounds: bounds.to_vec(), ..problem })
 }

@@ -1,4 +1,4 @@
-//! Curves through given points, as near as can be in the worst of them: the largest absolute value counts.
+//! Curve fits in the maximum norm: the largest absolute residual counts.
 
 use mops_core::Scalar;
 use mops_core::math;
@@ -30,7 +30,7 @@ pub(super) fn problems() -> Vec<Problem> {
     curves.into_iter().map(|problem| Problem { sense: Sense::MaxAbs, ..problem }).collect()
 }
 
-/// `count` numbers from `first` to `last`, evenly.
+/// Returns `count` equidistant numbers from `first` to `last`.
 #[allow(clippy::cast_precision_loss)]
 fn even(first: f64, last: f64, count: usize) -> impl Iterator<Item = f64> {
     (0..count).map(move |i| first + (last - first) * i as f64 / (count - 1) as f64)
@@ -82,7 +82,7 @@ fn gamma<S: Scalar>(x: &[S]) -> Vec<S> {
         500.0, 1e5,
     ];
     let at = |t: f64| {
-        // The factor that makes e^t Gamma(t + 1) = ((t + 1) y)^(t + 1/2), so that the power is one of a number near 1.
+        // Factor with e^t Gamma(t + 1) = ((t + 1) y)^(t + 1/2), so that the base of the power is near 1.
         let y = (log_gamma(t + 1.0) + t) / (t + 0.5) - math::ln(t + 1.0);
         let base = (x[1] + t + S::from(1.0) / (x[2] * t + x[3])) / ((t + 1.0) * math::exp(y));
         x[0] * base.abs().powf(t + 0.5) - 1.0
@@ -90,7 +90,7 @@ fn gamma<S: Scalar>(x: &[S]) -> Vec<S> {
     T.map(at).to_vec()
 }
 
-/// The logarithm of the gamma function of a positive number.
+/// Returns the logarithm of the gamma function of a positive number.
 ///
 /// Source: NIST Handbook of Mathematical Functions (2010), equations 5.5.1 and 5.11.1.
 fn log_gamma(mut z: f64) -> f64 {
@@ -128,7 +128,8 @@ fn evd61<S: Scalar>(x: &[S]) -> Vec<S> {
 
 const FILTER: [f64; 9] = [0.0, 1.0, 0.0, -0.15, 0.0, -0.68, 0.0, -0.72, 0.37];
 
-/// Magnitude of a digital filter of two second-order sections, `1 + x z^-1 + y z^-2` above and below, against a notch.
+/// Magnitude of a digital filter of two second-order sections, with `1 + x z^-1 + y z^-2` in numerator and denominator,
+/// compared with a notch.
 #[allow(clippy::cast_precision_loss)]
 fn filter<S: Scalar>(x: &[S]) -> Vec<S> {
     let frequency = |i: usize| match i {
@@ -146,7 +147,7 @@ fn filter<S: Scalar>(x: &[S]) -> Vec<S> {
     (0..41).map(frequency).map(at).collect()
 }
 
-/// A polynomial that solves `p' = p^2 + 1`, `p(0) = 0`, at 29 points.
+/// Polynomial that solves `p' = p^2 + 1`, `p(0) = 0`, at 29 points.
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_wrap, clippy::cast_possible_truncation)]
 fn watson<S: Scalar>(x: &[S]) -> Vec<S> {
     let at = |t: f64| {

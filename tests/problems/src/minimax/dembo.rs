@@ -1,4 +1,4 @@
-//! Chemical engineering problems as exact penalty functions, with the constraints that are linear as such.
+//! Chemical engineering problems as exact penalty functions; linear constraints remain constraints.
 //!
 //! N.B.: with bounds as in the report; its program has x10 of HS114 in [140, 160], and no bounds in Dembo5.
 
@@ -34,7 +34,7 @@ pub(super) fn problems() -> Vec<Problem> {
     ]
 }
 
-/// Start, smallest and largest value.
+/// Initial guess, lower and upper bound.
 const HS114: [[f64; 3]; 10] = [
     [1745.0, 1e-5, 2000.0],
     [12000.0, 1e-5, 16000.0],
@@ -48,7 +48,7 @@ const HS114: [[f64; 3]; 10] = [
     [145.0, 145.0, 162.0],
 ];
 
-/// Alkylation: equalities that bind within 1 % as pairs of inequalities, the exact ones too.
+/// Alkylation: every equality becomes a pair of inequalities, some with a tolerance of 1 %.
 fn hs114<S: Scalar>(x: &[S]) -> Vec<S> {
     let f = x[0] * 5.04 + x[1] * 0.035 + x[2] * 10.0 + x[4] * 3.36 - x[3] * x[6] * 0.063;
     let yield_of = x[0] * 1.12 + x[0] * x[7] * (x[7] * -0.00667 + 0.13167);
@@ -152,7 +152,7 @@ const DEMBO7: [[f64; 3]; 16] = [
     [5.7, 1e-6, 5000.0],
 ];
 
-/// A separation in five stages.
+/// Separation in five stages.
 fn dembo7<S: Scalar>(x: &[S]) -> Vec<S> {
     let flow: S = x[11] + x[12] + x[13] + x[14] + x[15];
     let carried = x[0] * x[11] + x[1] * x[12] + x[2] * x[13] + x[3] * x[14] + x[4] * x[15];

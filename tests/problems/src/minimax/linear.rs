@@ -99,10 +99,10 @@ fn mad5<S: Scalar>(x: &[S]) -> Vec<S> {
     [slope(x).to_vec(), vec![x[0] * 0.9 - x[1] + 1.0]].concat()
 }
 
-/// N.B.: the start of the report's program lies outside the constraints; the last coordinate is 0 here instead of 1.
+/// N.B.: the initial guess of the report's program is infeasible; the last coordinate is 0 here instead of 1.
 const PENTAGON: [f64; 6] = [-1.0, 0.0, 0.0, -1.0, 1.0, 0.0];
 
-/// Three points in a pentagon, as far apart as can be.
+/// Three points in a pentagon, as far apart as possible.
 fn pentagon<S: Scalar>(x: &[S]) -> Vec<S> {
     let distance = |i: usize, j: usize| -(sq(x[i] - x[j]) + sq(x[i + 1] - x[j + 1])).sqrt();
     let mut rows = vec![distance(0, 2), distance(2, 4), distance(4, 0)];
@@ -179,7 +179,7 @@ fn mad8<S: Scalar>(x: &[S]) -> Vec<S> {
 
 const BPFILTER: [f64; 9] = [0.0398, 9.68e-5, 1.03e-4, 0.0389, 1.01, 0.968, 1.03, 0.988, -11.6];
 
-/// Attenuation of a band-pass filter of four resonators: flat in the pass band, high at two frequencies beside it.
+/// Attenuation of a band-pass filter of four resonators: flat in the pass band, high at two neighbouring frequencies.
 #[allow(clippy::cast_precision_loss)]
 fn bpfilter<S: Scalar>(x: &[S]) -> Vec<S> {
     let attenuation = |frequency: f64| {

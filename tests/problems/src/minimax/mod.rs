@@ -19,8 +19,8 @@ pub(crate) const SUITE: Suite = Suite {
     problems,
 };
 
-/// The problems in the order of the report. Optima were found again with higher accuracy; those of GAMMA and Watson in the
-/// report are not optimal.
+/// Returns the problems in the order of the report. Optima were recomputed with higher accuracy; those of GAMMA and
+/// Watson in the report are not optimal.
 fn problems() -> Vec<Problem> {
     let mut all: Vec<Problem> =
         small::problems().into_iter().chain(curves::problems()).chain(penalties::problems()).collect();

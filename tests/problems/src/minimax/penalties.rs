@@ -25,7 +25,7 @@ fn rosen_suzuki<S: Scalar>(x: &[S]) -> Vec<S> {
     penalised(10.0, &hs43(x))
 }
 
-/// Rosen and Suzuki's functions of curved coordinates.
+/// Rosen and Suzuki's functions of nonlinearly transformed coordinates.
 fn polak6<S: Scalar>(x: &[S]) -> Vec<S> {
     let first = x[0] - fourth(x[3] + 1.0);
     rosen_suzuki(&[first, x[1] - fourth(first), x[2], x[3]])

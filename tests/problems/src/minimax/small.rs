@@ -1,4 +1,4 @@
-//! Few functions of few variables.
+//! Problems with few functions of few variables.
 
 use mops_core::Scalar;
 use mops_core::math;
@@ -50,8 +50,9 @@ fn evd52<S: Scalar>(x: &[S]) -> Vec<S> {
 
 const TRANSFORMER: [f64; 6] = [0.8, 1.5, 1.2, 3.0, 0.8, 6.0];
 
-/// Reflection of a transformer of three line sections, of lengths `x[0], x[2], x[4]` (in quarter wavelengths) and
-/// impedances `x[1], x[3], x[5]`, that matches 1 to 10, at eleven frequencies: `|(Z - 1) / (Z + 1)|` with `Z` seen at its input.
+/// Reflection coefficient `|(Z - 1) / (Z + 1)|` of a three-section transformer that matches 1 to 10, at eleven
+/// frequencies. The sections have lengths `x[0], x[2], x[4]` (in quarter wavelengths) and impedances `x[1], x[3],
+/// x[5]`; `Z` is the input impedance.
 fn transformer<S: Scalar>(x: &[S]) -> Vec<S> {
     let reflection = |frequency: f64| {
         // Voltage and current from the load towards the source, as pairs of real and imaginary part.

@@ -1,4 +1,4 @@
-//! Measurements that the functions are fitted to. Source: More, Garbow, Hillstrom (1981), functions 8, 9, 10, 17 and 19.
+//! Measured data of the fitted functions. Source: More, Garbow, Hillstrom (1981), functions 8, 9, 10, 17 and 19.
 
 pub(super) const BARD: [f64; 15] =
     [0.14, 0.18, 0.22, 0.25, 0.29, 0.32, 0.35, 0.39, 0.37, 0.58, 0.73, 0.96, 1.34, 2.1, 4.39];

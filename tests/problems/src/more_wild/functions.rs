@@ -1,4 +1,4 @@
-//! Residuals and starts of the 22 functions.
+//! Residuals and initial guesses of the 22 functions.
 
 use std::f64::consts::PI;
 
@@ -8,7 +8,7 @@ use mops_core::math;
 use super::data::{BARD, KOWALIK, KOWALIK_AT, MEYER, OSBORNE_1, OSBORNE_2};
 use crate::arithmetic::{atan, c, cube, sq, sum};
 
-/// Where a search of the function in `n` variables begins.
+/// Returns the initial guess of a function in `n` variables.
 #[allow(clippy::cast_precision_loss)]
 pub(super) fn start(function: u32, n: usize) -> Vec<f64> {
     match function {
@@ -32,7 +32,7 @@ pub(super) fn start(function: u32, n: usize) -> Vec<f64> {
     }
 }
 
-/// The residuals at `x`, `m` of them.
+/// Returns the `m` residuals at `x`.
 pub(super) fn residuals<S: Scalar>(function: u32, m: usize, x: &[S]) -> Vec<S> {
     match function {
         1..=3 => linear(function, m, x),
@@ -73,7 +73,7 @@ pub(super) fn residuals<S: Scalar>(function: u32, m: usize, x: &[S]) -> Vec<S> {
     }
 }
 
-/// Of full rank, of rank one, and of rank one with zero columns and rows.
+/// Linear functions: of full rank, of rank one, and of rank one with zero columns and rows.
 #[allow(clippy::cast_precision_loss)]
 fn linear<S: Scalar>(function: u32, m: usize, x: &[S]) -> Vec<S> {
     let n = x.len();

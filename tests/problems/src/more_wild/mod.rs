@@ -1,5 +1,5 @@
-//! `more-wild`: 53 problems for solvers without slopes, from 22 functions; smooth, piecewise smooth and noisy. The sum is all
-//! that a solver sees.
+//! `more-wild`: 53 problems for derivative-free solvers, from 22 functions; smooth, piecewise smooth and noisy. Solvers
+//! see only the sum.
 
 mod data;
 mod functions;
@@ -15,7 +15,7 @@ const SOURCE: &str = "J. J. More, S. M. Wild, SIAM J. Optimization 20 (2009) 172
 
 pub(crate) const SMOOTH: Suite = Suite {
     name: "more-wild",
-    about: "53 problems without slopes: sums of squares, which the solver sees as one number",
+    about: "53 derivative-free problems: sums of squares, passed to the solver as one number",
     source: SOURCE,
     accuracy: 1e-5,
     budget: |n| 100 * (n + 1),
@@ -24,7 +24,7 @@ pub(crate) const SMOOTH: Suite = Suite {
 
 pub(crate) const PIECEWISE: Suite = Suite {
     name: "more-wild-piecewise",
-    about: "the same 53 problems with sums of absolute values",
+    about: "the 53 problems of `more-wild` with sums of absolute values",
     source: SOURCE,
     accuracy: 1e-3,
     budget: |n| 100 * (n + 1),
@@ -33,26 +33,26 @@ pub(crate) const PIECEWISE: Suite = Suite {
 
 pub(crate) const NOISY: Suite = Suite {
     name: "more-wild-noisy",
-    about: "the same 53 problems with a deterministic noise of a thousandth",
+    about: "the 53 problems of `more-wild` with deterministic noise of 0.1 %",
     source: SOURCE,
     accuracy: 1e-3,
     budget: |n| 100 * (n + 1),
     problems: || all(Kind::Noisy),
 };
 
-/// What becomes of the residuals.
+/// Combination of the residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// The sum of their squares.
+    /// Sum of squares.
     Smooth,
-    /// The sum of their absolute values.
+    /// Sum of absolute values.
     Piecewise,
-    /// The sum of their squares times `1 + 1e-3 phi(x)`, with a polynomial of sines for `phi`.
+    /// Sum of squares times `1 + 1e-3 phi(x)`, with a polynomial of sines for `phi`.
     Noisy,
 }
 
-/// Function, variables, residuals, and the power of ten that the start is multiplied by.
-/// After the table of the paper, in the order of its data file; the rows were not checked against it.
+/// Function, variables, residuals, and the power of ten that scales the initial guess. From the table of the paper, in
+/// the order of its data file; the rows were not checked against it.
 const TABLE: [(u32, usize, usize, i32); 53] = [
     (1, 9, 45, 0),
     (1, 9, 45, 1),
@@ -120,10 +120,10 @@ fn all(kind: Kind) -> Vec<Problem> {
     TABLE.iter().map(of).collect()
 }
 
-/// The least sum of squares, where it is published.
+/// Returns the published minimum of the sum of squares, if any.
 ///
-/// Source: More, Garbow, Hillstrom (1981), the minima listed with each function; cube and heart: their residuals vanish at a
-/// point. N.B.: of Chebyquad with ten variables the paper lists the local minimum 6.50395e-3.
+/// Source: More, Garbow, Hillstrom (1981), the minima listed with each function; cube and heart: their residuals vanish
+/// at a point. N.B.: for Chebyquad with ten variables the paper lists the local minimum 6.50395e-3.
 fn least(function: u32, n: usize, m: usize) -> Option<f64> {
     #[allow(clippy::cast_precision_loss)]
     let (variables, rows) = (n as f64, m as f64);
@@ -147,7 +147,7 @@ fn least(function: u32, n: usize, m: usize) -> Option<f64> {
     })
 }
 
-/// One number from the residuals.
+/// Combination of the residuals into one number.
 struct Summed {
     function: u32,
     m: usize,
@@ -156,7 +156,7 @@ struct Summed {
 
 impl Formula for Summed {
     fn at<S: Scalar>(&self, x: &[S]) -> Vec<S> {
-        // Some of the piecewise smooth ones are not defined for negative variables.
+        // Some of the piecewise smooth functions are undefined for negative variables.
         let clipped = self.kind == Kind::Piecewise && [8, 9, 13, 16, 17, 18].contains(&self.function);
         let x: Vec<S> = x.iter().map(|x| if clipped && x.value() < 0.0 { S::from(0.0) } else { *x }).collect();
         let residuals = residuals(self.function, self.m, &x);
@@ -198,7 +198,7 @@ mod tests {
 
     /// Source: More, Garbow, Hillstrom (1981), the minima listed with each function.
     #[test]
-    fn functions_have_their_published_least_values() {
+    fn functions_have_their_published_minima() {
         let known: [(u32, usize, &[f64], f64, f64); 6] = [
             (4, 2, &[1.0, 1.0], 0.0, 1e-20),
             (5, 3, &[1.0, 0.0, 0.0], 0.0, 1e-20),
@@ -236,10 +236,10 @@ mod tests {
         assert!(smooth(2, n).functions.values(&x)[0] > value);
     }
 
-    /// Source: More, Garbow, Hillstrom (1981): the sum of squares at x = 0 of the linear function of full rank is m + n, and
-    /// (-1, .., -1) gives m - n.
+    /// Source: More, Garbow, Hillstrom (1981): the sum of squares at x = 0 of the linear function of full rank is m +
+    /// n, and (-1, .., -1) gives m - n.
     #[test]
-    fn the_linear_function_has_its_least_value_at_minus_one() {
+    fn the_linear_function_has_its_minimum_at_minus_one() {
         assert!((smooth(1, 9).functions.values(&[-1.0; 9])[0] - 36.0).abs() < 1e-12);
         assert_eq!(least(1, 9, 45), Some(36.0));
     }

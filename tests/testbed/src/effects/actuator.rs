@@ -1,4 +1,4 @@
-//! What an actuator makes of its command.
+//! Actuator effects.
 
 use mops_math as math;
 
@@ -6,18 +6,18 @@ use super::{Effect, Family, any_actuator, real_actuator};
 use crate::law::{At, Law, Own, Spot};
 use crate::plant::{Place, Plant};
 
-/// The input of a plant whose first joint turns.
+/// Returns the input of a plant whose first joint is rotary.
 fn motor(plant: &Plant) -> Vec<Spot> {
     let turns = matches!(plant.places.first(), Some(Place::Joint { angle: true, .. }));
     if turns { real_actuator(plant) } else { Vec::new() }
 }
 
-/// A curve of the command.
+/// Creates a static characteristic of the command.
 fn curve(f: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Law {
     Law { actuate: Some(Box::new(move |_, u| f(u))), ..Law::default() }
 }
 
-/// What acts at the start of an experiment: the first command, or nothing as after switching on.
+/// Initial actuator output in an experiment: the first command, or zero as after switching on.
 fn first(from_command: bool) -> Option<Own> {
     from_command.then(|| -> Own { Box::new(|at, z| z[0] = at.q) })
 }
@@ -56,7 +56,7 @@ pub const ALL: &[Effect] = &[
         build: |s| {
             let (peak, low, high) = (s.peak(), s.range.0, s.range.1);
             Family::up_to(0.75, move |cut| {
-                // Commands that are never negative are cut at the top.
+                // Commands that are never negative are limited from above.
                 let limit = if low >= 0.0 { high - cut * (high - low) } else { peak * (1.0 - cut) };
                 (curve(move |u| u.clamp(-limit, limit)), vec![("limit", limit)])
             })
@@ -112,8 +112,8 @@ pub const ALL: &[Effect] = &[
         name: "rate-limit",
         fits: real_actuator,
         build: |s| {
-            // The limit is neutral at infinity: what is open is its inverse. A command that is nearly reached is approached
-            // within less than a step of the integrator.
+            // The null value of the limit is infinity, so its inverse is the free magnitude. Close to the command, the
+            // output converges within less than an integrator step.
             let (from_command, peak, quick) = (s.chance(0.6), s.peak(), 0.03 * s.setup.dt);
             Family::up_to(0.25 * s.setup.duration(), move |slowness| {
                 let limit = peak / slowness;

@@ -7,17 +7,17 @@ use crate::law::Spot;
 use crate::law::{Dry, Law};
 use crate::plant::{Place, Plant};
 
-/// Joints without viscous friction in the base model.
+/// Returns the joints without viscous friction in the baseline model.
 fn undamped(plant: &Plant) -> Vec<Spot> {
     joints(plant, |place| matches!(place, Place::Joint { damped: false, .. }))
 }
 
-/// Joints whose friction has a mechanism: a ball in the air has none.
+/// Returns the joints with bearings; a ball in flight has none.
 fn bearings(plant: &Plant) -> Vec<Spot> {
     if plant.name == "ball" { Vec::new() } else { any_joint(plant) }
 }
 
-/// Dry friction with the same level both ways.
+/// Creates dry friction with the same level in both directions.
 fn dry(slide: impl Fn(f64, f64) -> f64 + Send + Sync + 'static, hold: f64) -> Law {
     let levels = move |at: &crate::law::At<'_>, _: f64| Dry { slide: slide(at.q, at.v.abs()), hold };
     Law { dry: Some(Box::new(levels)), ..Law::default() }
@@ -81,7 +81,7 @@ pub const ALL: &[Effect] = &[
         name: "dahl",
         fits: bearings,
         build: |s| {
-            // The bristles bend by c/stiffness before they slide.
+            // The bristles deflect by c/stiffness before they slide.
             let bend = s.reach() * s.between(0.01, 0.06);
             Family::up_to(0.9 * s.force, move |c| {
                 let stiffness = c / bend;
@@ -120,7 +120,7 @@ pub const ALL: &[Effect] = &[
     },
 ];
 
-/// A force that depends on the speed.
+/// Creates a force that depends on the speed.
 fn push(force: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Law {
     Law { force: Some(Box::new(move |at| force(at.v))), ..Law::default() }
 }

@@ -1,4 +1,4 @@
-//! Forces and flows from outside, and what changes with time.
+//! External forces and flows, and time-varying parameters.
 
 use std::f64::consts::TAU;
 
@@ -16,8 +16,8 @@ fn athermal(plant: &Plant) -> Vec<Spot> {
     if plant.traits.thermal { Vec::new() } else { any_place(plant) }
 }
 
-/// A step of a parameter, in the calibration experiment only: its start and duration, s, and the share of it that acts: 0
-/// before, 1 after.
+/// Smooth step of a parameter, in the calibration experiment only. Returns its start and duration, s, and the active
+/// share: 0 before, 1 after.
 fn step(s: &Scene<'_>) -> (f64, f64, impl Fn(&At<'_>) -> f64 + Send + Sync + Copy + 'static) {
     let end = s.setup.duration();
     let (from, length) = (end * s.between(0.2, 0.7), end * s.between(0.01, 0.1));
@@ -84,7 +84,7 @@ pub const ALL: &[Effect] = &[
         fits: masses,
         build: |s| {
             let (mass, full) = (s.plant.traits.mass?, s.p[s.plant.traits.mass?]);
-            // Most that may go in the calibration experiment is 70 %; a longer one ends at 15 % left.
+            // At most 70 % is lost in the calibration experiment; in longer experiments at least 15 % remains.
             let most = 0.7 * full / s.setup.duration();
             Family::up_to(most, move |rate| {
                 let law = Law {
@@ -99,7 +99,7 @@ pub const ALL: &[Effect] = &[
         name: "damping-drift",
         fits: any_joint,
         build: |s| {
-            // It only grows: one that falls could make the damping negative.
+            // The damping only increases, because a decrease could make it negative.
             Family::up_to(2.0 * s.force / s.speed / s.setup.duration(), |r| {
                 (Law { force: Some(Box::new(move |at| -r * at.t * at.v)), ..Law::default() }, vec![("rate", r)])
             })
@@ -110,7 +110,7 @@ pub const ALL: &[Effect] = &[
         fits: real_actuator,
         build: |s| {
             let sign = s.sign();
-            // Another experiment may be twice as long; no command changes its sign.
+            // Other experiments may be twice as long; no command must change its sign.
             Family::up_to(0.45 / s.setup.duration(), move |r| {
                 let law = Law { actuate: Some(Box::new(move |at, u| u * (1.0 + sign * r * at.t))), ..Law::default() };
                 (law, vec![("rate", sign * r)])

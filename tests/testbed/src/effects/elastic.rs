@@ -1,4 +1,4 @@
-//! Springs, stops, play, and forces that repeat with the position.
+//! Springs, end stops, backlash, and forces periodic in the position.
 
 use mops_math as math;
 
@@ -6,12 +6,12 @@ use super::{Effect, Family, Scene, any_joint, joints};
 use crate::law::{Law, Spot};
 use crate::plant::{Place, Plant};
 
-/// A force that depends on the position.
+/// Creates a force that depends on the position.
 fn pull(force: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Law {
     Law { force: Some(Box::new(move |at| force(at.q))), ..Law::default() }
 }
 
-/// Joints without a spring in the base model; a ball in the air has none at all.
+/// Returns the joints without a spring in the baseline model; a ball in flight has no joint.
 fn unsprung(plant: &Plant) -> Vec<Spot> {
     if plant.name == "ball" {
         return Vec::new();
@@ -23,17 +23,17 @@ fn mechanisms(plant: &Plant) -> Vec<Spot> {
     if plant.name == "ball" { Vec::new() } else { any_joint(plant) }
 }
 
-/// Joints of springs with play, and couplings with play.
+/// Returns the joints and couplings whose springs may have backlash.
 fn gaps(plant: &Plant) -> Vec<Spot> {
     if plant.traits.spring.is_some() || plant.traits.coupling.is_some() { vec![Spot::Place(0)] } else { Vec::new() }
 }
 
-/// Largest distance from a position.
+/// Returns the largest distance from a position.
 fn farthest(s: &Scene<'_>, from: f64) -> f64 {
     (s.range.1 - from).abs().max((s.range.0 - from).abs())
 }
 
-/// Waves per unit of position.
+/// Returns the spatial angular frequency, rad per unit of position.
 fn waves(s: &Scene<'_>) -> f64 {
     if s.is_angle() { (2 + s.below(7)) as f64 } else { s.between(3.0, 10.0) / s.reach() }
 }
@@ -75,7 +75,8 @@ pub const ALL: &[Effect] = &[
         name: "end-stop",
         fits: mechanisms,
         build: |s| {
-            // A stiff spring with some damping; what is open is how far the stop is inside the range.
+            // A stiff spring with some damping; the free magnitude is the distance of the stop from the end of the
+            // range.
             let (low, high) = s.range;
             let side = s.sign();
             let omega = (0.2 * 20.0 / s.setup.dt).min(15.0 * s.omega);
@@ -99,7 +100,7 @@ pub const ALL: &[Effect] = &[
         build: |s| {
             if let Some(k) = s.plant.traits.coupling {
                 let k = s.p[k];
-                // The shaft of the base model, minus what the play takes away.
+                // Cancels the shaft torque of the baseline model within the gap.
                 return Family::up_to(0.3, move |gap| {
                     let force = move |at: &crate::law::At<'_>| k * (at.x[0] - at.x[2]).clamp(-gap, gap);
                     let law = Law { force: Some(Box::new(force)), also: vec![(1, -1.0)], ..Law::default() };
@@ -124,7 +125,7 @@ pub const ALL: &[Effect] = &[
         name: "flexible-mode",
         fits: mechanisms,
         build: |s| {
-            // A mass on a spring: z'' = w0^2 (q - z) + 2 zeta w0 (v - z'), which pulls back with m z''.
+            // A mass on a spring: z'' = w0^2 (q - z) + 2 zeta w0 (v - z'), with the reaction force m z''.
             let w0 = (s.omega * s.between(1.3, 4.0)).min(1.5 / s.setup.dt * 0.2);
             let zeta = s.between(0.02, 0.1);
             Family::up_to(0.8 * s.inertia.abs(), move |m| {

@@ -1,4 +1,4 @@
-//! The effects: where each fits, and what it does at a strength.
+//! Effects: the places where each fits, and its law at a given magnitude.
 
 mod actuator;
 mod dissipative;
@@ -13,18 +13,18 @@ pub use scene::{Family, Scene};
 use crate::law::Spot;
 use crate::plant::{Place, Plant};
 
-/// An effect that a base model may lack.
+/// Effect that a baseline model may lack.
 #[derive(Debug)]
 pub struct Effect {
     /// Name, in kebab case.
     pub name: &'static str,
-    /// Where it makes sense in a plant.
+    /// Places where the effect makes sense in a plant.
     pub fits: fn(&Plant) -> Vec<Spot>,
-    /// Draws its shape at a place; `None` where there is nothing to act on. What is left open is the strength.
+    /// Draws its shape at a place, with a free magnitude; `None` if there is nothing to act on.
     pub build: fn(&Scene<'_>) -> Option<Family>,
 }
 
-/// All effects.
+/// Returns all effects.
 pub fn effects() -> Vec<&'static Effect> {
     [dissipative::ALL, elastic::ALL, actuator::ALL, sensor::ALL, process::ALL, disturbance::ALL]
         .iter()
@@ -32,39 +32,39 @@ pub fn effects() -> Vec<&'static Effect> {
         .collect()
 }
 
-/// The joints for which something holds.
+/// Returns the joints that satisfy a condition.
 pub fn joints(plant: &Plant, holds: impl Fn(&Place) -> bool) -> Vec<Spot> {
     let joint = |place: &Place| matches!(place, Place::Joint { .. }) && holds(place);
     (0..plant.places.len()).filter(|&j| joint(&plant.places[j])).map(Spot::Place).collect()
 }
 
-/// The states of first order.
+/// Returns the first-order states.
 pub fn processes(plant: &Plant) -> Vec<Spot> {
     let process = |j: &usize| matches!(plant.places[*j], Place::Process { .. });
     (0..plant.places.len()).filter(process).map(Spot::Place).collect()
 }
 
-/// All joints.
+/// Returns all joints.
 pub fn any_joint(plant: &Plant) -> Vec<Spot> {
     joints(plant, |_| true)
 }
 
-/// All equations.
+/// Returns all equations.
 pub fn any_place(plant: &Plant) -> Vec<Spot> {
     (0..plant.places.len()).map(Spot::Place).collect()
 }
 
-/// All inputs.
+/// Returns all inputs.
 pub fn any_actuator(plant: &Plant) -> Vec<Spot> {
     (0..plant.inputs.len()).map(Spot::Actuator).collect()
 }
 
-/// Inputs that an actuator makes; not what the weather makes.
+/// Returns the inputs driven by an actuator, without those driven by the weather.
 pub fn real_actuator(plant: &Plant) -> Vec<Spot> {
     (0..plant.inputs.len().min(1)).map(Spot::Actuator).collect()
 }
 
-/// All outputs.
+/// Returns all outputs.
 pub fn any_sensor(plant: &Plant) -> Vec<Spot> {
     (0..plant.outputs.len()).map(Spot::Sensor).collect()
 }

@@ -26,7 +26,7 @@ pub const ALL: &[Effect] = &[
         name: "leak",
         fits: levels,
         build: |s| {
-            // A hole at a height within the levels seen, or at the bottom.
+            // A hole at a height within the range of levels, or at the bottom.
             let height = if s.chance(0.7) { s.within(0.1, 0.6) } else { 0.0 };
             Family::up_to(3.0 * s.force / s.peak().sqrt(), move |k| {
                 (flow(move |h| -k * (h - height).max(0.0).sqrt()), vec![("flow", k), ("height", height)])
@@ -37,7 +37,7 @@ pub const ALL: &[Effect] = &[
         name: "overflow",
         fits: levels,
         build: |s| {
-            // A weir below the highest level; a share of what spills runs into the next tank.
+            // A weir below the highest level; a share of the overflow runs into the next tank.
             let (level, share) = (s.within(0.5, 0.9), if s.spot == Spot::Place(0) { s.between(0.0, 1.0) } else { 0.0 });
             Family::up_to(8.0 * s.force / s.reach(), move |k| {
                 let law = Law { also: vec![(1, -share)], ..flow(move |h| -k * (h - level).max(0.0)) };
@@ -63,7 +63,8 @@ pub const ALL: &[Effect] = &[
         name: "radiation-loss",
         fits: temperatures,
         build: |s| {
-            // Around: the second input in a room, else 20 degC. The range of temperatures sees little of the fourth power.
+            // Ambient temperature: the second input in a room, otherwise 20 degC. Over the temperature range, the
+            // fourth power is almost linear.
             let outdoors = s.plant.name == "room";
             let span = 4.0 * math::powi(ICE + s.range.1, 3) * (s.range.1 - 10.0).abs().max(10.0);
             Family::up_to(6.0 * s.force / span, move |k| {
@@ -79,7 +80,7 @@ pub const ALL: &[Effect] = &[
         name: "hidden-thermal-mass",
         fits: temperatures,
         build: |s| {
-            // Walls: z' = (T - z)/time, which take coupling*(T - z).
+            // Walls: z' = (T - z)/time, absorbing coupling*(T - z).
             let time = s.setup.duration() * s.between(0.03, 0.15);
             let apart = s.between(-3.0, 3.0);
             Family::up_to(4.0 * s.force / s.reach(), move |k| {

@@ -1,4 +1,4 @@
-//! Where an effect is put: sizes of motion and force there, and what can be made of them.
+//! Signal ranges at the place of an effect, and effects with a free magnitude.
 
 use std::cell::RefCell;
 
@@ -9,15 +9,15 @@ use crate::law::{Law, Spot};
 use crate::plant::{Place, Plant, Setup};
 use crate::simulate::base_states;
 
-/// A place in a plant as it moves in the calibration experiment without any effect.
+/// Place in a plant during the calibration experiment, without any effect.
 pub struct Scene<'a> {
-    /// The plant.
+    /// Plant.
     pub plant: &'a Plant,
     /// True parameters.
     pub p: &'a [f64],
     /// Calibration experiment.
     pub setup: &'a Setup,
-    /// The place.
+    /// Place.
     pub spot: Spot,
     /// Smallest and largest position, state or command.
     pub range: (f64, f64),
@@ -32,19 +32,19 @@ pub struct Scene<'a> {
     draw: RefCell<Draw>,
 }
 
-/// An effect with all its numbers, and the names and values of its strengths.
+/// Complete effect with the names and values of its parameters.
 pub type Made = (Law, Vec<(&'static str, f64)>);
 
-/// An effect whose shape is drawn and whose strength is open.
+/// Effect with a fixed random shape and a free magnitude.
 pub struct Family {
-    /// Smallest and largest strength that make sense.
+    /// Smallest and largest plausible magnitude.
     pub bounds: (f64, f64),
-    /// The effect at a strength, with the names and values of its strengths.
+    /// Builds the effect at a magnitude, with the names and values of its parameters.
     pub make: Box<dyn Fn(f64) -> Made>,
 }
 
 impl Family {
-    /// Strengths up to a largest one.
+    /// Creates a family with magnitudes up to a maximum.
     pub fn up_to(high: f64, make: impl Fn(f64) -> Made + 'static) -> Option<Self> {
         let sensible = high.is_finite() && high > 0.0;
         sensible.then(|| Self { bounds: (high * 1e-6, high), make: Box::new(make) })
@@ -52,7 +52,7 @@ impl Family {
 }
 
 impl<'a> Scene<'a> {
-    /// Looks at a place; `None` where the base model diverges.
+    /// Computes the signal ranges at a place; `None` if the baseline model diverges.
     pub fn new(plant: &'a Plant, p: &'a [f64], setup: &'a Setup, spot: Spot, draw: Draw) -> Option<Self> {
         let n = plant.states.len();
         let all: Vec<usize> = (0..n).collect();
@@ -81,7 +81,7 @@ impl<'a> Scene<'a> {
         }
         let values = match spot {
             Spot::Actuator(i) => &setup.inputs[i],
-            _ => &states[state.expect("it has one")],
+            _ => &states[state.expect("a place or sensor has a state")],
         };
         let low = values.iter().copied().fold(f64::INFINITY, f64::min);
         let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -94,23 +94,23 @@ impl<'a> Scene<'a> {
         Some(Self { plant, p, setup, spot, range: (low, high), speed, force: rms(&forces), inertia, omega, draw })
     }
 
-    /// Half the range of positions.
+    /// Returns half the range of positions.
     pub fn reach(&self) -> f64 {
         0.5 * (self.range.1 - self.range.0)
     }
 
-    /// Largest absolute command or position.
+    /// Returns the largest absolute command or position.
     pub fn peak(&self) -> f64 {
         self.range.0.abs().max(self.range.1.abs())
     }
 
-    /// A position a fraction of the way through the range.
+    /// Returns a random position between two fractions of the range.
     pub fn within(&self, low: f64, high: f64) -> f64 {
         let c = self.between(low, high);
         self.range.0 + c * (self.range.1 - self.range.0)
     }
 
-    /// The joint at the place.
+    /// Returns the joint at the place.
     pub fn joint(&self) -> Option<Place> {
         match self.spot {
             Spot::Place(j) => Some(self.plant.places[j]),
@@ -118,7 +118,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// Position about which springs are symmetric.
+    /// Returns the position about which springs are symmetric.
     pub fn rest(&self) -> f64 {
         match self.joint() {
             Some(Place::Joint { rest, .. }) => rest,
@@ -126,7 +126,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// True where the position, of a joint or behind a sensor, is an angle.
+    /// Returns true if the position, of a joint or behind a sensor, is an angle.
     pub fn is_angle(&self) -> bool {
         let state = match self.spot {
             Spot::Place(j) => self.plant.places[j].state(),
@@ -136,22 +136,22 @@ impl<'a> Scene<'a> {
         self.plant.states[state].1 == "rad"
     }
 
-    /// Uniform between two numbers.
+    /// Draws from the uniform distribution between two numbers.
     pub fn between(&self, low: f64, high: f64) -> f64 {
         self.draw.borrow_mut().between(low, high)
     }
 
-    /// 1 or -1.
+    /// Draws 1 or -1.
     pub fn sign(&self) -> f64 {
         self.draw.borrow_mut().sign()
     }
 
-    /// A whole number below `n`.
+    /// Draws an integer below `n`.
     pub fn below(&self, n: usize) -> usize {
         self.draw.borrow_mut().below(n)
     }
 
-    /// True with a probability.
+    /// Returns true with the given probability.
     pub fn chance(&self, probability: f64) -> bool {
         self.draw.borrow_mut().chance(probability)
     }

@@ -1,4 +1,4 @@
-//! What a sensor makes of a state.
+//! Sensor effects.
 
 use mops_math as math;
 
@@ -6,7 +6,7 @@ use super::{Effect, Family, any_sensor};
 use crate::law::{Law, Spot};
 use crate::plant::Plant;
 
-/// A curve of what is measured.
+/// Creates a static characteristic of the measured value.
 fn curve(f: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Law {
     Law { sense: Some(Box::new(move |_, y| f(y))), ..Law::default() }
 }
@@ -34,7 +34,7 @@ pub const ALL: &[Effect] = &[
         fits: any_sensor,
         build: |s| {
             let sign = s.sign();
-            // Angles count from where the sensor's zero is.
+            // Angles count from the zero of the sensor.
             Family::up_to(0.4, move |g| (curve(move |y| (1.0 + sign * g) * y), vec![("gain", 1.0 + sign * g)]))
         },
     },
@@ -79,7 +79,8 @@ pub const ALL: &[Effect] = &[
         name: "sensor-dead-zone",
         fits: any_sensor,
         build: |s| {
-            // The gap of a potentiometer: within it the reading stays at its middle; or a dead band that shifts all else.
+            // Gap of a potentiometer: inside it the reading stays at the centre; or a dead band that shifts all other
+            // readings.
             let (middle, shifts) = (s.within(0.3, 0.7), s.chance(0.5));
             Family::up_to(0.35 * s.reach(), move |width| {
                 let law = curve(move |y| {

@@ -20,7 +20,7 @@ pub const PLANT: Plant = Plant {
         dx[1] = -G - p[0] * x[1] + w[0];
     },
     setup: |draw, experiment| {
-        // Thrown up in the first two, dropped from a height in the last.
+        // Thrown up in the first two experiments, dropped from a height in the last.
         let start = match experiment {
             2 => vec![draw.between(9.0, 14.0), 0.0],
             _ => vec![draw.between(1.0, 1.8), draw.between(7.0, 11.0)],

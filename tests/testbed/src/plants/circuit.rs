@@ -1,9 +1,9 @@
-//! Two resistors and two capacitors in a chain behind a voltage source; times in ms would be usual, here it is slow.
+//! Two resistors and two capacitors in a chain behind a voltage source; slower than the usual ms range.
 
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Place, Plant, Setup, Traits};
 
-/// First capacitor, F: the voltages tell only ratios.
+/// First capacitor, F: the voltages determine only ratios.
 const C1: f64 = 0.001;
 
 pub const PLANT: Plant = Plant {

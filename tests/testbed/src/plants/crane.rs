@@ -1,4 +1,5 @@
-//! Trolley with a hanging load, driven by a force; th = 0 hangs. The load's joint has no friction in the base model.
+//! Trolley with a hanging load, driven by a force; th = 0 is hanging. The joint of the load has no friction in the
+//! baseline model.
 
 use mops_math as math;
 

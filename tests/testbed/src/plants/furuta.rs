@@ -8,10 +8,10 @@ use super::angle;
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Plant, Setup};
 
-/// Inertia of the pendulum, which a free swing cannot tell: all others count in units of it.
+/// Inertia of the pendulum, which a free swing cannot identify: all other inertias are relative to it.
 const A: f64 = 0.0044;
 
-/// Released, no torque.
+/// Released, without torque.
 pub const FREE: Plant = Plant {
     name: "furuta-free",
     constants: &[("a", A, "kg m2")],

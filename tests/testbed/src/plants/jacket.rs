@@ -3,9 +3,9 @@
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Place, Plant, Setup, Traits};
 
-/// Temperature around, degC.
+/// Ambient temperature, degC.
 const TA: f64 = 20.0;
-/// Heat capacity that flows through, kW/K.
+/// Heat capacity flow through the tank, kW/K.
 const F: f64 = 0.1;
 
 pub const PLANT: Plant = Plant {

@@ -1,4 +1,4 @@
-//! The plants, one file each.
+//! Plants, one file each.
 
 mod axis;
 mod ball;
@@ -16,7 +16,7 @@ mod torsion;
 
 use crate::plant::{Place, Plant};
 
-/// All plants.
+/// Returns all plants.
 pub fn plants() -> &'static [&'static Plant] {
     &[
         &furuta::FREE,
@@ -36,12 +36,12 @@ pub fn plants() -> &'static [&'static Plant] {
     ]
 }
 
-/// An angle with viscous friction and without a spring in the base model.
+/// Creates an angle with viscous friction and without a spring in the baseline model.
 const fn angle(q: usize, v: usize, rest: f64) -> Place {
     Place::Joint { q, v, rest, angle: true, damped: true, sprung: false }
 }
 
-/// A length with viscous friction and without a spring in the base model.
+/// Creates a length with viscous friction and without a spring in the baseline model.
 const fn length(q: usize, v: usize) -> Place {
     Place::Joint { q, v, rest: 0.0, angle: false, damped: true, sprung: false }
 }

@@ -1,4 +1,4 @@
-//! Disc on a torsion wire, released. No friction in the base model.
+//! Disc on a torsion wire, released. No friction in the baseline model.
 
 use crate::plant::{Output, PLAIN, Parameter, Place, Plant, Setup, Traits};
 

@@ -1,34 +1,36 @@
 //! Dry friction with exact rest.
 //!
-//! A joint with dry friction slides one way, slides the other way or rests. While it slides the direction in the formula
-//! is that of the mode, so that a step is smooth; where a step passes zero speed, the crossing is located (regula falsi on
-//! the length of the step), the speed set to exactly 0, and the joint rests if the force that holds it is within the
-//! breakaway level, else it slides on. While it rests, the force that keeps its acceleration at 0 is solved for, and it
-//! breaks away where a command takes that force out of the level, or at the end of the step in which it leaves.
+//! A joint with dry friction slides in either direction or rests. During sliding, the direction in the formula is that
+//! of the mode, so that a step is smooth. If a step passes zero speed, the zero crossing is located (regula falsi on
+//! the step size) and the speed set to exactly 0. The joint then rests if the force required is within the breakaway
+//! level, and slides on otherwise.
+//!
+//! At rest, the force that keeps the acceleration at 0 is computed. The joint breaks away when a command drives that
+//! force beyond the level, or at the end of a step that exceeds it.
 
 use super::world::World;
 use super::{FEW, SIZE, State, runge_kutta};
 use crate::law::Spot;
 
-/// What a joint with dry friction does.
+/// Mode of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Mode {
-    /// No dry friction here.
+    /// No dry friction.
     Free,
-    /// It slides in this direction, 1 or -1.
+    /// Sliding in this direction, 1 or -1.
     Slides(f64),
-    /// It rests.
+    /// At rest.
     Rests,
 }
 
 impl World<'_> {
-    /// The levels at a joint for a direction, of all effects there.
+    /// Returns the sum of the breakaway levels of all effects at a joint, for a direction.
     fn hold(&self, j: usize, t: f64, x: &State, way: f64) -> f64 {
         let here = self.effects.iter().enumerate().filter(|(_, e)| e.spot == Spot::Place(j));
         here.filter_map(|(i, e)| e.law.dry.as_ref().map(|dry| dry(&self.at(i, t, x), way).hold)).sum()
     }
 
-    /// Modes at the start.
+    /// Sets the initial modes.
     pub(super) fn begin(&mut self, t: f64, x: &State) {
         for j in 0..self.plant.places.len() {
             let speed = x[self.plant.places[j].equation()];
@@ -39,7 +41,7 @@ impl World<'_> {
         self.break_away(t, x);
     }
 
-    /// Lets joints go that rest under more than the level.
+    /// Releases joints at rest whose force exceeds the level.
     pub(super) fn break_away(&mut self, t: f64, x: &State) {
         for j in 0..self.plant.places.len() {
             if self.modes[j] == Mode::Rests {
@@ -57,7 +59,7 @@ impl World<'_> {
         runge_kutta(x, self.n, h, |c, x, dx| self.rates(t + c * h, x, dx, &mut [0.0; FEW]))
     }
 
-    /// Advances by `h`, through what joints with dry friction do.
+    /// Advances by `h`, through the mode changes of joints with dry friction.
     pub(super) fn advance(&mut self, t: f64, x: State, h: f64) -> State {
         let (mut x, mut t, mut left) = (x, t, h);
         for _ in 0..12 {
@@ -80,7 +82,7 @@ impl World<'_> {
             }
             self.modes[j] = Mode::Rests;
             if length <= 0.0 {
-                continue; // It would turn back at once: it rests to the end of this step.
+                continue; // The joint would reverse at once: it rests until the end of this step.
             }
             t += length;
             left -= length;
@@ -94,7 +96,7 @@ impl World<'_> {
         x
     }
 
-    /// Length of the step at whose end the speed of joint `j` is 0.
+    /// Returns the step size at whose end the speed of joint `j` is 0.
     fn crossing(&self, j: usize, t: f64, x: &State, h: f64, end: &State) -> f64 {
         let equation = self.plant.places[j].equation();
         let (mut low, mut high) = ((0.0, x[equation]), (h, end[equation]));
@@ -108,7 +110,7 @@ impl World<'_> {
             if speed.abs() < 1e-12 * (low.1.abs() + high.1.abs()) || high.0 - low.0 < 1e-12 * h {
                 return middle;
             }
-            // Illinois: the end that stays twice counts half.
+            // Illinois: an end kept twice is halved.
             if speed * low.1 > 0.0 {
                 low = (middle, speed);
                 if last == 1 {

@@ -1,6 +1,6 @@
-//! The integrator: classical Runge-Kutta of order 4 with fixed steps.
+//! Integrator: classical Runge-Kutta method of order 4 with fixed steps.
 //!
-//! Inputs are held; a delayed input ends a step where it changes. Dry friction: see [`friction`].
+//! Inputs are held (zero-order hold); a step ends where a delayed input changes. Dry friction: see [`friction`].
 
 mod friction;
 mod world;
@@ -11,23 +11,24 @@ use crate::plant::{Plant, Setup};
 
 /// Steps per sample of a plant with effects.
 const STEPS: usize = 20;
-/// Largest number of states, of the plant and of its effects.
+/// Maximum number of states, of the plant and its effects.
 const SIZE: usize = 16;
-/// Largest number of places, inputs, outputs.
+/// Maximum number of places, inputs and outputs.
 const FEW: usize = 4;
-/// Largest number of parameters.
+/// Maximum number of parameters.
 const MANY: usize = 8;
 
 /// States of the plant, then those of its effects.
 type State = [f64; SIZE];
 
-/// Clean outputs of the base model, by output and sample; `None` where it diverges. `steps` per sample.
+/// Returns the noise-free outputs of the baseline model, by output and sample, with `steps` integration steps per
+/// sample; `None` if it diverges.
 pub fn base_outputs(plant: &Plant, p: &[f64], start: &[f64], setup: &Setup, steps: usize) -> Option<Vec<Vec<f64>>> {
     let outputs: Vec<usize> = plant.outputs.iter().map(|output| output.state).collect();
     base_states(plant, p, start, setup, (steps, &outputs))
 }
 
-/// The same for some states; `None` where it diverges.
+/// Returns selected states of the baseline model, by state and sample; `None` if it diverges.
 pub fn base_states(
     plant: &Plant,
     p: &[f64],
@@ -63,7 +64,7 @@ pub fn base_states(
     Some(out)
 }
 
-/// One step of the classical method of order 4 over `n` states; `rates(fraction, x, dx)`.
+/// Does one step of the classical method of order 4 for `n` states; `rates(fraction, x, dx)`.
 fn runge_kutta(x: &State, n: usize, h: f64, rates: impl Fn(f64, &State, &mut [f64])) -> State {
     let (mut k1, mut k2, mut k3, mut k4) = ([0.0; SIZE], [0.0; SIZE], [0.0; SIZE], [0.0; SIZE]);
     let ahead = |k: &State, c: f64| {

@@ -1,11 +1,11 @@
-//! A plant with effects as it runs through an experiment.
+//! Simulation of a plant with effects through an experiment.
 
 use super::friction::Mode;
 use super::{FEW, MANY, SIZE, STEPS, State};
 use crate::law::{At, Installed, Spot};
 use crate::plant::{Place, Plant, Setup};
 
-/// Clean outputs of the plant with effects, by output and sample; `None` where it diverges.
+/// Returns the noise-free outputs of the plant with effects, by output and sample; `None` if it diverges.
 pub fn outputs(
     plant: &Plant,
     p: &[f64],
@@ -16,16 +16,16 @@ pub fn outputs(
     World::new(plant, p, setup, experiment, effects).run()
 }
 
-/// What runs.
+/// Simulation of a plant with effects.
 pub(super) struct World<'a> {
     pub(super) plant: &'a Plant,
     p: &'a [f64],
     setup: &'a Setup,
     experiment: usize,
     pub(super) effects: &'a [Installed],
-    /// Where each effect's own states begin.
+    /// Index of each effect's first own state.
     own: Vec<usize>,
-    /// States of plant and effects.
+    /// Number of states of plant and effects.
     pub(super) n: usize,
     /// Commands that act now, delays included.
     u: [f64; FEW],
@@ -44,7 +44,7 @@ impl<'a> World<'a> {
                 modes[j] = Mode::Rests;
             }
         }
-        assert!(n <= SIZE && p.len() <= MANY && plant.places.len() <= FEW, "sizes are small");
+        assert!(n <= SIZE && p.len() <= MANY && plant.places.len() <= FEW, "the plant exceeds the fixed array sizes");
         Self { plant, p, setup, experiment, effects, own, n, u: [0.0; FEW], modes }
     }
 
@@ -64,7 +64,7 @@ impl<'a> World<'a> {
         cuts.sort_by(f64::total_cmp);
         let before = late(false).fold(0.0, f64::max);
 
-        // What a delayed measurement shows at first has happened before.
+        // The first values of a delayed measurement lie before the first sample.
         let mut past: Vec<(f64, State)> = Vec::new();
         self.commands(0.0);
         for (i, effect) in self.effects.iter().enumerate() {
@@ -165,7 +165,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Derivatives; the forces that hold resting joints are left in `held`.
+    /// Computes the derivatives, and in `held` the forces that keep joints at rest.
     pub(super) fn rates(&self, t: f64, x: &State, dx: &mut [f64], held: &mut [f64; FEW]) {
         let (n, m) = (self.plant.states.len(), self.plant.places.len());
         let (mut u, mut w, mut p) = (self.u, [0.0; FEW], [0.0; MANY]);
@@ -199,7 +199,8 @@ impl<'a> World<'a> {
         if !self.modes[..m].contains(&Mode::Rests) {
             return;
         }
-        // Accelerations are affine in w: two sweeps of elimination suffice for one resting joint, and converge for two.
+        // Accelerations are affine in w: one sweep of elimination suffices for one resting joint; for more, the sweeps
+        // converge.
         let resting = |j: usize| self.modes[j] == Mode::Rests;
         let mut moved = [0.0; SIZE];
         for _ in 0..if (0..m).filter(|&j| resting(j)).count() > 1 { 40 } else { 1 } {
@@ -220,7 +221,7 @@ impl<'a> World<'a> {
     }
 }
 
-/// A state at an earlier time, on straight lines between steps.
+/// Returns a state at an earlier time, linearly interpolated between steps.
 fn earlier(past: &[(f64, State)], t: f64, state: usize) -> f64 {
     let i = past.partition_point(|(at, _)| *at <= t).clamp(1, past.len() - 1);
     let ((t0, x0), (t1, x1)) = (&past[i - 1], &past[i]);

@@ -1,51 +1,52 @@
-//! Takes the most crowded members from a front one by one.
+//! Removal of the most crowded members of a front, one at a time.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::evolution::Pool;
 
-/// Memory of the thinning: neighbours of every member along every objective.
+/// Pruning of a front; stores the neighbours of every member along every objective.
 #[derive(Debug, Default)]
-pub struct Thinning {
-    /// `[member * m + k]`: the places in the front before and after it along objective `k`.
+pub struct Pruning {
+    /// Previous and next member along objective `k`, at `[member * m + k]`.
     before: Vec<u32>,
     after: Vec<u32>,
     sorted: Vec<u32>,
     ranges: Vec<f64>,
-    /// Distances as bits, which order as the numbers do where they are not negative; old entries are passed over.
+    /// Crowding distances as bits, which have the order of the numbers for non-negative values. Outdated entries are
+    /// skipped.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
-    gone: Vec<bool>,
+    removed: Vec<bool>,
 }
 
 const NONE: u32 = u32::MAX;
 
-impl Thinning {
-    /// Moves the `keep` members of `front` that are left when the most crowded are taken away to its beginning. `distance` is
-    /// by place in the pool.
+impl Pruning {
+    /// Removes the most crowded members of `front` one at a time and moves the remaining `keep` to its start.
+    /// `distance` is indexed by position in the pool.
     #[allow(clippy::cast_possible_truncation)]
-    pub fn thin(&mut self, pool: &Pool, front: &mut [u32], keep: usize, distance: &mut [f64]) {
+    pub fn prune(&mut self, pool: &Pool, front: &mut [u32], keep: usize, distance: &mut [f64]) {
         let (m, count) = (pool.m, front.len());
         self.link(pool, front);
-        self.gone.clear();
-        self.gone.resize(count, false);
+        self.removed.clear();
+        self.removed.resize(count, false);
         self.queue.clear();
         for member in 0..count {
             let crowding = self.crowding(pool, front, member);
             distance[front[member] as usize] = crowding;
             self.queue.push(Reverse((crowding.to_bits(), member as u32)));
         }
-        let mut left = count;
-        while left > keep {
+        let mut remaining = count;
+        while remaining > keep {
             let Some(Reverse((bits, member))) = self.queue.pop() else { break };
-            let place = member as usize;
-            if self.gone[place] || distance[front[place] as usize].to_bits() != bits {
+            let index = member as usize;
+            if self.removed[index] || distance[front[index] as usize].to_bits() != bits {
                 continue;
             }
-            self.gone[place] = true;
-            left -= 1;
+            self.removed[index] = true;
+            remaining -= 1;
             for k in 0..m {
-                let (before, after) = (self.before[place * m + k], self.after[place * m + k]);
+                let (before, after) = (self.before[index * m + k], self.after[index * m + k]);
                 if before != NONE {
                     self.after[before as usize * m + k] = after;
                 }
@@ -54,7 +55,7 @@ impl Thinning {
                 }
             }
             for k in 0..m {
-                for near in [self.before[place * m + k], self.after[place * m + k]] {
+                for near in [self.before[index * m + k], self.after[index * m + k]] {
                     if near != NONE {
                         let crowding = self.crowding(pool, front, near as usize);
                         distance[front[near as usize] as usize] = crowding;
@@ -65,14 +66,14 @@ impl Thinning {
         }
         let mut end = 0;
         for member in 0..count {
-            if !self.gone[member] {
+            if !self.removed[member] {
                 front.swap(end, member);
                 end += 1;
             }
         }
     }
 
-    /// Finds every member's neighbours.
+    /// Finds the neighbours of every member.
     #[allow(clippy::cast_possible_truncation)]
     fn link(&mut self, pool: &Pool, front: &[u32]) {
         let m = pool.m;
@@ -94,10 +95,10 @@ impl Thinning {
         }
     }
 
-    /// The gaps between the neighbours, relative to the front's range; infinite at an end.
+    /// Returns the sum of the gaps between the neighbours, relative to the range of the front; infinite at an end.
     fn crowding(&self, pool: &Pool, front: &[u32], member: usize) -> f64 {
         let m = pool.m;
-        let value = |place: u32, k: usize| pool.objectives[front[place as usize] as usize * m + k];
+        let value = |index: u32, k: usize| pool.objectives[front[index as usize] as usize * m + k];
         let gap = |k: usize| {
             let (before, after) = (self.before[member * m + k], self.after[member * m + k]);
             if before == NONE || after == NONE {
@@ -115,12 +116,12 @@ mod tests {
 
     #[test]
     fn the_most_crowded_go_first_and_the_ends_stay() {
-        // A line with a cluster: 0, 1, 2, 3, 3.1, 3.2, 4.
+        // Line with a cluster: 0, 1, 2, 3, 3.1, 3.2, 4.
         let at = [0.0, 1.0, 2.0, 3.0, 3.1, 3.2, 4.0];
         let objectives = at.iter().flat_map(|x| [*x, 4.0 - *x]).collect();
         let pool = Pool { m: 2, points: Vec::new(), objectives, violations: vec![0.0; 7] };
         let mut front: Vec<u32> = (0..7).collect();
-        Thinning::default().thin(&pool, &mut front, 5, &mut [0.0; 7]);
+        Pruning::default().prune(&pool, &mut front, 5, &mut [0.0; 7]);
         let mut kept = front[..5].to_vec();
         kept.sort_unstable();
         assert!(kept == [0, 1, 2, 3, 6] || kept == [0, 1, 2, 5, 6], "{kept:?}");

@@ -1,21 +1,22 @@
-//! Objectives brought to one scale: 0 at the best of each, 1 where the plane through the extreme points meets its axis.
+//! Normalisation of the objectives: 0 at the ideal point, 1 at the axis intercept of the plane through the extreme
+//! points.
 
 use nalgebra::{DMatrix, DVector};
 
-/// The ideal point and the intercepts so far.
+/// Ideal point and intercepts found so far.
 ///
 /// Source: K. Deb, H. Jain, IEEE Transactions on Evolutionary Computation 18 (2014) 577-601, section IV C.
 #[derive(Debug, Clone, Default)]
-pub struct Scale {
+pub struct Normalisation {
     ideal: Vec<f64>,
     nadir: Vec<f64>,
-    /// The worst of every objective ever seen.
+    /// Largest value of every objective so far.
     worst: Vec<f64>,
     extremes: Vec<Vec<f64>>,
 }
 
-impl Scale {
-    /// Of `m` objectives, before any point.
+impl Normalisation {
+    /// Creates the normalisation of `m` objectives, before any point.
     pub fn new(m: usize) -> Self {
         Self {
             ideal: vec![f64::INFINITY; m],
@@ -25,7 +26,7 @@ impl Scale {
         }
     }
 
-    /// Takes the objectives of a generation with their ranks.
+    /// Updates ideal point and intercepts from the objectives of a generation and their ranks.
     pub fn update(&mut self, objectives: &[f64], ranks: &[u32]) {
         let m = self.ideal.len();
         let rows = || objectives.chunks_exact(m);
@@ -34,15 +35,15 @@ impl Scale {
             self.worst.iter_mut().zip(row).for_each(|(worst, f)| *worst = worst.max(*f));
         }
         let front: Vec<&[f64]> = rows().zip(ranks).filter(|(_, rank)| **rank == 0).map(|(row, _)| row).collect();
-        // Extreme along an axis: the least of what the achievement function of that axis gives.
+        // The extreme point of an axis minimises the achievement scalarising function of that axis.
         let extremes: Vec<Vec<f64>> = (0..m)
             .map(|axis| {
-                let height = |row: &[f64]| {
+                let achievement = |row: &[f64]| {
                     let weight = |k: usize| if k == axis { 1.0 } else { 1e6 };
                     (0..m).map(|k| (row[k] - self.ideal[k]) * weight(k)).fold(0.0, f64::max)
                 };
                 let all = self.extremes.iter().map(Vec::as_slice).chain(front.iter().copied());
-                all.min_by(|a, b| height(a).total_cmp(&height(b))).map(<[f64]>::to_vec).unwrap_or_default()
+                all.min_by(|a, b| achievement(a).total_cmp(&achievement(b))).map(<[f64]>::to_vec).unwrap_or_default()
             })
             .collect();
         self.extremes = extremes;
@@ -56,7 +57,7 @@ impl Scale {
         }
     }
 
-    /// Where the plane through the extreme points meets the axes; `None` where it does not.
+    /// Computes the axis intercepts of the plane through the extreme points; `None` if there are none.
     fn intercepts(&self) -> Option<Vec<f64>> {
         let m = self.ideal.len();
         let plane = DMatrix::from_fn(m, m, |i, k| self.extremes[i][k] - self.ideal[k]);
@@ -65,7 +66,7 @@ impl Scale {
         (0..m).all(usable).then(|| (0..m).map(|k| self.ideal[k] + 1.0 / normal[k]).collect())
     }
 
-    /// The `k`-th objective on its scale.
+    /// Returns the normalised value of the `k`-th objective.
     pub fn normalised(&self, k: usize, value: f64) -> f64 {
         let range = self.nadir[k] - self.ideal[k];
         if range > 0.0 { (value - self.ideal[k]) / range } else { 0.0 }

@@ -1,16 +1,16 @@
-//! What one solver among several has seen itself.
+//! Archive of the best point of one run among several.
 
 use mops_core::{Evaluation, Halt, Linearisation, Oracle, Shape, Stream};
 
-/// The oracle of one run: its best is the best of that run.
-pub struct Own<'a> {
-    /// That of all.
+/// Oracle of one run, whose best point is the best of that run only.
+pub struct LocalArchive<'a> {
+    /// Oracle shared by all runs.
     pub oracle: &'a mut dyn Oracle,
-    /// The best point of this run.
+    /// Best point of this run.
     pub best: &'a mut Option<Evaluation>,
 }
 
-impl Oracle for Own<'_> {
+impl Oracle for LocalArchive<'_> {
     fn shape(&self) -> &Shape {
         self.oracle.shape()
     }
