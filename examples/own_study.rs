@@ -6,8 +6,8 @@
 use mops::criteria::settling_time::SettlingTime;
 use mops::models::kernel::{PlantModel, Simulated};
 use mops::{
-    Analysis, Case, Criterion, CriterionDraft, CriterionSpec, Draft, Failure, Instant, Interface, Mistake, Options,
-    Parameter, Plant, Scalar, Study, TunerDraft, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionBuilder, CriterionSpec, Failure, Instant, Interface, Options, Parameter, Plant,
+    Scalar, Study, StudyBuilder, StudyError, TunerBuilder, Unit, Value, Variable,
 };
 
 /// Interface of the model: its signals and parameters.
@@ -68,7 +68,7 @@ impl PlantModel for Suspension {
 struct Shaking;
 
 impl CriterionSpec for Shaking {
-    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         Ok(Box::new(self.clone()))
     }
 }
@@ -89,25 +89,25 @@ impl Criterion for Shaking {
 }
 
 /// Builds the study.
-pub fn study() -> Result<Study, Mistake> {
+pub fn study() -> Result<Study, StudyError> {
     let settling = SettlingTime {
         signal: "x".into(),
         target: Some(0.0.into()),
         band: Some(1e-3.into()),
         ..SettlingTime::default()
     };
-    Draft {
+    StudyBuilder {
         name: "suspension".into(),
         models: vec![("wheel".into(), Simulated::new(Suspension::new()).into())],
         tuners: vec![
-            ("k".into(), TunerDraft::new(20e3, 5e3, 80e3).log()),
-            ("d".into(), TunerDraft::new(500.0, 100.0, 10e3).log()),
+            ("k".into(), TunerBuilder::new(20e3, 5e3, 80e3).log()),
+            ("d".into(), TunerBuilder::new(500.0, 100.0, 10e3).log()),
         ],
         criteria: vec![
-            ("settling".into(), CriterionDraft::minimise(settling, 1.0)),
-            ("shaking".into(), CriterionDraft::minimise(Shaking, 2.0)),
+            ("settling".into(), CriterionBuilder::minimise(settling, 1.0)),
+            ("shaking".into(), CriterionBuilder::minimise(Shaking, 2.0)),
         ],
-        ..Draft::default()
+        ..StudyBuilder::default()
     }
     .build()
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Budget, Cancellation, Effect, Ending, Evaluation, Mistake, Objective, Oracle, Outcome, Pareto, Place, Problem,
-    Quiet, Record, Run, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, Task, Watch, conclude,
+    Budget, Cancellation, Effect, Ending, Evaluation, Objective, Oracle, Outcome, Pareto, Place, Problem, Quiet,
+    Record, Run, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task, Watch, conclude,
 };
 
 use mops_discrepancy::Diagnosis;
@@ -22,14 +22,14 @@ pub struct Options {
     /// Effects that a diagnosis may find.
     pub effects: Vec<Arc<dyn Effect>>,
     /// Where points are kept, and what is known of them from before; it changes no bit of the result.
-    pub keeping: Option<Keeping>,
+    pub keeping: Option<EvaluationStore>,
     /// Asks the run to end, within a simulation too.
     pub cancellation: Cancellation,
 }
 
 /// A store, and the study whose points it knows.
 #[derive(Clone)]
-pub struct Keeping {
+pub struct EvaluationStore {
     /// The study.
     pub study: Study,
     /// Its points.
@@ -88,27 +88,27 @@ pub struct Solved {
 
 /// The solver or the task cannot treat the study: why, and what would; with the keys that lead to the place, if there is one.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unsuitable(pub Mistake);
+pub struct SolveError(pub StudyError);
 
-impl std::fmt::Display for Unsuitable {
+impl std::fmt::Display for SolveError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.0.message)?;
         self.0.help.as_ref().map_or(Ok(()), |help| write!(f, "; {help}"))
     }
 }
 
-impl std::error::Error for Unsuitable {}
+impl std::error::Error for SolveError {}
 
 /// Whether a solver can do the task of a study, as far as that is known without a simulation.
 ///
 /// # Errors
 /// The solver cannot treat the problem.
-pub fn suits(study: &Study, solver: &SolverChoice) -> Result<(), Unsuitable> {
+pub fn suits(study: &Study, solver: &SolverChoice) -> Result<(), SolveError> {
     if solves(study) { accepts(solver, solver.make().as_ref(), &Problem::outline(study)) } else { Ok(()) }
 }
 
-fn accepts(choice: &SolverChoice, solver: &dyn Solver, shape: &Shape) -> Result<(), Unsuitable> {
-    solver.accepts(shape).map_err(|why| Unsuitable(Mistake::new(choice.kind, why).within("solver")))
+fn accepts(choice: &SolverChoice, solver: &dyn Solver, shape: &Shape) -> Result<(), SolveError> {
+    solver.accepts(shape).map_err(|why| SolveError(StudyError::new(choice.kind, why).within("solver")))
 }
 
 /// Whether the task of a study needs a solver.
@@ -127,7 +127,7 @@ pub(crate) fn solves(study: &Study) -> bool {
 ///
 /// # Errors
 /// The solver cannot treat the problem.
-pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let begun = Instant::now();
     let problem = Problem::new(Arc::new(study));
     let mut solver = options.solver.make();

@@ -6,8 +6,8 @@ mod function;
 use std::sync::Arc;
 
 use mops::{
-    Analysis, Budget, Case, Criterion, CriterionDraft, CriterionSpec, Draft, Interface, Mistake, Objective, Oracle,
-    Problem, Run, SolverKind, Stop, Study, TunerDraft, Unit, Usage, Value, Watch,
+    Analysis, Budget, Case, Criterion, CriterionBuilder, CriterionSpec, Interface, Objective, Oracle, Problem, Run,
+    SolverKind, Stop, Study, StudyBuilder, StudyError, TunerBuilder, Unit, Usage, Value, Watch,
 };
 
 use function::{End, Function};
@@ -27,17 +27,17 @@ fn study_of(objective: Objective, n: usize, usages: &[Usage], f: fn(&[f64]) -> O
     let name = |prefix: &str, i: usize| format!("{prefix}{i}");
     let parameters: Vec<String> = (0..n).map(|j| name("x", j)).collect();
     let function = Function::new(&parameters.iter().map(String::as_str).collect::<Vec<_>>(), usages.len(), f);
-    Draft {
+    StudyBuilder {
         name: "function".into(),
         objective: Some(objective),
         models: vec![("function".into(), function.into())],
-        tuners: (0..n).map(|j| (name("x", j), TunerDraft::new(1.5, -2.0, 2.0))).collect(),
+        tuners: (0..n).map(|j| (name("x", j), TunerBuilder::new(1.5, -2.0, 2.0))).collect(),
         criteria: usages
             .iter()
             .enumerate()
-            .map(|(i, usage)| (name("c", i), CriterionDraft::minimise(End(name("f", i)), 1.0).used_as(*usage)))
+            .map(|(i, usage)| (name("c", i), CriterionBuilder::minimise(End(name("f", i)), 1.0).used_as(*usage)))
             .collect(),
-        ..Draft::default()
+        ..StudyBuilder::default()
     }
     .build()
     .unwrap()
@@ -48,7 +48,7 @@ fn study_of(objective: Objective, n: usize, usages: &[Usage], f: fn(&[f64]) -> O
 struct Line;
 
 impl CriterionSpec for Line {
-    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         Ok(Box::new(self.clone()))
     }
 }
@@ -72,13 +72,13 @@ impl Criterion for Line {
 
 /// A least-squares problem in two tuners, whose simulations fail where `f` says.
 fn line(f: fn(&[f64]) -> Option<Vec<f64>>) -> Problem {
-    let study = Draft {
+    let study = StudyBuilder {
         name: "line".into(),
         task: mops::Task::Calibration,
         models: vec![("function".into(), Function::new(&["x0", "x1"], 2, f).into())],
-        tuners: ["x0", "x1"].map(|name| (name.into(), TunerDraft::new(-1.5, -2.0, 2.0))).into(),
-        criteria: vec![("line".into(), CriterionDraft::minimise(Line, 1.0))],
-        ..Draft::default()
+        tuners: ["x0", "x1"].map(|name| (name.into(), TunerBuilder::new(-1.5, -2.0, 2.0))).into(),
+        criteria: vec![("line".into(), CriterionBuilder::minimise(Line, 1.0))],
+        ..StudyBuilder::default()
     };
     Problem::new(Arc::new(study.build().unwrap()))
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
-use mops::{EffectDraft, ModelDraft};
+use mops::{EffectBuilder, ModelBuilder};
 use mops_core::math;
 use serde_json::Value;
 
@@ -107,9 +107,9 @@ fn in_rust_a_model_takes_its_effects_by_the_same_names() {
     let catalogue = mops::catalogue();
     let plain = || {
         let kind = catalogue.models.iter().find(|kind| kind.name == "furuta").unwrap();
-        ModelDraft { model: kind.default_model().unwrap(), parameters: Vec::new() }
+        ModelBuilder { model: kind.default_model().unwrap(), parameters: Vec::new() }
     };
-    let friction = |name: &str, place: &str| [EffectDraft::new(name, "coulomb-friction", place)];
+    let friction = |name: &str, place: &str| [EffectBuilder::new(name, "coulomb-friction", place)];
     let draft = plain().with_effects(&catalogue, &friction("arm", "joint:phi")).unwrap();
     // More effects go beside those that are there.
     let draft = draft.with_effects(&catalogue, &friction("swing", "joint:theta")).unwrap();

@@ -8,65 +8,65 @@ use std::path::Path;
 use assert_cmd::cargo::cargo_bin_cmd;
 use mops::criteria::normalised_error::NormalisedError;
 use mops::{
-    Analysis, CaseDraft, ChannelDraft, Chosen, CriterionDraft, DistributionDraft, Draft, Failure, Interface, Job,
+    Analysis, CaseBuilder, ChannelBuilder, Chosen, CriterionBuilder, DistributionBuilder, Failure, Interface, Job,
     Measured, Model, MonteCarloTask, Options, Outcome, Parameter, Place, Response, RobustTask, SensitivityMethod,
-    SensitivityTask, Task, TasksDraft, Trace, TunerDraft, UncertainDraft, UncertaintyTask, Usage, Variable,
-    WorstCaseTask, statistics::Sampling,
+    SensitivityTask, StudyBuilder, Task, TasksBuilder, Trace, TunerBuilder, UncertainBuilder, UncertaintyTask, Usage,
+    Variable, WorstCaseTask, statistics::Sampling,
 };
 use serde_json::Value as Json;
 
 use function::{End, Function};
 use mops_core::math;
 
-fn end(i: usize, demand: f64, usage: Usage) -> (String, CriterionDraft) {
-    (format!("c{i}"), CriterionDraft::minimise(End(format!("f{i}")), demand).used_as(usage))
+fn end(i: usize, demand: f64, usage: Usage) -> (String, CriterionBuilder) {
+    (format!("c{i}"), CriterionBuilder::minimise(End(format!("f{i}")), demand).used_as(usage))
 }
 
-fn between(min: f64, max: f64) -> UncertainDraft {
-    UncertainDraft { min: Some(min.into()), max: Some(max.into()), ..UncertainDraft::default() }
+fn between(min: f64, max: f64) -> UncertainBuilder {
+    UncertainBuilder { min: Some(min.into()), max: Some(max.into()), ..UncertainBuilder::default() }
 }
 
-fn normal(mean: f64, deviation: f64) -> UncertainDraft {
-    let distribution = DistributionDraft::Normal { mean: mean.into(), deviation: deviation.into() };
-    UncertainDraft { distribution: Some(distribution), ..UncertainDraft::default() }
+fn normal(mean: f64, deviation: f64) -> UncertainBuilder {
+    let distribution = DistributionBuilder::Normal { mean: mean.into(), deviation: deviation.into() };
+    UncertainBuilder { distribution: Some(distribution), ..UncertainBuilder::default() }
 }
 
 /// A study of `f` with one tuner `t` and the uncertain parameters `x0`, `x1`.
 fn draft(
     task: Task,
-    uncertain: [UncertainDraft; 2],
-    criteria: Vec<(String, CriterionDraft)>,
+    uncertain: [UncertainBuilder; 2],
+    criteria: Vec<(String, CriterionBuilder)>,
     f: fn(&[f64]) -> Option<Vec<f64>>,
-) -> Draft {
+) -> StudyBuilder {
     let [x0, x1] = uncertain;
-    let case = CaseDraft {
+    let case = CaseBuilder {
         name: "nominal".into(),
         parameters: vec![("x0".into(), 0.5.into()), ("x1".into(), 0.0.into())],
-        ..CaseDraft::default()
+        ..CaseBuilder::default()
     };
-    Draft {
+    StudyBuilder {
         name: "function".into(),
         task,
         seed: 1,
         models: vec![("function".into(), Function::new(&["t", "x0", "x1"], criteria.len(), f).into())],
-        tuners: vec![("t".into(), TunerDraft::new(1.5, -2.0, 2.0))],
+        tuners: vec![("t".into(), TunerBuilder::new(1.5, -2.0, 2.0))],
         cases: vec![case],
         criteria,
-        tasks: TasksDraft {
+        tasks: TasksBuilder {
             uncertain: vec![("x0".into(), x0), ("x1".into(), x1)],
             worst_case: WorstCaseTask { at: Place::Start, ..WorstCaseTask::default() },
             monte_carlo: MonteCarloTask { at: Place::Start, ..MonteCarloTask::default() },
-            ..TasksDraft::default()
+            ..TasksBuilder::default()
         },
-        ..Draft::default()
+        ..StudyBuilder::default()
     }
 }
 
-fn solved(draft: Draft) -> Outcome {
+fn solved(draft: StudyBuilder) -> Outcome {
     mops::solve(draft.build().unwrap(), &Options::default(), &()).unwrap().outcome
 }
 
-const BOX: fn() -> [UncertainDraft; 2] = || [between(-1.0, 1.0), between(-1.0, 1.0)];
+const BOX: fn() -> [UncertainBuilder; 2] = || [between(-1.0, 1.0), between(-1.0, 1.0)];
 
 /// Cases that differ in nothing but what is uncertain are one.
 #[test]
@@ -169,7 +169,7 @@ fn samples_of_a_linear_criterion_are_distributed_as_its_closed_form() {
 #[test]
 fn a_tolerance_is_a_range_around_the_design() {
     let mut draft = draft(Task::MonteCarlo, BOX(), vec![end(0, 1.6, Usage::Minimise)], |p| Some(vec![p[0]]));
-    let tolerance = UncertainDraft { tolerance: Some(0.1), ..UncertainDraft::default() };
+    let tolerance = UncertainBuilder { tolerance: Some(0.1), ..UncertainBuilder::default() };
     draft.tasks.uncertain = vec![("t".into(), tolerance)];
     draft.tasks.monte_carlo.method = Sampling::LatinHypercube;
     let found = solved(draft).found.monte_carlo.unwrap();
@@ -301,7 +301,7 @@ fn fitted_line(task: UncertaintyTask) -> Fitted {
     let estimates = [inverse[0][0] * sy + inverse[0][1] * sty, inverse[1][0] * sy + inverse[1][1] * sty];
     let variance = sum(&|t, y| math::powi(y - estimates[0] - estimates[1] * t, 2)) / (n - 2.0);
     let channel =
-        ChannelDraft { signal: "y".into(), times, values, noise: Some(0.1.into()), ..ChannelDraft::default() };
+        ChannelBuilder { signal: "y".into(), times, values, noise: Some(0.1.into()), ..ChannelBuilder::default() };
     let interface = Interface {
         signals: vec![Variable::new("y", "1", "output")],
         parameters: ["offset", "slope"].map(|name| Parameter::new(name, "1", "of the line")).to_vec(),
@@ -309,22 +309,22 @@ fn fitted_line(task: UncertaintyTask) -> Fitted {
         ..Interface::default()
     };
     let measured = Measured { channels: vec![channel], ..Measured::default() };
-    let draft = Draft {
+    let draft = StudyBuilder {
         name: "line".into(),
         task: Task::Calibration,
         seed: 1,
         models: vec![("line".into(), Line(interface).into())],
-        tuners: ["offset", "slope"].map(|name| (name.into(), TunerDraft::new(1.0, -5.0, 5.0))).into(),
-        cases: vec![CaseDraft { name: "line".into(), measured: Some(measured), ..CaseDraft::default() }],
+        tuners: ["offset", "slope"].map(|name| (name.into(), TunerBuilder::new(1.0, -5.0, 5.0))).into(),
+        cases: vec![CaseBuilder { name: "line".into(), measured: Some(measured), ..CaseBuilder::default() }],
         criteria: vec![("error".into(), error())],
-        tasks: TasksDraft { uncertainty: Some(task), ..TasksDraft::default() },
-        ..Draft::default()
+        tasks: TasksBuilder { uncertainty: Some(task), ..TasksBuilder::default() },
+        ..StudyBuilder::default()
     };
     Fitted { outcome: solved(draft), estimates, variance, inverse, n }
 }
 
-fn error() -> CriterionDraft {
-    CriterionDraft::minimise(NormalisedError { signal: "y".into(), ..NormalisedError::default() }, 1.0)
+fn error() -> CriterionBuilder {
+    CriterionBuilder::minimise(NormalisedError { signal: "y".into(), ..NormalisedError::default() }, 1.0)
 }
 
 /// Published: the t quantile of 97.5 % with 39 degrees of freedom is 2.022691.

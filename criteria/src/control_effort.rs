@@ -1,7 +1,7 @@
 //! Control effort.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StudyError, Unit, Value,
     Variable,
 };
 use schemars::JsonSchema;
@@ -45,7 +45,7 @@ impl CriterionOptions for ControlEffort {
 }
 
 impl CriterionSpec for ControlEffort {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let signal = signal(signals, &self.signal)?.clone();
         let offset = optional("offset", self.offset.as_ref(), &signal.unit)?.unwrap_or(0.0);
         Ok(Box::new(Bound { signal, of: self.of, offset }))

@@ -2,7 +2,7 @@
 
 use mops_core::math::complex;
 use mops_core::{
-    AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, StateSpace, Unit, Value,
+    AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StateSpace, StudyError, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -37,7 +37,7 @@ impl CriterionSpec for CrossoverFrequency {
         AnalysisKind::Linear
     }
 
-    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.in_loop()?;
         let value = |system: StateSpace| {
             let still = complex::norm(system.response()?.scalar(0.0));

@@ -1,7 +1,7 @@
 //! Delay time of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StudyError, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -34,7 +34,7 @@ impl CriterionOptions for DelayTime {
 }
 
 impl CriterionSpec for DelayTime {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),
@@ -44,7 +44,7 @@ impl CriterionSpec for DelayTime {
         let step = options.bind(signals)?;
         let level = number("level", self.level.as_ref().unwrap_or(&0.5.into()), &Unit::one())?;
         if !(0.0 < level && level <= 1.0) {
-            return Err(Mistake::new("level", format!("`level` must be above 0 and at most 1, not {level}")));
+            return Err(StudyError::new("level", format!("`level` must be above 0 and at most 1, not {level}")));
         }
         Ok(Box::new(Bound { step, level }))
     }

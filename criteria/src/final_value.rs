@@ -1,7 +1,7 @@
 //! Value of a signal at the end.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, StudyError, Unit, Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -27,7 +27,7 @@ impl CriterionOptions for FinalValue {
 }
 
 impl CriterionSpec for FinalValue {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone() }))
     }
 }

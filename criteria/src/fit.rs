@@ -1,7 +1,7 @@
 //! Fit to a measurement: the integral of the squared residual.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Samples, Sense, Tangent, Unit,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Samples, Sense, StudyError, Tangent, Unit,
     Value, Variable,
 };
 use schemars::JsonSchema;
@@ -49,10 +49,10 @@ impl CriterionOptions for Fit {
 }
 
 impl CriterionSpec for Fit {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let signal = signal(signals, &self.signal)?.clone();
         if !(self.weight.is_finite() && self.weight > 0.0) {
-            return Err(Mistake::new("weight", format!("`weight` must be positive, not {}", self.weight)));
+            return Err(StudyError::new("weight", format!("`weight` must be positive, not {}", self.weight)));
         }
         Ok(Box::new(Bound { signal, weight: self.weight }))
     }

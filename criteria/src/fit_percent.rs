@@ -1,6 +1,8 @@
 //! Fit to a measurement, in percent.
 
-use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit, Value};
+use mops_core::{
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit, Value,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -27,7 +29,7 @@ impl CriterionOptions for FitPercent {
 }
 
 impl CriterionSpec for FitPercent {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.name.clone() }))
     }
 

@@ -2,7 +2,7 @@
 
 use mops_core::linear::Complex;
 use mops_core::{
-    Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit, Value,
+    Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -45,9 +45,9 @@ impl CriterionSpec for FrequencyFit {
         AnalysisKind::Linear
     }
 
-    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let channel = Channel::bind(model, self.input.as_ref(), Some(&self.signal))
-            .map_err(|m| if m.path == ["output"] { Mistake { path: vec!["signal".to_owned()], ..m } } else { m })?;
+            .map_err(|m| if m.path == ["output"] { StudyError { path: vec!["signal".to_owned()], ..m } } else { m })?;
         Ok(Box::new(Bound { channel, signal: self.signal.clone(), absolute: self.absolute }))
     }
 

@@ -1,6 +1,6 @@
 //! Gain margin of a feedback loop.
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -39,7 +39,7 @@ impl CriterionSpec for GainMargin {
         AnalysisKind::Linear
     }
 
-    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.in_loop()?;
         let both = self.either_way;
         let value = move |system| Ok(capped(feedback(system)?.gain_margin(both)?, 200.0));

@@ -1,7 +1,7 @@
 //! H2 norm.
 
 use mops_core::linear::h2_norm;
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -36,7 +36,7 @@ impl CriterionSpec for H2Norm {
         AnalysisKind::Linear
     }
 
-    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
         let unit = channel.unit.clone();
         Ok(LinearCriterion::boxed(channel, Values::of(unit, Sense::Less).within(0.0, f64::INFINITY), |system| {

@@ -1,6 +1,6 @@
 //! Integral of the squared error.
 
-use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity};
+use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, StudyError};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -30,7 +30,7 @@ impl CriterionOptions for Ise {
 }
 
 impl CriterionSpec for Ise {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),

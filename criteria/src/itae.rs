@@ -1,6 +1,6 @@
 //! Integral of time and absolute error.
 
-use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity};
+use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, StudyError};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -32,7 +32,7 @@ impl CriterionOptions for Itae {
 }
 
 impl CriterionSpec for Itae {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),

@@ -1,6 +1,6 @@
 //! Integral of time and squared error.
 
-use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity};
+use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, StudyError};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -31,7 +31,7 @@ impl CriterionOptions for Itse {
 }
 
 impl CriterionSpec for Itse {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),

@@ -3,11 +3,11 @@
 //! A study file refers to them by kind; a study written in Rust sets their options:
 //!
 //! ```
-//! use mops_core::CriterionDraft;
+//! use mops_core::CriterionBuilder;
 //! use mops_criteria::overshoot::Overshoot;
 //!
 //! let overshoot = Overshoot { signal: "y".into(), target: Some(1.0.into()), ..Overshoot::default() };
-//! let criterion = CriterionDraft::minimise(overshoot, 0.1);
+//! let criterion = CriterionBuilder::minimise(overshoot, 0.1);
 //! ```
 
 pub mod bandwidth;

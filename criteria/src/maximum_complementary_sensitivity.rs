@@ -1,6 +1,6 @@
 //! Maximum complementary sensitivity of a feedback loop.
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -33,7 +33,7 @@ impl CriterionSpec for MaximumComplementarySensitivity {
         AnalysisKind::Linear
     }
 
-    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.in_loop()?;
         Ok(LinearCriterion::boxed(channel, Values::of(Unit::one(), Sense::Less).within(0.0, f64::INFINITY), |system| {
             Ok(feedback(system)?.peak_complementary()?.into())

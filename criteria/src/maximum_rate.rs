@@ -1,7 +1,7 @@
 //! Largest rate of change of a signal.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit, Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -28,7 +28,7 @@ impl CriterionOptions for MaximumRate {
 }
 
 impl CriterionSpec for MaximumRate {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone() }))
     }
 }

@@ -2,7 +2,7 @@
 
 use mops_core::math;
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StudyError, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -59,7 +59,7 @@ impl CriterionOptions for ModelTracking {
 }
 
 impl CriterionSpec for ModelTracking {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: Some(&self.target),
@@ -73,12 +73,12 @@ impl CriterionSpec for ModelTracking {
         let reference = match (time_constant, frequency, damping) {
             (Some(time_constant), None, None) => Reference::First { time_constant },
             (None, Some(_), Some(damping)) if damping < LEAST_DAMPING => {
-                return Err(Mistake::new("damping", format!("a damping of {damping} is below {LEAST_DAMPING}"))
+                return Err(StudyError::new("damping", format!("a damping of {damping} is below {LEAST_DAMPING}"))
                     .with_help("choose a reference model with more damping"));
             }
             (None, Some(frequency), Some(damping)) => Reference::Second { frequency, damping },
             _ => {
-                return Err(Mistake::here("the reference model is missing or ambiguous").with_help(
+                return Err(StudyError::here("the reference model is missing or ambiguous").with_help(
                     "give either `time-constant` (first order) or `frequency` and `damping` (second order)",
                 ));
             }

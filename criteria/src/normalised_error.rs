@@ -1,8 +1,8 @@
 //! Fit to a measurement, in units of its noise level.
 
 use mops_core::{
-    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Samples, Sense,
-    Tangent, Unit, Value,
+    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Samples, Sense,
+    StudyError, Tangent, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -35,7 +35,7 @@ impl CriterionOptions for NormalisedError {
 }
 
 impl CriterionSpec for NormalisedError {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let signal = signal(signals, &self.signal)?;
         let noise = positive("noise", self.noise.as_ref(), &signal.unit)?;
         Ok(Box::new(Bound { signal: signal.name.clone(), noise }))
@@ -79,10 +79,10 @@ impl Criterion for Bound {
         NOT_NEGATIVE
     }
 
-    fn suits(&self, case: &Case) -> Result<(), Mistake> {
+    fn suits(&self, case: &Case) -> Result<(), StudyError> {
         let channel = case.experiment.as_ref().and_then(|experiment| experiment.channel(&self.signal));
         match channel {
-            Some(channel) if self.noise.or(channel.noise).is_none() => Err(Mistake::here(format!(
+            Some(channel) if self.noise.or(channel.noise).is_none() => Err(StudyError::here(format!(
                 "the noise level of `{}` in `{}` is unknown",
                 self.signal, case.name
             ))

@@ -1,7 +1,8 @@
 //! Overshoot of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Sense, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Quantity, Sense, StudyError, Unit,
+    Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -40,7 +41,7 @@ impl CriterionOptions for Overshoot {
 }
 
 impl CriterionSpec for Overshoot {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),

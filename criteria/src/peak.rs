@@ -1,7 +1,8 @@
 //! Largest or smallest value of a signal.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Sense, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Sense, StudyError, Unit, Value,
+    Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -44,7 +45,7 @@ impl CriterionOptions for Peak {
 }
 
 impl CriterionSpec for Peak {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone(), of: self.of }))
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -38,7 +38,7 @@ impl CriterionSpec for PhaseMargin {
         AnalysisKind::Linear
     }
 
-    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.in_loop()?;
         let value = |system| Ok(capped(feedback(system)?.phase_margin()?, PI));
         Ok(LinearCriterion::boxed(channel, Values::of(Unit::known("rad"), Sense::More).within(-PI, PI), value))

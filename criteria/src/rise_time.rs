@@ -1,7 +1,7 @@
 //! Rise time of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StudyError, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -38,7 +38,7 @@ impl CriterionOptions for RiseTime {
 }
 
 impl CriterionSpec for RiseTime {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),
@@ -50,7 +50,7 @@ impl CriterionSpec for RiseTime {
         let high = number("high", self.high.as_ref().unwrap_or(&0.9.into()), &Unit::one())?;
         if !(0.0 <= low && low < high && high <= 1.0) {
             let key = if self.high.is_some() { "high" } else { "low" };
-            return Err(Mistake::new(key, format!("a rise from {low} to {high} of the step is impossible"))
+            return Err(StudyError::new(key, format!("a rise from {low} to {high} of the step is impossible"))
                 .with_help("choose 0 <= low < high <= 1, such as low = 0.1 and high = 0.9"));
         }
         Ok(Box::new(Bound { step, low, high }))

@@ -1,7 +1,7 @@
 //! Root mean square difference from a measurement.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit, Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -28,7 +28,7 @@ impl CriterionOptions for Rmse {
 }
 
 impl CriterionSpec for Rmse {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone() }))
     }
 

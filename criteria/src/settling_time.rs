@@ -1,7 +1,8 @@
 //! Settling time of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Sense, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Quantity, Sense, StudyError, Unit,
+    Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -44,7 +45,7 @@ impl CriterionOptions for SettlingTime {
 }
 
 impl CriterionSpec for SettlingTime {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),
@@ -56,12 +57,12 @@ impl CriterionSpec for SettlingTime {
         let relative = positive("relative-band", self.relative_band.as_ref(), &Unit::one())?;
         if let Some(relative) = relative.filter(|relative| *relative >= 1.0) {
             let fact = format!("a band of {relative} times the step contains the initial value");
-            return Err(Mistake::new("relative-band", fact)
+            return Err(StudyError::new("relative-band", fact)
                 .with_help(format!("write a fraction of the step below 1; for percent write \"{relative} %\"")));
         }
         let band = match (absolute, relative) {
             (Some(_), Some(_)) => {
-                return Err(Mistake::new("relative-band", "`band` and `relative-band` exclude each other")
+                return Err(StudyError::new("relative-band", "`band` and `relative-band` exclude each other")
                     .with_help("remove one of them"));
             }
             (Some(band), None) => Band::Absolute(band),

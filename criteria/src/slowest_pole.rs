@@ -1,6 +1,6 @@
 //! Slowest pole.
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Sense, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -37,7 +37,7 @@ impl CriterionSpec for SlowestPole {
         AnalysisKind::Linear
     }
 
-    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.read_as(self.of)?;
         let of = self.of;
         let value = move |system| {

@@ -1,7 +1,7 @@
 //! Steady-state error.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StudyError, Unit, Value,
     Variable,
 };
 use schemars::JsonSchema;
@@ -32,7 +32,7 @@ impl CriterionOptions for SteadyStateError {
 }
 
 impl CriterionSpec for SteadyStateError {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let signal = signal(signals, &self.signal)?.clone();
         let target = number("target", &self.target, &signal.unit)?;
         let window = positive("window", self.window.as_ref(), &second())?;

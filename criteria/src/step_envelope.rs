@@ -1,7 +1,7 @@
 //! Distance of a response from an envelope.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mistake, Quantity, Sense, Trace, Unit,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StudyError, Trace, Unit,
     Value, Variable,
 };
 use schemars::JsonSchema;
@@ -41,10 +41,10 @@ impl CriterionOptions for StepEnvelope {
 }
 
 impl CriterionSpec for StepEnvelope {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let signal = signal(signals, &self.signal)?.clone();
         if self.upper.is_empty() && self.lower.is_empty() {
-            return Err(Mistake::here("an envelope needs at least one bound")
+            return Err(StudyError::here("an envelope needs at least one bound")
                 .with_help("add `upper = [[time, value], ...]` or `lower = [[time, value], ...]`"));
         }
         let step_time = step_time(self.step_time.as_ref())?;
@@ -60,14 +60,14 @@ struct Stretch {
     value: [f64; 2],
 }
 
-fn stretches(key: &str, points: &[[Quantity; 2]], unit: &Unit, step_time: f64) -> Result<Vec<Stretch>, Mistake> {
+fn stretches(key: &str, points: &[[Quantity; 2]], unit: &Unit, step_time: f64) -> Result<Vec<Stretch>, StudyError> {
     let mut stretches: Vec<Stretch> = Vec::new();
     for [time, value] in points {
         let (time, value) = (step_time + number(key, time, &second())?, number(key, value, unit)?);
         if let Some(last) = stretches.last_mut() {
             if time < last.time[0] {
                 let before = last.time[0] - step_time;
-                return Err(Mistake::new(
+                return Err(StudyError::new(
                     key,
                     format!("the points are not in order: {} s follows {before} s", time - step_time),
                 )

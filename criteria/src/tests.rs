@@ -6,8 +6,8 @@ use std::io;
 use mops_core::file::{Files, describe, read};
 use mops_core::math;
 use mops_core::{
-    Analysis, AnalysisKind, Catalogue, Failure, Interface, Job, Mistake, Model, ModelKind, ModelOptions, Problem,
-    Response, Solver, SolverKind, SolverOptions, Trace, Variable,
+    Analysis, AnalysisKind, Catalogue, Failure, Interface, Job, Model, ModelKind, ModelOptions, Problem, Response,
+    Solver, SolverKind, SolverOptions, StudyError, Trace, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -160,7 +160,7 @@ struct LagModel(Interface);
 impl ModelOptions for Lag {
     const KIND: &'static str = "lag";
 
-    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+    fn build(self) -> Result<Box<dyn Model>, StudyError> {
         let signals = vec![Variable::new("y", "m", "output")];
         let parameters = vec![mops_core::Parameter::new("T", "s", "time constant")];
         Ok(Box::new(LagModel(Interface { signals, parameters, ..Interface::default() })))
@@ -188,7 +188,7 @@ struct LinearLagModel(Interface);
 impl ModelOptions for LinearLag {
     const KIND: &'static str = "linear-lag";
 
-    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+    fn build(self) -> Result<Box<dyn Model>, StudyError> {
         Ok(Box::new(LinearLagModel(Interface {
             signals: vec![Variable::new("y", "m", "output")],
             inputs: vec![Variable::new("u", "m", "input")],

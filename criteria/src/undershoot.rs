@@ -1,7 +1,8 @@
 //! Undershoot of a step response: its largest excursion in the wrong direction.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Mistake, Quantity, Sense, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Quantity, Sense, StudyError, Unit,
+    Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -39,7 +40,7 @@ impl CriterionOptions for Undershoot {
 }
 
 impl CriterionSpec for Undershoot {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use mops_core::math;
-use mops_core::{Effect, Mistake, Role, Study};
+use mops_core::{Effect, Role, Study, StudyError};
 use rayon::prelude::*;
 
 use crate::base;
@@ -37,10 +37,10 @@ pub struct BruteForce {
 /// # Errors
 /// The study is no diagnosis, or its model cannot be simulated.
 #[allow(clippy::cast_precision_loss)]
-pub fn brute_force(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<BruteForce, Mistake> {
+pub fn brute_force(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<BruteForce, StudyError> {
     let subject = Subject::new(study)?;
     let simulations = Meter::new(&());
-    let failed = || Mistake::here("the model cannot be simulated near its start values");
+    let failed = || StudyError::here("the model cannot be simulated near its start values");
     let declared = base::fit(&subject, study.seed, &simulations).ok_or_else(failed)?;
     subject.take_pace(&declared.point.globals);
     let point = &declared.point;

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use mops_core::math;
-use mops_core::{At, Dimension, Effect, Interface, Placement, Port, PortKind, Strength, Trials, Unit};
+use mops_core::{
+    Dimension, Effect, EffectParameter, InitialGrid, Interface, Placement, Port, PortKind, PortState, Unit,
+};
 
 use crate::gap::Gap;
 use crate::quantum::quantum;
@@ -52,12 +54,12 @@ impl Candidate {
     }
 
     /// The unit of a strength as results spell it: empty where the model does not tell that of its forces.
-    pub fn unit(&self, strength: &Strength, unit: &Unit) -> String {
+    pub fn unit(&self, strength: &EffectParameter, unit: &Unit) -> String {
         let untold = matches!(self.port, Port::Joint { unit: None, .. } | Port::Process { unit: None, .. });
         if untold && strength.dimension.output != 0 { String::new() } else { unit.to_string() }
     }
 
-    /// Whether fits of it that have stuck are restarted at every shape: [`Strength::restarts`].
+    /// Whether fits of it that have stuck are restarted at every shape: [`EffectParameter::restarts`].
     pub fn has_restarts(&self) -> bool {
         !self.effect.strengths()[0].restarts.is_empty()
     }
@@ -66,7 +68,7 @@ impl Candidate {
     pub fn is_dry_friction(&self) -> bool {
         let strengths: Vec<f64> =
             self.effect.strengths().iter().map(|s| 1.0_f64.clamp(s.bounds[0], s.bounds[1])).collect();
-        let moving = At {
+        let moving = PortState {
             t: 0.0,
             value: 0.0,
             q: 0.0,
@@ -213,14 +215,14 @@ impl Sizes {
     /// typical size is besides no more than [`FARTHEST_SHAPE`] times the largest of them, and one that is tried within a range is
     /// no more than so many widths beyond it: farther off it does nothing, or stands for something else, as a force stands for
     /// a constant one that would yield after a path much longer than the motion.
-    pub fn bounds(&self, strength: &Strength) -> [f64; 2] {
+    pub fn bounds(&self, strength: &EffectParameter) -> [f64; 2] {
         let [low, high] = strength.bounds;
         let [least, most] = match (strength.neutral, strength.trials) {
-            (None, Trials::Scaled(multiples)) => {
+            (None, InitialGrid::Scaled(multiples)) => {
                 let largest = multiples.iter().copied().fold(0.0, f64::max) * self.of(strength.dimension);
                 [f64::NEG_INFINITY, FARTHEST_SHAPE * largest]
             }
-            (None, Trials::Within(_)) => {
+            (None, InitialGrid::Within(_)) => {
                 let beyond = FARTHEST_SHAPE * (self.range[1] - self.range[0]);
                 [self.range[0] - beyond, self.range[1] + beyond]
             }
@@ -231,41 +233,43 @@ impl Sizes {
 
     /// The values of a strength that are tried.
     #[allow(clippy::cast_precision_loss)]
-    pub fn values(&self, dimension: Dimension, trials: Trials, bounds: [f64; 2]) -> Vec<f64> {
+    pub fn values(&self, dimension: Dimension, trials: InitialGrid, bounds: [f64; 2]) -> Vec<f64> {
         let scaled = |multiples: &'static [f64]| multiples.iter().map(|m| m * self.of(dimension));
         let values: Vec<f64> = match trials {
-            Trials::Linear => vec![self.of(dimension).clamp(bounds[0], bounds[1])],
-            Trials::Scaled(multiples) => scaled(multiples).collect(),
-            Trials::PlainAndScaled(values, multiples) => values.iter().copied().chain(scaled(multiples)).collect(),
-            Trials::Within(shares) => {
+            InitialGrid::Linear => vec![self.of(dimension).clamp(bounds[0], bounds[1])],
+            InitialGrid::Scaled(multiples) => scaled(multiples).collect(),
+            InitialGrid::PlainAndScaled(values, multiples) => values.iter().copied().chain(scaled(multiples)).collect(),
+            InitialGrid::Within(shares) => {
                 shares.iter().map(|s| self.range[0] + s * (self.range[1] - self.range[0])).collect()
             }
-            Trials::WithinAndGap(shares) => {
-                let within = self.values(dimension, Trials::Within(shares), bounds);
+            InitialGrid::WithinAndGap(shares) => {
+                let within = self.values(dimension, InitialGrid::Within(shares), bounds);
                 within.into_iter().chain(self.gap.map(|gap| gap.middle)).collect()
             }
-            Trials::ScaledAndGap(multiples) => scaled(multiples).chain(self.gap.map(|gap| gap.half_width)).collect(),
-            Trials::SlewAndScaled(shares, multiples) => {
+            InitialGrid::ScaledAndGap(multiples) => {
+                scaled(multiples).chain(self.gap.map(|gap| gap.half_width)).collect()
+            }
+            InitialGrid::SlewAndScaled(shares, multiples) => {
                 let slew = self.slew;
                 shares.iter().filter_map(|s| Some(s * slew?)).chain(scaled(multiples)).collect()
             }
-            Trials::WithinSize(shares) => {
+            InitialGrid::WithinSize(shares) => {
                 let crosses = self.range[0] < 0.0 && self.range[1] > 0.0;
                 let least = if crosses { 0.0 } else { self.range[0].abs().min(self.range[1].abs()) };
                 shares.iter().map(|s| least + s * (self.largest() - least)).collect()
             }
-            Trials::Plain(values) | Trials::Jumps(values) => values.to_vec(),
-            Trials::Frequencies => {
+            InitialGrid::Plain(values) | InitialGrid::Jumps(values) => values.to_vec(),
+            InitialGrid::Frequencies => {
                 let step = std::f64::consts::TAU / (PER_PERIOD * self.record);
                 let highest = (0.5 * std::f64::consts::PI / self.sample).min(PER_PERIOD * MOST_PERIODS * step);
                 (1..).map(|k| f64::from(k) * step).take_while(|&w| w <= highest).collect()
             }
-            Trials::Steps => {
+            InitialGrid::Steps => {
                 let numbers = 1..=PER_STEP * (MOST_STEPS - 1);
                 let sizes = numbers.map(|n| self.largest() / (1.0 + f64::from(n - 1) / f64::from(PER_STEP)));
                 sizes.chain(self.quantum).collect()
             }
-            Trials::Moments(shares) => shares.iter().map(|s| s * self.record).collect(),
+            InitialGrid::Moments(shares) => shares.iter().map(|s| s * self.record).collect(),
         };
         let inside = |v: &f64| v.is_finite() && *v >= bounds[0] && *v <= bounds[1];
         values.into_iter().filter(inside).collect()

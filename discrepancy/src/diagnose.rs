@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Effect, Mistake, Study, Watch};
+use mops_core::{Effect, Study, StudyError, Watch};
 use rayon::prelude::*;
 
 use crate::account::{
@@ -49,10 +49,10 @@ pub fn diagnose(
     effects: &[Arc<dyn Effect>],
     options: &Options,
     watch: &dyn Watch,
-) -> Result<Diagnosis, Mistake> {
+) -> Result<Diagnosis, StudyError> {
     let done = explain(study, effects, options, watch);
     // Simulations that were not made any more make everything that follows from them void.
-    if watch.wants_stop() { Err(Mistake::here("the diagnosis was interrupted")) } else { done }
+    if watch.wants_stop() { Err(StudyError::here("the diagnosis was interrupted")) } else { done }
 }
 
 fn explain(
@@ -60,13 +60,13 @@ fn explain(
     effects: &[Arc<dyn Effect>],
     options: &Options,
     watch: &dyn Watch,
-) -> Result<Diagnosis, Mistake> {
+) -> Result<Diagnosis, StudyError> {
     let subject = Subject::new(study)?;
     let simulations = Meter::new(watch);
     let limits = Limits::at(options.level);
     let search = Search::new(&subject, effects, limits, &simulations);
     let lost = || {
-        Mistake::new("tuners", "the declared model cannot be simulated from anywhere near the start values")
+        StudyError::new("tuners", "the declared model cannot be simulated from anywhere near the start values")
             .with_help("`mops simulate` shows what happens there; start nearer to what is plausible")
     };
     watch.stage("fit of the declared model", 0.02);

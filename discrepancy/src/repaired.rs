@@ -181,7 +181,7 @@ impl Calibrated<'_> {
     pub fn strengths(&self, index: usize, variant: &Variant) -> Vec<StrengthValue> {
         let a = &self.added[index];
         let parameters = &mops_core::Model::interface(variant.model.as_ref()).parameters;
-        let one = |(k, strength): (usize, &mops_core::Strength)| {
+        let one = |(k, strength): (usize, &mops_core::EffectParameter)| {
             let place = self.free.iter().position(|&f| f == (index, k)).map(|place| self.tuners.len() + place);
             let (std_error, interval95) = place.map_or((None, None), |place| self.told(place, &a.candidate.port));
             StrengthValue {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Port, Trials, math, stream};
+use mops_core::{InitialGrid, Port, math, stream};
 use rayon::prelude::*;
 
 use crate::base;
@@ -149,7 +149,7 @@ impl<'a> Search<'a> {
             let is_best = !places.contains(&&added.candidate.port);
             places.push(&added.candidate.port);
             // Of what is not proportional to its strength, the screening knows less.
-            let is_linear = added.candidate.effect.strengths()[0].trials == Trials::Linear;
+            let is_linear = added.candidate.effect.strengths()[0].trials == InitialGrid::Linear;
             is_best || !is_linear || from.fitted.chi2 - FARTHEST * gain <= goal
         });
         let shapes = chosen.iter().flat_map(|&i| std::iter::once(&screened[i].added).chain(&screened[i].others));
@@ -357,7 +357,7 @@ impl<'a> Search<'a> {
     pub(crate) fn neutral_start(&self, added: &Added) -> Added {
         let mut added = added.clone();
         let first = &added.candidate.effect.strengths()[0];
-        if let (Trials::Linear, Some(neutral)) = (first.trials, first.neutral) {
+        if let (InitialGrid::Linear, Some(neutral)) = (first.trials, first.neutral) {
             added.strengths[0] = neutral;
         }
         added

@@ -4,7 +4,7 @@
 //! (1973), section 6e.3.
 
 use mops_core::math;
-use mops_core::{Port, Scope, Strength, Trials};
+use mops_core::{EffectParameter, InitialGrid, Port, Scope};
 use mops_models::WithEffects;
 use rayon::prelude::*;
 
@@ -229,7 +229,7 @@ impl Left {
     }
 
     /// How the residuals pull, by which factor that wants the strengths, and what the sum of squares falls by.
-    fn against(&self, residuals: &[f64], first: &Strength, strength: f64) -> (f64, f64, f64) {
+    fn against(&self, residuals: &[f64], first: &EffectParameter, strength: f64) -> (f64, f64, f64) {
         let along = -dot(&self.trace, residuals);
         let wanted = along / self.rest;
         let factor = if is_linear(first) {
@@ -242,8 +242,8 @@ impl Left {
     }
 }
 
-fn is_linear(strength: &Strength) -> bool {
-    matches!(strength.trials, Trials::Linear)
+fn is_linear(strength: &EffectParameter) -> bool {
+    matches!(strength.trials, InitialGrid::Linear)
 }
 
 /// The best of the strengths tried of a candidate, and the best gains on the draws.
@@ -264,7 +264,7 @@ fn best_of(
     let mut found: Vec<Screened> = Vec::new();
     let mut by_chance = vec![0.0_f64; draws.len()];
     let combinations = sizes.combinations(effect);
-    let resolved = effect.strengths().iter().filter(|s| s.trials == Trials::Frequencies);
+    let resolved = effect.strengths().iter().filter(|s| s.trials == InitialGrid::Frequencies);
     let resolved = resolved.map(|s| sizes.values(s.dimension, s.trials, s.bounds).len()).max().unwrap_or(0);
     let periods = u32::try_from(resolved).unwrap_or(u32::MAX);
     // Combinations that differ in what each experiment has of its own come together.

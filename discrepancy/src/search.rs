@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use mops_core::{Effect, Role, Scope, Strength, math, stream};
+use mops_core::{Effect, EffectParameter, Role, Scope, math, stream};
 
 use crate::base;
 use crate::candidate::Candidate;
@@ -419,7 +419,7 @@ impl<'a> Trial<'a> {
 
     /// Number of unknowns that its effects bring in for each experiment anew: phases, say, and where their states begin.
     pub fn own_unknowns(&self) -> usize {
-        let free = |s: &&Strength| s.scope == Scope::Experiment && !s.fixed;
+        let free = |s: &&EffectParameter| s.scope == Scope::Experiment && !s.fixed;
         let of = |effect: &dyn Effect| effect.strengths().iter().filter(free).count() + effect.free_starts().len();
         self.added.iter().map(|a| of(a.candidate.effect.as_ref())).sum()
     }

@@ -1,6 +1,6 @@
 //! Other values of shapes that no fit moves, such as the number of waves in a turn, of the effects that were found.
 
-use mops_core::Trials;
+use mops_core::InitialGrid;
 use rayon::prelude::*;
 
 use crate::search::{Search, Trial};
@@ -47,7 +47,7 @@ fn others(own: &Added) -> Vec<Vec<Vec<f64>>> {
         if values(&strengths) == values(&own.strengths) {
             continue;
         }
-        if effect.strengths()[0].trials == Trials::Linear {
+        if effect.strengths()[0].trials == InitialGrid::Linear {
             strengths[0] = own.strengths[0];
         }
         match others.iter_mut().find(|begins| values(&begins[0]) == values(&strengths)) {

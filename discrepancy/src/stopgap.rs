@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use mops_core::{Acting, Along, At, Dimension, Effect, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{
+    BoundEffect, Dimension, Dual7, Effect, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use crate::candidate::Candidate;
 use crate::diagnosis::Unexplained;
@@ -22,12 +24,12 @@ struct Stopgap {
     points: Vec<f64>,
 }
 
-const fn value_at(name: &'static str) -> Strength {
+const fn value_at(name: &'static str) -> EffectParameter {
     let bounds = [f64::NEG_INFINITY, f64::INFINITY];
-    Strength::shape(name, "value at a point of the table", Dimension::OUTPUT, bounds, Trials::Plain(&[0.0]))
+    EffectParameter::shape(name, "value at a point of the table", Dimension::OUTPUT, bounds, InitialGrid::Plain(&[0.0]))
 }
 
-const VALUES: &[Strength] = &[
+const VALUES: &[EffectParameter] = &[
     value_at("y1"),
     value_at("y2"),
     value_at("y3"),
@@ -46,7 +48,7 @@ const VALUES: &[Strength] = &[
 ];
 
 impl Stopgap {
-    fn acting<S: Scalar>(&self, values: &[S]) -> Box<dyn Acting<S>> {
+    fn acting<S: Scalar>(&self, values: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtValues {
             over: self.over,
             passes: !matches!(self.kind, [PortKind::Joint | PortKind::Process]),
@@ -81,15 +83,15 @@ impl Effect for Stopgap {
         &[PortKind::Joint, PortKind::Process, PortKind::Actuator, PortKind::Sensor]
     }
 
-    fn strengths(&self) -> &'static [Strength] {
+    fn strengths(&self) -> &'static [EffectParameter] {
         &VALUES[..self.points.len()]
     }
 
-    fn act(&self, strengths: &[f64]) -> Box<dyn Acting<f64>> {
+    fn act(&self, strengths: &[f64]) -> Box<dyn BoundEffect<f64>> {
         self.acting(strengths)
     }
 
-    fn act_along(&self, strengths: &[Along]) -> Box<dyn Acting<Along>> {
+    fn bind_dual(&self, strengths: &[Dual7]) -> Box<dyn BoundEffect<Dual7>> {
         self.acting(strengths)
     }
 }
@@ -103,8 +105,8 @@ struct AtValues<S> {
     values: Vec<S>,
 }
 
-impl<S: Scalar> Acting<S> for AtValues<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtValues<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let x = match self.over {
             Over::Position => at.q,
             Over::Speed => at.v,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
-use mops_core::{Case, Dual, Effect, Job, Mistake, Model, ParameterSource, Role, Scalar, Scale, Study};
+use mops_core::{Case, Dual, Effect, Job, Model, ParameterSource, Role, Scalar, Scale, Study, StudyError};
 
 use crate::candidate::{Candidate, candidates};
 use crate::hygiene::{noise_of, without_spikes};
@@ -78,19 +78,19 @@ impl Subject {
     ///
     /// # Errors
     /// No experiment for calibration, no channels, several models, or a model that does not open its equations.
-    pub fn new(study: &Study) -> Result<Self, Mistake> {
+    pub fn new(study: &Study) -> Result<Self, StudyError> {
         let measured = |job: &usize| {
             let case = &study.cases[study.jobs[*job].case];
             case.experiment.as_ref().is_some_and(|e| !e.channels.is_empty())
         };
         let jobs: Vec<usize> = (0..study.jobs.len()).filter(measured).collect();
         let Some(&first) = jobs.first() else {
-            return Err(Mistake::new("experiments", "a diagnosis needs measured channels")
+            return Err(StudyError::new("experiments", "a diagnosis needs measured channels")
                 .with_help("add an experiment with `channels`"));
         };
         let index = study.jobs[first].model;
         if jobs.iter().any(|&job| study.jobs[job].model != index) {
-            return Err(Mistake::new(
+            return Err(StudyError::new(
                 "models",
                 "a diagnosis looks at one model, and the experiments belong to several",
             )
@@ -100,7 +100,7 @@ impl Subject {
         if model.ported().is_none() && model.augmented().is_none() {
             let fact = format!("the model `{name}` does not open its equations: no effect can be added to it");
             return Err(
-                Mistake::new("models", fact).with_help("`mops check` tells which places the models of a study have")
+                StudyError::new("models", fact).with_help("`mops check` tells which places the models of a study have")
             );
         }
         let globals: Vec<usize> = (0..study.tuners.len())
@@ -121,7 +121,7 @@ impl Subject {
                 let estimate = noise_of(&channel.times, &channel.values);
                 let noise = channel.noise.or(estimate).ok_or_else(|| {
                     let fact = "too few samples, or samples that never change, tell nothing of the noise";
-                    Mistake::new(format!("experiments.{}.channels.{}", case.name, channel.signal), fact)
+                    StudyError::new(format!("experiments.{}.channels.{}", case.name, channel.signal), fact)
                         .with_help("give its `noise`, the standard deviation")
                 })?;
                 let largest = estimate.map_or(noise, |estimate| noise.max(estimate));
@@ -183,7 +183,7 @@ impl Subject {
             ));
         }
         if !measurements.iter().any(|m| m.role == Role::Calibration) {
-            return Err(Mistake::new("experiments", "no experiment is for calibration")
+            return Err(StudyError::new("experiments", "no experiment is for calibration")
                 .with_help("give one the role \"calibration\""));
         }
         Ok(Self {

@@ -1,6 +1,6 @@
 //! The trace of a candidate: what it would add to the residuals, to first order in its size, along the motion of the model.
 
-use mops_core::{Acting, At, Hold, Input, Port, Trials};
+use mops_core::{BoundEffect, Hold, InitialGrid, Input, Port, PortState};
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::Piece;
@@ -192,9 +192,9 @@ pub fn relative_sizes(
 
 /// The same with what samples at a sensor tell of an effect whose strengths ask for it: the size of steps, a gap.
 pub fn sizes_by_samples(sizes: Sizes, candidate: &Candidate, model: &WithEffects, pieces: &[Piece]) -> Sizes {
-    let asks = |wanted: fn(Trials) -> bool| candidate.effect.strengths().iter().any(|s| wanted(s.trials));
-    let of_steps = asks(|trials| trials == Trials::Steps);
-    let of_gap = asks(|trials| matches!(trials, Trials::WithinAndGap(_) | Trials::ScaledAndGap(_)));
+    let asks = |wanted: fn(InitialGrid) -> bool| candidate.effect.strengths().iter().any(|s| wanted(s.trials));
+    let of_steps = asks(|trials| trials == InitialGrid::Steps);
+    let of_gap = asks(|trials| matches!(trials, InitialGrid::WithinAndGap(_) | InitialGrid::ScaledAndGap(_)));
     if !(of_steps || of_gap) {
         return sizes;
     }
@@ -220,7 +220,7 @@ pub struct View<'a> {
     along: &'a Trajectory,
     here: Spot,
     /// At the nodes of the motion, at a sensor at its samples; nothing where the candidate does not act.
-    seen: Vec<At<'a, f64>>,
+    seen: Vec<PortState<'a, f64>>,
     /// The input that an actuator commands.
     input: Option<&'a Input>,
 }
@@ -257,7 +257,7 @@ impl<'a> View<'a> {
         Some(view)
     }
 
-    fn at_node(&self, companion: Option<Spot>, m: &'a Moment) -> At<'a, f64> {
+    fn at_node(&self, companion: Option<Spot>, m: &'a Moment) -> PortState<'a, f64> {
         let inputs = self.along.inputs();
         let inertial = self.candidate.effect.is_inertial();
         let (other, other_speed) = match companion {
@@ -275,17 +275,28 @@ impl<'a> View<'a> {
             Spot::Actuator(i) => (m.u[i], m.u[i], 0.0, 0.0, 0.0),
             Spot::Sensor(_) => (0.0, 0.0, 0.0, 0.0, 0.0),
         };
-        At { t: m.t + self.piece.case.begins, value, q, v, a, mobility, other, other_speed, u: &m.u, closed: None }
+        PortState {
+            t: m.t + self.piece.case.begins,
+            value,
+            q,
+            v,
+            a,
+            mobility,
+            other,
+            other_speed,
+            u: &m.u,
+            closed: None,
+        }
     }
 
-    fn at_sample(&self, series: usize, companion: Option<Spot>, k: usize) -> At<'a, f64> {
+    fn at_sample(&self, series: usize, companion: Option<Spot>, k: usize) -> PortState<'a, f64> {
         let at = self.piece.series[series].times[k];
         let other = match companion {
             Some(Spot::Sensor(other)) => between(&self.piece.series[other].times, &self.along.predicted[other], at),
             _ => 0.0,
         };
         let y = self.along.predicted[series][k];
-        At {
+        PortState {
             t: at + self.piece.case.begins,
             value: y,
             q: y,
@@ -342,13 +353,13 @@ impl<'a> View<'a> {
     }
 
     /// The signal that an effect adds at the nodes of a motion, and its column.
-    fn signal(&self, acting: &dyn Acting<f64>) -> Option<(usize, Vec<f64>)> {
+    fn signal(&self, acting: &dyn BoundEffect<f64>) -> Option<(usize, Vec<f64>)> {
         let along = self.along;
         let inputs = along.inputs();
         let begins = self.piece.case.begins;
         let command = |t: f64| self.input.map_or(0.0, |input| input.at(t.max(-begins)));
         let delayed = |k: usize, delay: f64| command(self.seen[k].t - begins - delay);
-        let change = |at: &At<'_, f64>, value: f64, z: &[f64]| match self.here {
+        let change = |at: &PortState<'_, f64>, value: f64, z: &[f64]| match self.here {
             Spot::Actuator(_) => value - at.value,
             _ => {
                 let friction = acting.friction(at, z).map_or(0.0, |f| match at.v {
@@ -378,9 +389,9 @@ impl<'a> View<'a> {
     /// `delayed` is what came so much earlier.
     fn followed(
         &self,
-        acting: &dyn Acting<f64>,
+        acting: &dyn BoundEffect<f64>,
         delayed: impl Fn(usize, f64) -> f64,
-        made: impl Fn(&At<'_, f64>, f64, &[f64]) -> f64,
+        made: impl Fn(&PortState<'_, f64>, f64, &[f64]) -> f64,
     ) -> Vec<f64> {
         let effect = self.candidate.effect.as_ref();
         let mut z = vec![0.0; effect.states()];
@@ -389,7 +400,7 @@ impl<'a> View<'a> {
             self.before().iter().for_each(|at| acting.remember(at, &mut memory));
         }
         let delay = acting.delay();
-        let one = |(k, at): (usize, &At<'_, f64>)| {
+        let one = |(k, at): (usize, &PortState<'_, f64>)| {
             if k == 0 {
                 acting.start(at, &mut z);
             } else if !z.is_empty() {
@@ -409,10 +420,10 @@ impl<'a> View<'a> {
     }
 
     /// What came to an actuator before the window of a record, where it bends or jumps: there from the left and from the right.
-    fn before(&self) -> Vec<At<'a, f64>> {
+    fn before(&self) -> Vec<PortState<'a, f64>> {
         let begins = self.piece.case.begins;
         let (Some(input), Some(first)) = (self.input, self.seen.first()) else { return Vec::new() };
-        let at = |t: f64, value: f64| At { t: t + begins, value, q: value, ..*first };
+        let at = |t: f64, value: f64| PortState { t: t + begins, value, q: value, ..*first };
         let mut before = Vec::new();
         let mut t = -begins;
         while t < 0.0 {
@@ -426,7 +437,7 @@ impl<'a> View<'a> {
     }
 
     /// What an effect changes at a sensor, in units of the noise.
-    fn measured(&self, acting: &dyn Acting<f64>, series: usize) -> Vec<f64> {
+    fn measured(&self, acting: &dyn BoundEffect<f64>, series: usize) -> Vec<f64> {
         let s = &self.piece.series[series];
         let y = &self.along.predicted[series];
         let interpolate = |t: f64| {
@@ -446,11 +457,11 @@ impl<'a> View<'a> {
 }
 
 /// Moves the states of an effect from one node to the next, in two steps of the classical Runge-Kutta method.
-fn advance(acting: &dyn Acting<f64>, from: &At<'_, f64>, to: &At<'_, f64>, z: &mut [f64]) {
+fn advance(acting: &dyn BoundEffect<f64>, from: &PortState<'_, f64>, to: &PortState<'_, f64>, z: &mut [f64]) {
     const PARTS: u32 = 2;
     let between = |s: f64| {
         let mix = |a: f64, b: f64| a + s * (b - a);
-        At {
+        PortState {
             t: mix(from.t, to.t),
             value: mix(from.value, to.value),
             q: mix(from.q, to.q),

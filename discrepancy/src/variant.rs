@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Dimension, Model, Port, Scope, Strength, Trials};
+use mops_core::{Dimension, EffectParameter, InitialGrid, Model, Port, Scope};
 use mops_models::WithEffects;
 use nalgebra::DMatrix;
 
@@ -58,7 +58,7 @@ impl Added {
             && first.bounds.iter().filter(|e| is_limit(e)).any(|&e| e == value)
     }
 
-    /// The same at all shapes that are tried, and as strong as a fit is restarted from: [`mops_core::Strength::restarts`].
+    /// The same at all shapes that are tried, and as strong as a fit is restarted from: [`mops_core::EffectParameter::restarts`].
     pub fn restarts(&self) -> Vec<Self> {
         let effect = self.candidate.effect.as_ref();
         let first = &effect.strengths()[0];
@@ -151,8 +151,8 @@ impl Variant {
 }
 
 /// Whether a strength is looked for in its logarithm: shapes that cannot be 0, and are not tried there.
-fn is_log(strength: &Strength, value: f64) -> bool {
-    !matches!(strength.trials, Trials::Plain([0.0]))
+fn is_log(strength: &EffectParameter, value: f64) -> bool {
+    !matches!(strength.trials, InitialGrid::Plain([0.0]))
         && strength.neutral != Some(0.0)
         && strength.bounds[0] >= 0.0
         && value > 0.0
@@ -211,9 +211,9 @@ pub fn problem<'a>(
                 let steps = strength.trials.jumps();
                 let scale = match strength.trials {
                     // Half way to the next value that was tried.
-                    Trials::Steps => 0.5 * a.sizes.gap_to_next_size(value),
-                    Trials::ScaledAndGap(_) => 0.1 * scale,
-                    Trials::Jumps(_) => 0.5 * scale,
+                    InitialGrid::Steps => 0.5 * a.sizes.gap_to_next_size(value),
+                    InitialGrid::ScaledAndGap(_) => 0.1 * scale,
+                    InitialGrid::Jumps(_) => 0.5 * scale,
                     _ => scale,
                 };
                 let bounds = a.sizes.bounds(strength);

@@ -1,6 +1,6 @@
 //! Additional mass that moves with a joint.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -20,20 +20,20 @@ impl Definition for AddedMass {
     const SOURCE: &'static str = "H. Lamb, Hydrodynamics, 6th edition (Cambridge 1932), chapter VI";
     const CLASS: EffectClass = EffectClass::Inertial;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[Strength::positive(
+    const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::positive(
         "m",
         "mass or inertia",
         Dimension::OUTPUT.over(Dimension::SPEED).over(Dimension::PER_TIME),
     )];
     const IS_INERTIAL: bool = true;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { m: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.m * at.a / (self.m * at.mobility + 1.0)
     }
 }

@@ -1,6 +1,8 @@
 //! Dry friction that depends on the direction of motion.
 
-use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{
+    BoundEffect, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 
@@ -23,28 +25,28 @@ impl Definition for AsymmetricFriction {
                                   30 (1994), section 2";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("c", "mean of both friction forces", Dimension::OUTPUT),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("c", "mean of both friction forces", Dimension::OUTPUT),
+        EffectParameter::shape(
             "skew",
             "difference of both friction forces divided by their sum, positive if friction is larger forward",
             Dimension::ONE,
             [-1.0, 1.0],
-            Trials::Plain(&[-0.4, 0.4]),
+            InitialGrid::Plain(&[-0.4, 0.4]),
         ),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { c: s[0], skew: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         S::from(0.0)
     }
 
-    fn friction(&self, _: &At<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
+    fn friction(&self, _: &PortState<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
         let sliding = [self.c * (self.skew + 1.0), self.c * (-self.skew + 1.0)];
         Some(DryFriction { sliding, limit: sliding })
     }

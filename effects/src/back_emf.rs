@@ -1,6 +1,6 @@
 //! Back electromotive force of a motor.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -20,17 +20,17 @@ impl Definition for BackEmf {
                                   6th edition (Pearson 2010), section 2.3";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const COMPANION: Option<PortKind> = Some(PortKind::Joint);
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("k", "loss of command per speed", Dimension::OUTPUT.over(Dimension::SPEED))];
+    const SECOND_PORT: Option<PortKind> = Some(PortKind::Joint);
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("k", "loss of command per speed", Dimension::OUTPUT.over(Dimension::SPEED))];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value - self.k * at.other_speed
     }
 }

@@ -1,6 +1,6 @@
 //! Backlash.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::clamp;
@@ -22,27 +22,28 @@ impl Definition for Backlash {
         "M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator, PortKind::Sensor];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("gap", "width of the gap", Dimension::VALUE).tried(Trials::Scaled(&[0.05, 0.15, 0.4]))];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("gap", "width of the gap", Dimension::VALUE)
+            .tried(InitialGrid::Scaled(&[0.05, 0.15, 0.4]))];
     const MEMORY: usize = 1;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { gap: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value
     }
 
-    fn remember(&self, at: &At<'_, S>, memory: &mut [S]) {
+    fn remember(&self, at: &PortState<'_, S>, memory: &mut [S]) {
         let first = memory[0].value().is_nan();
         memory[0] = if first { at.value } else { self.recall(at, memory) };
     }
 
-    fn recall(&self, at: &At<'_, S>, memory: &[S]) -> S {
+    fn recall(&self, at: &PortState<'_, S>, memory: &[S]) -> S {
         if self.gap.value() > 0.0 {
             clamp(memory[0], at.value - self.gap * 0.5, at.value + self.gap * 0.5)
         } else {

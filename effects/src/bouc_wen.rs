@@ -1,6 +1,6 @@
 //! Force with hysteresis.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{power, sign};
@@ -28,46 +28,46 @@ impl Definition for BoucWen {
                                   a survey, Archives of Computational Methods in Engineering 16 (2009)";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("c", "yield force", Dimension::OUTPUT),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("c", "yield force", Dimension::OUTPUT),
+        EffectParameter::shape(
             "y",
             "displacement over which the force builds up",
             Dimension::POSITION,
             [1e-4, f64::INFINITY],
-            Trials::Scaled(&[0.05, 0.2, 0.7, 2.0]),
+            InitialGrid::Scaled(&[0.05, 0.2, 0.7, 2.0]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "sigma",
             "1/2: elastic unloading; larger: energy is dissipated immediately",
             Dimension::ONE,
             [0.5, 10.0],
-            Trials::Plain(&[0.5, 1.0]),
+            InitialGrid::Plain(&[0.5, 1.0]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "n",
             "sharpness of the transition to yielding",
             Dimension::ONE,
             [1.0, 10.0],
-            Trials::Plain(&[1.0, 2.0]),
+            InitialGrid::Plain(&[1.0, 2.0]),
         ),
     ];
     const STATES: usize = 1;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::ONE];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { c: s[0], y: s[1], sigma: s[2], n: s[3] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn rates(&self, at: &PortState<'_, S>, z: &[S], dz: &mut [S]) {
         let full = power(z[0].abs(), self.n);
         let against = self.sigma * at.v.abs() * full * sign(z[0].value());
         dz[0] = (at.v - against + (self.sigma - 1.0) * at.v * full) / self.y;
     }
 
-    fn value(&self, _: &At<'_, S>, z: &[S]) -> S {
+    fn value(&self, _: &PortState<'_, S>, z: &[S]) -> S {
         -self.c * z[0]
     }
 }

@@ -1,6 +1,6 @@
 //! Cogging force of teeth or magnets.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{phase, waves};
@@ -24,19 +24,19 @@ impl Definition for Cogging {
         "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' Collective 2003)";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("a", "amplitude", Dimension::OUTPUT),
-        waves(Trials::Plain(&[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 24.0])).kept(),
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("a", "amplitude", Dimension::OUTPUT),
+        waves(InitialGrid::Plain(&[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 24.0])).kept(),
         phase(),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { a: s[0], n: s[1], phase: s[2] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         self.a * (self.n * at.q + self.phase).sin()
     }
 }

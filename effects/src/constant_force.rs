@@ -1,6 +1,6 @@
 //! Constant load.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -20,16 +20,17 @@ impl Definition for ConstantForce {
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), chapter 3";
     const CLASS: EffectClass = EffectClass::Bias;
     const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
-    const STRENGTHS: &'static [Strength] = &[Strength::signed("f", "added force, torque or flow", Dimension::OUTPUT)];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::signed("f", "added force, torque or flow", Dimension::OUTPUT)];
     const RARITY: u8 = 0;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { f: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         self.f
     }
 }

@@ -1,6 +1,6 @@
 //! Coulomb friction.
 
-use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, DryFriction, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -21,20 +21,21 @@ impl Definition for CoulombFriction {
                                   compensation methods for the control of machines with friction, Automatica 30 (1994), section 2.1";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[Strength::positive("c", "friction force", Dimension::OUTPUT)];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("c", "friction force", Dimension::OUTPUT)];
     const RARITY: u8 = 0;
 
-    fn make<S: Scalar>(strengths: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(strengths: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(Coulomb { torque: strengths[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for Coulomb<S> {
-    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for Coulomb<S> {
+    fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         S::from(0.0)
     }
 
-    fn friction(&self, _: &At<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
+    fn friction(&self, _: &PortState<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
         Some(DryFriction { sliding: [self.torque; 2], limit: [self.torque; 2] })
     }
 }

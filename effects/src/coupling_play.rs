@@ -1,6 +1,6 @@
 //! Elastic coupling with backlash.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, Pressed};
@@ -29,52 +29,56 @@ impl Definition for CouplingPlay {
     const CLASS: EffectClass = EffectClass::Elastic;
     const FORM_OF: Option<&'static str> = Some("backlash");
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const COMPANION: Option<PortKind> = Some(PortKind::Joint);
+    const SECOND_PORT: Option<PortKind> = Some(PortKind::Joint);
     const MUTUAL: bool = true;
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "stiffness of the coupling with backlash", Dimension::OUTPUT.over(Dimension::POSITION)),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive(
+            "k",
+            "stiffness of the coupling with backlash",
+            Dimension::OUTPUT.over(Dimension::POSITION),
+        ),
+        EffectParameter::shape(
             "gap",
             "width of the gap",
             Dimension::POSITION,
             NOT_NEGATIVE,
-            Trials::Scaled(&[0.1, 0.4, 1.0, 2.0]),
+            InitialGrid::Scaled(&[0.1, 0.4, 1.0, 2.0]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "tau",
             "damping of the coupling that acts only in contact, divided by its stiffness",
             Dimension::TIME,
             NOT_NEGATIVE,
-            Trials::Plain(&[0.0]),
+            InitialGrid::Plain(&[0.0]),
         ),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], gap: s[1], tau: s[2] })
     }
 }
 
 impl<S: Scalar> AtStrengths<S> {
     /// Returns the contact on the side on which one joint leads the other, and the sign of that side.
-    fn nearer(&self, at: &At<'_, S>) -> (Pressed<S>, f64) {
+    fn nearer(&self, at: &PortState<'_, S>) -> (Pressed<S>, f64) {
         let (ahead, faster) = (at.q - at.other, at.v - at.other_speed);
         let side = if ahead.value() < 0.0 { -1.0 } else { 1.0 };
         (Pressed { into: ahead * side - self.gap * 0.5, damped: self.tau * faster * side }, side)
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let (pressed, side) = self.nearer(at);
         let coupled = at.q - at.other + self.tau * (at.v - at.other_speed);
         self.k * (coupled - pressed.force(at.closed) * side)
     }
 
-    fn onward(&self, at: &At<'_, S>, z: &[S]) -> S {
+    fn onward(&self, at: &PortState<'_, S>, z: &[S]) -> S {
         -self.value(at, z)
     }
 
-    fn gap(&self, at: &At<'_, S>) -> Option<S> {
+    fn gap(&self, at: &PortState<'_, S>) -> Option<S> {
         (self.k.value() != 0.0).then(|| self.nearer(at).0.gap())
     }
 }

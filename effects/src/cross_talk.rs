@@ -1,6 +1,6 @@
 //! Sensor with crosstalk from another sensor.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -19,17 +19,17 @@ impl Definition for CrossTalk {
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    const COMPANION: Option<PortKind> = Some(PortKind::Sensor);
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::signed("k", "fraction of the other signal", Dimension::OUTPUT.over(Dimension::POSITION))];
+    const SECOND_PORT: Option<PortKind> = Some(PortKind::Sensor);
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::signed("k", "fraction of the other signal", Dimension::OUTPUT.over(Dimension::POSITION))];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value + self.k * at.other
     }
 }

@@ -1,6 +1,6 @@
 //! Hardening or softening spring.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::ANY;
@@ -22,23 +22,29 @@ impl Definition for CubicStiffness {
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 4 (Duffing)";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::signed(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::signed(
             "k",
             "force per displacement to the third power",
             Dimension::OUTPUT.over(Dimension::POSITION.power(3)),
         ),
-        Strength::shape("rest", "position without force", Dimension::POSITION, ANY, Trials::Within(&[0.2, 0.5, 0.8])),
+        EffectParameter::shape(
+            "rest",
+            "position without force",
+            Dimension::POSITION,
+            ANY,
+            InitialGrid::Within(&[0.2, 0.5, 0.8]),
+        ),
     ];
     const RARITY: u8 = 0;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], rest: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let d = at.q - self.rest;
         -self.k * d * d * d
     }

@@ -1,6 +1,6 @@
 //! Dry friction with elastic presliding.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -21,30 +21,30 @@ impl Definition for DahlFriction {
         "P. R. Dahl, A solid friction model, report TOR-0158(3107-18)-1, The Aerospace Corporation (1968)";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("c", "friction force", Dimension::OUTPUT),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("c", "friction force", Dimension::OUTPUT),
+        EffectParameter::shape(
             "y",
             "displacement over which the force builds up",
             Dimension::POSITION,
             [1e-4, f64::INFINITY],
-            Trials::Scaled(&[0.01, 0.05, 0.2]),
+            InitialGrid::Scaled(&[0.01, 0.05, 0.2]),
         ),
     ];
     const STATES: usize = 1;
     const RARITY: u8 = 2;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { c: s[0], y: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn rates(&self, at: &PortState<'_, S>, z: &[S], dz: &mut [S]) {
         dz[0] = (at.v - z[0] * at.v.abs()) / self.y;
     }
 
-    fn value(&self, _: &At<'_, S>, z: &[S]) -> S {
+    fn value(&self, _: &PortState<'_, S>, z: &[S]) -> S {
         -self.c * z[0]
     }
 }

@@ -1,6 +1,6 @@
 //! Viscous friction that drifts with time.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -21,19 +21,19 @@ impl Definition for DampingDrift {
         "R. Isermann, Fault-Diagnosis Systems (Springer 2006), chapter 5 (faults of parameters, abrupt and drifting)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[Strength::signed(
+    const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::signed(
         "r",
         "change of force per speed, per time",
         Dimension::OUTPUT.over(Dimension::SPEED).over(Dimension::TIME),
     )];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { r: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.r * at.v * at.t
     }
 }

@@ -1,6 +1,6 @@
 //! Viscous friction that changes once.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{STEPS_BEGIN, STEPS_LAST, Span, from, length};
@@ -23,24 +23,24 @@ impl Definition for DampingStep {
         "R. Isermann, Fault-Diagnosis Systems (Springer 2006), chapter 5 (faults of parameters, abrupt and drifting)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::signed("d", "change of force per speed", Dimension::OUTPUT.over(Dimension::SPEED)),
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::signed("d", "change of force per speed", Dimension::OUTPUT.over(Dimension::SPEED)),
         from(STEPS_BEGIN),
         length(STEPS_LAST),
     ];
     const IS_ONE_OFF: bool = true;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { d: s[0], span: Span::new(&s[1..]) })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
     fn breaks(&self) -> Vec<f64> {
         self.span.breaks()
     }
 
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.d * at.v * self.span.risen(at.t)
     }
 }

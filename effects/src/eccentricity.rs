@@ -1,6 +1,6 @@
 //! Eccentric angular scale.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::phase;
@@ -23,16 +23,16 @@ impl Definition for Eccentricity {
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     // In rad, as the angle is, the amplitude is the offset of the centre divided by the radius of the scale. The bound
     // of half the radius is an assumption.
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("a", "amplitude", Dimension::OUTPUT).within(0.0, 0.5), phase()];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("a", "amplitude", Dimension::OUTPUT).within(0.0, 0.5), phase()];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { a: s[0], phase: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value + self.a * (at.value + self.phase).sin()
     }
 }

@@ -1,6 +1,6 @@
 //! Elastic end stops with dampers that cannot pull.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{ANY, NOT_NEGATIVE, Pressed};
@@ -24,33 +24,33 @@ impl Definition for EndStop {
     const SOURCE: &'static str = "B. Brogliato, Nonsmooth Mechanics, 3rd edition (Springer 2016), chapter 2";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "stiffness of the stops", Dimension::OUTPUT.over(Dimension::POSITION))
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("k", "stiffness of the stops", Dimension::OUTPUT.over(Dimension::POSITION))
             .restarted_from(&[1.0, 10.0]),
-        Strength::shape(
+        EffectParameter::shape(
             "low",
             "position of the lower stop",
             Dimension::POSITION,
             ANY,
-            Trials::Within(&[-0.05, 0.0, 0.05, 0.2]),
+            InitialGrid::Within(&[-0.05, 0.0, 0.05, 0.2]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "high",
             "position of the upper stop",
             Dimension::POSITION,
             ANY,
-            Trials::Within(&[0.8, 0.95, 1.0, 1.05]),
+            InitialGrid::Within(&[0.8, 0.95, 1.0, 1.05]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "tau",
             "damping of the stops divided by their stiffness",
             Dimension::TIME,
             NOT_NEGATIVE,
-            Trials::Plain(&[0.0]),
+            InitialGrid::Plain(&[0.0]),
         ),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], low: s[1], high: s[2], tau: s[3] })
     }
 }
@@ -58,7 +58,7 @@ impl Definition for EndStop {
 impl<S: Scalar> AtStrengths<S> {
     /// Returns the contact with the nearer stop, and the direction of its force. If the stops have crossed, both are at
     /// their middle.
-    fn nearer(&self, at: &At<'_, S>) -> (Pressed<S>, f64) {
+    fn nearer(&self, at: &PortState<'_, S>) -> (Pressed<S>, f64) {
         let middle = (self.low + self.high) * 0.5;
         let (low, high) = if self.low.value() > self.high.value() { (middle, middle) } else { (self.low, self.high) };
         let (below, above) = (low - at.q, at.q - high);
@@ -67,13 +67,13 @@ impl<S: Scalar> AtStrengths<S> {
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let (pressed, to) = self.nearer(at);
         self.k * pressed.force(at.closed) * to
     }
 
-    fn gap(&self, at: &At<'_, S>) -> Option<S> {
+    fn gap(&self, at: &PortState<'_, S>) -> Option<S> {
         (self.k.value() != 0.0).then(|| self.nearer(at).0.gap())
     }
 }

@@ -1,6 +1,6 @@
 //! Flexible mode: a mass attached to a joint by a spring.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
@@ -22,46 +22,46 @@ impl Definition for FlexibleMode {
     const SOURCE: &'static str = "J. P. Den Hartog, Mechanical Vibrations, 4th edition (McGraw-Hill 1956), section 3.3";
     const CLASS: EffectClass = EffectClass::Inertial;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive(
             "m",
             "attached mass or inertia",
             Dimension::OUTPUT.over(Dimension::SPEED).over(Dimension::PER_TIME),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "w",
             "natural frequency of the attached mass with the joint fixed, rad/s",
             Dimension::PER_TIME,
             NOT_NEGATIVE,
-            Trials::Frequencies,
+            InitialGrid::Frequencies,
         ),
-        Strength::shape("d", "damping ratio", Dimension::ONE, [0.0, 2.0], Trials::Plain(&[0.02, 0.2])),
+        EffectParameter::shape("d", "damping ratio", Dimension::ONE, [0.0, 2.0], InitialGrid::Plain(&[0.02, 0.2])),
     ];
     const STATES: usize = 2;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::POSITION, Dimension::SPEED];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { m: s[0], w: s[1], d: s[2] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn start(&self, at: &At<'_, S>, z: &mut [S]) {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn start(&self, at: &PortState<'_, S>, z: &mut [S]) {
         z.copy_from_slice(&[at.q, at.v]);
     }
 
-    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+    fn rates(&self, at: &PortState<'_, S>, z: &[S], dz: &mut [S]) {
         dz.copy_from_slice(&[z[1], -self.pull(at, z)]);
     }
 
-    fn value(&self, at: &At<'_, S>, z: &[S]) -> S {
+    fn value(&self, at: &PortState<'_, S>, z: &[S]) -> S {
         self.m * self.pull(at, z)
     }
 }
 
 impl<S: Scalar> AtStrengths<S> {
     /// Returns the force on the joint per attached mass.
-    fn pull(&self, at: &At<'_, S>, z: &[S]) -> S {
+    fn pull(&self, at: &PortState<'_, S>, z: &[S]) -> S {
         self.w * self.w * (z[0] - at.q) + self.d * self.w * (z[1] - at.v) * 2.0
     }
 }

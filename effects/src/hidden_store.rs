@@ -1,6 +1,6 @@
 //! Hidden store of heat or matter.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
@@ -23,34 +23,34 @@ impl Definition for HiddenStore {
                                   buildings, Energy and Buildings 43 (2011)";
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "exchange per difference", Dimension::OUTPUT.over(Dimension::POSITION)),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("k", "exchange per difference", Dimension::OUTPUT.over(Dimension::POSITION)),
+        EffectParameter::shape(
             "tau",
             "time constant of the hidden store",
             Dimension::TIME,
             NOT_NEGATIVE,
-            Trials::Scaled(&[0.3, 1.0, 3.0, 10.0]),
+            InitialGrid::Scaled(&[0.3, 1.0, 3.0, 10.0]),
         ),
     ];
     const STATES: usize = 1;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::POSITION];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], tau: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn start(&self, at: &At<'_, S>, z: &mut [S]) {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn start(&self, at: &PortState<'_, S>, z: &mut [S]) {
         z[0] = at.q;
     }
 
-    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+    fn rates(&self, at: &PortState<'_, S>, z: &[S], dz: &mut [S]) {
         dz[0] = if self.tau.value() > 0.0 { (at.q - z[0]) / self.tau } else { S::from(0.0) };
     }
 
-    fn value(&self, at: &At<'_, S>, z: &[S]) -> S {
+    fn value(&self, at: &PortState<'_, S>, z: &[S]) -> S {
         self.k * (z[0] - at.q)
     }
 }

@@ -1,6 +1,6 @@
 //! Mass off the axis of rotation.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::phase;
@@ -22,16 +22,16 @@ impl Definition for Imbalance {
     const SOURCE: &'static str = "J. P. Den Hartog, Mechanical Vibrations, 4th edition (McGraw-Hill 1956), chapter 6";
     const CLASS: EffectClass = EffectClass::Gravity;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("a", "amplitude of the gravity torque", Dimension::OUTPUT), phase()];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("a", "amplitude of the gravity torque", Dimension::OUTPUT), phase()];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { a: s[0], phase: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.a * (at.q - self.phase).sin()
     }
 }

@@ -1,6 +1,6 @@
 //! Actuator whose gain depends on the direction.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -19,20 +19,20 @@ impl Definition for InputAsymmetry {
     const SOURCE: &'static str = "R. Isermann, Fault-Diagnosis Systems (Springer 2006)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const STRENGTHS: &'static [Strength] = &[Strength::signed(
+    const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::signed(
         "a",
         "relative increase of the gain for positive and decrease for negative commands",
         Dimension::ONE,
     )
     .within(-1.0, 1.0)];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { a: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value + self.a * at.value.abs()
     }
 }

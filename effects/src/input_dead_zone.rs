@@ -1,6 +1,6 @@
 //! Dead zone of an actuator.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::clamp;
@@ -21,18 +21,18 @@ impl Definition for InputDeadZone {
     const SOURCE: &'static str = "H. K. Khalil, Nonlinear Systems, 3rd edition (Prentice Hall 2002), section 1.2.7";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("width", "largest command without effect", Dimension::VALUE)
-            .tried(Trials::Scaled(&[0.05, 0.15, 0.3, 0.6]))];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("width", "largest command without effect", Dimension::VALUE)
+            .tried(InitialGrid::Scaled(&[0.05, 0.15, 0.3, 0.6]))];
     const RARITY: u8 = 0;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { width: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value - clamp(at.value, -self.width, self.width)
     }
 }

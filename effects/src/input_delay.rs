@@ -1,6 +1,6 @@
 //! Delay of an input.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -20,17 +20,17 @@ impl Definition for InputDelay {
         "L. Ljung, System Identification: Theory for the User, 2nd edition (Prentice Hall 1999), section 4.2";
     const CLASS: EffectClass = EffectClass::DelayLike;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("delay", "delay", Dimension::TIME).tried(Trials::Scaled(&[0.02, 0.05, 0.1, 0.2, 0.5]))];
+    const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::positive("delay", "delay", Dimension::TIME)
+        .tried(InitialGrid::Scaled(&[0.02, 0.05, 0.1, 0.2, 0.5]))];
     const RARITY: u8 = 0;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { delay: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value
     }
 

@@ -1,6 +1,6 @@
 //! Gain error of an input.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -19,16 +19,16 @@ impl Definition for InputGain {
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 2-2";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::signed("g", "relative error of the gain", Dimension::ONE).within(-1.0, f64::INFINITY)];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::signed("g", "relative error of the gain", Dimension::ONE).within(-1.0, f64::INFINITY)];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { g: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value * (self.g + 1.0)
     }
 }

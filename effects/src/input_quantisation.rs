@@ -1,6 +1,6 @@
 //! Quantised input.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::quantised;
@@ -20,17 +20,17 @@ impl Definition for InputQuantisation {
     const SOURCE: &'static str = "B. Widrow, I. Kollar, Quantization Noise (Cambridge 2008)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("step", "quantisation step", Dimension::VALUE).tried(Trials::Steps)];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("step", "quantisation step", Dimension::VALUE).tried(InitialGrid::Steps)];
     const RARITY: u8 = 2;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { step: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         quantised(at.value, self.step)
     }
 }

@@ -1,6 +1,6 @@
 //! Actuator with a rate limit.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::clamp;
@@ -20,30 +20,30 @@ impl Definition for InputRateLimit {
     const SOURCE: &'static str = "L. Zaccarian, A. R. Teel, Modern Anti-windup Synthesis (Princeton 2011)";
     const CLASS: EffectClass = EffectClass::DelayLike;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("rate", "maximum rate", Dimension::VALUE.over(Dimension::TIME))
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("rate", "maximum rate", Dimension::VALUE.over(Dimension::TIME))
             .neutral_at(f64::INFINITY)
-            .tried(Trials::SlewAndScaled(&[0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 0.95], &[0.3, 1.0, 3.0]))];
+            .tried(InitialGrid::SlewAndScaled(&[0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 0.95], &[0.3, 1.0, 3.0]))];
     const MEMORY: usize = 2;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { rate: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value
     }
 
-    fn remember(&self, at: &At<'_, S>, memory: &mut [S]) {
+    fn remember(&self, at: &PortState<'_, S>, memory: &mut [S]) {
         let first = memory[0].value().is_nan();
         memory[0] = if first { at.value } else { self.recall(at, memory) };
         memory[1] = S::from(at.t);
     }
 
-    fn recall(&self, at: &At<'_, S>, memory: &[S]) -> S {
+    fn recall(&self, at: &PortState<'_, S>, memory: &[S]) -> S {
         let way = self.rate * (at.t - memory[1].value());
         if way.value().is_nan() { at.value } else { clamp(at.value, memory[0] - way, memory[0] + way) }
     }

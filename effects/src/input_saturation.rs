@@ -1,6 +1,6 @@
 //! Actuator with saturation.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::clamp;
@@ -20,18 +20,18 @@ impl Definition for InputSaturation {
     const SOURCE: &'static str = "H. K. Khalil, Nonlinear Systems, 3rd edition (Prentice Hall 2002), section 1.2.7";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const STRENGTHS: &'static [Strength] = &[Strength::positive("limit", "limit", Dimension::VALUE)
+    const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::positive("limit", "limit", Dimension::VALUE)
         .neutral_at(f64::INFINITY)
-        .tried(Trials::WithinSize(&[0.4, 0.6, 0.7, 0.8, 0.9, 0.96]))];
+        .tried(InitialGrid::WithinSize(&[0.4, 0.6, 0.7, 0.8, 0.9, 0.96]))];
     const RARITY: u8 = 0;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { limit: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         clamp(at.value, -self.limit, self.limit)
     }
 }

@@ -1,6 +1,6 @@
 //! Leak of a store.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
@@ -21,24 +21,24 @@ impl Definition for Leak {
     const SOURCE: &'static str = "F. M. White, Fluid Mechanics, 7th edition (McGraw-Hill 2011), chapter 3 (Torricelli)";
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "outflow at a level of 1 above the hole", Dimension::OUTPUT),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("k", "outflow at a level of 1 above the hole", Dimension::OUTPUT),
+        EffectParameter::shape(
             "hole",
             "level of the hole",
             Dimension::POSITION,
             NOT_NEGATIVE,
-            Trials::Within(&[-0.3, 0.0, 0.3, 0.6]),
+            InitialGrid::Within(&[-0.3, 0.0, 0.3, 0.6]),
         ),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], hole: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let head = at.q - self.hole;
         if head.value() > 0.0 { -self.k * head.sqrt() } else { S::from(0.0) }
     }

@@ -74,7 +74,7 @@ mod wind_gust;
 
 use std::sync::Arc;
 
-use mops_core::{Acting, Along, Dimension, Effect, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, Dual7, Effect, EffectClass, EffectParameter, PortKind, Scalar};
 
 /// Definition of an effect in its file; see [`Effect`] for the meaning of each item.
 pub trait Definition: Send + Sync + 'static {
@@ -93,11 +93,11 @@ pub trait Definition: Send + Sync + 'static {
     /// Value of [`Effect::ports`].
     const PORTS: &'static [PortKind];
     /// Value of [`Effect::companion`].
-    const COMPANION: Option<PortKind> = None;
+    const SECOND_PORT: Option<PortKind> = None;
     /// Value of [`Effect::mutual`].
     const MUTUAL: bool = false;
     /// Value of [`Effect::strengths`].
-    const STRENGTHS: &'static [Strength];
+    const PARAMETERS: &'static [EffectParameter];
     /// Value of [`Effect::states`].
     const STATES: usize = 0;
     /// Value of [`Effect::free_starts`].
@@ -112,7 +112,7 @@ pub trait Definition: Send + Sync + 'static {
     const RARITY: u8 = 1;
 
     /// Creates the effect at given parameters.
-    fn make<S: Scalar>(strengths: &[S]) -> Box<dyn Acting<S>>;
+    fn make<S: Scalar>(strengths: &[S]) -> Box<dyn BoundEffect<S>>;
 }
 
 /// Effect given by its definition.
@@ -141,13 +141,13 @@ impl<D: Definition> Effect for Defined<D> {
         D::FORM_OF
     }
     fn companion(&self) -> Option<PortKind> {
-        D::COMPANION
+        D::SECOND_PORT
     }
     fn mutual(&self) -> bool {
         D::MUTUAL
     }
-    fn strengths(&self) -> &'static [Strength] {
-        D::STRENGTHS
+    fn strengths(&self) -> &'static [EffectParameter] {
+        D::PARAMETERS
     }
     fn states(&self) -> usize {
         D::STATES
@@ -167,10 +167,10 @@ impl<D: Definition> Effect for Defined<D> {
     fn rarity(&self) -> u8 {
         D::RARITY
     }
-    fn act(&self, strengths: &[f64]) -> Box<dyn Acting<f64>> {
+    fn act(&self, strengths: &[f64]) -> Box<dyn BoundEffect<f64>> {
         D::make(strengths)
     }
-    fn act_along(&self, strengths: &[Along]) -> Box<dyn Acting<Along>> {
+    fn bind_dual(&self, strengths: &[Dual7]) -> Box<dyn BoundEffect<Dual7>> {
         D::make(strengths)
     }
 }

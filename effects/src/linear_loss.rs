@@ -1,6 +1,6 @@
 //! Loss proportional to a difference.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::ANY;
@@ -22,24 +22,24 @@ impl Definition for LinearLoss {
                                   Mass Transfer, 6th edition (Wiley 2007), section 5.1";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "loss per difference", Dimension::OUTPUT.over(Dimension::POSITION)),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("k", "loss per difference", Dimension::OUTPUT.over(Dimension::POSITION)),
+        EffectParameter::shape(
             "around",
             "value of the surroundings",
             Dimension::POSITION,
             ANY,
-            Trials::Within(&[-0.5, 0.0, 0.5]),
+            InitialGrid::Within(&[-0.5, 0.0, 0.5]),
         ),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], around: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.k * (at.q - self.around)
     }
 }

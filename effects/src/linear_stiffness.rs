@@ -1,6 +1,6 @@
 //! Linear spring.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::ANY;
@@ -21,19 +21,25 @@ impl Definition for LinearStiffness {
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 1";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "force per displacement", Dimension::OUTPUT.over(Dimension::POSITION)),
-        Strength::shape("rest", "position without force", Dimension::POSITION, ANY, Trials::Within(&[0.2, 0.5, 0.8])),
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("k", "force per displacement", Dimension::OUTPUT.over(Dimension::POSITION)),
+        EffectParameter::shape(
+            "rest",
+            "position without force",
+            Dimension::POSITION,
+            ANY,
+            InitialGrid::Within(&[0.2, 0.5, 0.8]),
+        ),
     ];
     const RARITY: u8 = 0;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], rest: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.k * (at.q - self.rest)
     }
 }

@@ -1,6 +1,6 @@
 //! Dry friction proportional to the transmitted load.
 
-use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, DryFriction, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -23,21 +23,21 @@ impl Definition for LoadDependentFriction {
                                   Measurement, and Control 134 (2012)";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const COMPANION: Option<PortKind> = Some(PortKind::Actuator);
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("mu", "friction force per input", Dimension::OUTPUT.over(Dimension::VALUE))];
+    const SECOND_PORT: Option<PortKind> = Some(PortKind::Actuator);
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("mu", "friction force per input", Dimension::OUTPUT.over(Dimension::VALUE))];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { mu: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         S::from(0.0)
     }
 
-    fn friction(&self, at: &At<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
+    fn friction(&self, at: &PortState<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
         let sliding = [self.mu * at.other.abs(); 2];
         Some(DryFriction { sliding, limit: sliding })
     }

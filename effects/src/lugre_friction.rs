@@ -1,6 +1,6 @@
 //! Dry friction of elastic bristles that slip.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
@@ -25,58 +25,58 @@ impl Definition for LugreFriction {
                                   of systems with friction, IEEE Transactions on Automatic Control 40 (1995)";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("c", "friction force at high speed", Dimension::OUTPUT),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("c", "friction force at high speed", Dimension::OUTPUT),
+        EffectParameter::shape(
             "rise",
             "break-away force divided by the friction force at high speed, minus 1",
             Dimension::ONE,
             NOT_NEGATIVE,
-            Trials::Plain(&[0.5]),
+            InitialGrid::Plain(&[0.5]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "vs",
             "speed at which the rise has decreased to 1/e",
             Dimension::SPEED,
             NOT_NEGATIVE,
-            Trials::Scaled(&[0.05, 0.2]),
+            InitialGrid::Scaled(&[0.05, 0.2]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "y",
             "deflection of the bristles at high speed",
             Dimension::POSITION,
             [1e-4, f64::INFINITY],
-            Trials::Scaled(&[0.01, 0.05, 0.2]),
+            InitialGrid::Scaled(&[0.01, 0.05, 0.2]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "tau",
             "damping of the bristles divided by their stiffness",
             Dimension::TIME,
             NOT_NEGATIVE,
-            Trials::Scaled(&[0.01]),
+            InitialGrid::Scaled(&[0.01]),
         ),
     ];
     const STATES: usize = 1;
     const RARITY: u8 = 2;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { c: s[0], rise: s[1], vs: s[2], y: s[3], tau: s[4] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn rates(&self, at: &PortState<'_, S>, z: &[S], dz: &mut [S]) {
         dz[0] = self.slip(at, z[0]);
     }
 
-    fn value(&self, at: &At<'_, S>, z: &[S]) -> S {
+    fn value(&self, at: &PortState<'_, S>, z: &[S]) -> S {
         -self.c * (z[0] + self.tau * self.slip(at, z[0]))
     }
 }
 
 impl<S: Scalar> AtStrengths<S> {
     /// Returns the rate of the deflection.
-    fn slip(&self, at: &At<'_, S>, z: S) -> S {
+    fn slip(&self, at: &PortState<'_, S>, z: S) -> S {
         let mut steady = S::from(1.0);
         if self.vs.value() > 0.0 {
             let ratio = at.v / self.vs;

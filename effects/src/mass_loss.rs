@@ -1,6 +1,6 @@
 //! Mass that decreases with time.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -20,17 +20,17 @@ impl Definition for MassLoss {
     const SOURCE: &'static str = "F. O. Eke, Dynamics of variable mass systems, NASA/CR-1998-208246 (1998)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("r", "mass or inertia lost per time", Dimension::OUTPUT.over(Dimension::SPEED))];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("r", "mass or inertia lost per time", Dimension::OUTPUT.over(Dimension::SPEED))];
     const IS_INERTIAL: bool = true;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { r: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         // The lost mass as a fraction of the moving mass, limited so that some mass remains.
         let gone = self.r * at.t;
         let left = -gone * at.mobility + 1.0;

@@ -1,6 +1,6 @@
 //! Outflow with a general exponent.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::power;
@@ -21,18 +21,18 @@ impl Definition for OrificeExponent {
     const SOURCE: &'static str = "F. M. White, Fluid Mechanics, 7th edition (McGraw-Hill 2011), chapter 6 (orifices)";
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "outflow at a level of 1", Dimension::OUTPUT),
-        Strength::shape("n", "exponent", Dimension::ONE, [0.2, 3.0], Trials::Plain(&[0.3, 0.75, 1.5])),
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("k", "outflow at a level of 1", Dimension::OUTPUT),
+        EffectParameter::shape("n", "exponent", Dimension::ONE, [0.2, 3.0], InitialGrid::Plain(&[0.3, 0.75, 1.5])),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], n: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.k * power(at.q, self.n)
     }
 }

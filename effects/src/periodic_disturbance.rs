@@ -1,6 +1,6 @@
 //! Sinusoidal disturbance.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, phase};
@@ -22,23 +22,29 @@ impl Definition for PeriodicDisturbance {
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), chapter 7";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("a", "amplitude", Dimension::OUTPUT),
-        Strength::shape("w", "angular frequency, rad/s", Dimension::PER_TIME, NOT_NEGATIVE, Trials::Frequencies),
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("a", "amplitude", Dimension::OUTPUT),
+        EffectParameter::shape(
+            "w",
+            "angular frequency, rad/s",
+            Dimension::PER_TIME,
+            NOT_NEGATIVE,
+            InitialGrid::Frequencies,
+        ),
         phase().per_experiment(),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { a: s[0], w: s[1], phase: s[2] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
     fn longest_step(&self) -> f64 {
         std::f64::consts::TAU / (16.0 * self.w.value().abs())
     }
 
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         self.a * (self.w * at.t + self.phase).sin()
     }
 }

@@ -1,6 +1,8 @@
 //! Dry friction that depends on the position.
 
-use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{
+    BoundEffect, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::{phase, waves};
@@ -27,24 +29,30 @@ impl Definition for PositionDependentFriction {
                                   30 (1994), section 2";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("c", "mean friction force", Dimension::OUTPUT),
-        Strength::shape("a", "relative amplitude of the variation", Dimension::ONE, [0.0, 1.0], Trials::Plain(&[0.6])),
-        waves(Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0], &[1.0, 2.0, 3.5, 5.5, 8.5, 13.0])),
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("c", "mean friction force", Dimension::OUTPUT),
+        EffectParameter::shape(
+            "a",
+            "relative amplitude of the variation",
+            Dimension::ONE,
+            [0.0, 1.0],
+            InitialGrid::Plain(&[0.6]),
+        ),
+        waves(InitialGrid::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0], &[1.0, 2.0, 3.5, 5.5, 8.5, 13.0])),
         phase(),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { c: s[0], a: s[1], n: s[2], phase: s[3] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         S::from(0.0)
     }
 
-    fn friction(&self, at: &At<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
+    fn friction(&self, at: &PortState<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
         let share = self.a * (self.n * at.q + self.phase).cos();
         let sliding = [self.c * (share + 1.0); 2];
         Some(DryFriction { sliding, limit: sliding })

@@ -1,6 +1,6 @@
 //! Force that is periodic along a position.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{phase, waves};
@@ -25,19 +25,19 @@ impl Definition for PositionRipple {
     const CLASS: EffectClass = EffectClass::Periodic;
     const FORM_OF: Option<&'static str> = Some("cogging");
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("a", "amplitude", Dimension::OUTPUT),
-        waves(Trials::Scaled(&[2.0, 3.5, 5.0, 7.0, 9.0, 12.0, 16.0, 21.0, 28.0, 36.0])),
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("a", "amplitude", Dimension::OUTPUT),
+        waves(InitialGrid::Scaled(&[2.0, 3.5, 5.0, 7.0, 9.0, 12.0, 16.0, 21.0, 28.0, 36.0])),
         phase(),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { a: s[0], n: s[1], phase: s[2] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         self.a * (self.n * at.q + self.phase).sin()
     }
 }

@@ -1,6 +1,6 @@
 //! Friction proportional to a power of the speed.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{power, sign};
@@ -22,19 +22,19 @@ impl Definition for PowerFriction {
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 3";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("c", "force at a speed of 1", Dimension::OUTPUT),
-        Strength::shape("p", "exponent", Dimension::ONE, [0.5, 4.0], Trials::Plain(&[0.5, 1.5, 2.5])),
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("c", "force at a speed of 1", Dimension::OUTPUT),
+        EffectParameter::shape("p", "exponent", Dimension::ONE, [0.5, 4.0], InitialGrid::Plain(&[0.5, 1.5, 2.5])),
     ];
     const RARITY: u8 = 2;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { c: s[0], p: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.c * power(at.v.abs(), self.p) * sign(at.v.value())
     }
 }

@@ -1,6 +1,6 @@
 //! Quadratic drag of a fluid.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -19,17 +19,17 @@ impl Definition for QuadraticDrag {
     const SOURCE: &'static str = "S. F. Hoerner, Fluid-Dynamic Drag (1965)";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("k", "force per squared speed", Dimension::OUTPUT.over(Dimension::SPEED.power(2)))];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("k", "force per squared speed", Dimension::OUTPUT.over(Dimension::SPEED.power(2)))];
     const RARITY: u8 = 0;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.k * at.v * at.v.abs()
     }
 }

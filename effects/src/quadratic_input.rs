@@ -1,6 +1,6 @@
 //! Thrust with a quadratic part in the command.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -19,19 +19,19 @@ impl Definition for QuadraticInput {
     const SOURCE: &'static str = "T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (Wiley 2011)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const STRENGTHS: &'static [Strength] = &[Strength::signed(
+    const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::signed(
         "a",
         "relative change of the gain per command",
         Dimension::OUTPUT.over(Dimension::VALUE.power(2)),
     )];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { a: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value + self.a * at.value * at.value.abs()
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::ANY;
@@ -24,19 +24,30 @@ impl Definition for QuadraticStiffness {
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 4";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::signed("k", "force per squared displacement", Dimension::OUTPUT.over(Dimension::POSITION.power(2))),
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::signed(
+            "k",
+            "force per squared displacement",
+            Dimension::OUTPUT.over(Dimension::POSITION.power(2)),
+        ),
         // Not fitted, as its estimate would conflict with the stiffness: the force is strongly nonlinear in both.
-        Strength::shape("rest", "position without force", Dimension::POSITION, ANY, Trials::Plain(&[0.0, PI])).kept(),
+        EffectParameter::shape(
+            "rest",
+            "position without force",
+            Dimension::POSITION,
+            ANY,
+            InitialGrid::Plain(&[0.0, PI]),
+        )
+        .kept(),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], rest: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let d = at.q - self.rest;
         -self.k * d * d
     }

@@ -1,6 +1,6 @@
 //! Radiation to surroundings whose temperature is an input.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, RADIATION, emission, radiated};
@@ -22,26 +22,26 @@ impl Definition for RadiationExchange {
     const CLASS: EffectClass = EffectClass::Dissipative;
     const FORM_OF: Option<&'static str> = Some("radiation-loss");
     const PORTS: &'static [PortKind] = &[PortKind::Process];
-    const COMPANION: Option<PortKind> = Some(PortKind::Actuator);
-    const STRENGTHS: &'static [Strength] = &[
+    const SECOND_PORT: Option<PortKind> = Some(PortKind::Actuator);
+    const PARAMETERS: &'static [EffectParameter] = &[
         emission(),
-        Strength::shape(
+        EffectParameter::shape(
             "zero",
             "offset to the absolute temperature of state and input: 0, or 273.15 for degC",
             Dimension::POSITION,
             NOT_NEGATIVE,
-            Trials::Plain(&[0.0, 273.15]),
+            InitialGrid::Plain(&[0.0, 273.15]),
         )
         .kept(),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], zero: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -radiated(self.k, at.q, at.other, self.zero)
     }
 }

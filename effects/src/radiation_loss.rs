@@ -1,6 +1,6 @@
 //! Radiation to the surroundings.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{ANY, NOT_NEGATIVE, RADIATION, emission, radiated};
@@ -22,32 +22,32 @@ impl Definition for RadiationLoss {
     const SOURCE: &'static str = RADIATION;
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
-    const STRENGTHS: &'static [Strength] = &[
+    const PARAMETERS: &'static [EffectParameter] = &[
         emission(),
-        Strength::shape(
+        EffectParameter::shape(
             "around",
             "temperature of the surroundings, on the scale of the state",
             Dimension::POSITION,
             ANY,
-            Trials::Within(&[-0.3, 0.0, 0.3]),
+            InitialGrid::Within(&[-0.3, 0.0, 0.3]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "zero",
             "offset to the absolute temperature of the state: 0, 273.15 for degC, 293.15 relative to a room",
             Dimension::POSITION,
             NOT_NEGATIVE,
-            Trials::Plain(&[0.0, 273.15, 293.15]),
+            InitialGrid::Plain(&[0.0, 273.15, 293.15]),
         )
         .kept(),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], around: s[1], zero: s[2] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -radiated(self.k, at.q, self.around, self.zero)
     }
 }

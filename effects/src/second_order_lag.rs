@@ -1,6 +1,6 @@
 //! Second-order actuator or sensor.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::damped;
@@ -21,21 +21,21 @@ impl Definition for SecondOrderLag {
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 5-3";
     const CLASS: EffectClass = EffectClass::DelayLike;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator, PortKind::Sensor];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("tau", "inverse of the natural frequency", Dimension::TIME)
-            .tried(Trials::Scaled(&[0.02, 0.05, 0.1, 0.3])),
-        Strength::shape("d", "damping ratio", Dimension::ONE, [0.05, 5.0], Trials::Plain(&[0.3, 0.8, 1.5])),
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("tau", "inverse of the natural frequency", Dimension::TIME)
+            .tried(InitialGrid::Scaled(&[0.02, 0.05, 0.1, 0.3])),
+        EffectParameter::shape("d", "damping ratio", Dimension::ONE, [0.05, 5.0], InitialGrid::Plain(&[0.3, 0.8, 1.5])),
     ];
     const STATES: usize = 2;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE, Dimension::VALUE.over(Dimension::TIME)];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { tau: s[0], d: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn start(&self, at: &At<'_, S>, z: &mut [S]) {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn start(&self, at: &PortState<'_, S>, z: &mut [S]) {
         z.copy_from_slice(&[at.value, S::from(0.0)]);
     }
 
@@ -43,7 +43,7 @@ impl<S: Scalar> Acting<S> for AtStrengths<S> {
         0.5 * damped(self.tau) / (self.d.value() * 2.0).max(1.0)
     }
 
-    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+    fn rates(&self, at: &PortState<'_, S>, z: &[S], dz: &mut [S]) {
         let bend = if self.tau.value() > 0.0 {
             ((at.value - z[0]) / self.tau - self.d * z[1] * 2.0) / self.tau
         } else {
@@ -52,7 +52,7 @@ impl<S: Scalar> Acting<S> for AtStrengths<S> {
         dz.copy_from_slice(&[z[1], bend]);
     }
 
-    fn value(&self, at: &At<'_, S>, z: &[S]) -> S {
+    fn value(&self, at: &PortState<'_, S>, z: &[S]) -> S {
         if self.tau.value() > 0.0 { z[0] } else { at.value }
     }
 }

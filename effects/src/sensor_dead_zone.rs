@@ -1,6 +1,6 @@
 //! Dead zone of a sensor.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{ANY, clamp};
@@ -23,25 +23,25 @@ impl Definition for SensorDeadZone {
                                   Nonlinearities (Wiley 1996), chapter 2";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("width", "largest change that is not measured", Dimension::VALUE)
-            .tried(Trials::Scaled(&[0.05, 0.2, 0.5])),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("width", "largest change that is not measured", Dimension::VALUE)
+            .tried(InitialGrid::Scaled(&[0.05, 0.2, 0.5])),
+        EffectParameter::shape(
             "centre",
             "middle of the dead zone",
             Dimension::VALUE,
             ANY,
-            Trials::Within(&[0.2, 0.35, 0.5, 0.65, 0.8]),
+            InitialGrid::Within(&[0.2, 0.35, 0.5, 0.65, 0.8]),
         ),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { width: s[0], centre: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value - clamp(at.value - self.centre, -self.width, self.width)
     }
 }

@@ -1,6 +1,6 @@
 //! Drift of a measurement.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -19,16 +19,16 @@ impl Definition for SensorDrift {
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::signed("r", "drift per time", Dimension::OUTPUT.over(Dimension::TIME))];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::signed("r", "drift per time", Dimension::OUTPUT.over(Dimension::TIME))];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { r: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value + self.r * at.t
     }
 }

@@ -1,6 +1,6 @@
 //! Gain error of a measurement.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -19,17 +19,17 @@ impl Definition for SensorGain {
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    const STRENGTHS: &'static [Strength] =
+    const PARAMETERS: &'static [EffectParameter] =
         // An assumption: an error of more than half indicates another scale or a unit error.
-        &[Strength::signed("g", "relative error of the gain", Dimension::ONE).within(-0.5, 0.5)];
+        &[EffectParameter::signed("g", "relative error of the gain", Dimension::ONE).within(-0.5, 0.5)];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { g: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value * (self.g + 1.0)
     }
 }

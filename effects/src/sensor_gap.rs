@@ -1,6 +1,6 @@
 //! Potentiometer with a gap.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::ANY;
@@ -22,25 +22,25 @@ impl Definition for SensorGap {
     const CLASS: EffectClass = EffectClass::Gain;
     const FORM_OF: Option<&'static str> = Some("sensor-dead-zone");
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("width", "half the width of the gap", Dimension::VALUE)
-            .tried(Trials::ScaledAndGap(&[0.05, 0.1, 0.2, 0.4])),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("width", "half the width of the gap", Dimension::VALUE)
+            .tried(InitialGrid::ScaledAndGap(&[0.05, 0.1, 0.2, 0.4])),
+        EffectParameter::shape(
             "centre",
             "middle of the gap, and the value shown there",
             Dimension::VALUE,
             ANY,
-            Trials::WithinAndGap(&[0.2, 0.35, 0.5, 0.65, 0.8]),
+            InitialGrid::WithinAndGap(&[0.2, 0.35, 0.5, 0.65, 0.8]),
         ),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { width: s[0], centre: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         if (at.value - self.centre).value().abs() < self.width.value() { self.centre } else { at.value }
     }
 }

@@ -1,6 +1,6 @@
 //! First-order sensor.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::damped;
@@ -20,19 +20,19 @@ impl Definition for SensorLag {
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 5-2";
     const CLASS: EffectClass = EffectClass::DelayLike;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("tau", "time constant", Dimension::TIME)
-            .tried(Trials::Scaled(&[0.02, 0.05, 0.1, 0.3, 1.0]))];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("tau", "time constant", Dimension::TIME)
+            .tried(InitialGrid::Scaled(&[0.02, 0.05, 0.1, 0.3, 1.0]))];
     const STATES: usize = 1;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { tau: s[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn start(&self, at: &At<'_, S>, z: &mut [S]) {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn start(&self, at: &PortState<'_, S>, z: &mut [S]) {
         z[0] = at.value;
     }
 
@@ -40,11 +40,11 @@ impl<S: Scalar> Acting<S> for AtStrengths<S> {
         damped(self.tau)
     }
 
-    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+    fn rates(&self, at: &PortState<'_, S>, z: &[S], dz: &mut [S]) {
         dz[0] = if self.tau.value() > 0.0 { (at.value - z[0]) / self.tau } else { S::from(0.0) };
     }
 
-    fn value(&self, at: &At<'_, S>, z: &[S]) -> S {
+    fn value(&self, at: &PortState<'_, S>, z: &[S]) -> S {
         if self.tau.value() > 0.0 { z[0] } else { at.value }
     }
 }

@@ -1,6 +1,6 @@
 //! Sensor with a limited range.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{ANY, clamp};
@@ -22,28 +22,28 @@ impl Definition for SensorSaturation {
     const SOURCE: &'static str = "H. K. Khalil, Nonlinear Systems, 3rd edition (Prentice Hall 2002), section 1.2.7";
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("limit", "limit", Dimension::VALUE)
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("limit", "limit", Dimension::VALUE)
             .within(ANY[0], ANY[1])
             .neutral_at(f64::INFINITY)
-            .tried(Trials::Within(&[0.04, 0.1, 0.2, 0.3, 0.6, 0.7, 0.8, 0.9, 0.96])),
-        Strength::shape(
+            .tried(InitialGrid::Within(&[0.04, 0.1, 0.2, 0.3, 0.6, 0.7, 0.8, 0.9, 0.96])),
+        EffectParameter::shape(
             "side",
             "side that saturates: 1 above, -1 below, 0 both",
             Dimension::ONE,
             [-1.0, 1.0],
-            Trials::Plain(&[1.0, 0.0, -1.0]),
+            InitialGrid::Plain(&[1.0, 0.0, -1.0]),
         )
         .kept(),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { limit: s[0], side: s[1].value() })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let (y, limit) = (at.value, self.limit);
         if limit.value().is_infinite() {
             return y;

@@ -1,6 +1,6 @@
 //! Overflow above a level into another store.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{ANY, NOT_NEGATIVE, power};
@@ -24,44 +24,44 @@ impl Definition for SpillOver {
     const CLASS: EffectClass = EffectClass::Flow;
     const FORM_OF: Option<&'static str> = Some("overflow");
     const PORTS: &'static [PortKind] = &[PortKind::Process];
-    const COMPANION: Option<PortKind> = Some(PortKind::Process);
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "outflow at a level of 1 above the edge", Dimension::OUTPUT),
-        Strength::shape(
+    const SECOND_PORT: Option<PortKind> = Some(PortKind::Process);
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("k", "outflow at a level of 1 above the edge", Dimension::OUTPUT),
+        EffectParameter::shape(
             "level",
             "level of the edge",
             Dimension::POSITION,
             ANY,
-            Trials::Within(&[0.5, 0.7, 0.85, 0.95]),
+            InitialGrid::Within(&[0.5, 0.7, 0.85, 0.95]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "n",
             "exponent: 1 for a plain edge, 3/2 for a rectangular weir",
             Dimension::ONE,
             [1.0, 2.5],
-            Trials::Plain(&[1.0, 1.5]),
+            InitialGrid::Plain(&[1.0, 1.5]),
         )
         .kept(),
-        Strength::shape(
+        EffectParameter::shape(
             "share",
             "fraction that flows into the companion, times the ratio of the areas if the states are levels",
             Dimension::ONE,
             NOT_NEGATIVE,
-            Trials::Plain(&[0.3, 1.0]),
+            InitialGrid::Plain(&[0.3, 1.0]),
         ),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], level: s[1], n: s[2], share: s[3] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.k * power(at.q - self.level, self.n)
     }
 
-    fn onward(&self, at: &At<'_, S>, z: &[S]) -> S {
+    fn onward(&self, at: &PortState<'_, S>, z: &[S]) -> S {
         -self.share * self.value(at, z)
     }
 }

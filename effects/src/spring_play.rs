@@ -1,6 +1,6 @@
 //! Spring with backlash.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, clamp};
@@ -25,18 +25,28 @@ impl Definition for SpringPlay {
     const CLASS: EffectClass = EffectClass::Elastic;
     const FORM_OF: Option<&'static str> = Some("backlash");
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "stiffness of the spring with backlash", Dimension::OUTPUT.over(Dimension::POSITION)),
-        Strength::shape("gap", "width of the gap", Dimension::POSITION, NOT_NEGATIVE, Trials::Scaled(&[0.1, 0.4, 1.0])),
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive(
+            "k",
+            "stiffness of the spring with backlash",
+            Dimension::OUTPUT.over(Dimension::POSITION),
+        ),
+        EffectParameter::shape(
+            "gap",
+            "width of the gap",
+            Dimension::POSITION,
+            NOT_NEGATIVE,
+            InitialGrid::Scaled(&[0.1, 0.4, 1.0]),
+        ),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], gap: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let half = self.gap * 0.5;
         self.k * clamp(at.q, -half, half)
     }

@@ -1,6 +1,8 @@
 //! Break-away force above the sliding force.
 
-use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{
+    BoundEffect, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
@@ -23,28 +25,28 @@ impl Definition for Stiction {
                                   30 (1994), section 2";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("c", "friction force in motion", Dimension::OUTPUT),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("c", "friction force in motion", Dimension::OUTPUT),
+        EffectParameter::shape(
             "rise",
             "friction force at rest divided by that in motion, minus 1",
             Dimension::ONE,
             NOT_NEGATIVE,
-            Trials::Jumps(&[0.0, 0.5]),
+            InitialGrid::Jumps(&[0.0, 0.5]),
         ),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { c: s[0], rise: s[1] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         S::from(0.0)
     }
 
-    fn friction(&self, _: &At<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
+    fn friction(&self, _: &PortState<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
         Some(DryFriction { sliding: [self.c; 2], limit: [self.c * (self.rise + 1.0); 2] })
     }
 }

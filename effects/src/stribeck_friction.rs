@@ -1,6 +1,8 @@
 //! Dry friction that decreases with speed.
 
-use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{
+    BoundEffect, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
@@ -24,35 +26,35 @@ impl Definition for StribeckFriction {
                                   30 (1994), section 2";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("c", "friction force at high speed", Dimension::OUTPUT),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("c", "friction force at high speed", Dimension::OUTPUT),
+        EffectParameter::shape(
             "rise",
             "friction force at rest divided by that at high speed, minus 1",
             Dimension::ONE,
             NOT_NEGATIVE,
-            Trials::Plain(&[0.4, 1.5]),
+            InitialGrid::Plain(&[0.4, 1.5]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "vs",
             "speed at which the rise has decreased to 1/e",
             Dimension::SPEED,
             NOT_NEGATIVE,
-            Trials::Scaled(&[0.03, 0.1, 0.3, 0.8]),
+            InitialGrid::Scaled(&[0.03, 0.1, 0.3, 0.8]),
         ),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { c: s[0], rise: s[1], vs: s[2] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         S::from(0.0)
     }
 
-    fn friction(&self, at: &At<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
+    fn friction(&self, at: &PortState<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
         let rise = if self.vs.value() > 0.0 {
             let ratio = at.v / self.vs;
             self.rise * (-(ratio * ratio)).exp()

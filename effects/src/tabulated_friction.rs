@@ -1,6 +1,8 @@
 //! Dry friction as a table over the speed.
 
-use mops_core::{Acting, At, Dimension, DryFriction, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{
+    BoundEffect, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
@@ -28,44 +30,51 @@ impl Definition for TabulatedFriction {
                                   30 (1994), section 2";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("c", "friction force at rest", Dimension::OUTPUT),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("c", "friction force at rest", Dimension::OUTPUT),
+        EffectParameter::shape(
             "r1",
             "force at a quarter of the top speed divided by that at rest",
             Dimension::ONE,
             [0.0, 100.0],
-            Trials::Plain(&[0.7, 1.5]),
+            InitialGrid::Plain(&[0.7, 1.5]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "r2",
             "force at half the top speed divided by that at rest",
             Dimension::ONE,
             [0.0, 100.0],
-            Trials::Plain(&[0.7, 2.5]),
+            InitialGrid::Plain(&[0.7, 2.5]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "r3",
             "force at the top speed divided by that at rest",
             Dimension::ONE,
             [0.0, 100.0],
-            Trials::Plain(&[1.0, 4.0]),
+            InitialGrid::Plain(&[1.0, 4.0]),
         ),
-        Strength::shape("top", "top speed of the table", Dimension::SPEED, NOT_NEGATIVE, Trials::Scaled(&[2.0])).kept(),
+        EffectParameter::shape(
+            "top",
+            "top speed of the table",
+            Dimension::SPEED,
+            NOT_NEGATIVE,
+            InitialGrid::Scaled(&[2.0]),
+        )
+        .kept(),
     ];
     const RARITY: u8 = 2;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { c: s[0], r1: s[1], r2: s[2], r3: s[3], top: s[4] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, _: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         S::from(0.0)
     }
 
-    fn friction(&self, at: &At<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
+    fn friction(&self, at: &PortState<'_, S>, _: &[S]) -> Option<DryFriction<S>> {
         let points =
             [(S::from(0.0), S::from(1.0)), (self.top * 0.25, self.r1), (self.top * 0.5, self.r2), (self.top, self.r3)];
         let speed = at.v.abs();

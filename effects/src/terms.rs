@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use mops_core::{Dimension, Scalar, Strength, Trials};
+use mops_core::{Dimension, EffectParameter, InitialGrid, Scalar};
 
 /// Bounds of a parameter that may be any number.
 pub(super) const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
@@ -12,9 +12,9 @@ pub(super) const NOT_NEGATIVE: [f64; 2] = [0.0, f64::INFINITY];
 
 /// Returns the parameter for the phase of a sine, rad, with initial values at every quarter turn. The bounds extend one
 /// turn further, so that no fit stops at the end of the first turn.
-pub(super) const fn phase() -> Strength {
-    let quarters = Trials::Plain(&[-FRAC_PI_2, 0.0, FRAC_PI_2, PI]);
-    Strength::shape("phase", "phase of the sine, rad", Dimension::ONE, [-3.0 * PI, 3.0 * PI], quarters)
+pub(super) const fn phase() -> EffectParameter {
+    let quarters = InitialGrid::Plain(&[-FRAC_PI_2, 0.0, FRAC_PI_2, PI]);
+    EffectParameter::shape("phase", "phase of the sine, rad", Dimension::ONE, [-3.0 * PI, 3.0 * PI], quarters)
 }
 
 /// Source of [`radiated`] and [`emission`].
@@ -22,8 +22,8 @@ pub(super) const RADIATION: &str = "F. P. Incropera, D. P. DeWitt, T. L. Bergman
                                     Mass Transfer, 6th edition (Wiley 2007), section 1.2.3";
 
 /// Returns the parameter for the radiated heat per difference of fourth powers.
-pub(super) const fn emission() -> Strength {
-    Strength::positive(
+pub(super) const fn emission() -> EffectParameter {
+    EffectParameter::positive(
         "k",
         "emissivity times area times the Stefan-Boltzmann constant",
         Dimension::OUTPUT.over(Dimension::POSITION.power(4)),
@@ -98,8 +98,8 @@ pub(super) fn power<S: Scalar>(x: S, exponent: S) -> S {
 }
 
 /// Returns the parameter for a start time in an experiment, s, with initial values at these fractions of the record.
-pub(super) const fn from(shares: &'static [f64]) -> Strength {
-    Strength::shape("from", "start", Dimension::TIME, NOT_NEGATIVE, Trials::Moments(shares))
+pub(super) const fn from(shares: &'static [f64]) -> EffectParameter {
+    EffectParameter::shape("from", "start", Dimension::TIME, NOT_NEGATIVE, InitialGrid::Moments(shares))
 }
 
 /// Fractions of a record for the initial values of the start of a parameter step.
@@ -109,14 +109,14 @@ pub(super) const STEPS_BEGIN: &[f64] = &[0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.6
 pub(super) const STEPS_LAST: &[f64] = &[0.03, 0.12];
 
 /// Returns the parameter for a duration, s, with initial values at these fractions of the record.
-pub(super) const fn length(shares: &'static [f64]) -> Strength {
-    Strength::shape("length", "duration", Dimension::TIME, NOT_NEGATIVE, Trials::Moments(shares))
+pub(super) const fn length(shares: &'static [f64]) -> EffectParameter {
+    EffectParameter::shape("length", "duration", Dimension::TIME, NOT_NEGATIVE, InitialGrid::Moments(shares))
 }
 
 /// Returns the parameter for a wave number along a position.
-pub(super) const fn waves(trials: Trials) -> Strength {
+pub(super) const fn waves(trials: InitialGrid) -> EffectParameter {
     let about = "wave number: 2 pi divided by the period; for an angle, the number of periods per turn";
-    Strength::shape("n", about, Dimension::ONE.over(Dimension::POSITION), NOT_NEGATIVE, trials)
+    EffectParameter::shape("n", about, Dimension::ONE.over(Dimension::POSITION), NOT_NEGATIVE, trials)
 }
 
 /// Time span with the parameters [`from`] and [`length`].

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use mops_core::math;
-use mops_core::{Acting, Along, At, Effect, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dual7, Effect, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::effects;
 
@@ -32,13 +32,13 @@ fn place(even: &mut Even) -> [f64; 11] {
     })
 }
 
-fn at<S: Scalar>(seen: &[S; 11]) -> At<'static, S> {
+fn at<S: Scalar>(seen: &[S; 11]) -> PortState<'static, S> {
     let [value, q, v, a, mobility, other, other_speed, ..] = *seen;
-    At { t: 0.3, value, q, v, a, mobility, other, other_speed, u: &[], closed: None }
+    PortState { t: 0.3, value, q, v, a, mobility, other, other_speed, u: &[], closed: None }
 }
 
 /// Returns the output of an effect: value, delay, the four numbers of dry friction, and the rates of its states.
-fn answer<S: Scalar>(effect: &dyn Effect, acting: &dyn Acting<S>, seen: &[S; 11]) -> Vec<S> {
+fn answer<S: Scalar>(effect: &dyn Effect, acting: &dyn BoundEffect<S>, seen: &[S; 11]) -> Vec<S> {
     let at = at(seen);
     let z = &seen[7..7 + effect.states()];
     let mut all = vec![if effect.memory() > 0 {
@@ -58,7 +58,7 @@ fn answer<S: Scalar>(effect: &dyn Effect, acting: &dyn Acting<S>, seen: &[S; 11]
 }
 
 /// Returns a value within the bounds.
-fn strength(of: &Strength, even: &mut Even) -> f64 {
+fn strength(of: &EffectParameter, even: &mut Even) -> f64 {
     match of.bounds {
         [low, high] if high.is_finite() => low + (high.min(low + 3.0) - low) * even.between(0.2, 0.8),
         [low, _] if low.is_finite() => even.between(0.3, 1.5),
@@ -113,19 +113,21 @@ fn first_trials_are_few_and_allowed() {
         for of in effect.strengths() {
             let allowed = |values: &[f64]| values.iter().all(|v| of.bounds[0] <= *v && *v <= of.bounds[1]);
             match of.trials {
-                Trials::Linear => assert!(of.neutral == Some(0.0), "{}: {}", effect.name(), of.name),
-                Trials::Plain(values) | Trials::Jumps(values) => {
+                InitialGrid::Linear => assert!(of.neutral == Some(0.0), "{}: {}", effect.name(), of.name),
+                InitialGrid::Plain(values) | InitialGrid::Jumps(values) => {
                     assert!(allowed(values), "{}", effect.name());
                     count *= values.len();
                 }
-                Trials::Scaled(values) | Trials::Within(values) | Trials::WithinSize(values) => count *= values.len(),
-                Trials::SlewAndScaled(shares, multiples) => count *= shares.len() + multiples.len(),
-                Trials::WithinAndGap(values) | Trials::ScaledAndGap(values) => count *= values.len() + 1,
-                Trials::PlainAndScaled(values, multiples) => {
+                InitialGrid::Scaled(values) | InitialGrid::Within(values) | InitialGrid::WithinSize(values) => {
+                    count *= values.len()
+                }
+                InitialGrid::SlewAndScaled(shares, multiples) => count *= shares.len() + multiples.len(),
+                InitialGrid::WithinAndGap(values) | InitialGrid::ScaledAndGap(values) => count *= values.len() + 1,
+                InitialGrid::PlainAndScaled(values, multiples) => {
                     assert!(allowed(values), "{}", effect.name());
                     count *= values.len() + multiples.len();
                 }
-                Trials::Frequencies | Trials::Steps | Trials::Moments(_) => {}
+                InitialGrid::Frequencies | InitialGrid::Steps | InitialGrid::Moments(_) => {}
             }
         }
         assert!(count <= 44, "{}: {count}", effect.name());
@@ -168,7 +170,7 @@ fn dissipative_effects_add_no_energy() {
             assert!(acting.value(&at, &[]) * at.v <= 0.0, "{} {at:?}", effect.name());
             let Some(friction) = acting.friction(&at, &[]) else { continue };
             assert!(friction.sliding.iter().all(|force| *force >= 0.0), "{} {at:?}", effect.name());
-            let rest = acting.friction(&At { v: 0.0, ..at }, &[]).expect("it has friction");
+            let rest = acting.friction(&PortState { v: 0.0, ..at }, &[]).expect("it has friction");
             let holds = rest.limit.iter().zip(rest.sliding).all(|(limit, sliding)| *limit >= sliding);
             assert!(holds, "{} {at:?}", effect.name());
         }
@@ -230,10 +232,10 @@ fn tangents_agree_with_differences() {
         for _ in 0..30 {
             let (s, seen) = (strengths(effect.as_ref(), &mut even), place(&mut even));
             for index in 0..s.len() + seen.len() - 1 {
-                let lifted = |i: usize, x: f64| if i == index { Along::variable(x, 0) } else { Along::from(x) };
-                let with: Vec<Along> = s.iter().enumerate().map(|(i, &x)| lifted(i, x)).collect();
-                let sees: [Along; 11] = std::array::from_fn(|i| lifted(s.len() + i, seen[i]));
-                let exact = answer(effect.as_ref(), effect.act_along(&with).as_ref(), &sees);
+                let lifted = |i: usize, x: f64| if i == index { Dual7::variable(x, 0) } else { Dual7::from(x) };
+                let with: Vec<Dual7> = s.iter().enumerate().map(|(i, &x)| lifted(i, x)).collect();
+                let sees: [Dual7; 11] = std::array::from_fn(|i| lifted(s.len() + i, seen[i]));
+                let exact = answer(effect.as_ref(), effect.bind_dual(&with).as_ref(), &sees);
                 let plain = answer(effect.as_ref(), effect.act(&s).as_ref(), &seen);
                 let [up, down] = [1e-6, -1e-6].map(|by| moved(effect.as_ref(), &s, &seen, index, by));
                 for (k, exact) in exact.iter().enumerate() {
@@ -289,7 +291,8 @@ fn play_keeps_its_output_until_the_gap_is_crossed() {
 fn a_gust_has_the_impulse_of_its_integral() {
     let gust = effects().into_iter().find(|e| e.name() == "wind-gust").expect("it is there").act(&[3.0, 0.7, 0.45]);
     let h = 1e-4;
-    let push: f64 = (0..20_000).map(|k| gust.value(&At { t: f64::from(k) * h, ..at(&[0.0; 11]) }, &[]) * h).sum();
+    let push: f64 =
+        (0..20_000).map(|k| gust.value(&PortState { t: f64::from(k) * h, ..at(&[0.0; 11]) }, &[]) * h).sum();
     assert!((push - 3.0 * 0.45 / 2.0).abs() < 1e-9, "{push}");
 }
 

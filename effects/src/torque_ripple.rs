@@ -1,6 +1,6 @@
 //! Torque ripple over the position of a rotor.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{phase, waves};
@@ -24,20 +24,20 @@ impl Definition for TorqueRipple {
         "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' Collective 2003)";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
-    const COMPANION: Option<PortKind> = Some(PortKind::Joint);
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("a", "relative amplitude", Dimension::ONE).within(0.0, 1.0),
-        waves(Trials::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0], &[4.0, 7.0, 13.0])),
+    const SECOND_PORT: Option<PortKind> = Some(PortKind::Joint);
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive("a", "relative amplitude", Dimension::ONE).within(0.0, 1.0),
+        waves(InitialGrid::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0], &[4.0, 7.0, 13.0])),
         phase(),
     ];
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { a: s[0], n: s[1], phase: s[2] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value * (self.a * (self.n * at.other + self.phase).sin() + 1.0)
     }
 }

@@ -1,6 +1,6 @@
 //! Spring with hysteresis.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength, Trials};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
@@ -23,38 +23,42 @@ impl Definition for TorsionalHysteresis {
     const SOURCE: &'static str = "P. R. Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14 (1976)";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::positive("k", "stiffness along the hysteresis loop", Dimension::OUTPUT.over(Dimension::POSITION)),
-        Strength::shape(
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::positive(
+            "k",
+            "stiffness along the hysteresis loop",
+            Dimension::OUTPUT.over(Dimension::POSITION),
+        ),
+        EffectParameter::shape(
             "h",
             "stiffness after a reversal divided by that along the loop, minus 1",
             Dimension::ONE,
             NOT_NEGATIVE,
-            Trials::Plain(&[0.3, 2.0]),
+            InitialGrid::Plain(&[0.3, 2.0]),
         ),
-        Strength::shape(
+        EffectParameter::shape(
             "y",
             "displacement over which the effect of a reversal decays",
             Dimension::POSITION,
             [1e-4, f64::INFINITY],
-            Trials::Scaled(&[0.05, 0.3]),
+            InitialGrid::Scaled(&[0.05, 0.3]),
         ),
     ];
     const STATES: usize = 1;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::ONE];
     const RARITY: u8 = 2;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { k: s[0], h: s[1], y: s[2] })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
-    fn rates(&self, at: &At<'_, S>, z: &[S], dz: &mut [S]) {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+    fn rates(&self, at: &PortState<'_, S>, z: &[S], dz: &mut [S]) {
         dz[0] = (at.v - z[0] * at.v.abs()) / self.y;
     }
 
-    fn value(&self, at: &At<'_, S>, z: &[S]) -> S {
+    fn value(&self, at: &PortState<'_, S>, z: &[S]) -> S {
         -self.k * (at.q + self.h * self.y * z[0])
     }
 }

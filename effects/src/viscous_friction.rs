@@ -1,6 +1,6 @@
 //! Viscous friction.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -20,17 +20,17 @@ impl Definition for ViscousFriction {
                                   compensation methods for the control of machines with friction, Automatica 30 (1994), section 2.1";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
-    const STRENGTHS: &'static [Strength] =
-        &[Strength::positive("d", "force per speed", Dimension::OUTPUT.over(Dimension::SPEED))];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::positive("d", "force per speed", Dimension::OUTPUT.over(Dimension::SPEED))];
     const RARITY: u8 = 0;
 
-    fn make<S: Scalar>(strengths: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(strengths: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(Viscous { factor: strengths[0] })
     }
 }
 
-impl<S: Scalar> Acting<S> for Viscous<S> {
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+impl<S: Scalar> BoundEffect<S> for Viscous<S> {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.factor * at.v
     }
 }

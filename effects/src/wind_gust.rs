@@ -1,6 +1,6 @@
 //! Single gust.
 
-use mops_core::{Acting, At, Dimension, EffectClass, PortKind, Scalar, Strength};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
 
 use super::Definition;
 use super::terms::{Span, from, length};
@@ -22,24 +22,24 @@ impl Definition for WindGust {
         "Certification Specifications for Large Aeroplanes CS-25 (EASA), section 25.341 (discrete gust)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
     const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
-    const STRENGTHS: &'static [Strength] = &[
-        Strength::signed("a", "peak value", Dimension::OUTPUT),
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::signed("a", "peak value", Dimension::OUTPUT),
         from(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]),
         length(&[0.06, 0.15, 0.4]),
     ];
     const IS_ONE_OFF: bool = true;
 
-    fn make<S: Scalar>(s: &[S]) -> Box<dyn Acting<S>> {
+    fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
         Box::new(AtStrengths { a: s[0], span: Span::new(&s[1..]) })
     }
 }
 
-impl<S: Scalar> Acting<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
     fn breaks(&self) -> Vec<f64> {
         self.span.breaks()
     }
 
-    fn value(&self, at: &At<'_, S>, _: &[S]) -> S {
+    fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         self.a * 0.5 * (-(self.span.passed(at.t) * std::f64::consts::TAU).cos() + 1.0)
     }
 }

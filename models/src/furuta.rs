@@ -1,8 +1,8 @@
 //! Furuta pendulum: an arm that turns about the vertical axis, and a pendulum that swings at its end.
 
 use mops_core::{
-    AnalysisKind, EventInstant, Failure, Instant, Interface, Mistake, Model, ModelOptions, Parameter, Plant, Quantity,
-    Scalar, State, Unit, Variable,
+    AnalysisKind, EventInstant, Failure, Instant, Interface, Model, ModelOptions, Parameter, Plant, Quantity, Scalar,
+    State, StudyError, Unit, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -42,10 +42,10 @@ pub struct FurutaOptions {
 impl ModelOptions for FurutaOptions {
     const KIND: &'static str = "furuta";
 
-    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+    fn build(self) -> Result<Box<dyn Model>, StudyError> {
         self.tolerance.check()?;
         let horizon = self.horizon.as_ref().map(|q| q.to(&Unit::known("s"))).transpose();
-        let horizon = horizon.map_err(|e| Mistake::new("horizon", e))?;
+        let horizon = horizon.map_err(|e| StudyError::new("horizon", e))?;
         Ok(Box::new(Furuta::model(horizon, self.tolerance)))
     }
 }

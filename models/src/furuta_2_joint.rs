@@ -1,6 +1,6 @@
 //! Furuta pendulum as two rigid bodies with two bearings.
 
-use mops_core::{Failure, Interface, Mistake, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, Variable};
+use mops_core::{Failure, Interface, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, StudyError, Variable};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -43,7 +43,7 @@ pub struct Furuta2JointOptions {
 impl ModelOptions for Furuta2JointOptions {
     const KIND: &'static str = "furuta-2-joint";
 
-    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+    fn build(self) -> Result<Box<dyn Model>, StudyError> {
         self.tolerance.check()?;
         let mut parameters = body_parameters();
         parameters.extend([

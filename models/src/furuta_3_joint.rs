@@ -1,6 +1,6 @@
 //! Furuta pendulum whose pendulum can also tilt sideways against a spring.
 
-use mops_core::{Failure, Interface, Mistake, Model, ModelOptions, Parameter, Plant, Quantity, Scalar};
+use mops_core::{Failure, Interface, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, StudyError};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -46,7 +46,7 @@ pub struct Furuta3JointOptions {
 impl ModelOptions for Furuta3JointOptions {
     const KIND: &'static str = "furuta-3-joint";
 
-    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+    fn build(self) -> Result<Box<dyn Model>, StudyError> {
         self.tolerance.check()?;
         let at = |name: &str, default| {
             let about = format!("speed of the arm at entry {} of its friction table", &name[5..]);

@@ -1,6 +1,6 @@
 //! Furuta pendulum linearised about its upright position.
 
-use mops_core::{Failure, Instant, Interface, Mistake, Model, ModelOptions, Parameter, Plant, Quantity, Scalar};
+use mops_core::{Failure, Instant, Interface, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, StudyError};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -35,7 +35,7 @@ pub struct FurutaLinearOptions {
 impl ModelOptions for FurutaLinearOptions {
     const KIND: &'static str = "furuta-linear";
 
-    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+    fn build(self) -> Result<Box<dyn Model>, StudyError> {
         self.tolerance.check()?;
         let interface = mechanism::interface(&upright_joints(), lumped_parameters(), vec![arm_torque()]);
         let horizon = seconds("horizon", self.horizon.as_ref())?;

@@ -1,7 +1,7 @@
 //! Furuta pendulum balanced upright by state feedback, with a setpoint for the angle of the arm.
 
 use mops_core::{
-    EventInstant, Failure, Instant, Interface, Mistake, Model, ModelOptions, Parameter, Quantity, Scalar, Variable,
+    EventInstant, Failure, Instant, Interface, Model, ModelOptions, Parameter, Quantity, Scalar, StudyError, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -55,7 +55,7 @@ enum Plant {
 impl ModelOptions for FurutaStateFeedbackOptions {
     const KIND: &'static str = "furuta-state-feedback";
 
-    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+    fn build(self) -> Result<Box<dyn Model>, StudyError> {
         self.tolerance.check()?;
         let positive = |name, unit, about| Parameter::new(name, unit, about).within(f64::MIN_POSITIVE, f64::INFINITY);
         let mut parameters = vec![

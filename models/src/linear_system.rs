@@ -5,7 +5,7 @@ use std::fmt;
 
 use mops_core::expression::units::{Conflict, Dimensions, Measure, Named};
 use mops_core::{
-    Along, Analysis, DIRECTIONS, Dual, Expression, Failure, Job, Mistake, Parameter, Scalar, StateSpace, Unit,
+    Analysis, DIRECTIONS, Dual, Dual7, Expression, Failure, Job, Parameter, Scalar, StateSpace, StudyError, Unit,
     WithTangents,
 };
 use nalgebra::DMatrix;
@@ -58,9 +58,9 @@ pub(crate) fn tangents(model: &impl LinearSystem, job: &Job<'_>, seeds: &[Vec<f6
             let tangent = std::array::from_fn(|direction| seeds.get(direction).map_or(0.0, |seed| seed[i]));
             Dual { value, tangent }
         };
-        let parameters: Vec<Along> = job.parameters.iter().enumerate().map(parameter).collect();
+        let parameters: Vec<Dual7> = job.parameters.iter().enumerate().map(parameter).collect();
         let matrices = model.matrices(&parameters)?;
-        let along = |direction: usize| part(model, &matrices, |x: Along| x.tangent[direction]);
+        let along = |direction: usize| part(model, &matrices, |x: Dual7| x.tangent[direction]);
         tangents.extend((0..seeds.len()).map(|direction| Analysis::Linear(along(direction))));
     }
     Ok((analyse(model, job)?, tangents))
@@ -196,10 +196,10 @@ impl Units<'_> {
         signals: &[String],
         entries: impl IntoIterator<Item = &'e Bound>,
         delay: Option<&Bound>,
-    ) -> Result<(), Mistake> {
+    ) -> Result<(), StudyError> {
         let known: Vec<&str> = parameters.iter().chain(signals).map(String::as_str).collect();
         for (name, unit) in self.0 {
-            let wrong = |fact: String, help: String| Mistake::new(name, fact).with_help(help).within("units");
+            let wrong = |fact: String, help: String| StudyError::new(name, fact).with_help(help).within("units");
             if !known.contains(&name.as_str()) {
                 let help = mops_core::suggestion(name, known.iter().copied());
                 return Err(wrong(format!("the system has no parameter, input or output `{name}`"), help));
@@ -219,7 +219,7 @@ impl Units<'_> {
         };
         let mut named = Named(parameters.iter().cloned().zip(parameters.iter().map(measure)).collect());
         let wrong = |Conflict { fact, help, .. }: Conflict| {
-            Mistake::new("units", format!("in an entry of the system {fact}")).with_help(help)
+            StudyError::new("units", format!("in an entry of the system {fact}")).with_help(help)
         };
         for entry in entries {
             dimensions.measure(&mut named, entry.expression.root()).map_err(wrong)?;

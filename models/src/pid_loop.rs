@@ -1,8 +1,8 @@
 //! PID controller in a loop with a linear plant.
 
 use mops_core::{
-    AnalysisKind, EventInstant, Failure, Input, Instant, Interface, Mistake, Model, ModelOptions, Parameter, Plant,
-    Quantity, Scalar, Unit, Variable,
+    AnalysisKind, EventInstant, Failure, Input, Instant, Interface, Model, ModelOptions, Parameter, Plant, Quantity,
+    Scalar, StudyError, Unit, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -66,14 +66,17 @@ struct StepOptions {
 impl ModelOptions for PidLoopOptions {
     const KIND: &'static str = "pid-loop";
 
-    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+    fn build(self) -> Result<Box<dyn Model>, StudyError> {
         self.tolerance.check()?;
-        let seconds = |key: &str, q: &Quantity| q.to(&Unit::known("s")).map_err(|e| Mistake::new(key, e));
+        let seconds = |key: &str, q: &Quantity| q.to(&Unit::known("s")).map_err(|e| StudyError::new(key, e));
         let horizon = seconds("horizon", &self.horizon)?;
         if !(horizon > 0.0 && horizon.is_finite()) {
-            return Err(Mistake::new("horizon", format!("expected a positive and finite horizon, found {horizon} s")));
+            return Err(StudyError::new(
+                "horizon",
+                format!("expected a positive and finite horizon, found {horizon} s"),
+            ));
         }
-        let step = |key: &str, options: &Option<StepOptions>| -> Result<Option<Input>, Mistake> {
+        let step = |key: &str, options: &Option<StepOptions>| -> Result<Option<Input>, StudyError> {
             let Some(options) = options else { return Ok(None) };
             let time = options.time.as_ref().map_or(Ok(0.0), |q| seconds("time", q)).map_err(|m| m.within(key))?;
             Ok(Some(Input::Step { time, before: 0.0, after: options.size }))
@@ -84,7 +87,7 @@ impl ModelOptions for PidLoopOptions {
             Some([low, high]) if low < high => Some([low, high]),
             None => None,
             Some([low, high]) => {
-                return Err(Mistake::new(
+                return Err(StudyError::new(
                     "limit",
                     format!("expected a lower limit below the upper limit, found {low} and {high}"),
                 ));
@@ -93,16 +96,21 @@ impl ModelOptions for PidLoopOptions {
         let sampling = match (&self.sample_time, &self.delay) {
             (None, None) => None,
             (None, Some(_)) => {
-                return Err(Mistake::new("delay", "a delay needs a sampled controller").with_help("give `sample-time`"));
+                return Err(
+                    StudyError::new("delay", "a delay needs a sampled controller").with_help("give `sample-time`")
+                );
             }
             (Some(period), delay) => {
                 let period = seconds("sample-time", period)?;
                 let delay = delay.as_ref().map_or(Ok(0.0), |q| seconds("delay", q))?;
                 if !(period > 0.0 && period.is_finite()) {
-                    return Err(Mistake::new("sample-time", format!("expected a positive period, found {period} s")));
+                    return Err(StudyError::new(
+                        "sample-time",
+                        format!("expected a positive period, found {period} s"),
+                    ));
                 }
                 if !(0.0..=period).contains(&delay) {
-                    return Err(Mistake::new(
+                    return Err(StudyError::new(
                         "delay",
                         format!("expected a delay between 0 and the period of {period} s, found {delay} s"),
                     ));

@@ -1,7 +1,7 @@
 //! Loop transfer function of a PID controller and its plant.
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Mistake, Model, ModelOptions, Parameter, Scalar, Variable,
+    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, Parameter, Scalar, StudyError, Variable,
     WithTangents,
 };
 use schemars::JsonSchema;
@@ -45,7 +45,7 @@ struct PidOpenLoop {
 impl ModelOptions for PidOpenLoopOptions {
     const KIND: &'static str = "pid-open-loop";
 
-    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+    fn build(self) -> Result<Box<dyn Model>, StudyError> {
         let mut names = Vec::new();
         let plant = TransferFunction::new(&self.plant, &OWN, &mut names).map_err(|m| m.within("plant"))?;
         let positive = |name, unit, about| Parameter::new(name, unit, about).within(f64::MIN_POSITIVE, f64::INFINITY);

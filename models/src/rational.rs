@@ -1,6 +1,6 @@
 //! Plant given by its transfer function, whose coefficients may be parameters of the model.
 
-use mops_core::{Failure, Mistake, Scalar};
+use mops_core::{Failure, Scalar, StudyError};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
@@ -94,8 +94,8 @@ impl Slot {
 
 impl TransferFunction {
     /// Checks the plant. Adds to `names` the parameters that the plant names, which must not be `taken`.
-    pub fn new(plant: &PlantOptions, taken: &[&str], names: &mut Vec<String>) -> Result<Self, Mistake> {
-        let mut slots = |key: &str, list: &[Coefficient]| -> Result<Vec<Slot>, Mistake> {
+    pub fn new(plant: &PlantOptions, taken: &[&str], names: &mut Vec<String>) -> Result<Self, StudyError> {
+        let mut slots = |key: &str, list: &[Coefficient]| -> Result<Vec<Slot>, StudyError> {
             list.iter().map(|c| slot(c, taken, names).map_err(|m| m.within(key))).collect()
         };
         let form = match (&plant.poles, &plant.numerator, &plant.denominator) {
@@ -109,7 +109,7 @@ impl TransferFunction {
             }
             (None, Some(numerator), Some(denominator)) => {
                 if plant.gain.is_some() || !plant.zeros.is_empty() {
-                    return Err(Mistake::here("`gain` and `zeros` require `poles` instead of coefficients"));
+                    return Err(StudyError::here("`gain` and `zeros` require `poles` instead of coefficients"));
                 }
                 Form::Coefficients {
                     numerator: slots("numerator", numerator)?,
@@ -117,7 +117,7 @@ impl TransferFunction {
                 }
             }
             _ => {
-                return Err(Mistake::here("expected poles, or numerator and denominator, of the plant")
+                return Err(StudyError::here("expected poles, or numerator and denominator, of the plant")
                     .with_help("for example plant = { poles = [0.0, -4.0, -1.0], gain = 1.0 }, or { numerator = [1.0], denominator = [1.0, 5.0, 4.0, 0.0] }"));
             }
         };
@@ -128,7 +128,7 @@ impl TransferFunction {
             }
         };
         if above >= below {
-            return Err(Mistake::here(format!(
+            return Err(StudyError::here(format!(
                 "expected a strictly proper plant, found order {above} over order {below}"
             ))
             .with_help("add the pole of the actuator or the sensor"));
@@ -171,11 +171,11 @@ impl TransferFunction {
     }
 }
 
-fn slot(coefficient: &Coefficient, taken: &[&str], names: &mut Vec<String>) -> Result<Slot, Mistake> {
+fn slot(coefficient: &Coefficient, taken: &[&str], names: &mut Vec<String>) -> Result<Slot, StudyError> {
     match coefficient {
         Coefficient::Number(number) => Ok(Slot::Number(*number)),
         Coefficient::Name(name) if taken.contains(&name.as_str()) => {
-            Err(Mistake::here(format!("`{name}` is a parameter of the controller"))
+            Err(StudyError::here(format!("`{name}` is a parameter of the controller"))
                 .with_help("give the plant's parameter another name"))
         }
         Coefficient::Name(name) => Ok(Slot::Named(names.iter().position(|known| known == name).unwrap_or_else(|| {

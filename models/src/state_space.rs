@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Mistake, Model, ModelOptions, Scalar, Variable, WithTangents,
+    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, Scalar, StudyError, Variable, WithTangents,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -55,7 +55,7 @@ struct Given {
 impl ModelOptions for StateSpaceOptions {
     const KIND: &'static str = "state-space";
 
-    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+    fn build(self) -> Result<Box<dyn Model>, StudyError> {
         let n = self.a.len();
         let (inputs, outputs) = (self.b.first().map_or(0, Vec::len), self.c.len());
         let zeros = || vec![vec![Entry(mops_core::Expression::parse("0").expect("a number")); inputs]; outputs];
@@ -70,7 +70,7 @@ impl ModelOptions for StateSpaceOptions {
             if !fits || height == 0 || width == 0 {
                 let widths: Vec<usize> = rows.iter().map(Vec::len).collect();
                 let fact = format!("expected {height} rows of {width} entries in `{key}`, found rows of {widths:?}");
-                return Err(Mistake::new(key, fact).with_help(
+                return Err(StudyError::new(key, fact).with_help(
                     "a has one row and one column per state, b one column per input, c one row per output",
                 ));
             }
@@ -101,15 +101,15 @@ impl ModelOptions for StateSpaceOptions {
 }
 
 /// Returns the given names, of which there must be `count`, or numbered names.
-fn named(key: &str, given: Option<Vec<String>>, letter: &str, count: usize) -> Result<Vec<String>, Mistake> {
+fn named(key: &str, given: Option<Vec<String>>, letter: &str, count: usize) -> Result<Vec<String>, StudyError> {
     match given {
         Some(names) if names.len() != count => {
-            Err(Mistake::new(key, format!("expected {count} names in `{key}`, found {}", names.len()))
+            Err(StudyError::new(key, format!("expected {count} names in `{key}`, found {}", names.len()))
                 .with_help(format!("name all of them, or leave `{key}` out")))
         }
         Some(names) => match names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
             Some((_, twice)) => {
-                Err(Mistake::new(key, format!("duplicate name `{twice}` in {key}")).with_help("choose another name"))
+                Err(StudyError::new(key, format!("duplicate name `{twice}` in {key}")).with_help("choose another name"))
             }
             None => Ok(names),
         },

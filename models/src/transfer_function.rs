@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Mistake, Model, ModelOptions, Scalar, Variable, WithTangents,
+    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, Scalar, StudyError, Variable, WithTangents,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -61,7 +61,7 @@ struct Given {
 impl ModelOptions for TransferFunctionOptions {
     const KIND: &'static str = "transfer-function";
 
-    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+    fn build(self) -> Result<Box<dyn Model>, StudyError> {
         let mut names = Vec::new();
         let form = match (&self.numerator, &self.denominator, &self.poles) {
             (Some(numerator), Some(denominator), None) if self.zeros.is_none() && self.gain.is_none() => {
@@ -76,7 +76,7 @@ impl ModelOptions for TransferFunctionOptions {
                 gain: self.gain.as_ref().map(|gain| Bound::new(gain, &mut names)),
             },
             _ => {
-                return Err(Mistake::here(
+                return Err(StudyError::here(
                     "expected numerator and denominator, or poles, zeros and gain",
                 )
                 .with_help(
@@ -95,7 +95,7 @@ impl ModelOptions for TransferFunctionOptions {
                 below.saturating_sub(1)
             );
             return Err(
-                Mistake::here(fact).with_help("the order of the denominator must be at least that of the numerator")
+                StudyError::here(fact).with_help("the order of the denominator must be at least that of the numerator")
             );
         }
         let delay = self.delay.as_ref().map(|delay| Bound::new(delay, &mut names));

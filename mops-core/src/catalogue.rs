@@ -7,15 +7,15 @@ use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
 use toml::de::ValueDeserializer;
 
+use crate::catalogue_study::CatalogueStudy;
 use crate::criterion::CriterionSpec;
 use crate::effect::{Effect, Placement};
-use crate::known_study::KnownStudy;
-use crate::mistake::Mistake;
 use crate::model::Model;
 use crate::solver::Solver;
+use crate::study_error::StudyError;
 
 /// Function that adds effects to a model with ports. It is injected because core does not contain the simulation.
-pub type Augment = fn(Arc<dyn Model>, Vec<Placement>) -> Result<Box<dyn Model>, Mistake>;
+pub type Augment = fn(Arc<dyn Model>, Vec<Placement>) -> Result<Box<dyn Model>, StudyError>;
 
 /// Options of a kind of model, as written in a study file; their documentation is the manual page of the kind.
 pub trait ModelOptions: DeserializeOwned + JsonSchema {
@@ -26,7 +26,7 @@ pub trait ModelOptions: DeserializeOwned + JsonSchema {
     ///
     /// # Errors
     /// Returns an error if options contradict each other; it names the key.
-    fn build(self) -> Result<Box<dyn Model>, Mistake>;
+    fn build(self) -> Result<Box<dyn Model>, StudyError>;
 }
 
 /// Options of a kind of criterion, as written in a study file; their documentation is the manual page of the kind.
@@ -53,7 +53,7 @@ pub struct ModelKind {
     pub name: &'static str,
     /// Returns the schema of the options, with their documentation.
     pub schema: fn() -> Schema,
-    pub(crate) read: Reader<Result<Box<dyn Model>, Mistake>>,
+    pub(crate) read: Reader<Result<Box<dyn Model>, StudyError>>,
 }
 
 impl ModelKind {
@@ -148,7 +148,7 @@ pub struct Catalogue {
     /// Function that adds effects to a model; without it no study can name an effect.
     pub augment: Option<Augment>,
     /// Studies known by name.
-    pub studies: Vec<KnownStudy>,
+    pub studies: Vec<CatalogueStudy>,
 }
 
 impl Catalogue {
@@ -183,7 +183,7 @@ impl Catalogue {
     /// Adds a study: files in the program ([`crate::Shipped`]), a folder ([`crate::StudyFolder`]), or one built in Rust
     /// ([`crate::BuiltStudy`]). It replaces a study of the same name.
     #[must_use]
-    pub fn with_study(mut self, study: impl Into<KnownStudy>) -> Self {
+    pub fn with_study(mut self, study: impl Into<CatalogueStudy>) -> Self {
         let study = study.into();
         self.studies.retain(|known| known.name() != study.name());
         self.studies.push(study);
@@ -191,7 +191,7 @@ impl Catalogue {
     }
 
     /// Returns the study of this name.
-    pub fn study(&self, name: &str) -> Option<&KnownStudy> {
+    pub fn study(&self, name: &str) -> Option<&CatalogueStudy> {
         self.studies.iter().find(|study| study.name() == name)
     }
 }

@@ -4,9 +4,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::case::Case;
-use crate::mistake::Mistake;
 use crate::model::{Analysis, AnalysisKind, Interface};
 use crate::samples::Samples;
+use crate::study_error::StudyError;
 use crate::unit::Unit;
 
 /// Options of a criterion as written in the study; names and quantities are not yet checked against a model.
@@ -20,7 +20,7 @@ pub trait CriterionSpec: Send + Sync {
     ///
     /// # Errors
     /// Returns an error for an unknown signal, a quantity in a wrong unit or an invalid option. The error names the option.
-    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, Mistake>;
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError>;
 
     /// Returns the name of the measured signal if the criterion compares with a measurement; it then applies only to cases
     /// that have one.
@@ -41,7 +41,7 @@ pub trait Criterion: Send + Sync {
     ///
     /// # Errors
     /// Returns an error if data are missing: which, and how to provide them.
-    fn suits(&self, _case: &Case) -> Result<(), Mistake> {
+    fn suits(&self, _case: &Case) -> Result<(), StudyError> {
         Ok(())
     }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use crate::port::Port;
-use crate::scalar::{Along, Scalar};
+use crate::scalar::{Dual7, Scalar};
 
 /// Physical class of an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -158,7 +158,7 @@ impl Dimension {
 /// The grid is relative to the trajectories and needs no knowledge of the plant. The typical size of a parameter is the
 /// product of the typical sizes at its place, raised to the powers of its [`Dimension`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Trials {
+pub enum InitialGrid {
     /// Single value: the added term is proportional to the parameter, and regression determines the factor.
     Linear,
     /// Multiples of the typical size.
@@ -166,7 +166,7 @@ pub enum Trials {
     /// Relative positions between the smallest and the largest position (of a process: state; of an actuator or sensor:
     /// value).
     Within(&'static [f64]),
-    /// Relative positions as in [`Trials::Within`], and the centre of a dead band visible in the samples of a sensor.
+    /// Relative positions as in [`InitialGrid::Within`], and the centre of a dead band visible in the samples of a sensor.
     WithinAndGap(&'static [f64]),
     /// Multiples of the typical size, and half the width of a dead band visible in the samples of a sensor.
     ScaledAndGap(&'static [f64]),
@@ -190,7 +190,7 @@ pub enum Trials {
     Moments(&'static [f64]),
 }
 
-impl Trials {
+impl InitialGrid {
     /// Returns true if the residuals are discontinuous in the parameter, so that gradients carry no information. Examples:
     /// quantisation steps, the width of a dead band, a break-away force.
     pub fn jumps(&self) -> bool {
@@ -209,7 +209,7 @@ pub enum Scope {
 
 /// A parameter (strength) of an effect: a magnitude or a shape parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Strength {
+pub struct EffectParameter {
     /// Name, such as `torque`.
     pub name: &'static str,
     /// Description in one line.
@@ -221,7 +221,7 @@ pub struct Strength {
     /// Smallest and largest physically possible value.
     pub bounds: [f64; 2],
     /// Initial grid.
-    pub trials: Trials,
+    pub trials: InitialGrid,
     /// Scope: the study or a single experiment.
     pub scope: Scope,
     /// True if the parameter keeps its grid value, such as an integer number of periods per turn.
@@ -231,7 +231,7 @@ pub struct Strength {
     pub restarts: &'static [f64],
 }
 
-impl Strength {
+impl EffectParameter {
     /// Creates a non-negative factor of the added term, with the null value 0.
     pub const fn positive(name: &'static str, about: &'static str, dimension: Dimension) -> Self {
         Self {
@@ -240,7 +240,7 @@ impl Strength {
             dimension,
             neutral: Some(0.0),
             bounds: [0.0, f64::INFINITY],
-            trials: Trials::Linear,
+            trials: InitialGrid::Linear,
             scope: Scope::Study,
             fixed: false,
             restarts: &[],
@@ -258,14 +258,14 @@ impl Strength {
         about: &'static str,
         dimension: Dimension,
         bounds: [f64; 2],
-        trials: Trials,
+        trials: InitialGrid,
     ) -> Self {
         Self { bounds, trials, neutral: None, ..Self::positive(name, about, dimension) }
     }
 
     /// Sets another initial grid.
     #[must_use]
-    pub const fn tried(mut self, trials: Trials) -> Self {
+    pub const fn tried(mut self, trials: InitialGrid) -> Self {
         self.trials = trials;
         self
     }
@@ -309,7 +309,7 @@ impl Strength {
 
 /// State of the port at which an effect is evaluated.
 #[derive(Debug, Clone, Copy)]
-pub struct At<'a, S> {
+pub struct PortState<'a, S> {
     /// Time, s.
     pub t: f64,
     /// Command at an actuator, signal at a sensor, both before the effect; 0 elsewhere.
@@ -343,31 +343,31 @@ pub struct DryFriction<S> {
 }
 
 /// An effect at given parameters.
-pub trait Acting<S: Scalar> {
+pub trait BoundEffect<S: Scalar> {
     /// Writes the default initial values of the states of the effect.
-    fn start(&self, _at: &At<'_, S>, _z: &mut [S]) {}
+    fn start(&self, _at: &PortState<'_, S>, _z: &mut [S]) {}
 
     /// Writes the rates of the states of the effect.
-    fn rates(&self, _at: &At<'_, S>, _z: &[S], _dz: &mut [S]) {}
+    fn rates(&self, _at: &PortState<'_, S>, _z: &[S], _dz: &mut [S]) {}
 
     /// Returns the output of the effect. At a joint or a process: the term added to the right-hand side of the equation,
     /// positive forward. At an actuator: the input that reaches the plant. At a sensor: the measured value.
-    fn value(&self, at: &At<'_, S>, z: &[S]) -> S;
+    fn value(&self, at: &PortState<'_, S>, z: &[S]) -> S;
 
     /// Returns the term added to the equation of the second port, if both ports are joints or processes.
-    fn onward(&self, _at: &At<'_, S>, _z: &[S]) -> S {
+    fn onward(&self, _at: &PortState<'_, S>, _z: &[S]) -> S {
         S::from(0.0)
     }
 
     /// Returns the dry friction at a joint, in addition to [`Acting::value`].
-    fn friction(&self, _at: &At<'_, S>, _z: &[S]) -> Option<DryFriction<S>> {
+    fn friction(&self, _at: &PortState<'_, S>, _z: &[S]) -> Option<DryFriction<S>> {
         None
     }
 
     /// Returns the opening of a contact at a joint, negative while the contact is closed. The gap depends on positions and
     /// speeds alone; an effect has one throughout a simulation or never. A simulation ends a step at its zero crossing, and
     /// tangents account for the event time. Within a step [`At::closed`] selects the law, also slightly beyond the crossing.
-    fn gap(&self, _at: &At<'_, S>) -> Option<S> {
+    fn gap(&self, _at: &PortState<'_, S>) -> Option<S> {
         None
     }
 
@@ -394,10 +394,10 @@ pub trait Acting<S: Scalar> {
 
     /// Updates the hysteresis state ([`Effect::memory`]), which is NaN before the first update. Called at an actuator before
     /// and after each jump of the command or of its derivative, at a sensor along the simulation.
-    fn remember(&self, _at: &At<'_, S>, _memory: &mut [S]) {}
+    fn remember(&self, _at: &PortState<'_, S>, _memory: &mut [S]) {}
 
     /// Returns the output, as [`Acting::value`], for an effect with a hysteresis state.
-    fn recall(&self, at: &At<'_, S>, _memory: &[S]) -> S {
+    fn recall(&self, at: &PortState<'_, S>, _memory: &[S]) -> S {
         self.value(at, &[])
     }
 }
@@ -438,7 +438,7 @@ pub trait Effect: Send + Sync {
     }
 
     /// Returns the parameters; the effect vanishes if the first is at its null value.
-    fn strengths(&self) -> &'static [Strength];
+    fn strengths(&self) -> &'static [EffectParameter];
 
     /// Returns the number of states; a diagnosis does not consider effects with more than eight.
     fn states(&self) -> usize {
@@ -474,10 +474,10 @@ pub trait Effect: Send + Sync {
     }
 
     /// Returns the effect at the given parameters.
-    fn act(&self, strengths: &[f64]) -> Box<dyn Acting<f64>>;
+    fn act(&self, strengths: &[f64]) -> Box<dyn BoundEffect<f64>>;
 
     /// Returns the effect with tangents, at parameters with tangents.
-    fn act_along(&self, strengths: &[Along]) -> Box<dyn Acting<Along>>;
+    fn bind_dual(&self, strengths: &[Dual7]) -> Box<dyn BoundEffect<Dual7>>;
 }
 
 /// An effect at a place of a model.

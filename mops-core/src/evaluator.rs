@@ -1,7 +1,7 @@
 //! Problems that a run evaluates: the problem of a study, or one with a known solution.
 
 use crate::evaluation::Evaluation;
-use crate::known::{Kept, KeptSlopes, Known, RowSlopes};
+use crate::known::{CachedGradients, CachedPoint, Known, RowSlopes};
 use crate::problem::{Problem, Slopes};
 use crate::solver::Shape;
 
@@ -26,13 +26,18 @@ pub trait Evaluator: Sync {
     }
 
     /// Evaluates a point with a cache entry.
-    fn evaluate_keeping(&self, point: &[f64], _known: Option<Known>) -> Kept {
-        Kept { evaluation: self.evaluate(point), learned: None }
+    fn evaluate_keeping(&self, point: &[f64], _known: Option<Known>) -> CachedPoint {
+        CachedPoint { evaluation: self.evaluate(point), learned: None }
     }
 
     /// Returns the derivatives at a point with a cache entry.
-    fn slopes_keeping(&self, at: &Evaluation, reach: f64, _known: Option<Option<RowSlopes>>) -> KeptSlopes<Slopes> {
-        KeptSlopes { slopes: self.slopes(at, reach), learned: None }
+    fn slopes_keeping(
+        &self,
+        at: &Evaluation,
+        reach: f64,
+        _known: Option<Option<RowSlopes>>,
+    ) -> CachedGradients<Slopes> {
+        CachedGradients { slopes: self.slopes(at, reach), learned: None }
     }
 
     /// Returns the relative noise of values at neighbouring points. Simulations at a relative tolerance of 1e-8 repeat to
@@ -62,11 +67,11 @@ impl Evaluator for Problem {
         self.slopes(at, reach)
     }
 
-    fn evaluate_keeping(&self, point: &[f64], known: Option<Known>) -> Kept {
+    fn evaluate_keeping(&self, point: &[f64], known: Option<Known>) -> CachedPoint {
         self.evaluate_keeping(point, known)
     }
 
-    fn slopes_keeping(&self, at: &Evaluation, reach: f64, known: Option<Option<RowSlopes>>) -> KeptSlopes<Slopes> {
+    fn slopes_keeping(&self, at: &Evaluation, reach: f64, known: Option<Option<RowSlopes>>) -> CachedGradients<Slopes> {
         self.slopes_keeping(at, reach, known)
     }
 

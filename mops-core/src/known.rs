@@ -45,7 +45,7 @@ impl Known {
 pub type RowSlopes = Vec<(usize, Vec<Value>)>;
 
 /// An evaluation, and the new cache entry.
-pub struct Kept {
+pub struct CachedPoint {
     /// The evaluation.
     pub evaluation: Evaluation,
     /// New results, valid under every demand, usage and weight; `None` if there are none.
@@ -53,7 +53,7 @@ pub struct Kept {
 }
 
 /// Derivatives, and the new cache entry.
-pub struct KeptSlopes<S> {
+pub struct CachedGradients<S> {
     /// Derivatives; `None` if there are no exact ones.
     pub slopes: Option<S>,
     /// New results; `None` if the derivatives were cached, or if the problem has no cache.

@@ -7,6 +7,7 @@ pub mod band_limited;
 mod cancellation;
 mod case;
 mod catalogue;
+mod catalogue_study;
 mod conclude;
 mod criterion;
 pub mod data;
@@ -24,10 +25,8 @@ pub mod file;
 pub mod front;
 pub mod identification;
 mod known;
-mod known_study;
 pub mod linear;
 mod linearised;
-mod mistake;
 mod model;
 mod outcome;
 mod placement;
@@ -44,6 +43,7 @@ mod slopes;
 mod solver;
 pub mod statistics;
 mod study;
+mod study_error;
 mod tolerance;
 mod trace;
 mod trade_offs;
@@ -57,24 +57,24 @@ pub use catalogue::{
     Augment, Catalogue, CriterionKind, CriterionOptions, ModelKind, ModelOptions, SolverChoice, SolverKind,
     SolverOptions,
 };
+pub use catalogue_study::{BuiltStudy, CatalogueStudy, Shipped, StudyFolder};
 pub use conclude::{Ending, conclude};
 pub use criterion::{Criterion, CriterionSpec, Mark, Missed, Sense, Tangent, Usage, Value};
 pub use demand::{Demand, Scaled};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use differences::Differences;
 pub use effect::{
-    Acting, At, Dimension, DryFriction, Effect, EffectClass, Placement, PortKind, Scope, Strength, Trials,
+    BoundEffect, Dimension, DryFriction, Effect, EffectClass, EffectParameter, InitialGrid, Placement, PortKind,
+    PortState, Scope,
 };
 pub use evaluation::{Evaluation, FEASIBLE, Merit, Objective, Reading};
 pub use evaluator::Evaluator;
 pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
 pub use failure::Failure;
-pub use known::{JobValues, Kept, KeptSlopes, Known, RowSlopes, RowValue, Store};
-pub use known_study::{BuiltStudy, KnownStudy, Shipped, StudyFolder};
+pub use known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes, RowValue, Store};
 pub use linear::StateSpace;
 pub use linearised::{Linearise, Linearised, Resting, Rough};
-pub use mistake::Mistake;
 pub use model::{
     Analysis, AnalysisKind, Event, Interface, Job, Local, Model, OperatingPoint, Parameter, Response, State, Variable,
     WithTangents, Work,
@@ -84,7 +84,7 @@ pub use outcome::{
     CalibrationReport, ChannelReport, CriterionReport, ExcitationFindings, ExperimentReport, FailureReport, Findings,
     Outcome, ParameterReport, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
 };
-pub use placement::EffectDraft;
+pub use placement::EffectBuilder;
 pub use plant::{EventInstant, Instant, Open, Opening, Plant, Span};
 pub use port::Port;
 pub use prediction::SignalSlopes;
@@ -97,16 +97,17 @@ pub use robustness::{
 };
 pub use run::{Budget, FailureCount, Quiet, Record, Run, State as RunState, Watch};
 pub use samples::Samples;
-pub use scalar::{Along, DIRECTIONS, Dual, Scalar};
+pub use scalar::{DIRECTIONS, Dual, Dual7, Scalar};
 pub use slopes::{CriterionSlopes, SlopesReport};
 pub use solver::{Linearisation, Oracle, Progress, Shape, Solver, Stop};
 pub use study::{
-    Axis, AxisDraft, CaseDraft, ChannelDraft, Chosen, CriterionDraft, DiagnosisTask, Distribution, DistributionDraft,
-    Draft, ExcitationDraft, ExcitationTask, Free, JobPlan, Measured, ModelDraft, MonteCarloTask, ParameterSource,
-    Place, RegressionDraft, RegressionTask, RobustTask, Row, Scenario, SensitivityMethod, SensitivityTask, Study,
-    SweepDraft, SweepTask, Task, Tasks, TasksDraft, TunerDraft, Uncertain, UncertainDraft, UncertaintyTask,
-    WorstCaseTask,
+    Axis, AxisBuilder, CaseBuilder, ChannelBuilder, Chosen, CriterionBuilder, DiagnosisTask, Distribution,
+    DistributionBuilder, ExcitationBuilder, ExcitationTask, Free, JobPlan, Measured, ModelBuilder, MonteCarloTask,
+    ParameterSource, Place, RegressionBuilder, RegressionTask, RobustTask, Row, Scenario, SensitivityMethod,
+    SensitivityTask, Study, StudyBuilder, SweepBuilder, SweepTask, Task, Tasks, TasksBuilder, TunerBuilder, Uncertain,
+    UncertainBuilder, UncertaintyTask, WorstCaseTask,
 };
+pub use study_error::StudyError;
 pub use tolerance::{IntegrationMethod, Tolerance};
 pub use trace::{Piece, Trace};
 pub use trade_offs::{Certified, Exchange, FrontCriterion, FrontPoint, Pareto, TradeOffs};

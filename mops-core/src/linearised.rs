@@ -10,8 +10,8 @@ use crate::case::Case;
 use crate::diagnostic::suggestion;
 use crate::failure::Failure;
 use crate::linear::{Balance, NoEquilibrium, Point, StateSpace, equilibrium};
-use crate::mistake::Mistake;
 use crate::model::{Analysis, AnalysisKind, Interface, Job, Local, Model, OperatingPoint, Variable};
+use crate::study_error::StudyError;
 use crate::unit::Quantity;
 
 /// Options of a linearisation: operating point, inputs and outputs.
@@ -94,7 +94,7 @@ impl Linearised {
     /// # Errors
     /// Returns an error if the model has no equations that can be linearised, for unknown names and for quantities in a
     /// wrong unit.
-    pub fn new(model: Arc<dyn Model>, options: &Linearise) -> Result<Self, Mistake> {
+    pub fn new(model: Arc<dyn Model>, options: &Linearise) -> Result<Self, StudyError> {
         let states = model.equation_states();
         let of = model.interface();
         if states.is_empty() {
@@ -103,30 +103,30 @@ impl Linearised {
                 AnalysisKind::Time => "this model cannot be linearised: its equations are not available",
                 AnalysisKind::Linear => "this model is already linear",
             };
-            return Err(Mistake::here(fact).with_help("remove `linearise`"));
+            return Err(StudyError::here(fact).with_help("remove `linearise`"));
         }
         let inputs = chosen("inputs", options.inputs.as_deref(), &of.inputs, "input")?;
         let outputs = chosen("outputs", options.outputs.as_deref(), &of.signals, "signal")?;
         let places: Vec<&Variable> = states.iter().chain(&of.inputs).collect();
         let place = |name: &str| {
             places.iter().position(|v| v.name == name).ok_or_else(|| {
-                Mistake::new(name, format!("the model has no state or input `{name}`"))
+                StudyError::new(name, format!("the model has no state or input `{name}`"))
                     .with_help(suggestion(name, places.iter().map(|v| v.name.as_str())))
             })
         };
         let mut given = vec![None; places.len()];
         for (name, quantity) in &options.at {
             let index = place(name).map_err(|m| m.within("at"))?;
-            let value = quantity.to(&places[index].unit).map_err(|why| Mistake::new(name, why).within("at"))?;
+            let value = quantity.to(&places[index].unit).map_err(|why| StudyError::new(name, why).within("at"))?;
             if !value.is_finite() {
                 return Err(
-                    Mistake::new(name, format!("expected a finite value for `{name}`, found {value}")).within("at")
+                    StudyError::new(name, format!("expected a finite value for `{name}`, found {value}")).within("at")
                 );
             }
             given[index] = Some(value);
         }
         if !options.equilibrium && !options.free.is_empty() {
-            return Err(Mistake::new("free", "`free` applies only to the search for an equilibrium")
+            return Err(StudyError::new("free", "`free` applies only to the search for an equilibrium")
                 .with_help("add equilibrium = true, or remove `free`"));
         }
         let mut free: Vec<bool> = (0..places.len()).map(|i| i < states.len() && given[i].is_none()).collect();
@@ -134,7 +134,7 @@ impl Linearised {
             free[place(name).map_err(|m| m.within("free"))?] = true;
         }
         if options.equilibrium && !free.contains(&true) {
-            return Err(Mistake::new(
+            return Err(StudyError::new(
                 "equilibrium",
                 "every state and input is fixed, so that the search has no variables",
             )
@@ -279,17 +279,17 @@ impl Model for Linearised {
 }
 
 /// Returns the indices of the named variables; of all variables without names.
-fn chosen(key: &str, names: Option<&[String]>, known: &[Variable], what: &str) -> Result<Vec<usize>, Mistake> {
+fn chosen(key: &str, names: Option<&[String]>, known: &[Variable], what: &str) -> Result<Vec<usize>, StudyError> {
     let Some(names) = names else { return Ok((0..known.len()).collect()) };
     let find = |name: &String| {
         known.iter().position(|v| v.name == *name).ok_or_else(|| {
-            Mistake::new(name, format!("the model has no {what} `{name}`"))
+            StudyError::new(name, format!("the model has no {what} `{name}`"))
                 .with_help(suggestion(name, known.iter().map(|v| v.name.as_str())))
                 .within(key)
         })
     };
     if names.is_empty() {
-        return Err(Mistake::new(key, format!("`{key}` is empty"))
+        return Err(StudyError::new(key, format!("`{key}` is empty"))
             .with_help(format!("list at least one {what}, or omit `{key}` for all")));
     }
     names.iter().map(find).collect()

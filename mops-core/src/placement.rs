@@ -5,13 +5,13 @@ use std::sync::Arc;
 use crate::catalogue::Catalogue;
 use crate::diagnostic::suggestion;
 use crate::effect::Placement;
-use crate::mistake::Mistake;
 use crate::model::{Interface, Model};
 use crate::port::Port;
+use crate::study_error::StudyError;
 
 /// An effect at a place of a model, as written in a study and not yet checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct EffectDraft {
+pub struct EffectBuilder {
     /// Name of the effect in the model; its parameters are called `name.strength`.
     pub name: String,
     /// Kind of effect.
@@ -22,7 +22,7 @@ pub struct EffectDraft {
     pub companion: Option<String>,
 }
 
-impl EffectDraft {
+impl EffectBuilder {
     /// Creates an effect of a kind at a place.
     pub fn new(name: impl Into<String>, kind: impl Into<String>, place: impl Into<String>) -> Self {
         Self { name: name.into(), kind: kind.into(), place: place.into(), companion: None }
@@ -35,13 +35,13 @@ impl EffectDraft {
     }
 
     /// Returns the effect and its ports.
-    fn placement(&self, catalogue: &Catalogue, model: &Interface) -> Result<Placement, Mistake> {
+    fn placement(&self, catalogue: &Catalogue, model: &Interface) -> Result<Placement, StudyError> {
         if self.name.is_empty() || !self.name.chars().all(|c| c.is_alphanumeric() || "_-".contains(c)) {
-            return Err(Mistake::here(format!("invalid effect name `{}`", self.name))
+            return Err(StudyError::here(format!("invalid effect name `{}`", self.name))
                 .with_help("use letters, digits, `_` and `-` only"));
         }
         let effect = catalogue.effects.iter().find(|effect| effect.name() == self.kind).ok_or_else(|| {
-            Mistake::new(&self.kind, format!("there is no effect `{}`", self.kind))
+            StudyError::new(&self.kind, format!("there is no effect `{}`", self.kind))
                 .with_help(suggestion(&self.kind, catalogue.effects.iter().map(|effect| effect.name())))
         })?;
         let port = |key: &str, text: &str| Port::named(text, model).map_err(|m| m.within(key).within(&self.kind));
@@ -61,12 +61,12 @@ impl Catalogue {
     /// # Errors
     /// Returns an error for an unknown kind of effect or place, and for an effect that does not act there. The error has the
     /// effect's name as its first key.
-    pub fn with_effects(&self, model: Arc<dyn Model>, effects: &[EffectDraft]) -> Result<Box<dyn Model>, Mistake> {
-        let placement = |draft: &EffectDraft| {
+    pub fn with_effects(&self, model: Arc<dyn Model>, effects: &[EffectBuilder]) -> Result<Box<dyn Model>, StudyError> {
+        let placement = |draft: &EffectBuilder| {
             draft.placement(self, model.interface()).map_err(|mistake| mistake.within(&draft.name))
         };
         let placements = effects.iter().map(placement).collect::<Result<Vec<_>, _>>()?;
-        let augment = self.augment.ok_or_else(|| Mistake::here("this catalogue has no simulation of effects"))?;
+        let augment = self.augment.ok_or_else(|| StudyError::here("this catalogue has no simulation of effects"))?;
         augment(model, placements)
     }
 }
@@ -83,12 +83,12 @@ impl Port {
     ///
     /// # Errors
     /// Returns an error if the model has no such port.
-    pub fn named(text: &str, model: &Interface) -> Result<Self, Mistake> {
+    pub fn named(text: &str, model: &Interface) -> Result<Self, StudyError> {
         if let Some(port) = model.ports.iter().find(|port| port.to_string() == text) {
             return Ok(port.clone());
         }
         if model.ports.is_empty() {
-            return Err(Mistake::here("this model has no places for effects: its equations are not accessible")
+            return Err(StudyError::here("this model has no places for effects: its equations are not accessible")
                 .with_help("remove `effects`, or write the model as equations (`mops describe equations`)"));
         }
         let names: Vec<String> = model.places().map(ToString::to_string).collect();
@@ -99,7 +99,7 @@ impl Port {
         } else {
             format!("such as {}", meant.join(", "))
         };
-        Err(Mistake::here(format!("the model has no place `{text}`")).with_help(help))
+        Err(StudyError::here(format!("the model has no place `{text}`")).with_help(help))
     }
 }
 
@@ -122,10 +122,10 @@ mod tests {
     #[test]
     fn an_unknown_effect_is_a_mistake_at_its_kind() {
         let catalogue = Catalogue::default();
-        let draft = EffectDraft::new("arm", "coulomb-friction", "joint:phi");
+        let draft = EffectBuilder::new("arm", "coulomb-friction", "joint:phi");
         let mistake = draft.placement(&catalogue, &Interface::default()).err().unwrap();
         assert_eq!(mistake.path, ["coulomb-friction"]);
-        let draft = EffectDraft::new("arm.c", "coulomb-friction", "joint:phi");
+        let draft = EffectBuilder::new("arm.c", "coulomb-friction", "joint:phi");
         assert!(draft.placement(&catalogue, &Interface::default()).err().unwrap().path.is_empty());
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::enclosure::Enclosure;
 use crate::failure::Failure;
-use crate::scalar::{Along, Scalar};
+use crate::scalar::{Dual7, Scalar};
 
 /// Time, states, inputs and forces at which a plant is evaluated.
 #[derive(Debug, Clone, Copy)]
@@ -238,7 +238,7 @@ pub trait Open: Send + Sync {
     ///
     /// # Errors
     /// Returns an error as [`Open::open`] does.
-    fn open_along<'a>(&'a self, parameters: &'a [Along]) -> Result<Box<dyn Plant<Along> + 'a>, Failure>;
+    fn open_dual<'a>(&'a self, parameters: &'a [Dual7]) -> Result<Box<dyn Plant<Dual7> + 'a>, Failure>;
 
     /// Returns the accuracy and the limits of simulations of the model.
     fn tolerance(&self) -> crate::Tolerance;
@@ -246,30 +246,30 @@ pub trait Open: Send + Sync {
 
 /// Scalar type of effects and opened models: a number, or a number with tangents.
 pub trait Opening: Scalar {
-    /// Calls [`Open::open`] or [`Open::open_along`].
+    /// Calls [`Open::open`] or [`Open::open_dual`].
     ///
     /// # Errors
     /// Returns an error as these functions do.
     fn open<'a>(model: &'a dyn Open, parameters: &'a [Self]) -> Result<Box<dyn Plant<Self> + 'a>, Failure>;
 
-    /// Calls [`crate::Effect::act`] or [`crate::Effect::act_along`].
-    fn act(effect: &dyn crate::Effect, strengths: &[Self]) -> Box<dyn crate::Acting<Self>>;
+    /// Calls [`crate::Effect::act`] or [`crate::Effect::bind_dual`].
+    fn act(effect: &dyn crate::Effect, strengths: &[Self]) -> Box<dyn crate::BoundEffect<Self>>;
 }
 
 impl Opening for f64 {
     fn open<'a>(model: &'a dyn Open, parameters: &'a [Self]) -> Result<Box<dyn Plant<Self> + 'a>, Failure> {
         model.open(parameters)
     }
-    fn act(effect: &dyn crate::Effect, strengths: &[Self]) -> Box<dyn crate::Acting<Self>> {
+    fn act(effect: &dyn crate::Effect, strengths: &[Self]) -> Box<dyn crate::BoundEffect<Self>> {
         effect.act(strengths)
     }
 }
 
-impl Opening for Along {
+impl Opening for Dual7 {
     fn open<'a>(model: &'a dyn Open, parameters: &'a [Self]) -> Result<Box<dyn Plant<Self> + 'a>, Failure> {
-        model.open_along(parameters)
+        model.open_dual(parameters)
     }
-    fn act(effect: &dyn crate::Effect, strengths: &[Self]) -> Box<dyn crate::Acting<Self>> {
-        effect.act_along(strengths)
+    fn act(effect: &dyn crate::Effect, strengths: &[Self]) -> Box<dyn crate::BoundEffect<Self>> {
+        effect.bind_dual(strengths)
     }
 }

@@ -10,7 +10,7 @@ use crate::demand::Demand;
 use crate::evaluation::{Evaluation, Merit, Objective, Reading};
 use crate::experiment::Role;
 use crate::failure::Failure;
-use crate::known::{JobValues, Kept, KeptSlopes, Known, RowSlopes as KnownSlopes, RowValue};
+use crate::known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes as KnownSlopes, RowValue};
 use crate::model::{Analysis, Job};
 use crate::random::stream;
 use crate::scalar::Dual;
@@ -196,16 +196,16 @@ impl Problem {
     }
 
     /// Evaluates a point with a cache entry: only jobs that are not cached run.
-    pub fn evaluate_keeping(&self, point: &[f64], known: Option<Known>) -> Kept {
+    pub fn evaluate_keeping(&self, point: &[f64], known: Option<Known>) -> CachedPoint {
         self.keep(point.to_vec(), self.tuners_at(point), &self.counting, known)
     }
 
     /// Evaluates given values of all tuners in every case, as [`Problem::evaluate_at`], with a cache entry.
-    pub fn evaluate_at_keeping(&self, tuners: &[f64], known: Option<Known>) -> Kept {
+    pub fn evaluate_at_keeping(&self, tuners: &[f64], known: Option<Known>) -> CachedPoint {
         self.keep(self.point_of(tuners), tuners.to_vec(), &self.jobs, known)
     }
 
-    fn keep(&self, point: Vec<f64>, tuners: Vec<f64>, jobs: &[usize], known: Option<Known>) -> Kept {
+    fn keep(&self, point: Vec<f64>, tuners: Vec<f64>, jobs: &[usize], known: Option<Known>) -> CachedPoint {
         let known = known.unwrap_or_default();
         let values: Vec<(usize, JobValues, bool)> = (jobs.par_iter())
             .map(|&job| match known.job(job).filter(|values| self.suffices(job, values)) {
@@ -219,7 +219,7 @@ impl Problem {
             .map(|(job, values, _)| (*job, if keeps_residuals { values.clone() } else { without_residuals(values) }))
             .collect();
         let learned = (!learned.is_empty()).then_some(Known { jobs: learned });
-        Kept { evaluation: self.judge(point, tuners, values.into_iter().map(|(job, v, _)| (job, v))), learned }
+        CachedPoint { evaluation: self.judge(point, tuners, values.into_iter().map(|(job, v, _)| (job, v))), learned }
     }
 
     /// Returns the evaluation of a point from its cache entry; `None` if the entry is incomplete.
@@ -307,12 +307,12 @@ impl Problem {
         at: &Evaluation,
         reach: f64,
         known: Option<Option<KnownSlopes>>,
-    ) -> KeptSlopes<Slopes> {
+    ) -> CachedGradients<Slopes> {
         let known = known.filter(|known| known.as_ref().is_none_or(|rows| self.suffice(rows)));
         let (rows, new) = known.map_or_else(|| (self.row_slopes(at, reach), true), |known| (known, false));
         // Derivatives that were cut off are not cached.
         let learned = (new && (rows.is_some() || !self.is_cancelled())).then(|| rows.clone());
-        KeptSlopes { slopes: rows.and_then(|rows| self.scaled_slopes(at, rows)), learned }
+        CachedGradients { slopes: rows.and_then(|rows| self.scaled_slopes(at, rows)), learned }
     }
 
     /// Returns true if cached derivatives contain everything that this problem needs.

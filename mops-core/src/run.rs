@@ -11,7 +11,7 @@ use crate::evaluation::{Evaluation, Merit, Objective};
 use crate::evaluator::Evaluator;
 use crate::failure::Failure;
 use crate::front;
-use crate::known::{Kept, KeptSlopes, Store};
+use crate::known::{CachedGradients, CachedPoint, Store};
 use crate::problem::{Problem, Slopes};
 use crate::random::{Stream, stream};
 use crate::solver::{Linearisation, Oracle, Progress, Shape, Solver, Stop};
@@ -194,7 +194,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
 
     /// Records an evaluation of the start made elsewhere, so that a run cancelled before its first evaluation has a point to
     /// report.
-    pub fn take_start(&mut self, answer: Kept) {
+    pub fn take_start(&mut self, answer: CachedPoint) {
         let key = bits(&answer.evaluation.tuners);
         self.keep(key, answer);
     }
@@ -257,13 +257,13 @@ impl<'a, E: Evaluator> Run<'a, E> {
     }
 
     /// Evaluates a point, simulating only what is not in the store.
-    fn answer(&self, point: &[f64]) -> Kept {
+    fn answer(&self, point: &[f64]) -> CachedPoint {
         answer(self.problem, self.store, point)
     }
 
     /// Records an evaluated point, and passes new results to the store.
-    fn keep(&mut self, key: Vec<u64>, answer: Kept) {
-        let Kept { evaluation, learned } = answer;
+    fn keep(&mut self, key: Vec<u64>, answer: CachedPoint) {
+        let CachedPoint { evaluation, learned } = answer;
         self.record(&evaluation);
         if let Some(store) = self.store {
             self.reused += usize::from(learned.is_none());
@@ -284,7 +284,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
     fn slopes(&self, at: &Evaluation, reach: f64) -> Option<Slopes> {
         let Some(store) = self.store else { return self.problem.slopes(at, reach) };
         let known = store.known_slopes(&at.tuners, reach);
-        let KeptSlopes { slopes, learned } = self.problem.slopes_keeping(at, reach, known);
+        let CachedGradients { slopes, learned } = self.problem.slopes_keeping(at, reach, known);
         if let Some(learned) = learned {
             store.learned_slopes(&at.tuners, reach, learned);
         }
@@ -354,9 +354,9 @@ impl Hasher for Bits {
 }
 
 /// Evaluates a point, simulating only what is not in the store.
-fn answer(problem: &impl Evaluator, store: Option<&dyn Store>, point: &[f64]) -> Kept {
+fn answer(problem: &impl Evaluator, store: Option<&dyn Store>, point: &[f64]) -> CachedPoint {
     match store {
-        None => Kept { evaluation: problem.evaluate(point), learned: None },
+        None => CachedPoint { evaluation: problem.evaluate(point), learned: None },
         Some(store) => {
             let known = store.known(&problem.tuners_at(point));
             if let (None, Some(end)) = (&known, store.closed()) {
@@ -399,7 +399,7 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
             }
             let (problem, store) = (self.problem, self.store);
             // Sending a single point to another thread does not pay off.
-            let answers: Vec<Kept> = match batch {
+            let answers: Vec<CachedPoint> = match batch {
                 [i] => vec![answer(problem, store, &points[*i])],
                 _ => batch.par_iter().map(|&i| answer(problem, store, &points[i])).collect(),
             };

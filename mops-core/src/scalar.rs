@@ -133,7 +133,7 @@ impl Scalar for f64 {
 pub const DIRECTIONS: usize = 7;
 
 /// Dual number with the tangents of one simulation.
-pub type Along = Dual<DIRECTIONS>;
+pub type Dual7 = Dual<DIRECTIONS>;
 
 /// A dual number: a value with its derivatives with respect to `N` quantities (forward differentiation).
 ///

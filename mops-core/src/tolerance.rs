@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
-use crate::mistake::Mistake;
+use crate::study_error::StudyError;
 use crate::unit::{Quantity, Unit};
 
 /// Accuracy and limits of a simulation.
@@ -63,8 +63,8 @@ impl Tolerance {
     ///
     /// # Errors
     /// Returns an error for a tolerance outside (0, 1), a maximum step size that is not positive, or no steps at all.
-    pub fn check(&self) -> Result<(), Mistake> {
-        let wrong = |key: &str, fact: String| Mistake::new(key, fact).within("tolerance");
+    pub fn check(&self) -> Result<(), StudyError> {
+        let wrong = |key: &str, fact: String| StudyError::new(key, fact).within("tolerance");
         for (key, value) in [("relative", Some(self.relative)), ("absolute", self.absolute)] {
             if let Some(value) = value.filter(|value| !(*value > 0.0 && *value < 1.0)) {
                 return Err(wrong(key, format!("expected a tolerance between 0 and 1, found {value}")));

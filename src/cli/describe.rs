@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Diagnostic, KnownStudy, ModelKind, suggestion};
+use mops_core::{Catalogue, CatalogueStudy, Diagnostic, ModelKind, suggestion};
 
 use super::effect;
 use super::places::places;
@@ -57,7 +57,7 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         .by_ref()
         .map(|(name, _)| name)
         .chain(catalogue.effects.iter().map(|effect| effect.name()))
-        .chain(catalogue.studies.iter().map(KnownStudy::name))
+        .chain(catalogue.studies.iter().map(CatalogueStudy::name))
         .chain(mops_core::file::tables().into_iter().map(|(table, _)| table))
         .collect();
     Err(Diagnostic::new(format!("nothing is called `{name}`"))
@@ -66,9 +66,9 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
 }
 
 /// The page of a study: its README and its file; of one built in Rust, the sentence that it brings.
-fn page_of(study: &KnownStudy) -> String {
+fn page_of(study: &CatalogueStudy) -> String {
     match study {
-        KnownStudy::Built(built) => {
+        CatalogueStudy::Built(built) => {
             format!(
                 "{}: {}\n\nBuilt in Rust; `mops check {0}` shows its tuners and criteria.\n",
                 built.name(),

@@ -1,7 +1,7 @@
 //! The manual page of an effect that a model may lack.
 
 use crate::terminal::number;
-use mops_core::{Dimension, Effect, PortKind, Scope, Strength};
+use mops_core::{Dimension, Effect, EffectParameter, PortKind, Scope};
 
 /// Its definition, formula, places, strengths and source.
 pub(super) fn page(effect: &dyn Effect) -> String {
@@ -38,7 +38,7 @@ fn place(kind: PortKind) -> &'static str {
     }
 }
 
-fn facts(strength: &Strength) -> String {
+fn facts(strength: &EffectParameter) -> String {
     let mut facts = vec![unit(strength.dimension)];
     match strength.bounds {
         [low, high] if low.is_finite() && high.is_finite() => {

@@ -7,7 +7,7 @@ use mops_core::file::StudyFile;
 use mops_core::{Diagnostic, SensitivityMethod, Stop, Study, Task, Watch};
 
 use super::study::{Home, StudyArguments};
-use crate::search::{Keeping, Options, Solved, Unsuitable, solves};
+use crate::search::{EvaluationStore, Options, SolveError, Solved, solves};
 use crate::solve::solve;
 use crate::store::{Identity, Keeper, Opened, Refusal, RunRow, RunState, Start, row};
 use crate::terminal::CommandError;
@@ -98,12 +98,12 @@ pub(super) fn open(
 }
 
 /// A solved study, and the database in which its points are.
-pub(super) type Done = (Result<Solved, Unsuitable>, Opened);
+pub(super) type Done = (Result<Solved, SolveError>, Opened);
 
 /// Solves the study; its points are kept.
 pub(super) fn solve_keeping(study: &Study, options: &Options, keeper: Keeper, watch: &dyn Watch) -> Done {
     let begin = keeper.begin.clone();
-    let keeping = Some(Keeping { study: study.clone(), store: keeper.store(), begin });
+    let keeping = Some(EvaluationStore { study: study.clone(), store: keeper.store(), begin });
     let options = Options { keeping, ..options.clone() };
     keeper.run(watch, |watch| solve(study.clone(), &options, watch))
 }

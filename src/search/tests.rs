@@ -5,8 +5,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mops_core::{
-    Analysis, CaseDraft, CriterionDraft, Draft, Failure, Halt, Interface, Job, Known, Model, ModelDraft, Parameter,
-    Response, RowSlopes, Trace, TunerDraft, Variable,
+    Analysis, CaseBuilder, CriterionBuilder, Failure, Halt, Interface, Job, Known, Model, ModelBuilder, Parameter,
+    Response, RowSlopes, StudyBuilder, Trace, TunerBuilder, Variable,
 };
 use mops_criteria::overshoot::Overshoot;
 
@@ -75,18 +75,18 @@ fn study(last: usize, cases: usize) -> (Study, Cancellation) {
         cancellation: cancellation.clone(),
     };
     let overshoot = || Overshoot { signal: "y".into(), target: Some(1.0.into()), ..Overshoot::default() };
-    let case = |i: u32| CaseDraft {
+    let case = |i: u32| CaseBuilder {
         name: format!("case {i}"),
         parameters: vec![("j".into(), f64::from(i).into())],
-        ..CaseDraft::default()
+        ..CaseBuilder::default()
     };
-    let study = Draft {
+    let study = StudyBuilder {
         name: "watched".into(),
-        models: vec![("loop".into(), ModelDraft::from(model))],
-        tuners: vec![("k".into(), TunerDraft::new(3.0, 0.5, 5.0))],
+        models: vec![("loop".into(), ModelBuilder::from(model))],
+        tuners: vec![("k".into(), TunerBuilder::new(3.0, 0.5, 5.0))],
         cases: (0..u32::try_from(cases).unwrap()).map(case).collect(),
-        criteria: vec![("overshoot".into(), CriterionDraft::minimise(overshoot(), 0.1))],
-        ..Draft::default()
+        criteria: vec![("overshoot".into(), CriterionBuilder::minimise(overshoot(), 0.1))],
+        ..StudyBuilder::default()
     };
     (study.build().unwrap(), cancellation)
 }
@@ -104,7 +104,7 @@ fn what_is_cut_off_is_no_evaluation_no_failure_and_kept_nowhere() {
                 let (study, cancellation) = study(last, cases);
                 let told = Arc::new(Told::default());
                 let store: Arc<dyn Store> = Arc::<Told>::clone(&told) as Arc<dyn Store>;
-                let keeping = Some(Keeping { study: study.clone(), store, begin: None });
+                let keeping = Some(EvaluationStore { study: study.clone(), store, begin: None });
                 let solved = solve(study, &Options { keeping, cancellation, ..options.clone() }, &()).unwrap();
                 let outcome = &solved.outcome;
                 let what = format!("{kind}, {last} of {cases}: {:?} after {}", outcome.stop, outcome.evaluations);

@@ -13,7 +13,7 @@ use super::runs::{RunRow, begin};
 use crate::files::{beside, is_at};
 
 /// A new database that is not yet at its place.
-pub(super) struct Draft {
+pub(super) struct StudyBuilder {
     beside: PathBuf,
     path: PathBuf,
     run: i64,
@@ -37,11 +37,11 @@ impl Database {
     }
 
     /// Makes a new one that holds this run and nothing else. Nobody sees a half of it: it is made beside its place, in one
-    /// transaction, and moved by [`Draft::settle`].
+    /// transaction, and moved by [`StudyBuilder::settle`].
     ///
     /// # Errors
     /// The file cannot be written.
-    pub(super) fn draft(path: &Path, run: &RunRow) -> rusqlite::Result<Draft> {
+    pub(super) fn draft(path: &Path, run: &RunRow) -> rusqlite::Result<StudyBuilder> {
         let beside = beside(path);
         let mut connection = Connection::open(&beside)?;
         let transaction = connection.transaction()?;
@@ -49,7 +49,7 @@ impl Database {
         let run = begin(&transaction, run)?;
         transaction.commit()?;
         connection.close().map_err(|(_, error)| error)?;
-        Ok(Draft { beside, path: path.to_owned(), run })
+        Ok(StudyBuilder { beside, path: path.to_owned(), run })
     }
 
     /// Whether no run was ever entered there: a run was killed while it began, in a version that made its database in parts.
@@ -108,13 +108,13 @@ impl Database {
     }
 }
 
-impl Drop for Draft {
+impl Drop for StudyBuilder {
     fn drop(&mut self) {
         Database::clear_draft(&self.path);
     }
 }
 
-impl Draft {
+impl StudyBuilder {
     /// Moves the database to its place and opens it there; with the number of its run.
     ///
     /// # Errors

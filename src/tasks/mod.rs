@@ -17,13 +17,13 @@ use std::time::Instant;
 
 use mops_core::{Halt, Place, Stop, Study, Task, Watch};
 
-use crate::search::{Options, Solved, Unsuitable, look, search};
+use crate::search::{Options, SolveError, Solved, look, search};
 
 /// Does the task of the study.
 ///
 /// # Errors
 /// The solver cannot treat the problem.
-pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let begun = Instant::now();
     let mut solved = match study.task {
         Task::Design if study.tasks.robust.is_some() => robust::perform(study, options, watch)?,
@@ -50,7 +50,7 @@ pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 }
 
 /// The point that a task asks for.
-fn at(place: Place, study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+fn at(place: Place, study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     match place {
         Place::Start => Ok(look(study, options, watch)),
         Place::Optimum => search(study, options, watch),

@@ -11,7 +11,7 @@ use super::batches::Stage;
 use super::copies::Copies;
 use super::worst_case::{NO_GUARANTEE, Question, Region, Worst, sentence};
 use crate::numbers::significant;
-use crate::search::{Keeping, Options, Solved, Unsuitable, search};
+use crate::search::{EvaluationStore, Options, SolveError, Solved, search};
 
 /// Outer approximation: solve for the cases at hand, search the box for worse ones, add them, and so on. The worst over the
 /// cases at hand is what no design can do better in, as far as the solver finds the optimum; the worst that is found in the
@@ -19,7 +19,7 @@ use crate::search::{Keeping, Options, Solved, Unsuitable, search};
 ///
 /// Source: J. W. Blankenship, J. E. Falk, Journal of Optimization Theory and Applications 19 (1976) 261-281 (algorithm 2.1).
 /// N.B.: there the worst case is found exactly; here it is searched, so that a promise is left out.
-pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let task = study.tasks.robust.clone().expect("the study asks for it");
     let mut rounds = Rounds { study, task, scenarios: Vec::new(), done: Vec::new(), worst: Vec::new() };
     let mut left = options.max_evaluations;
@@ -126,12 +126,12 @@ impl Rounds {
 
     /// Where the points of a round are kept: with those of the study. The first begins where the run does, the others at the
     /// design of the round before.
-    fn keeping(&self, study: &Study, options: &Options) -> Option<Keeping> {
+    fn keeping(&self, study: &Study, options: &Options) -> Option<EvaluationStore> {
         let store: Arc<dyn Store> = Arc::new(Copies::of(options, &self.study, study, &self.scenarios)?);
         let begin = options.keeping.as_ref().and_then(|keeping| keeping.begin.clone());
         let here = || Problem::new(Arc::new(study.clone())).start();
         let begin = begin.map(|begin| if self.done.is_empty() { begin } else { here() });
-        Some(Keeping { study: study.clone(), store, begin })
+        Some(EvaluationStore { study: study.clone(), store, begin })
     }
 
     /// Searches the box around a design, and adds what is worse than the cases at hand; whether there is any.

@@ -1,7 +1,7 @@
 //! A function dressed as a model, and the criterion that reads its values.
 
 use mops::{
-    Analysis, Case, Criterion, CriterionSpec, Failure, Interface, Job, Mistake, Model, Parameter, Response, Trace,
+    Analysis, Case, Criterion, CriterionSpec, Failure, Interface, Job, Model, Parameter, Response, StudyError, Trace,
     Unit, Value, Variable,
 };
 
@@ -45,7 +45,7 @@ impl Model for Function {
 pub struct End(pub String);
 
 impl CriterionSpec for End {
-    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         Ok(Box::new(self.clone()))
     }
 }

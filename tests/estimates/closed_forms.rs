@@ -1,6 +1,6 @@
 //! Standard errors, profiles and replicates against closed forms: of linear models, and of a rate that decays.
 
-use mops::{Chosen, CriterionDraft, TunerDraft, UncertaintyTask};
+use mops::{Chosen, CriterionBuilder, TunerBuilder, UncertaintyTask};
 use nalgebra::{DMatrix, DVector};
 
 use super::models::{Calibration, Channel, Curve, fit, lines, normalised, parameters, words};
@@ -54,13 +54,13 @@ fn mean(weight: f64, declared: f64) -> Weights {
     Box::new(move |times| vec![weight / (declared * declared * times.len() as f64); times.len()])
 }
 
-fn weighted(signal: &str, weight: f64, demand: f64) -> CriterionDraft {
-    CriterionDraft { weight, demand: Some(demand.into()), ..normalised(signal) }
+fn weighted(signal: &str, weight: f64, demand: f64) -> CriterionBuilder {
+    CriterionBuilder { weight, demand: Some(demand.into()), ..normalised(signal) }
 }
 
 fn neighbours() -> Vec<Lines> {
-    let normal: fn() -> Vec<(&'static str, CriterionDraft)> = || vec![("y", normalised("y")), ("z", normalised("z"))];
-    let fits: fn() -> Vec<(&'static str, CriterionDraft)> = || vec![("y", fit("y")), ("z", fit("z"))];
+    let normal: fn() -> Vec<(&'static str, CriterionBuilder)> = || vec![("y", normalised("y")), ("z", normalised("z"))];
+    let fits: fn() -> Vec<(&'static str, CriterionBuilder)> = || vec![("y", fit("y")), ("z", fit("z"))];
     let uneven = |signal| {
         let times: Vec<f64> = (0..60).map(|i| 2.0 * math::powi(f64::from(i) / 59.0, 2)).collect();
         Channel { times, ..channel(signal, 60, 0.02) }
@@ -137,10 +137,10 @@ fn neighbours() -> Vec<Lines> {
     ]
 }
 
-fn calibration(channels: [Channel; 2], criteria: fn() -> Vec<(&'static str, CriterionDraft)>) -> Calibration {
+fn calibration(channels: [Channel; 2], criteria: fn() -> Vec<(&'static str, CriterionBuilder)>) -> Calibration {
     Calibration {
         model: Box::new(lines),
-        tuners: ["a", "b", "slope"].map(|name| (name, TunerDraft::new(1.0, -10.0, 10.0))).into(),
+        tuners: ["a", "b", "slope"].map(|name| (name, TunerBuilder::new(1.0, -10.0, 10.0))).into(),
         channels: channels.into(),
         criteria: Box::new(criteria),
         uncertainty: None,
@@ -200,7 +200,7 @@ fn decays(count: [u32; 2], shared: bool, uncertainty: Option<UncertaintyTask>) -
     let short = if shared { |t: f64| math::exp(-t) } else { |t: f64| math::exp(-0.5 * t) };
     Calibration {
         model: Box::new(|| Curve::new(&["k"], |p, t| math::exp(-p[0] * t)).into()),
-        tuners: vec![("k", TunerDraft { per_case: !shared, ..TunerDraft::new(2.0, 0.1, 10.0).log() })],
+        tuners: vec![("k", TunerBuilder { per_case: !shared, ..TunerBuilder::new(2.0, 0.1, 10.0).log() })],
         channels: vec![
             Channel::new("long", "y", count[0], 3.0, |t| math::exp(-t), 0.01).declared(),
             Channel::new("short", "y", count[1], 2.7, short, 0.01).declared(),

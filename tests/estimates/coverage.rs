@@ -1,7 +1,7 @@
 //! How often 95 % intervals hold the truth, over simulated calibrations whose seeds are 0, 1, 2, ...
 
 use mops::statistics::share_interval;
-use mops::{CriterionDraft, TunerDraft};
+use mops::{CriterionBuilder, TunerBuilder};
 
 use super::models::{Calibration, Channel, Curve, fit, lines, normalised, parameters, words};
 use mops_core::math;
@@ -48,8 +48,8 @@ fn unequal_lengths(declared: bool) -> Calibration {
     Calibration {
         model: Box::new(|| Curve::new(&["g", "k"], |p, t| p[0] * math::exp(-p[1] * t)).into()),
         tuners: vec![
-            ("g", TunerDraft::new(2.0, 0.1, 10.0)),
-            ("k", TunerDraft { per_case: true, ..TunerDraft::new(2.0, 0.1, 10.0).log() }),
+            ("g", TunerBuilder::new(2.0, 0.1, 10.0)),
+            ("k", TunerBuilder { per_case: true, ..TunerBuilder::new(2.0, 0.1, 10.0).log() }),
         ],
         channels: if declared { channels.into_iter().map(Channel::declared).collect() } else { channels },
         criteria: Box::new(move || vec![("y", if declared { normalised("y") } else { fit("y") })]),
@@ -70,10 +70,10 @@ fn intervals_of_records_of_1000_and_10_samples_hold_the_truth_where_the_noise_is
 }
 
 /// Two lines with a common slope.
-fn two_channels(noise: [f64; 2], criteria: fn() -> Vec<(&'static str, CriterionDraft)>) -> Calibration {
+fn two_channels(noise: [f64; 2], criteria: fn() -> Vec<(&'static str, CriterionBuilder)>) -> Calibration {
     Calibration {
         model: Box::new(lines),
-        tuners: ["a", "b", "slope"].map(|name| (name, TunerDraft::new(1.0, -10.0, 10.0))).into(),
+        tuners: ["a", "b", "slope"].map(|name| (name, TunerBuilder::new(1.0, -10.0, 10.0))).into(),
         channels: vec![
             Channel::new("rig", "y", 60, 2.0, |t| 0.3 + 0.7 * t, noise[0]),
             Channel::new("rig", "z", 25, 2.0, |t| -0.2 + 0.7 * t, noise[1]),
@@ -93,7 +93,7 @@ fn intervals_of_two_channels_of_different_noise_hold_the_truth() {
 #[test]
 fn intervals_under_a_weight_of_ten_on_one_criterion_hold_the_truth() {
     let mut calibration = two_channels([0.02, 0.05], || {
-        vec![("y", normalised("y")), ("z", CriterionDraft { weight: 10.0, ..normalised("z") })]
+        vec![("y", normalised("y")), ("z", CriterionBuilder { weight: 10.0, ..normalised("z") })]
     });
     calibration.channels = calibration.channels.into_iter().map(Channel::declared).collect();
     assert_covers(&calibration, &LINES);

@@ -1,6 +1,6 @@
 //! What counts as determined: directions are judged by the noise, not by the stiffest of them.
 
-use mops::{Chosen, Outcome, TunerDraft, UncertaintyTask};
+use mops::{Chosen, Outcome, TunerBuilder, UncertaintyTask};
 
 use super::closed_forms::{Samples, scatter};
 use super::models::{Calibration, Channel, Polynomials, normalised, parameters, words};
@@ -15,7 +15,7 @@ fn sum_and_difference(stiff: f64, soft: f64) -> Calibration {
     channel.truth = |t| t;
     Calibration {
         model: Box::new(move || Polynomials::new(&["a", "b"], &[("y", vec![of(1.0), of(-1.0)])]).into()),
-        tuners: vec![("a", TunerDraft::new(0.4, -10.0, 10.0)), ("b", TunerDraft::new(0.4, -30.0, 30.0))],
+        tuners: vec![("a", TunerBuilder::new(0.4, -10.0, 10.0)), ("b", TunerBuilder::new(0.4, -30.0, 30.0))],
         channels: vec![channel],
         criteria: Box::new(|| vec![("y", normalised("y"))]),
         uncertainty: Some(UncertaintyTask { profile: Chosen::All, ..UncertaintyTask::default() }),

@@ -1,19 +1,19 @@
 //! Tuners that are local to a selection or validation experiment are estimated there.
 
-use mops::{CriterionDraft, Outcome, Role, TunerDraft, Usage};
+use mops::{CriterionBuilder, Outcome, Role, TunerBuilder, Usage};
 
 use super::models::{Calibration, Channel, Curve, fit, normalised};
 use mops_core::math;
 
 /// `y = exp(-k t) + 0.3 exp(-s t)`; `k` is 0.5 in the calibration record `a`, 1.5 in `b`.
-fn records(role: Role, start: f64, criterion: fn(&str) -> CriterionDraft) -> Calibration {
+fn records(role: Role, start: f64, criterion: fn(&str) -> CriterionBuilder) -> Calibration {
     let of = |name, truth| Channel::new(name, "y", 41, 4.0, truth, 0.01).declared();
     let b = of("b", |t| math::exp(-1.5 * t) + 0.3 * math::exp(-0.2 * t));
     Calibration {
         model: Box::new(|| Curve::new(&["k", "s"], |p, t| math::exp(-p[0] * t) + 0.3 * math::exp(-p[1] * t)).into()),
         tuners: vec![
-            ("k", TunerDraft { per_case: true, ..TunerDraft::new(start, 0.1, 10.0).log() }),
-            ("s", TunerDraft::new(0.5, 0.01, 10.0).log()),
+            ("k", TunerBuilder { per_case: true, ..TunerBuilder::new(start, 0.1, 10.0).log() }),
+            ("s", TunerBuilder::new(0.5, 0.01, 10.0).log()),
         ],
         channels: vec![of("a", |t| math::exp(-0.5 * t) + 0.3 * math::exp(-0.2 * t)), Channel { role, ..b }],
         criteria: Box::new(move || vec![("y", criterion("y"))]),
@@ -67,8 +67,10 @@ fn calibrated_tuners_do_not_depend_on_validation_records() {
 fn a_local_tuner_that_no_criterion_shows_leaves_no_validation_error() {
     let outcome = records(Role::Validation, 1.0, normalised).run(0);
     assert!(outcome.warnings.is_empty(), "{:?}", outcome.warnings);
-    let of =
-        |case: &str, usage: Usage| CriterionDraft { cases: Some(vec![case.into()]), ..normalised("y").used_as(usage) };
+    let of = |case: &str, usage: Usage| CriterionBuilder {
+        cases: Some(vec![case.into()]),
+        ..normalised("y").used_as(usage)
+    };
     let mut calibration = records(Role::Validation, 1.0, normalised);
     calibration.criteria = Box::new(move || vec![("a", of("a", Usage::Minimise)), ("b", of("b", Usage::Monitor))]);
     let outcome = calibration.run(0);

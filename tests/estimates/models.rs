@@ -3,25 +3,25 @@
 use mops::criteria::fit::Fit;
 use mops::criteria::normalised_error::NormalisedError;
 use mops::{
-    Analysis, CaseDraft, ChannelDraft, CriterionDraft, Draft, Failure, Interface, Job, Measured, Model, ModelDraft,
-    Options, Outcome, Parameter, ParameterReport, Response, Role, Task, TasksDraft, Trace, TunerDraft, UncertaintyTask,
-    Variable, WithTangents, stream,
+    Analysis, CaseBuilder, ChannelBuilder, CriterionBuilder, Failure, Interface, Job, Measured, Model, ModelBuilder,
+    Options, Outcome, Parameter, ParameterReport, Response, Role, StudyBuilder, Task, TasksBuilder, Trace,
+    TunerBuilder, UncertaintyTask, Variable, WithTangents, stream,
 };
 use mops_core::math;
 use rand::Rng;
 
 /// The normalised error of a signal, as a criterion.
-pub fn normalised(signal: &str) -> CriterionDraft {
-    CriterionDraft::minimise(NormalisedError { signal: signal.into(), ..NormalisedError::default() }, 1.0)
+pub fn normalised(signal: &str) -> CriterionBuilder {
+    CriterionBuilder::minimise(NormalisedError { signal: signal.into(), ..NormalisedError::default() }, 1.0)
 }
 
 /// The fit of a signal, as a criterion.
-pub fn fit(signal: &str) -> CriterionDraft {
-    CriterionDraft::minimise(Fit { signal: signal.into(), ..Fit::default() }, 1.0)
+pub fn fit(signal: &str) -> CriterionBuilder {
+    CriterionBuilder::minimise(Fit { signal: signal.into(), ..Fit::default() }, 1.0)
 }
 
 /// Two lines with a common slope: `y = a + slope t`, `z = b + slope t`.
-pub fn lines() -> ModelDraft {
+pub fn lines() -> ModelBuilder {
     let (constant, time, none) = ([1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0, 0.0], [0.0; 5]);
     let signals = [("y", vec![constant, none, time]), ("z", vec![none, constant, time])];
     Polynomials::new(&["a", "b", "slope"], &signals).into()
@@ -186,40 +186,40 @@ impl Channel {
         self.times.iter().enumerate().map(sample).collect()
     }
 
-    fn measured(&self, seed: u64) -> ChannelDraft {
-        ChannelDraft {
+    fn measured(&self, seed: u64) -> ChannelBuilder {
+        ChannelBuilder {
             signal: self.signal.into(),
             times: self.times.clone(),
             values: self.values(seed),
             noise: self.declared.map(Into::into),
-            ..ChannelDraft::default()
+            ..ChannelBuilder::default()
         }
     }
 }
 
 /// What is calibrated.
 pub struct Calibration {
-    pub model: Box<dyn Fn() -> ModelDraft>,
-    pub tuners: Vec<(&'static str, TunerDraft)>,
+    pub model: Box<dyn Fn() -> ModelBuilder>,
+    pub tuners: Vec<(&'static str, TunerBuilder)>,
     pub channels: Vec<Channel>,
-    pub criteria: Box<dyn Fn() -> Vec<(&'static str, CriterionDraft)>>,
+    pub criteria: Box<dyn Fn() -> Vec<(&'static str, CriterionBuilder)>>,
     pub uncertainty: Option<UncertaintyTask>,
 }
 
 impl Calibration {
     /// Calibrates once, with the noise of this seed.
     pub fn run(&self, seed: u64) -> Outcome {
-        let mut cases: Vec<CaseDraft> = Vec::new();
+        let mut cases: Vec<CaseBuilder> = Vec::new();
         for channel in &self.channels {
             if cases.iter().all(|case| case.name != channel.experiment) {
                 let measured = Measured { role: channel.role, ..Measured::default() };
                 let name = channel.experiment.into();
-                cases.push(CaseDraft { name, measured: Some(measured), ..CaseDraft::default() });
+                cases.push(CaseBuilder { name, measured: Some(measured), ..CaseBuilder::default() });
             }
             let case = cases.iter_mut().find(|case| case.name == channel.experiment).unwrap();
             case.measured.as_mut().unwrap().channels.push(channel.measured(seed));
         }
-        let draft = Draft {
+        let draft = StudyBuilder {
             name: "calibration".into(),
             task: Task::Calibration,
             seed: 1,
@@ -227,8 +227,8 @@ impl Calibration {
             tuners: self.tuners.iter().map(|(name, tuner)| ((*name).to_owned(), tuner.clone())).collect(),
             cases,
             criteria: (self.criteria)().into_iter().map(|(name, criterion)| (name.to_owned(), criterion)).collect(),
-            tasks: TasksDraft { uncertainty: self.uncertainty.clone(), ..TasksDraft::default() },
-            ..Draft::default()
+            tasks: TasksBuilder { uncertainty: self.uncertainty.clone(), ..TasksBuilder::default() },
+            ..StudyBuilder::default()
         };
         let options = Options { jobs: Some(1), ..Options::default() };
         mops::solve(draft.build().unwrap(), &options, &()).unwrap().outcome

@@ -1,7 +1,7 @@
 //! Ends of profiles where the likelihood is flat up to a cliff, against profiles on a fine grid.
 
 use mops::statistics::t_quantile;
-use mops::{Chosen, Outcome, ProfileReport, TunerDraft, UncertaintyTask};
+use mops::{Chosen, Outcome, ProfileReport, TunerBuilder, UncertaintyTask};
 use nalgebra::{DMatrix, DVector};
 
 use super::models::{Calibration, Channel, Curve, normalised, words};
@@ -10,7 +10,7 @@ use mops_core::math;
 /// Number of samples, at times where the curve is exact.
 const SAMPLES: u32 = 161;
 
-fn calibration(model: Curve2, channel: Channel, tuners: Vec<(&'static str, TunerDraft)>, of: &str) -> Calibration {
+fn calibration(model: Curve2, channel: Channel, tuners: Vec<(&'static str, TunerBuilder)>, of: &str) -> Calibration {
     let profile = Chosen::Some(vec![of.to_owned()]);
     Calibration {
         model: Box::new(move || Curve::new(model.0, model.1).into()),
@@ -55,7 +55,7 @@ struct Joint {
     speed: fn(f64) -> f64,
     truth: fn(f64) -> f64,
     noise: f64,
-    tuner: TunerDraft,
+    tuner: TunerBuilder,
     scale: f64,
 }
 
@@ -70,7 +70,7 @@ fn slow(t: f64) -> f64 {
 }
 
 fn joints() -> Vec<Joint> {
-    let log = |start: f64, max: f64| TunerDraft::new(start, 0.1, max).log();
+    let log = |start: f64, max: f64| TunerBuilder::new(start, 0.1, max).log();
     let usual = Joint {
         what: "a bound at 1e9",
         f: |p, t| p[0] * math::tanh(p[3] * fast(t)) + p[1] * fast(t) + p[2],
@@ -86,7 +86,7 @@ fn joints() -> Vec<Joint> {
         with("a bound at 1e3", log(10.0, 1e3)),
         with("started far out", log(1e5, 1e9)),
         with("started at the foot of the cliff", log(2.0, 1e6)),
-        with("a linear scale", TunerDraft::new(10.0, 0.1, 200.0)),
+        with("a linear scale", TunerBuilder::new(10.0, 0.1, 200.0)),
         Joint { what: "half the noise", noise: 0.01, ..joint(&usual) },
         Joint { what: "a tenth of the noise", noise: 0.002, ..joint(&usual) },
         Joint {
@@ -121,9 +121,9 @@ fn the_slope_of_a_friction_curve_has_the_interval_of_a_fine_grid() {
     for joint in joints() {
         let channel = Channel::new("e", "y", SAMPLES, 2.0, joint.truth, joint.noise);
         let tuners = vec![
-            ("c", TunerDraft::new(0.1, -5.0, 5.0)),
-            ("v", TunerDraft::new(0.1, -5.0, 5.0)),
-            ("o", TunerDraft::new(0.0, -5.0, 5.0)),
+            ("c", TunerBuilder::new(0.1, -5.0, 5.0)),
+            ("v", TunerBuilder::new(0.1, -5.0, 5.0)),
+            ("o", TunerBuilder::new(0.0, -5.0, 5.0)),
             ("k", joint.tuner.clone()),
         ];
         let values = channel.values(4);
@@ -153,7 +153,7 @@ fn the_slope_of_a_friction_curve_has_the_interval_of_a_fine_grid() {
 fn a_factor_of_a_ratio_goes_to_where_the_other_meets_its_bound() {
     for (bounds, start) in [([0.01, 100.0], 1.0), ([0.1, 10.0], 3.0), ([1e-4, 1e4], 0.5), ([0.5, 2.0], 1.0)] {
         let channel = Channel::new("e", "y", SAMPLES, 2.0, |t| math::exp(-1.1 * t), 0.01);
-        let tuner = || TunerDraft::new(start, bounds[0], bounds[1]).log();
+        let tuner = || TunerBuilder::new(start, bounds[0], bounds[1]).log();
         let values = channel.values(1);
         let times = channel.times.clone();
         let model = Curve2(&["a", "b"], |p, t| math::exp(-p[0] / p[1] * t));
@@ -173,7 +173,7 @@ fn a_factor_of_a_ratio_goes_to_where_the_other_meets_its_bound() {
 fn a_stop_that_is_not_reached_is_bounded_from_below_alone() {
     for (max, start) in [(100.0, 5.0), (1e6, 5.0), (100.0, 80.0), (3.0, 1.5)] {
         let channel = Channel::new("e", "y", SAMPLES, 3.0, |t| 0.9 * math::sin(t), 0.01);
-        let tuners = vec![("stop", TunerDraft::new(start, 0.5, max).log()), ("g", TunerDraft::new(1.0, 0.5, 2.0))];
+        let tuners = vec![("stop", TunerBuilder::new(start, 0.5, max).log()), ("g", TunerBuilder::new(1.0, 0.5, 2.0))];
         let (values, times) = (channel.values(2), channel.times.clone());
         let model = Curve2(&["stop", "g"], |p, t| p[1] * math::sin(t).min(p[0]));
         let outcome = calibration(model, channel, tuners, "stop").run(2);

@@ -1,6 +1,6 @@
 //! Integral criteria of the control error, which differ in the integrand only.
 
-use mops_core::{Analysis, Case, Criterion, Mistake, Sense, Unit, Value, Variable};
+use mops_core::{Analysis, Case, Criterion, Sense, StudyError, Unit, Value, Variable};
 
 use super::{NOT_NEGATIVE, Step, StepOptions};
 
@@ -18,7 +18,7 @@ impl ErrorIntegral {
         options: &StepOptions<'_>,
         powers: [i32; 2],
         integrand: fn(f64, f64) -> f64,
-    ) -> Result<Box<dyn Criterion>, Mistake> {
+    ) -> Result<Box<dyn Criterion>, StudyError> {
         let step = options.bind(signals)?;
         let unit = step.unit.power(powers[0], powers[1]);
         Ok(Box::new(Self { step, unit, integrand }))

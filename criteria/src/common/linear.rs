@@ -1,7 +1,9 @@
 //! Common parts of criteria of linear systems: channel, value type, criterion.
 
 use mops_core::linear::Loop;
-use mops_core::{Analysis, Case, Criterion, Interface, Mistake, Sense, StateSpace, Unit, Value, Variable, suggestion};
+use mops_core::{
+    Analysis, Case, Criterion, Interface, Sense, StateSpace, StudyError, Unit, Value, Variable, suggestion,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -32,7 +34,7 @@ pub struct Channel {
 
 impl Channel {
     /// Selects the channel by names, which may be omitted if the model has one input, or one output.
-    pub fn bind(model: &Interface, input: Option<&String>, output: Option<&String>) -> Result<Self, Mistake> {
+    pub fn bind(model: &Interface, input: Option<&String>, output: Option<&String>) -> Result<Self, StudyError> {
         let input = pick("input", input, &model.inputs)?;
         let output = pick("output", output, &model.signals)?;
         let (from, to) = (model.inputs[input].unit.difference(), model.signals[output].unit.difference());
@@ -50,14 +52,14 @@ impl Channel {
     ///
     /// # Errors
     /// If the output does not have the dimension of the input.
-    pub fn in_loop(self) -> Result<Self, Mistake> {
+    pub fn in_loop(self) -> Result<Self, StudyError> {
         let [from, to] = &self.ends;
         if !to.unit.is_compatible(&from.unit) {
             let fact = format!(
                 "unity feedback cannot close a loop from `{}` in {} to `{}` in {}",
                 from.name, from.unit, to.name, to.unit
             );
-            return Err(Mistake::here(fact).with_help(
+            return Err(StudyError::here(fact).with_help(
                 "input and output of a loop need the same dimension: add the controller and the sensor to the model, or \
                  use another input or output",
             ));
@@ -70,7 +72,7 @@ impl Channel {
     ///
     /// # Errors
     /// See [`Channel::in_loop`].
-    pub fn read_as(self, of: Of) -> Result<Self, Mistake> {
+    pub fn read_as(self, of: Of) -> Result<Self, StudyError> {
         match of {
             Of::System => Ok(self),
             Of::ClosedLoop => self.in_loop(),
@@ -89,17 +91,17 @@ impl Channel {
     }
 }
 
-fn pick(key: &str, name: Option<&String>, known: &[Variable]) -> Result<usize, Mistake> {
+fn pick(key: &str, name: Option<&String>, known: &[Variable]) -> Result<usize, StudyError> {
     let names = || known.iter().map(|v| v.name.as_str());
     match name {
         Some(name) => names().position(|n| n == name).ok_or_else(|| {
             let names: Vec<&str> = names().collect();
-            Mistake::new(key, format!("the model has no {key} `{name}`")).with_help(suggestion(name, names))
+            StudyError::new(key, format!("the model has no {key} `{name}`")).with_help(suggestion(name, names))
         }),
         None if known.len() == 1 => Ok(0),
         None => {
             let names: Vec<&str> = names().collect();
-            Err(Mistake::here(format!("the model has {} {key}s, and the criterion names none", known.len()))
+            Err(StudyError::here(format!("the model has {} {key}s, and the criterion names none", known.len()))
                 .with_help(format!("add {key} = one of {}", names.join(", "))))
         }
     }
@@ -192,7 +194,7 @@ mod tests {
     fn a_loop_is_closed_in_one_dimension_and_counted_in_one_unit() {
         let margin = |from: &str, to: &str, gain: f64| {
             let criterion = PhaseMargin::default().bind(&channel(from, to))?;
-            Ok::<f64, Mistake>(criterion.value(&Case::default(), &linear(&[gain], &[1.0, 1.0, 0.0])).unwrap().number)
+            Ok::<f64, StudyError>(criterion.value(&Case::default(), &linear(&[gain], &[1.0, 1.0, 0.0])).unwrap().number)
         };
         let exact = margin("rad", "rad", 3.0).unwrap();
         for (from, to, gain) in

@@ -8,7 +8,7 @@ mod step;
 #[cfg(test)]
 pub mod testing;
 
-use mops_core::{Analysis, Mistake, Quantity, Trace, Unit, Variable, suggestion};
+use mops_core::{Analysis, Quantity, StudyError, Trace, Unit, Variable, suggestion};
 
 pub use comparison::{compare, compared_slopes};
 pub use error_integral::ErrorIntegral;
@@ -20,43 +20,43 @@ pub use step::{Step, StepOptions};
 pub const NOT_NEGATIVE: [f64; 2] = [0.0, f64::INFINITY];
 
 /// Returns the signal of that name.
-pub fn signal<'a>(signals: &'a [Variable], name: &str) -> Result<&'a Variable, Mistake> {
+pub fn signal<'a>(signals: &'a [Variable], name: &str) -> Result<&'a Variable, StudyError> {
     signals.iter().find(|signal| signal.name == name).ok_or_else(|| {
-        Mistake::new("signal", format!("the model has no signal `{name}`"))
+        StudyError::new("signal", format!("the model has no signal `{name}`"))
             .with_help(suggestion(name, signals.iter().map(|signal| signal.name.as_str())))
     })
 }
 
 /// Returns an option as a number in `unit`.
-pub fn number(key: &str, option: &Quantity, unit: &Unit) -> Result<f64, Mistake> {
-    let number = option.to(unit).map_err(|why| Mistake::new(key, why))?;
+pub fn number(key: &str, option: &Quantity, unit: &Unit) -> Result<f64, StudyError> {
+    let number = option.to(unit).map_err(|why| StudyError::new(key, why))?;
     if number.is_finite() {
         Ok(number)
     } else {
-        Err(Mistake::new(key, format!("`{key}` must be finite, not {number}")))
+        Err(StudyError::new(key, format!("`{key}` must be finite, not {number}")))
     }
 }
 
 /// Returns an optional option as a number in `unit`.
-pub fn optional(key: &str, option: Option<&Quantity>, unit: &Unit) -> Result<Option<f64>, Mistake> {
+pub fn optional(key: &str, option: Option<&Quantity>, unit: &Unit) -> Result<Option<f64>, StudyError> {
     option.map(|option| number(key, option, unit)).transpose()
 }
 
 /// Returns an optional positive option as a number in `unit`; a temperature is a difference.
-pub fn positive(key: &str, option: Option<&Quantity>, unit: &Unit) -> Result<Option<f64>, Mistake> {
+pub fn positive(key: &str, option: Option<&Quantity>, unit: &Unit) -> Result<Option<f64>, StudyError> {
     match optional(key, option, &unit.difference())? {
         Some(number) if number <= 0.0 => {
-            Err(Mistake::new(key, format!("`{key}` must be positive, not {}", unit.amount(number))))
+            Err(StudyError::new(key, format!("`{key}` must be positive, not {}", unit.amount(number))))
         }
         number => Ok(number),
     }
 }
 
 /// Returns the time of the step, s; 0 if absent.
-pub fn step_time(option: Option<&Quantity>) -> Result<f64, Mistake> {
+pub fn step_time(option: Option<&Quantity>) -> Result<f64, StudyError> {
     match optional("step-time", option, &second())? {
         Some(time) if time < 0.0 => {
-            Err(Mistake::new("step-time", format!("the step at {time} s is before the start of the simulation")))
+            Err(StudyError::new("step-time", format!("the step at {time} s is before the start of the simulation")))
         }
         time => Ok(time.unwrap_or(0.0)),
     }

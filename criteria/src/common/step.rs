@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use mops_core::{Analysis, Mark, Mistake, Quantity, Trace, Unit, Value, Variable};
+use mops_core::{Analysis, Mark, Quantity, StudyError, Trace, Unit, Value, Variable};
 
 use super::{optional, part, signal, step_time, trace};
 
@@ -45,7 +45,7 @@ pub struct Answer<'a> {
 
 impl StepOptions<'_> {
     /// Checks the names and units.
-    pub fn bind(&self, signals: &[Variable]) -> Result<Step, Mistake> {
+    pub fn bind(&self, signals: &[Variable]) -> Result<Step, StudyError> {
         let unit = signal(signals, self.signal)?.unit.clone();
         let target = optional("target", self.target, &unit)?;
         let from = optional("from", self.from, &unit)?;
@@ -53,7 +53,7 @@ impl StepOptions<'_> {
         if let (Some(target), Some(from)) = (target, from)
             && target == from
         {
-            return Err(Mistake::new(
+            return Err(StudyError::new(
                 "target",
                 format!("the step has no height: `from` and `target` are both {}", unit.amount(from)),
             ));

@@ -1,6 +1,6 @@
 //! Where effects are tried, and at which values.
 
-use mops_core::{Dimension, Trials};
+use mops_core::{Dimension, InitialGrid};
 use mops_effects::effects;
 
 use crate::candidate::{Candidate, Sizes, candidates};
@@ -43,12 +43,12 @@ fn a_room_radiates_to_temperatures_alone() {
 fn limits_and_rates_are_tried_where_the_command_is() {
     let sizes = |range: [f64; 2], slew: Option<f64>| Sizes { value: 2.0, time: 0.5, range, slew, ..Sizes::UNTOLD };
     let tried = |sizes: Sizes, trials| sizes.values(Dimension::VALUE, trials, [0.0, f64::INFINITY]);
-    let half = Trials::WithinSize(&[0.5]);
+    let half = InitialGrid::WithinSize(&[0.5]);
     // Of a command of either sign half its largest size; of one with an offset half of the way that it moves.
     assert_eq!(tried(sizes([-4.0, 1.0], None), half), [2.0]);
     assert_eq!(tried(sizes([18.0, 22.0], None), half), [20.0]);
     assert_eq!(tried(sizes([-22.0, -18.0], None), half), [20.0]);
-    let rates = Trials::SlewAndScaled(&[0.1], &[3.0]);
+    let rates = InitialGrid::SlewAndScaled(&[0.1], &[3.0]);
     assert_eq!(tried(sizes([0.0, 1.0], Some(50.0)), rates), [5.0, 6.0]);
     assert_eq!(tried(sizes([0.0, 1.0], None), rates), [6.0]);
 }

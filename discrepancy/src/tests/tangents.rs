@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use mops_core::math;
-use mops_core::{Hold, Input, Job, Model, Trials};
+use mops_core::{Hold, InitialGrid, Input, Job, Model};
 use mops_effects::effects;
 
 use crate::candidate::candidates;
@@ -45,7 +45,7 @@ fn every_effect_that_is_linear_in_its_strength_is_screened_by_the_tangent_of_the
     for candidate in candidates(&effects(), subject.model.interface(), &measured, &[0]) {
         let effect = Arc::clone(&candidate.effect);
         let first = &effect.strengths()[0];
-        if first.trials != Trials::Linear || first.neutral != Some(0.0) {
+        if first.trials != InitialGrid::Linear || first.neutral != Some(0.0) {
             continue;
         }
         let Some(sizes) = sizes(&candidate.port, &variant.model, &fit.pieces, &scene.trajectories) else { continue };

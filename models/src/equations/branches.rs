@@ -1,6 +1,6 @@
 //! Functions of expressions in the graph; at a kink or a jump, a switch selects the branch.
 
-use mops_core::Mistake;
+use mops_core::StudyError;
 use mops_core::expression::{Comparison, Form, Function, Node};
 
 use super::definition::{Text, under};
@@ -14,7 +14,7 @@ impl Lowering<'_> {
         function: Function,
         arguments: &[Node],
         kinks: Kinks,
-    ) -> Result<Id, Mistake> {
+    ) -> Result<Id, StudyError> {
         let inner = match function {
             Function::Sqrt | Function::Ln | Function::Log10 | Function::Asin | Function::Acos => Kinks::AsTheyStand,
             _ => kinks,
@@ -78,7 +78,7 @@ impl Lowering<'_> {
 
     /// Checks that limits and the x values of a table increase. Numbers and constants out of order are an error. Those
     /// that depend on parameters are checked at the start of a simulation.
-    fn in_order(&mut self, text: &Text, function: Function, nodes: &[Node], values: &[Id]) -> Result<(), Mistake> {
+    fn in_order(&mut self, text: &Text, function: Function, nodes: &[Node], values: &[Id]) -> Result<(), StudyError> {
         let (places, strict): (Vec<usize>, bool) = match function {
             Function::Clip | Function::Deadzone => (vec![1, 2], false),
             Function::Table => ((1..values.len()).step_by(2).collect(), true),
@@ -91,7 +91,7 @@ impl Lowering<'_> {
             match (self.graph.constant(low), self.graph.constant(high)) {
                 (Some(a), Some(b)) if wrong(a, b) => {
                     let fact = format!("{what} of `{}` must increase, found {b} after {a}", function.name());
-                    let mistake = Mistake::here(fact).with_help("write the smaller value first");
+                    let mistake = StudyError::here(fact).with_help("write the smaller value first");
                     return Err(under(&text.path, mistake.at(nodes[pair[1]].span.clone())));
                 }
                 (Some(_), Some(_)) => {}
@@ -129,7 +129,7 @@ impl Lowering<'_> {
     }
 
     /// Adds `if(condition, a, .., otherwise)`.
-    fn pieces(&mut self, text: &Text, arguments: &[Node], kinks: Kinks) -> Result<Id, Mistake> {
+    fn pieces(&mut self, text: &Text, arguments: &[Node], kinks: Kinks) -> Result<Id, StudyError> {
         let branch = |lowering: &mut Self, node: &Node| {
             let affine = lowering.node(text, node, kinks)?;
             lowering.without_rates(text, &node.span, affine, "in `if`")
@@ -144,7 +144,7 @@ impl Lowering<'_> {
     }
 
     /// Adds a selection: `a` if the condition is true, else `b`.
-    fn decide(&mut self, text: &Text, condition: &Node, a: Id, b: Id) -> Result<Id, Mistake> {
+    fn decide(&mut self, text: &Text, condition: &Node, a: Id, b: Id) -> Result<Id, StudyError> {
         match &condition.form {
             Form::Compare(comparison, left, right) => {
                 let mut side = |node: &Node| {

@@ -1,6 +1,6 @@
 //! Compiled model: one tape for the derivatives, and small tapes for guards, resets and signals.
 
-use mops_core::Mistake;
+use mops_core::StudyError;
 
 use super::graph::{Id, Op};
 use super::layout::Layout;
@@ -124,7 +124,7 @@ impl Compiled {
         names: &[&str],
         [inputs, forces]: [usize; 2],
         parameters: usize,
-    ) -> Result<Self, Mistake> {
+    ) -> Result<Self, StudyError> {
         let graph = &system.graph;
         let mut wanted: Vec<Vec<Id>> = vec![system.derivatives.clone()];
         let mut graph = graph.clone();
@@ -147,7 +147,7 @@ impl Compiled {
         wanted.extend(system.signals.iter().map(|&id| vec![id]));
 
         let too_large = |_| {
-            Mistake::new("states", "the model needs more than 65536 registers")
+            StudyError::new("states", "the model needs more than 65536 registers")
                 .with_help("write a model of this size in Rust")
         };
         let mut layout = Layout::new(parameters, names.len(), inputs + forces, system.modes).map_err(too_large)?;

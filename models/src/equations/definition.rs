@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use mops_core::expression::{Equation, Form, equation};
-use mops_core::{Mistake, Quantity, Unit, suggestion};
+use mops_core::{Quantity, StudyError, Unit, suggestion};
 
 use super::key::{Index, Key, member};
 use super::options::{EquationsOptions, Formula};
@@ -120,7 +120,7 @@ pub struct Definition {
 }
 
 /// Prepends keys to the path of a mistake.
-pub fn under(path: &[String], mistake: Mistake) -> Mistake {
+pub fn under(path: &[String], mistake: StudyError) -> StudyError {
     path.iter().rev().fold(mistake, |mistake, key| mistake.within(key))
 }
 
@@ -130,20 +130,20 @@ fn path(keys: &[&str]) -> Vec<String> {
 
 impl Text {
     /// Parses a formula that has this path.
-    pub(super) fn read(path: Vec<String>, formula: &Formula, index: Option<(String, i64)>) -> Result<Self, Mistake> {
+    pub(super) fn read(path: Vec<String>, formula: &Formula, index: Option<(String, i64)>) -> Result<Self, StudyError> {
         let read = equation(&formula.0);
         let equation =
-            read.map_err(|wrong| under(&path, Mistake::here(wrong.message).with_help(HELP).at(wrong.span)))?;
+            read.map_err(|wrong| under(&path, StudyError::here(wrong.message).with_help(HELP).at(wrong.span)))?;
         Ok(Self { path, equation: Arc::new(equation), index })
     }
 
     /// Parses an expression; an equation is an error.
-    fn expression(path: Vec<String>, formula: &Formula, index: Option<(String, i64)>) -> Result<Self, Mistake> {
+    fn expression(path: Vec<String>, formula: &Formula, index: Option<(String, i64)>) -> Result<Self, StudyError> {
         let text = Self::read(path, formula, index)?;
         match &text.equation.left {
             Some(left) => Err(under(
                 &text.path,
-                Mistake::here("expected an expression, found an equation")
+                StudyError::here("expected an expression, found an equation")
                     .with_help("only `der` takes equations; a comparison is written `>=` or `<=`")
                     .at(left.span.start..text.equation.right.span.end),
             )),
@@ -174,12 +174,12 @@ impl Definition {
     ///
     /// # Errors
     /// The first wrong key, unit or expression, with its path.
-    pub fn read(options: &EquationsOptions) -> Result<Self, Mistake> {
+    pub fn read(options: &EquationsOptions) -> Result<Self, StudyError> {
         let mut d = Self::default();
         for (key, state) in &options.states.0 {
             let states = declared("states", key, &state.0.unit, state.0.about.as_deref())?;
             let scale = state.0.scale.as_ref().map(|scale| scale.to(&states[0].unit.difference())).transpose();
-            let wrong = |why| under(&path(&["states", key, "scale"]), Mistake::here(why));
+            let wrong = |why| under(&path(&["states", key, "scale"]), StudyError::here(why));
             let scale = scale.map_err(wrong)?;
             if let Some(scale) = scale.filter(|scale| !(*scale > 0.0 && scale.is_finite())) {
                 return Err(wrong(format!("expected a positive size, found {scale}")));
@@ -189,7 +189,7 @@ impl Definition {
         }
         if d.states.is_empty() {
             return Err(
-                Mistake::new("states", "the model has no state").with_help("for example states = { x = \"m\" }")
+                StudyError::new("states", "the model has no state").with_help("for example states = { x = \"m\" }")
             );
         }
         for (key, input) in &options.inputs.0 {
@@ -207,7 +207,7 @@ impl Definition {
                     value.map_err(|why| {
                         under(
                             &path(&["parameters", key, name]),
-                            Mistake::here(why).with_help(counts_in(&quantity.unit)),
+                            StudyError::here(why).with_help(counts_in(&quantity.unit)),
                         )
                     })
                 };
@@ -228,7 +228,7 @@ impl Definition {
         for (key, output) in &options.outputs.0 {
             let unit = output.0.unit.as_deref().unwrap_or_default();
             let [declared] = <[Declared; 1]>::try_from(declared("outputs", key, unit, output.0.about.as_deref())?)
-                .map_err(|_| under(&path(&["outputs", key]), Mistake::here("an output must be a single signal")))?;
+                .map_err(|_| under(&path(&["outputs", key]), StudyError::here("an output must be a single signal")))?;
             let text = Text::expression(declared.path.clone(), &output.0.value, None)?;
             d.outputs.push((declared, text));
         }
@@ -242,7 +242,7 @@ impl Definition {
         self.states.iter().map(|state| state.name.clone()).collect()
     }
 
-    fn read_definitions(&mut self, options: &EquationsOptions) -> Result<(), Mistake> {
+    fn read_definitions(&mut self, options: &EquationsOptions) -> Result<(), StudyError> {
         for (key, formula) in &options.definitions.0 {
             let place = path(&["let", key]);
             let parsed = Key::parse(key).map_err(|m| under(&place, m))?;
@@ -267,7 +267,7 @@ impl Definition {
             if !self.der.contains_key(&state.name) {
                 return Err(under(
                     &state.path,
-                    Mistake::here(format!("state `{}` has no equation", state.name))
+                    StudyError::here(format!("state `{}` has no equation", state.name))
                         .with_help(format!("add it to `der`, for example \"{}\" = \"...\"", state.name)),
                 ));
             }
@@ -275,18 +275,18 @@ impl Definition {
         Ok(())
     }
 
-    fn read_mass(&mut self, options: &EquationsOptions) -> Result<(), Mistake> {
+    fn read_mass(&mut self, options: &EquationsOptions) -> Result<(), StudyError> {
         let states = self.state_names();
         for (key, formula) in &options.mass.0 {
             let place = path(&["mass", key]);
             let (row, column) = key.split_once(',').ok_or_else(|| {
-                under(&place, Mistake::here(format!("expected a row and a column, found `{key}`")))
+                under(&place, StudyError::here(format!("expected a row and a column, found `{key}`")))
                     .with_help("write two states separated by a comma: \"w,w\" = \"J\"")
             })?;
             let (row, column) = (row.trim().to_owned(), column.trim().to_owned());
             for name in [&row, &column] {
                 if !states.contains(name) {
-                    return Err(under(&place, Mistake::here(format!("the model has no state `{name}`")))
+                    return Err(under(&place, StudyError::here(format!("the model has no state `{name}`")))
                         .with_help(suggestion(name, states.iter().map(String::as_str))));
                 }
             }
@@ -295,7 +295,7 @@ impl Definition {
         Ok(())
     }
 
-    fn read_elements(&mut self, options: &EquationsOptions) -> Result<(), Mistake> {
+    fn read_elements(&mut self, options: &EquationsOptions) -> Result<(), StudyError> {
         for (of, friction) in &options.friction.0 {
             let read = |key: &str, formula: &Option<Formula>| {
                 formula.as_ref().map(|f| Text::expression(path(&["friction", of, key]), f, None)).transpose()
@@ -315,7 +315,7 @@ impl Definition {
                 let value = |(state, formula): &(String, Formula)| {
                     let place = path(&["when", name, table, state]);
                     if !states.contains(state) {
-                        return Err(under(&place, Mistake::here(format!("the model has no state `{state}`")))
+                        return Err(under(&place, StudyError::here(format!("the model has no state `{state}`")))
                             .with_help(suggestion(state, states.iter().map(String::as_str))));
                     }
                     Ok((state.clone(), Text::expression(place, formula, None)?))
@@ -336,12 +336,12 @@ fn counts_in(unit: &Unit) -> String {
     format!("a number without a unit is read in `{unit}`")
 }
 
-fn declared(section: &str, key: &str, unit: &str, about: Option<&str>) -> Result<Vec<Declared>, Mistake> {
+fn declared(section: &str, key: &str, unit: &str, about: Option<&str>) -> Result<Vec<Declared>, StudyError> {
     let place = path(&[section, key]);
     let names = Key::parse(key).and_then(|key| key.declared()).map_err(|m| under(&place, m))?;
     let open = unit.trim().is_empty();
     let unit = Unit::parse(unit).map_err(|why| {
-        under(&place, Mistake::here(why))
+        under(&place, StudyError::here(why))
             .with_help("units are s, m, kg, rad, N, V, A, K and products such as \"kg m2\"")
     })?;
     let declare = |name| {
@@ -357,8 +357,8 @@ fn by_state(
     section: &str,
     entries: &[(String, Formula)],
     states: &[&str],
-    read: impl Fn(Vec<String>, &Formula, Option<(String, i64)>) -> Result<Text, Mistake>,
-) -> Result<BTreeMap<String, Text>, Mistake> {
+    read: impl Fn(Vec<String>, &Formula, Option<(String, i64)>) -> Result<Text, StudyError>,
+) -> Result<BTreeMap<String, Text>, StudyError> {
     let mut texts: BTreeMap<String, Text> = BTreeMap::new();
     let mut rest = Vec::new();
     for (key, formula) in entries {
@@ -378,12 +378,12 @@ fn by_state(
         };
         for (name, index) in members {
             if !states.contains(&name.as_str()) {
-                return Err(under(&place, Mistake::here(format!("the model has no state `{name}`")))
+                return Err(under(&place, StudyError::here(format!("the model has no state `{name}`")))
                     .with_help(suggestion(&name, states.iter().copied())));
             }
             let text = read(place.clone(), formula, index)?;
             if texts.insert(name.clone(), text).is_some() {
-                return Err(under(&place, Mistake::here(format!("`{name}` is defined twice")))
+                return Err(under(&place, StudyError::here(format!("`{name}` is defined twice")))
                     .with_help("the members given by different keys must not overlap"));
             }
         }
@@ -395,7 +395,7 @@ fn by_state(
         });
         let all: Vec<(&str, i64)> = all.collect();
         if all.is_empty() {
-            return Err(under(&place, Mistake::here(format!("the model has no states `{family}[..]`")))
+            return Err(under(&place, StudyError::here(format!("the model has no states `{family}[..]`")))
                 .with_help(format!("declare them, for example states = {{ \"{family}[1..100]\" = \"K\" }}")));
         }
         for (name, k) in all {

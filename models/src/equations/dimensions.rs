@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use mops_core::expression::units::{Conflict, Dimensions, Measure, Open, Quantities};
 use mops_core::expression::{Form, Node};
-use mops_core::{Mistake, Unit};
+use mops_core::{StudyError, Unit};
 
 use super::definition::{Declared, Definition, Text, under};
 use super::key::member;
@@ -42,7 +42,7 @@ impl Measured {
 ///
 /// # Errors
 /// The first part with a wrong dimension, with its position.
-pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Mistake> {
+pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, StudyError> {
     let mut model = Model::new(d);
     for (_, text) in &d.lets {
         model.measure(text)?;
@@ -165,16 +165,16 @@ impl<'d> Model<'d> {
         found
     }
 
-    fn measure(&mut self, text: &Text) -> Result<Measure, Mistake> {
+    fn measure(&mut self, text: &Text) -> Result<Measure, StudyError> {
         self.within(text, |dimensions, within| dimensions.measure(within, &text.equation.right))
     }
 
-    fn fits(&mut self, what: &Measure, text: &Text, rule: &str) -> Result<(), Mistake> {
+    fn fits(&mut self, what: &Measure, text: &Text, rule: &str) -> Result<(), StudyError> {
         self.within(text, |dimensions, within| dimensions.fits(within, what, &text.equation.right, rule))
     }
 
     /// Determines the dimension of the terms in the equation of a state.
-    fn force(&mut self, state: &str) -> Result<Measure, Mistake> {
+    fn force(&mut self, state: &str) -> Result<Measure, StudyError> {
         let text = &self.definition.der[state];
         if let Some(left) = &text.equation.left {
             return self.within(text, |dimensions, within| dimensions.equate(within, [left, &text.equation.right]));
@@ -227,9 +227,9 @@ struct Within<'m, 'd> {
 }
 
 impl Quantities for Within<'_, '_> {
-    type Error = Mistake;
+    type Error = StudyError;
 
-    fn measure(&mut self, dimensions: &mut Dimensions, node: &Node) -> Result<Measure, Mistake> {
+    fn measure(&mut self, dimensions: &mut Dimensions, node: &Node) -> Result<Measure, StudyError> {
         let name = match &node.form {
             Form::Name(name) => name.clone(),
             Form::Member(name, index) => member(name, self.index(index)),
@@ -269,8 +269,8 @@ impl Quantities for Within<'_, '_> {
         self.model.counted.insert((self.text.path.join("."), place.start, number), dimension);
     }
 
-    fn refuse(&self, Conflict { span, fact, help }: Conflict) -> Mistake {
-        under(&self.text.path, Mistake::here(fact).with_help(help).at(span))
+    fn refuse(&self, Conflict { span, fact, help }: Conflict) -> StudyError {
+        under(&self.text.path, StudyError::here(fact).with_help(help).at(span))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Interface of a model from text: parameters, initial states, and places of effects.
 
-use mops_core::{Mistake, Parameter, Port, Unit, Variable, suggestion};
+use mops_core::{Parameter, Port, StudyError, Unit, Variable, suggestion};
 
 use super::definition::{self, Definition, under};
 use super::graph::Op;
@@ -17,7 +17,7 @@ pub(super) enum Start {
 
 /// Returns the parameters of the model, the declared ones before the initial values, and the source of each initial
 /// value.
-pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Parameter>, Vec<Start>), Mistake> {
+pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Parameter>, Vec<Start>), StudyError> {
     let declared = |p: &definition::Settable| Parameter {
         variable: Variable {
             name: p.quantity.name.clone(),
@@ -41,7 +41,7 @@ pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Paramet
         };
         if let Some(taken) = d.parameters.iter().find(|p| p.quantity.name == name) {
             let mistake =
-                Mistake::here(format!("this parameter has the name of the initial value of `{}`", state.name));
+                StudyError::here(format!("this parameter has the name of the initial value of `{}`", state.name));
             return Err(under(&taken.quantity.path, mistake).with_help(format!(
                 "write start = {{ {} = \"{name}\" }} if this is intended, or choose another name",
                 state.name
@@ -65,13 +65,13 @@ pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Paramet
 
 /// Returns the ports: joints, equations of all states but positions, inputs, states and outputs. `forces` are the units
 /// of the terms in the equations of the states.
-pub(super) fn ports(d: &Definition, system: &System, forces: &[Unit]) -> Result<Vec<Port>, Mistake> {
+pub(super) fn ports(d: &Definition, system: &System, forces: &[Unit]) -> Result<Vec<Port>, StudyError> {
     let name = |s: usize| d.states[s].name.clone();
     let given = |position: usize| d.ports.iter().find(|(_, joint, _)| *joint == d.states[position].name);
     for (_, joint, path) in &d.ports {
         if !system.joints.iter().any(|&(position, _)| d.states[position].name == *joint) {
             let names = system.joints.iter().map(|&(position, _)| d.states[position].name.as_str());
-            return Err(under(path, Mistake::here(format!("`{joint}` is not the position of a joint")))
+            return Err(under(path, StudyError::here(format!("`{joint}` is not the position of a joint")))
                 .with_help(suggestion(joint, names)));
         }
     }

@@ -1,6 +1,6 @@
 //! Keys of the tables: names, and families such as `T[1..100]`, `T[i]`, `T[i=2..99]`.
 
-use mops_core::Mistake;
+use mops_core::StudyError;
 
 /// Key of a table of declarations or definitions.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,17 +32,17 @@ impl Key {
     ///
     /// # Errors
     /// An invalid name, or a bracket of unknown form.
-    pub fn parse(key: &str) -> Result<Self, Mistake> {
+    pub fn parse(key: &str) -> Result<Self, StudyError> {
         let (name, bracket) = match key.split_once('[') {
             None => (key, None),
             Some((name, rest)) => (name, Some(rest.strip_suffix(']').ok_or_else(|| wrong_bracket(key))?)),
         };
         if !is_name(name) {
-            return Err(Mistake::here(format!("`{name}` is not a valid name"))
+            return Err(StudyError::here(format!("`{name}` is not a valid name"))
                 .with_help("names consist of letters, digits and `_`, and start with a letter"));
         }
         if RESERVED.contains(&name) {
-            return Err(Mistake::here(format!("`{name}` is a reserved word")).with_help("choose another name"));
+            return Err(StudyError::here(format!("`{name}` is a reserved word")).with_help("choose another name"));
         }
         let index = match bracket {
             None => Index::None,
@@ -50,7 +50,7 @@ impl Key {
         };
         match index {
             Index::Range(_, from, to) if from > to || to.checked_sub(from).is_none_or(|n| n >= LARGEST) => {
-                Err(Mistake::here(format!("expected 1 to {LARGEST} members, found the range {from}..{to}"))
+                Err(StudyError::here(format!("expected 1 to {LARGEST} members, found the range {from}..{to}"))
                     .with_help("for example \"T[1..100]\""))
             }
             index => Ok(Self { name: name.to_owned(), index }),
@@ -58,12 +58,12 @@ impl Key {
     }
 
     /// Returns the names of the quantities that a key declares.
-    pub fn declared(&self) -> Result<Vec<String>, Mistake> {
+    pub fn declared(&self) -> Result<Vec<String>, StudyError> {
         match &self.index {
             Index::None => Ok(vec![self.name.clone()]),
             Index::One(k) => Ok(vec![member(&self.name, *k)]),
             Index::Range(_, from, to) => Ok((*from..=*to).map(|k| member(&self.name, k)).collect()),
-            Index::Rest(_) => Err(Mistake::here(format!("expected the range of the members of `{}`", self.name))
+            Index::Rest(_) => Err(StudyError::here(format!("expected the range of the members of `{}`", self.name))
                 .with_help(format!("for example \"{}[1..100]\"", self.name))),
         }
     }
@@ -82,8 +82,8 @@ fn is_name(text: &str) -> bool {
     letters.next().is_some_and(|c| c.is_alphabetic() || c == '_') && letters.all(|c| c.is_alphanumeric() || c == '_')
 }
 
-fn wrong_bracket(key: &str) -> Mistake {
-    Mistake::here(format!("the bracket in `{key}` is invalid")).with_help(
+fn wrong_bracket(key: &str) -> StudyError {
+    StudyError::here(format!("the bracket in `{key}` is invalid")).with_help(
         "declare a family as \"T[1..100]\"; define \"T[1]\", \"T[i=2..99]\", or \"T[i]\" for all other members",
     )
 }

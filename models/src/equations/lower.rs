@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
 use mops_core::expression::{Form, Node, Operator};
-use mops_core::{Mistake, Unit, suggestion};
+use mops_core::{StudyError, Unit, suggestion};
 
 use super::definition::{Declared, Definition, Text, under};
 use super::graph::{Graph, Id, Level, Op};
@@ -106,7 +106,7 @@ impl<'d> Lowering<'d> {
     ///
     /// # Errors
     /// Duplicate names.
-    pub fn new(definition: &'d Definition) -> Result<Self, Mistake> {
+    pub fn new(definition: &'d Definition) -> Result<Self, StudyError> {
         let d = definition;
         let mut names: HashMap<&str, (Meaning, &str)> = HashMap::new();
         let states = d.states.iter().enumerate().map(|(i, q)| (&q.name, Meaning::State(i), "a state", &q.path));
@@ -124,14 +124,17 @@ impl<'d> Lowering<'d> {
                 } else {
                     format!("both {first} and {what}")
                 };
-                return Err(under(path, Mistake::here(format!("`{name}` is {fact}")).with_help("choose another name")));
+                return Err(under(
+                    path,
+                    StudyError::here(format!("`{name}` is {fact}")).with_help("choose another name"),
+                ));
             }
         }
         for (output, _) in &d.outputs {
             if let Some((Meaning::State(_) | Meaning::Input(_), what)) = names.get(output.name.as_str()) {
                 return Err(under(
                     &output.path,
-                    Mistake::here(format!("`{}` is both {what} and an output", output.name)),
+                    StudyError::here(format!("`{}` is both {what} and an output", output.name)),
                 )
                 .with_help("states and inputs are signals already"));
             }
@@ -170,7 +173,7 @@ impl<'d> Lowering<'d> {
 
     /// Lowers an expression, or the difference `left - right` of the sides of an equation, with the derivatives on the
     /// left.
-    pub fn text(&mut self, text: &Text) -> Result<Affine, Mistake> {
+    pub fn text(&mut self, text: &Text) -> Result<Affine, StudyError> {
         let right = self.node(text, &text.equation.right, Kinks::ByMode)?;
         let Some(left) = &text.equation.left else { return Ok(right) };
         let left = self.node(text, left, Kinks::ByMode)?;
@@ -179,13 +182,13 @@ impl<'d> Lowering<'d> {
     }
 
     /// Lowers an expression without derivatives.
-    pub fn value(&mut self, text: &Text) -> Result<Id, Mistake> {
+    pub fn value(&mut self, text: &Text) -> Result<Id, StudyError> {
         let affine = self.text(text)?;
         self.without_rates(text, &text.equation.right.span, affine, "here")
     }
 
     /// Lowers an expression of parameters only; `what` describes its value in a message.
-    pub fn fixed(&mut self, text: &Text, what: &str) -> Result<Id, Mistake> {
+    pub fn fixed(&mut self, text: &Text, what: &str) -> Result<Id, StudyError> {
         let value = self.value(text)?;
         if self.graph.level(value) < Level::Variable {
             return Ok(value);
@@ -204,7 +207,7 @@ impl<'d> Lowering<'d> {
         let span = variable.unwrap_or_else(|| text.equation.right.span.clone());
         Err(under(
             &text.path,
-            Mistake::here(format!("{what} may depend on parameters and constants only"))
+            StudyError::here(format!("{what} may depend on parameters and constants only"))
                 .with_help("states, inputs and time change during a simulation")
                 .at(span),
         ))
@@ -216,13 +219,13 @@ impl<'d> Lowering<'d> {
         span: &Range<usize>,
         affine: Affine,
         place: &str,
-    ) -> Result<Id, Mistake> {
+    ) -> Result<Id, StudyError> {
         if affine.rates.is_empty() {
             return Ok(affine.rest);
         }
         Err(under(
             &text.path,
-            Mistake::here(format!("a derivative is not allowed {place}"))
+            StudyError::here(format!("a derivative is not allowed {place}"))
                 .with_help("equations must be linear in the derivatives; rewrite the expression without them")
                 .at(span.clone()),
         ))
@@ -244,10 +247,10 @@ impl<'d> Lowering<'d> {
         Affine { rest, rates: a.rates.into_iter().map(|(state, rate)| (state, f(&mut self.graph, rate))).collect() }
     }
 
-    pub(super) fn node(&mut self, text: &Text, node: &Node, kinks: Kinks) -> Result<Affine, Mistake> {
+    pub(super) fn node(&mut self, text: &Text, node: &Node, kinks: Kinks) -> Result<Affine, StudyError> {
         if self.depth == DEEPEST_NODE {
             let fact = format!("expressions are nested more than {DEEPEST_NODE} deep, including their definitions");
-            let mistake = Mistake::here(fact).with_help("split them into parts with less nesting");
+            let mistake = StudyError::here(fact).with_help("split them into parts with less nesting");
             return Err(under(&text.path, mistake.at(node.span.clone())));
         }
         self.depth += 1;
@@ -256,9 +259,9 @@ impl<'d> Lowering<'d> {
         found
     }
 
-    fn form(&mut self, text: &Text, node: &Node, kinks: Kinks) -> Result<Affine, Mistake> {
+    fn form(&mut self, text: &Text, node: &Node, kinks: Kinks) -> Result<Affine, StudyError> {
         let wrong = |fact: String, help: String| {
-            Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())))
+            Err(under(&text.path, StudyError::here(fact).with_help(help).at(node.span.clone())))
         };
         Ok(match &node.form {
             Form::Number(value) => Affine::of(self.graph.number(*value)),
@@ -307,7 +310,13 @@ impl<'d> Lowering<'d> {
 
     /// Lowers a sum or a product, from left to right. Factors are collected and multiplied at once, with one node of
     /// the graph for each. If multiplied one by one, the factors of every product would be sorted again.
-    fn chain(&mut self, text: &Text, first: &Node, rest: &[(Operator, Node)], kinks: Kinks) -> Result<Affine, Mistake> {
+    fn chain(
+        &mut self,
+        text: &Text,
+        first: &Node,
+        rest: &[(Operator, Node)],
+        kinks: Kinks,
+    ) -> Result<Affine, StudyError> {
         let mut result = self.node(text, first, kinks)?;
         let mut read = first.span.clone();
         let mut factors: Vec<Id> = Vec::new();
@@ -354,7 +363,7 @@ impl<'d> Lowering<'d> {
         affine.rates.values().chain([&affine.rest]).any(|&id| self.graph.level(id) == Level::Variable)
     }
 
-    fn power(&mut self, text: &Text, [a, b]: [&Node; 2], kinks: Kinks) -> Result<Affine, Mistake> {
+    fn power(&mut self, text: &Text, [a, b]: [&Node; 2], kinks: Kinks) -> Result<Affine, StudyError> {
         let exponent = self.node(text, b, kinks)?;
         let exponent = self.without_rates(text, &b.span, exponent, "in an exponent")?;
         let whole = self.graph.constant(exponent).is_some_and(|e| e.fract() == 0.0 && e > 0.0);
@@ -366,7 +375,7 @@ impl<'d> Lowering<'d> {
         Ok(Affine::of(self.graph.power(base, exponent)))
     }
 
-    fn index(&self, text: &Text, node: &Node) -> Result<i64, Mistake> {
+    fn index(&self, text: &Text, node: &Node) -> Result<i64, StudyError> {
         let mut unknown = None;
         let value = node.evaluate(&|name: &str| match (&text.index, self.names.get(name)) {
             #[allow(clippy::cast_precision_loss)]
@@ -387,20 +396,20 @@ impl<'d> Lowering<'d> {
             None if value.fract() == 0.0 && value.abs() < 1e9 => Ok(value as i64),
             None => Err(under(
                 &text.path,
-                Mistake::here(format!("expected an integer index, found {value}"))
+                StudyError::here(format!("expected an integer index, found {value}"))
                     .with_help("for example \"T[i]\" = \"T[i-1] - T[i]\"")
                     .at(node.span.clone()),
             )),
             Some(name) => Err(under(
                 &text.path,
-                Mistake::here(format!("expected an index of numbers and constants, found `{name}`"))
+                StudyError::here(format!("expected an index of numbers and constants, found `{name}`"))
                     .with_help("the index of a family is declared in its key, for example \"T[i]\" = \"T[i-1] - T[i]\"")
                     .at(node.span.clone()),
             )),
         }
     }
 
-    fn quantity(&mut self, text: &Text, node: &Node, name: &str, kinks: Kinks) -> Result<Affine, Mistake> {
+    fn quantity(&mut self, text: &Text, node: &Node, name: &str, kinks: Kinks) -> Result<Affine, StudyError> {
         if name == "time" {
             return Ok(Affine::of(self.graph.add_op(Op::Time)));
         }
@@ -420,7 +429,7 @@ impl<'d> Lowering<'d> {
             } else {
                 (format!("the model has no quantity `{name}`"), suggestion(name, known.iter().copied()))
             };
-            return Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())));
+            return Err(under(&text.path, StudyError::here(fact).with_help(help).at(node.span.clone())));
         };
         let definition: &'d Definition = self.definition;
         let declared = |lowering: &mut Self, op: Op, quantity: &Declared| {
@@ -437,7 +446,7 @@ impl<'d> Lowering<'d> {
                 Some(Visit::Open) => {
                     return Err(under(
                         &text.path,
-                        Mistake::here(format!("circular definition of `{name}`"))
+                        StudyError::here(format!("circular definition of `{name}`"))
                             .with_help("definitions may be in any order, but must not depend on themselves")
                             .at(node.span.clone()),
                     ));
@@ -447,7 +456,7 @@ impl<'d> Lowering<'d> {
                     if open >= DEEPEST {
                         let fact = format!("definitions are nested more than {DEEPEST} deep");
                         let help = "replace the sum by a family of states, or split it into parts";
-                        return Err(under(&text.path, Mistake::here(fact).with_help(help).at(node.span.clone())));
+                        return Err(under(&text.path, StudyError::here(fact).with_help(help).at(node.span.clone())));
                     }
                     self.lets.insert((i, kinks), Visit::Open);
                     let text = &definition.lets[i].1;

@@ -24,7 +24,7 @@ use std::collections::HashMap;
 use std::sync::OnceLock;
 
 use mops_core::{
-    AnalysisKind, Failure, Interface, Mistake, Model, ModelOptions, Plant, Port, Scalar, State, Unit, Variable,
+    AnalysisKind, Failure, Interface, Model, ModelOptions, Plant, Port, Scalar, State, StudyError, Unit, Variable,
 };
 
 use crate::kernel::{PlantModel, Simulated, Tolerance};
@@ -40,7 +40,7 @@ use system::System;
 impl ModelOptions for EquationsOptions {
     const KIND: &'static str = "equations";
 
-    fn build(self) -> Result<Box<dyn Model>, Mistake> {
+    fn build(self) -> Result<Box<dyn Model>, StudyError> {
         Ok(Box::new(Simulated::new(Equations::new(&self)?)))
     }
 }
@@ -63,14 +63,14 @@ impl Equations {
     ///
     /// # Errors
     /// The first mistake, with its key and its position in the expression.
-    pub fn new(options: &EquationsOptions) -> Result<Self, Mistake> {
+    pub fn new(options: &EquationsOptions) -> Result<Self, StudyError> {
         options.tolerance.check()?;
         let horizon = options.horizon.as_ref().map(|q| q.to(&Unit::known("s"))).transpose();
-        let horizon = horizon.map_err(|why| Mistake::new("horizon", why))?;
+        let horizon = horizon.map_err(|why| StudyError::new("horizon", why))?;
         Self::compile(Definition::read(options)?, horizon, options.tolerance)
     }
 
-    fn compile(mut definition: Definition, horizon: Option<f64>, tolerance: Tolerance) -> Result<Self, Mistake> {
+    fn compile(mut definition: Definition, horizon: Option<f64>, tolerance: Tolerance) -> Result<Self, StudyError> {
         let system = System::new(&definition, &[])?;
         let measured = dimensions::check(&definition, &system.joints)?;
         measured.declare(&mut definition);

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use mops_core::enclosure::Enclosure;
 use mops_core::expression::Comparison;
-use mops_core::{Along, DIRECTIONS, Dual, EventInstant, Failure, Instant, Plant, Scalar, Span};
+use mops_core::{DIRECTIONS, Dual, Dual7, EventInstant, Failure, Instant, Plant, Scalar, Span};
 
 use super::bank::{Bank, Large};
 use super::bounds::{self, moved, signed};
@@ -39,7 +39,7 @@ pub struct Running<'a, S, B> {
     /// Registers with bounds, created on first use.
     bounds: RefCell<Vec<Enclosure>>,
     /// Registers for the Jacobian, created on first use.
-    jacobian: RefCell<Option<Large<Along>>>,
+    jacobian: RefCell<Option<Large<Dual7>>>,
 }
 
 /// Number of changes from which a condition is reported as the cause of a reached step limit: a thousandth of the

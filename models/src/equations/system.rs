@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use mops_core::expression::Form;
-use mops_core::{Mistake, suggestion};
+use mops_core::{StudyError, suggestion};
 
 use super::definition::{Definition, Text, under};
 use super::graph::{Block, Graph, Id, Op};
@@ -83,7 +83,7 @@ impl System {
     ///
     /// # Errors
     /// Unknown names, circular definitions, or equations that do not determine the derivatives.
-    pub fn new(definition: &Definition, opened: &[usize]) -> Result<Self, Mistake> {
+    pub fn new(definition: &Definition, opened: &[usize]) -> Result<Self, StudyError> {
         let d = definition;
         let mut l = Lowering::new(d)?;
         let state = |name: &str| d.states.iter().position(|s| s.name == name).expect("names of states were checked");
@@ -94,7 +94,7 @@ impl System {
             let text = &d.der[&d.states[row].name];
             if text.equation.left.is_some() || rows[row].coefficients.len() > 1 {
                 let fact = "the equation contains derivatives and also has a row in `mass`";
-                return Err(under(&text.path, Mistake::here(fact))
+                return Err(under(&text.path, StudyError::here(fact))
                     .with_help("give the derivatives either in the equation or in `mass`"));
             }
             rows[row].coefficients.clear();
@@ -143,7 +143,7 @@ impl System {
                     let value = with_rates(&mut l.graph, affine, &derivatives);
                     Ok((state, l.declared(value, &d.states[state].unit)))
                 };
-                texts.iter().map(value).collect::<Result<Vec<_>, Mistake>>()
+                texts.iter().map(value).collect::<Result<Vec<_>, StudyError>>()
             };
             let (resets, at_rest) = (values(&when.resets)?, values(&when.at_rest)?);
             happenings.push(Happening { name: when.name.clone(), guard, resets, at_rest });
@@ -197,7 +197,7 @@ fn with_rates(graph: &mut Graph, affine: Affine, derivatives: &[Id]) -> Id {
     })
 }
 
-fn row(l: &mut Lowering<'_>, d: &Definition, state: usize, text: &Text) -> Result<Row, Mistake> {
+fn row(l: &mut Lowering<'_>, d: &Definition, state: usize, text: &Text) -> Result<Row, StudyError> {
     let affine = l.text(text)?;
     let own = l.graph.number(d.states[state].unit.factor());
     if text.equation.left.is_none() {
@@ -210,7 +210,7 @@ fn row(l: &mut Lowering<'_>, d: &Definition, state: usize, text: &Text) -> Resul
     }
     if affine.rates.is_empty() {
         let name = &d.states[state].name;
-        return Err(under(&text.path, Mistake::here("the equation contains no derivative")).with_help(format!(
+        return Err(under(&text.path, StudyError::here("the equation contains no derivative")).with_help(format!(
             "write the derivative of `{name}` as `{name}'`; without `=` the expression is the derivative"
         )));
     }
@@ -244,11 +244,11 @@ fn friction(
     d: &Definition,
     joints: &[(usize, usize)],
     rows: &mut [Row],
-) -> Result<Vec<Contact>, Mistake> {
+) -> Result<Vec<Contact>, StudyError> {
     let mut contacts: Vec<Contact> = Vec::new();
     for friction in &d.friction {
         if let (Some(peak), None) = (&friction.peak, &friction.coulomb) {
-            return Err(under(&peak.path, Mistake::here("`peak` is a ratio to `coulomb`, which is not given"))
+            return Err(under(&peak.path, StudyError::here("`peak` is a ratio to `coulomb`, which is not given"))
                 .with_help("add `coulomb`, or remove `peak`"));
         }
         let names = |s: usize| d.states[s].name.as_str();
@@ -256,7 +256,7 @@ fn friction(
         let Some(&(position, velocity)) = joint else {
             return Err(under(
                 &friction.path,
-                Mistake::here(format!("friction needs a joint, `{}` is not a joint", friction.of)),
+                StudyError::here(format!("friction needs a joint, `{}` is not a joint", friction.of)),
             )
             .with_help(match joints.is_empty() {
                 true => {
@@ -274,8 +274,11 @@ fn friction(
         }
         let Some(coulomb) = &friction.coulomb else { continue };
         if contacts.iter().any(|c| c.velocity == velocity) {
-            return Err(under(&friction.path, Mistake::here(format!("duplicate dry friction of `{}`", friction.of)))
-                .with_help("position and speed name the same joint: keep one of them"));
+            return Err(under(
+                &friction.path,
+                StudyError::here(format!("duplicate dry friction of `{}`", friction.of)),
+            )
+            .with_help("position and speed name the same joint: keep one of them"));
         }
         let coulomb = l.value(coulomb)?;
         let limit = match &friction.peak {
@@ -291,7 +294,7 @@ fn friction(
                 "at most {MOST_CONTACTS} joints can have dry friction, as all combinations of contacts are tried"
             );
             return Err(
-                under(&friction.path, Mistake::here(fact)).with_help("keep `coulomb` for joints that come to rest")
+                under(&friction.path, StudyError::here(fact)).with_help("keep `coulomb` for joints that come to rest")
             );
         }
         contacts.push(Contact { position, velocity, direction, stuck, coulomb, limit, torque: coulomb });
@@ -306,7 +309,7 @@ fn solve(
     rows: &[Row],
     contacts: &[Contact],
     matrices: &mut Vec<Vec<Id>>,
-) -> Result<Vec<Id>, Mistake> {
+) -> Result<Vec<Id>, StudyError> {
     let zero = graph.number(0.0);
     let mut derivatives = vec![zero; rows.len()];
     for group in groups(rows) {
@@ -314,7 +317,7 @@ fn solve(
             let name = &d.states[lost].name;
             return Err(under(
                 &d.der[name].path,
-                Mistake::here(format!("the equations do not determine the derivative of `{name}`")),
+                StudyError::here(format!("the equations do not determine the derivative of `{name}`")),
             )
             .with_help("write as many independent equations as there are derivatives in them"));
         }

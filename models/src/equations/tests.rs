@@ -3,7 +3,7 @@
 mod large;
 
 use mops_core::math;
-use mops_core::{Analysis, Case, Failure, Input, Job, Mistake, Model, Response};
+use mops_core::{Analysis, Case, Failure, Input, Job, Model, Response, StudyError};
 
 use super::EquationsOptions;
 use crate::kernel::Simulated;
@@ -19,7 +19,7 @@ mod units;
 
 const TIGHT: &str = "\n[tolerance]\nrelative = 1e-10\nabsolute = 1e-12\n";
 
-fn read(text: &str) -> Result<Equations, Mistake> {
+fn read(text: &str) -> Result<Equations, StudyError> {
     let options = toml::from_str::<EquationsOptions>(text).unwrap_or_else(|e| panic!("{e}\n{text}"));
     super::Equations::new(&options).map(Simulated::new)
 }

@@ -1,6 +1,6 @@
 //! Model equations at one point with exact derivatives, for linearisation there.
 
-use mops_core::{Along, DIRECTIONS, Dual, Failure, Instant, Local, OperatingPoint, Plant, Scalar};
+use mops_core::{DIRECTIONS, Dual, Dual7, Failure, Instant, Local, OperatingPoint, Plant, Scalar};
 use nalgebra::DMatrix;
 
 use super::PlantModel;
@@ -40,7 +40,7 @@ fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Resul
 pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, Failure> {
     let OperatingPoint { parameters, states, inputs, at_rest } = *at;
     let Here { values, left_out } = look(model, at)?;
-    let constants: Vec<Along> = parameters.iter().map(|&p| p.into()).collect();
+    let constants: Vec<Dual7> = parameters.iter().map(|&p| p.into()).collect();
     let columns = states.len() + inputs.len();
     let mut slopes = DMatrix::zeros(values.len(), columns);
     for first in (0..columns).step_by(DIRECTIONS) {
@@ -48,7 +48,7 @@ pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, 
             let direction = j.wrapping_sub(first);
             if direction < DIRECTIONS { Dual::variable(value, direction) } else { Dual::from(value) }
         };
-        let all: Vec<Along> = states.iter().chain(inputs).enumerate().map(variable).collect();
+        let all: Vec<Dual7> = states.iter().chain(inputs).enumerate().map(variable).collect();
         let (states, inputs) = all.split_at(states.len());
         let along = look(model, &OperatingPoint { parameters: &constants, states, inputs, at_rest })?;
         for (i, row) in along.values.iter().enumerate() {

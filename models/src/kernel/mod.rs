@@ -56,7 +56,7 @@ mod step_size;
 mod weights;
 
 use mops_core::enclosure::Enclosure;
-use mops_core::{Failure, Mistake, Quantity, Scalar, Unit, Work};
+use mops_core::{Failure, Quantity, Scalar, StudyError, Unit, Work};
 
 pub use mops_core::{IntegrationMethod, Tolerance};
 
@@ -219,8 +219,8 @@ pub trait Dynamics<S: Scalar> {
 ///
 /// # Errors
 /// The quantity is not a time.
-pub fn seconds(key: &str, time: Option<&Quantity>) -> Result<Option<f64>, Mistake> {
-    time.map(|q| q.to(&Unit::known("s"))).transpose().map_err(|e| Mistake::new(key, e))
+pub fn seconds(key: &str, time: Option<&Quantity>) -> Result<Option<f64>, StudyError> {
+    time.map(|q| q.to(&Unit::known("s"))).transpose().map_err(|e| StudyError::new(key, e))
 }
 
 /// Receiver of the progress of a simulation: of every step, then of the events at its end.

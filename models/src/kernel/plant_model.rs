@@ -1,7 +1,7 @@
 //! Models given by their plants.
 
 use mops_core::{
-    Along, Analysis, Failure, Input, Interface, Job, Local, Model, Open, OperatingPoint, Plant, Scalar, Variable,
+    Analysis, Dual7, Failure, Input, Interface, Job, Local, Model, Open, OperatingPoint, Plant, Scalar, Variable,
     WithTangents,
 };
 
@@ -78,9 +78,9 @@ pub trait PlantModel: Send + Sync {
 ///     }
 /// }
 ///
-/// struct At<S>([S; 5]);
+/// struct WithParameters<S>([S; 5]);
 ///
-/// impl<S: Scalar> Plant<S> for At<S> {
+/// impl<S: Scalar> Plant<S> for WithParameters<S> {
 ///     fn start(&self) -> Vec<S> {
 ///         self.0[3..].to_vec()
 ///     }
@@ -96,21 +96,21 @@ pub trait PlantModel: Send + Sync {
 ///         &self.0
 ///     }
 ///     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
-///         Ok(At(parameters.try_into().expect("three parameters and two initial states")))
+///         Ok(WithParameters(parameters.try_into().expect("three parameters and two initial states")))
 ///     }
 /// }
 ///
-/// // A model like any other: `Simulated::new(Pendulum::new()).into()` is a `ModelDraft`, which accepts effects.
-/// use mops_core::{Catalogue, EffectDraft, ModelDraft};
+/// // A model like any other: `Simulated::new(Pendulum::new()).into()` is a `ModelBuilder`, which accepts effects.
+/// use mops_core::{Catalogue, EffectBuilder, ModelBuilder};
 /// let catalogue = Catalogue {
 ///     effects: mops_effects::effects(),
 ///     augment: Some(|model, effects| Ok(Box::new(mops_models::WithEffects::new(model, effects)?))),
 ///     ..Catalogue::default()
 /// };
-/// let bearing = [EffectDraft::new("bearing", "coulomb-friction", "joint:theta")];
-/// let model = ModelDraft::from(Simulated::new(Pendulum::new())).with_effects(&catalogue, &bearing)?;
+/// let bearing = [EffectBuilder::new("bearing", "coulomb-friction", "joint:theta")];
+/// let model = ModelBuilder::from(Simulated::new(Pendulum::new())).with_effects(&catalogue, &bearing)?;
 /// assert_eq!(model.model.interface().parameters.last().unwrap().variable.name, "bearing.c");
-/// # Ok::<(), mops_core::Mistake>(())
+/// # Ok::<(), mops_core::StudyError>(())
 /// ```
 pub struct Simulated<M> {
     of: M,
@@ -199,7 +199,7 @@ impl<M: PlantModel> Open for Simulated<M> {
         Ok(Box::new(self.of.open_plant(parameters)?))
     }
 
-    fn open_along<'a>(&'a self, parameters: &'a [Along]) -> Result<Box<dyn Plant<Along> + 'a>, Failure> {
+    fn open_dual<'a>(&'a self, parameters: &'a [Dual7]) -> Result<Box<dyn Plant<Dual7> + 'a>, Failure> {
         Ok(Box::new(self.of.open_plant(parameters)?))
     }
 

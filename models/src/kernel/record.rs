@@ -1,7 +1,7 @@
 //! Traces of signals from the dense output of steps, with their tangents.
 
 use mops_core::{
-    Along, Analysis, Cancellation, DIRECTIONS, Dual, Event, Failure, Job, Response, Scalar, Trace, WithTangents,
+    Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Response, Scalar, Trace, WithTangents,
 };
 
 use super::weights::SHARE;
@@ -21,7 +21,7 @@ pub struct Recording {
 /// # Errors
 /// The failure of the simulation.
 pub fn tangents_of(
-    simulate: impl Fn(&[Along]) -> Result<Recording, Failure>,
+    simulate: impl Fn(&[Dual7]) -> Result<Recording, Failure>,
     parameters: &[f64],
     seeds: &[Vec<f64>],
 ) -> Result<WithTangents, Failure> {
@@ -32,7 +32,7 @@ pub fn tangents_of(
             let tangent = std::array::from_fn(|direction| seeds.get(direction).map_or(0.0, |seed| seed[i]));
             Dual { value, tangent }
         };
-        let parameters: Vec<Along> = parameters.iter().enumerate().map(parameter).collect();
+        let parameters: Vec<Dual7> = parameters.iter().enumerate().map(parameter).collect();
         let recording = simulate(&parameters)?;
         analysis.get_or_insert(recording.response);
         tangents.extend(recording.tangents.into_iter().take(seeds.len()).map(Analysis::Time));

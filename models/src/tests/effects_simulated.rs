@@ -4,7 +4,9 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use mops_core::math;
-use mops_core::{Analysis, Case, Effect, Hold, Input, Job, Model, ModelOptions, Placement, Port, PortKind, Strength};
+use mops_core::{
+    Analysis, Case, Effect, EffectParameter, Hold, Input, Job, Model, ModelOptions, Placement, Port, PortKind,
+};
 use mops_effects::effects;
 
 use crate::equations::EquationsOptions;
@@ -475,7 +477,7 @@ fn everywhere() -> Vec<(WithEffects, &'static str, bool)> {
 
 /// Returns parameters for which the effects are active within the range of the motion below.
 fn acting(name: &str, effect: &dyn Effect) -> Vec<f64> {
-    let of = |s: &Strength| match s.name {
+    let of = |s: &EffectParameter| match s.name {
         "limit" | "w" | "n" => 1.1,
         "rest" | "centre" | "hole" | "around" | "phase" | "skew" => 0.15,
         "low" => -0.4,

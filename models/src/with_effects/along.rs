@@ -1,7 +1,7 @@
 //! Linearisation along a simulation: response of the states and signals of a model with effects to small forces at the
 //! ports.
 
-use mops_core::{Along, Cancellation, DIRECTIONS, Dual, Failure, Job, Opening, Scalar};
+use mops_core::{Cancellation, DIRECTIONS, Dual, Dual7, Failure, Job, Opening, Scalar};
 use nalgebra::DMatrix;
 
 use super::WithEffects;
@@ -90,8 +90,8 @@ impl WithEffects {
         let end = times.last().copied().unwrap_or(job.horizon).max(job.horizon);
         integrate(&mut dynamics, 0.0, end, &start, &self.tolerance(open), &mut looks)?;
 
-        let parameters: Vec<Along> = job.parameters.iter().map(|&p| p.into()).collect();
-        let plant = Along::open(open, &parameters[..self.own()])?;
+        let parameters: Vec<Dual7> = job.parameters.iter().map(|&p| p.into()).collect();
+        let plant = Dual7::open(open, &parameters[..self.own()])?;
         let mut tangent = self.driven(plant, &acting, job, &parameters);
         tangent.start(&parameters)?;
         let forces = self.model.interface().forces();
@@ -99,7 +99,7 @@ impl WithEffects {
     }
 }
 
-fn moment(tangent: &mut Driven<'_, Along>, look: &Look, forces: usize, signals: &[usize]) -> Moment {
+fn moment(tangent: &mut Driven<'_, Dual7>, look: &Look, forces: usize, signals: &[usize]) -> Moment {
     let (n, inputs) = (look.x.len(), look.u.len());
     let columns = n + inputs + forces;
     let mut slopes = DMatrix::zeros(n + signals.len(), columns);
@@ -111,7 +111,7 @@ fn moment(tangent: &mut Driven<'_, Along>, look: &Look, forces: usize, signals: 
             if direction < DIRECTIONS { Dual::variable(value, direction) } else { Dual::from(value) }
         };
         let zeros = vec![0.0; forces];
-        let all: Vec<Along> = look.x.iter().chain(&look.u).chain(&zeros).enumerate().map(seeded).collect();
+        let all: Vec<Dual7> = look.x.iter().chain(&look.u).chain(&zeros).enumerate().map(seeded).collect();
         let (x, rest) = all.split_at(n);
         let (u, w) = rest.split_at(inputs);
         tangent.command(u.iter().map(|&u| Drive::held(u)));

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use mops_core::enclosure::Enclosure;
-use mops_core::{Acting, At, EventInstant, Failure, Instant, Job, Model, Opening, Plant, Scalar, Span};
+use mops_core::{BoundEffect, EventInstant, Failure, Instant, Job, Model, Opening, Plant, PortState, Scalar, Span};
 
 use super::contacts::Contacts;
 use super::{Place, Site, WithEffects};
@@ -12,7 +12,7 @@ use crate::kernel::{Dynamics, shown};
 
 /// Effect in a simulation.
 pub(super) struct Actor<S> {
-    pub(super) acting: Box<dyn Acting<S>>,
+    pub(super) acting: Box<dyn BoundEffect<S>>,
     pub(super) place: Place,
     /// Index of the first state of the effect, and number of its states.
     z: (usize, usize),
@@ -27,7 +27,7 @@ pub(super) struct Actor<S> {
 
 impl<S: Scalar> Actor<S> {
     /// Updates the hysteresis state to an instant, and returns the output.
-    pub(super) fn follow(&mut self, at: &At<'_, S>) -> S {
+    pub(super) fn follow(&mut self, at: &PortState<'_, S>) -> S {
         let first = self.memory[0].value().is_nan();
         self.acting.remember(at, &mut self.memory);
         if first {
@@ -257,7 +257,7 @@ impl<'a, S: Opening> Driven<'a, S> {
     }
 
     /// Returns the port state that an effect receives.
-    fn at<'b>(&self, actor: &Actor<S>, t: f64, x: &[S], u: &'b [S], value: S) -> At<'b, S> {
+    fn at<'b>(&self, actor: &Actor<S>, t: f64, x: &[S], u: &'b [S], value: S) -> PortState<'b, S> {
         let zero = S::from(0.0);
         let (q, v) = match actor.place.site {
             Site::Joint { position, velocity, .. } => (x[position], x[velocity]),
@@ -274,7 +274,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             None => (zero, zero),
         };
         let closed = actor.closed;
-        At { t: t + self.begins, value, q, v, a: zero, mobility: zero, other, other_speed, u, closed }
+        PortState { t: t + self.begins, value, q, v, a: zero, mobility: zero, other, other_speed, u, closed }
     }
 
     fn states<'b>(&self, actor: &Actor<S>, x: &'b [S]) -> &'b [S] {

@@ -9,8 +9,8 @@ mod sensors;
 use std::sync::Arc;
 
 use mops_core::{
-    Analysis, Dimension, Failure, Interface, Job, Mistake, Model, Opening, Parameter, Placement, Port, Scalar, State,
-    Trials, Unit, Variable, WithTangents,
+    Analysis, Dimension, Failure, InitialGrid, Interface, Job, Model, Opening, Parameter, Placement, Port, Scalar,
+    State, StudyError, Unit, Variable, WithTangents,
 };
 
 use crate::kernel::{Recording, Tolerance, record, tangents_of, wanted};
@@ -51,7 +51,7 @@ impl WithEffects {
     /// # Errors
     /// The model has no ports, a port does not exist, or the effect does not act there; or two effects have the same
     /// name. The path of the mistake starts with the name of the effect.
-    pub fn new(model: Arc<dyn Model>, placements: Vec<Placement>) -> Result<Self, Mistake> {
+    pub fn new(model: Arc<dyn Model>, placements: Vec<Placement>) -> Result<Self, StudyError> {
         // Effects are added to those that the model already has.
         let before = model.augmented().map(|(model, placements)| (Arc::clone(model), placements.to_vec()));
         let (model, placements) = match before {
@@ -61,7 +61,7 @@ impl WithEffects {
         let of = model.interface();
         if model.ported().is_none() {
             let fact = "this model does not support effects: its equations are not open";
-            return Err(Mistake::here(fact).with_help("`mops check` lists the places of the models in a study"));
+            return Err(StudyError::here(fact).with_help("`mops check` lists the places of the models in a study"));
         }
         let mut interface = of.clone();
         let mut places = Vec::new();
@@ -75,14 +75,14 @@ impl WithEffects {
                     name: format!("{name}.{}", strength.name),
                     unit: match strength.trials {
                         // With the unit 1/s, 5 Hz would be read as 5 rad/s.
-                        Trials::Frequencies => Unit::known("rad/s"),
+                        InitialGrid::Frequencies => Unit::known("rad/s"),
                         _ => unit(strength.dimension, &placement.port, placement.companion.as_ref(), of),
                     },
                     about: strength.about.to_owned(),
                 };
                 if interface.parameters.iter().any(|p| p.variable.name == variable.name) {
                     let fact = format!("the model already has a parameter `{}`", variable.name);
-                    return Err(Mistake::new(name, fact).with_help("give the effect another name"));
+                    return Err(StudyError::new(name, fact).with_help("give the effect another name"));
                 }
                 let default = strength.neutral;
                 interface.parameters.push(Parameter {
@@ -162,16 +162,17 @@ impl Site {
         placement: &Placement,
         interface: &Interface,
         states: &[Variable],
-    ) -> Result<(Self, Option<Self>), Mistake> {
+    ) -> Result<(Self, Option<Self>), StudyError> {
         let Placement { effect, port, companion, .. } = placement;
         let kind = |port: &Port| port.kind(&interface.ports);
         let site = |key: &str, port: &Port| {
-            Self::of(port, interface, states).ok_or_else(|| Mistake::new(key, format!("the model has no place {port}")))
+            Self::of(port, interface, states)
+                .ok_or_else(|| StudyError::new(key, format!("the model has no place {port}")))
         };
         if !kind(port).is_some_and(|kind| effect.ports().contains(&kind)) {
             let names: Vec<&str> = effect.ports().iter().map(|kind| kind.name()).collect();
             let fact = format!("`{}` does not act at {port}", effect.name());
-            return Err(Mistake::new("place", fact).with_help(format!("the effect acts at: {}", names.join(", "))));
+            return Err(StudyError::new("place", fact).with_help(format!("the effect acts at: {}", names.join(", "))));
         }
         let here = site("place", port)?;
         let there = match (effect.companion(), companion) {
@@ -185,11 +186,11 @@ impl Site {
                     || format!("the model has no {}", wanted.name()),
                     |port| format!("for example companion = \"{port}\""),
                 );
-                return Err(Mistake::new(key, fact).with_help(help));
+                return Err(StudyError::new(key, fact).with_help(help));
             }
             (None, Some(_)) => {
                 let fact = format!("`{}` has no second place", effect.name());
-                return Err(Mistake::new("companion", fact).with_help("remove `companion`"));
+                return Err(StudyError::new("companion", fact).with_help("remove `companion`"));
             }
         };
         Ok((here, there))

@@ -1,6 +1,6 @@
 //! Sensor effects with hysteresis or delay: applied after the simulation, as no other quantity depends on them.
 
-use mops_core::{At, Opening, Trace};
+use mops_core::{Opening, PortState, Trace};
 
 use super::Site;
 use super::dynamics::Driven;
@@ -37,7 +37,7 @@ impl<S: Opening> Driven<'_, S> {
                         let mut value = S::from(before[0].at(t));
                         (0..S::DIRECTIONS).for_each(|d| value.set_tangent(d, before[1 + d].at(t)));
                         let zero = S::from(0.0);
-                        let at = At {
+                        let at = PortState {
                             t,
                             value,
                             q: value,

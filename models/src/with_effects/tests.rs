@@ -347,9 +347,9 @@ impl Pendulum {
     }
 }
 
-struct At<S>([S; 3]);
+struct WithParameters<S>([S; 3]);
 
-impl<S: Scalar> Plant<S> for At<S> {
+impl<S: Scalar> Plant<S> for WithParameters<S> {
     fn start(&self) -> Vec<S> {
         self.0[1..].to_vec()
     }
@@ -364,7 +364,7 @@ impl PlantModel for Pendulum {
         &self.0
     }
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
-        Ok(At(parameters.try_into().expect("one parameter and two initial states")))
+        Ok(WithParameters(parameters.try_into().expect("one parameter and two initial states")))
     }
 }
 

@@ -8,10 +8,10 @@ use serde_json::{Value, json};
 use super::tree::{Node, Text};
 use super::{StudyFile, read_solver, tasks};
 use crate::catalogue::Catalogue;
+use crate::catalogue_study::BuiltStudy;
 use crate::diagnostic::{Diagnostic, suggestion};
 use crate::evaluation::Objective;
-use crate::known_study::BuiltStudy;
-use crate::study::{Draft, Study, Task};
+use crate::study::{Study, StudyBuilder, Task};
 use crate::unit::Quantity;
 
 /// What settings may replace in `[study]`.
@@ -85,7 +85,7 @@ fn read(catalogue: &Catalogue, built: &BuiltStudy, text: &Arc<Text>, program: &s
     })
 }
 
-fn set_tuner(draft: &mut Draft, name: &str, node: &Node<'_>) -> Result<(), Diagnostic> {
+fn set_tuner(draft: &mut StudyBuilder, name: &str, node: &Node<'_>) -> Result<(), Diagnostic> {
     let names: Vec<String> = draft.tuners.iter().map(|(name, _)| name.clone()).collect();
     let tuner = draft.tuners.iter_mut().find(|(known, _)| known == name).map(|(_, tuner)| tuner).ok_or_else(|| {
         node.key_diagnostic(format!("the study has no tuner `{name}`"))

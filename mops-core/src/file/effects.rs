@@ -7,7 +7,7 @@ use super::tree::Node;
 use crate::catalogue::Catalogue;
 use crate::diagnostic::Diagnostic;
 use crate::model::Model;
-use crate::placement::EffectDraft;
+use crate::placement::EffectBuilder;
 
 /// Returns the model with the effects of the table.
 pub(super) fn add(
@@ -22,7 +22,7 @@ pub(super) fn add(
         kind(&node, &[], &catalogue.effects, |effect| effect.name(), "effect")?;
         let draft = |(kind, section)| {
             let EffectSection { place, companion } = section;
-            EffectDraft { name: name.clone(), kind, place, companion }
+            EffectBuilder { name: name.clone(), kind, place, companion }
         };
         drafts.extend(kinds.0.into_iter().map(draft));
     }

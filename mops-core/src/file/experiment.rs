@@ -10,11 +10,11 @@ use super::{Files, UNIT_HELP, at_key, frequency, read_seconds, read_unit};
 use crate::data::{Column, DataFile};
 use crate::diagnostic::{Diagnostic, Source};
 use crate::experiment::Input;
-use crate::study::{CaseDraft, ChannelDraft, Free, Measured};
+use crate::study::{CaseBuilder, ChannelBuilder, Free, Measured};
 use crate::unit::{Quantity, Unit};
 
 /// Reads an experiment and its data file.
-pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<CaseDraft, Diagnostic> {
+pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<CaseBuilder, Diagnostic> {
     let section: ExperimentSection = node.read()?;
     let file = open(node, &section.file, files)?;
     if section.frequency.is_some() || !section.responses.0.is_empty() {
@@ -46,7 +46,7 @@ pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<C
         min: given.min,
         max: given.max,
     });
-    Ok(CaseDraft {
+    Ok(CaseBuilder {
         name,
         parameters: section.parameters.0,
         inputs,
@@ -143,10 +143,10 @@ impl<'f> Table<'f> {
         Ok(Self { file, time, times, rows: first..last, driven })
     }
 
-    fn channel(&self, place: &Node<'_>, signal: &str, table: &ChannelTable) -> Result<ChannelDraft, Diagnostic> {
+    fn channel(&self, place: &Node<'_>, signal: &str, table: &ChannelTable) -> Result<ChannelBuilder, Diagnostic> {
         let (values, unit) =
             self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
-        Ok(ChannelDraft {
+        Ok(ChannelBuilder {
             signal: signal.to_owned(),
             times: self.times[self.rows.clone()].to_vec(),
             values: values[self.rows.clone()].to_vec(),

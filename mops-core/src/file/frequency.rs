@@ -8,7 +8,7 @@ use crate::data::DataFile;
 use crate::diagnostic::Diagnostic;
 use crate::experiment::ResponseData;
 use crate::math;
-use crate::study::{CaseDraft, Measured};
+use crate::study::{CaseBuilder, Measured};
 use crate::unit::Unit;
 
 /// Reads an experiment with frequency responses.
@@ -17,7 +17,7 @@ pub(super) fn read(
     node: &Node<'_>,
     section: ExperimentSection,
     file: &DataFile,
-) -> Result<CaseDraft, Diagnostic> {
+) -> Result<CaseBuilder, Diagnostic> {
     for (key, is_there) in [("channels", !section.channels.0.is_empty()), ("inputs", !section.inputs.0.is_empty())] {
         if let (true, Some(place)) = (is_there, node.child(key)) {
             return Err(place
@@ -55,7 +55,7 @@ pub(super) fn read(
         responses.push(ResponseData { signal: signal.clone(), frequencies, values, unit });
     }
     let measured = Measured { responses, role: section.role, ..Measured::default() };
-    Ok(CaseDraft { name, parameters: section.parameters.0, measured: Some(measured), ..CaseDraft::default() })
+    Ok(CaseBuilder { name, parameters: section.parameters.0, measured: Some(measured), ..CaseBuilder::default() })
 }
 
 /// Returns the frequencies, rad/s.

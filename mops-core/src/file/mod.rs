@@ -1,5 +1,5 @@
 //! Study files: `study.toml`, read in two stages. The first keeps every position and checks keys and types. The second
-//! ([`crate::Draft::build`]) checks the contents; its errors are mapped back to their positions.
+//! ([`crate::StudyBuilder::build`]) checks the contents; its errors are mapped back to their positions.
 
 mod built;
 mod content;
@@ -27,16 +27,16 @@ pub use parts::{case, criterion, experiment, model};
 pub use schema::{describe, study_schema, tables, tables_with};
 
 use crate::catalogue::{Catalogue, SolverChoice};
+use crate::catalogue_study::Shipped;
 use crate::criterion::Usage;
 use crate::data::read_regular;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::experiment::Input;
 use crate::expression::Expression;
-use crate::known_study::Shipped;
 use crate::linearised::Linearised;
-use crate::mistake::Mistake;
 use crate::model::{AnalysisKind, Interface};
-use crate::study::{CaseDraft, CriterionDraft, Draft, ModelDraft, Study, TunerDraft};
+use crate::study::{CaseBuilder, CriterionBuilder, ModelBuilder, Study, StudyBuilder, TunerBuilder};
+use crate::study_error::StudyError;
 use crate::unit::{Quantity, Unit};
 use sections::{CaseOptions, CriterionCommon, ModelCommon, SolverCommon, StudySection, TunerSection};
 use tree::{Node, Text};
@@ -119,7 +119,7 @@ pub struct StudyFile {
 
 impl StudyFile {
     /// Returns the diagnostic of an error that occurred when the study was run, with its location in the text.
-    pub fn locate(&self, mistake: &Mistake) -> Diagnostic {
+    pub fn locate(&self, mistake: &StudyError) -> Diagnostic {
         match self.text.parse() {
             Ok(root) => self.text.settle(root.locate(mistake)),
             Err(_) => Diagnostic { help: mistake.help.clone(), ..Diagnostic::new(mistake.message.clone()) },
@@ -149,12 +149,12 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
     root.check_keys(&[&tables[..], &tasks::TABLES[..]].concat())?;
     let study: StudySection = root.required("study", "add [study] with name = \"...\"")?.read()?;
 
-    let mut draft = Draft {
+    let mut draft = StudyBuilder {
         name: study.name,
         task: study.task,
         objective: study.objective,
         seed: study.seed.unwrap_or(1),
-        ..Draft::default()
+        ..StudyBuilder::default()
     };
     for (name, node) in root.table("models")? {
         draft.models.push((name, read_model(catalogue, &node)?));
@@ -233,7 +233,7 @@ fn kind<'t, 'k, K>(
     })
 }
 
-fn read_model(catalogue: &Catalogue, node: &Node<'_>) -> Result<ModelDraft, Diagnostic> {
+fn read_model(catalogue: &Catalogue, node: &Node<'_>) -> Result<ModelBuilder, Diagnostic> {
     let (kind, options) = kind(node, ModelCommon::KEYS, &catalogue.models, |k| k.name, "model")?;
     let common: ModelCommon = node.only(ModelCommon::KEYS).read()?;
     let mut model = options.read_with(&(kind.schema)(), kind.read)?.map_err(|mistake| options.locate(&mistake))?;
@@ -245,17 +245,17 @@ fn read_model(catalogue: &Catalogue, node: &Node<'_>) -> Result<ModelDraft, Diag
         let linearised = Linearised::new(model.into(), &section.into()).map_err(|mistake| place.locate(&mistake))?;
         model = Box::new(linearised);
     }
-    Ok(ModelDraft { model, parameters: common.parameters.0 })
+    Ok(ModelBuilder { model, parameters: common.parameters.0 })
 }
 
-fn read_tuner(node: &Node<'_>) -> Result<TunerDraft, Diagnostic> {
+fn read_tuner(node: &Node<'_>) -> Result<TunerBuilder, Diagnostic> {
     let section: TunerSection = node.read()?;
     if let (Some(place), Some(tie)) = (node.child("tie"), &section.tie) {
         Expression::parse(tie).map_err(|wrong| {
             place.diagnostic_within(wrong.span, wrong.message).with_help("as in tie = \"2*Ti + 0.1\"")
         })?;
     }
-    Ok(TunerDraft {
+    Ok(TunerBuilder {
         unit: section.unit.as_deref().map(|unit| read_unit(node, "unit", unit)).transpose()?,
         start: section.start,
         min: section.min,
@@ -283,7 +283,7 @@ fn at_key(node: &Node<'_>, key: &str, why: String) -> Diagnostic {
     node.child(key).as_ref().unwrap_or(node).diagnostic(why)
 }
 
-fn read_case(name: String, node: &Node<'_>, models: &[(String, ModelDraft)]) -> Result<CaseDraft, Diagnostic> {
+fn read_case(name: String, node: &Node<'_>, models: &[(String, ModelBuilder)]) -> Result<CaseBuilder, Diagnostic> {
     let entries = node.entries()?;
     let options: CaseOptions = node.only(CaseOptions::KEYS).read()?;
     let mut parameters = Vec::new();
@@ -303,7 +303,7 @@ fn read_case(name: String, node: &Node<'_>, models: &[(String, ModelDraft)]) -> 
         };
         inputs.push((name.clone(), input, None));
     }
-    Ok(CaseDraft { name, parameters, inputs, horizon, ..CaseDraft::default() })
+    Ok(CaseBuilder { name, parameters, inputs, horizon, ..CaseBuilder::default() })
 }
 
 fn read_seconds(node: &Node<'_>, key: &str, quantity: Option<&Quantity>) -> Result<Option<f64>, Diagnostic> {
@@ -313,11 +313,11 @@ fn read_seconds(node: &Node<'_>, key: &str, quantity: Option<&Quantity>) -> Resu
         .transpose()
 }
 
-fn read_criterion(catalogue: &Catalogue, node: &Node<'_>) -> Result<CriterionDraft, Diagnostic> {
+fn read_criterion(catalogue: &Catalogue, node: &Node<'_>) -> Result<CriterionBuilder, Diagnostic> {
     let (kind, options) = kind(node, CriterionCommon::KEYS, &catalogue.criteria, |k| k.name, "criterion")?;
     let common: CriterionCommon = node.only(CriterionCommon::KEYS).read()?;
     let criterion = options.read_with(&(kind.schema)(), kind.read)?;
-    Ok(CriterionDraft {
+    Ok(CriterionBuilder {
         criterion: Box::new(Located { inner: criterion, kind: kind.name }),
         model: common.model,
         cases: common.cases,
@@ -340,7 +340,7 @@ impl crate::criterion::CriterionSpec for Located {
         self.inner.reads()
     }
 
-    fn bind(&self, model: &Interface) -> Result<Box<dyn crate::criterion::Criterion>, Mistake> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn crate::criterion::Criterion>, StudyError> {
         self.inner.bind(model).map_err(|mistake| mistake.within(self.kind))
     }
 

@@ -5,13 +5,13 @@ use super::tree::Text;
 use super::{Files, read_case, read_criterion, read_model};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::Diagnostic;
-use crate::study::{CaseDraft, CriterionDraft, ModelDraft};
+use crate::study::{CaseBuilder, CriterionBuilder, ModelBuilder};
 
 /// Reads a model from the contents of `[models.NAME]`: its kind with options, `parameters` and other common keys.
 ///
 /// # Errors
 /// Returns the first error, with its location in `text`.
-pub fn model(catalogue: &Catalogue, text: &str) -> Result<ModelDraft, Diagnostic> {
+pub fn model(catalogue: &Catalogue, text: &str) -> Result<ModelBuilder, Diagnostic> {
     let text = Text::new("model", text, &[]);
     read_model(catalogue, &text.parse()?)
 }
@@ -20,7 +20,7 @@ pub fn model(catalogue: &Catalogue, text: &str) -> Result<ModelDraft, Diagnostic
 ///
 /// # Errors
 /// Returns the first error, with its location in `text`.
-pub fn case(name: &str, text: &str, models: &[(String, ModelDraft)]) -> Result<CaseDraft, Diagnostic> {
+pub fn case(name: &str, text: &str, models: &[(String, ModelBuilder)]) -> Result<CaseBuilder, Diagnostic> {
     let text = Text::new(name, text, &[]);
     read_case(name.to_owned(), &text.parse()?, models)
 }
@@ -29,7 +29,7 @@ pub fn case(name: &str, text: &str, models: &[(String, ModelDraft)]) -> Result<C
 ///
 /// # Errors
 /// Returns the first error, with its location in `text` or in the data.
-pub fn experiment(name: &str, text: &str, files: &dyn Files) -> Result<CaseDraft, Diagnostic> {
+pub fn experiment(name: &str, text: &str, files: &dyn Files) -> Result<CaseBuilder, Diagnostic> {
     let text = Text::new(name, text, &[]);
     read_experiment(name.to_owned(), &text.parse()?, files)
 }
@@ -38,7 +38,7 @@ pub fn experiment(name: &str, text: &str, files: &dyn Files) -> Result<CaseDraft
 ///
 /// # Errors
 /// Returns the first error, with its location in `text`.
-pub fn criterion(catalogue: &Catalogue, text: &str) -> Result<CriterionDraft, Diagnostic> {
+pub fn criterion(catalogue: &Catalogue, text: &str) -> Result<CriterionBuilder, Diagnostic> {
     let text = Text::new("criterion", text, &[]);
     read_criterion(catalogue, &text.parse()?)
 }

@@ -8,7 +8,7 @@ use super::entries::Entries;
 use super::tree::Node;
 use crate::statistics::Sampling;
 use crate::study::{
-    Chosen, DistributionDraft, MonteCarloTask, Place, RobustTask, TasksDraft, UncertainDraft, UncertaintyTask,
+    Chosen, DistributionBuilder, MonteCarloTask, Place, RobustTask, TasksBuilder, UncertainBuilder, UncertaintyTask,
     WorstCaseTask,
 };
 use crate::unit::Quantity;
@@ -146,7 +146,7 @@ pub(super) enum AllOrSome {
 }
 
 /// Reads the tables; absent tables have their defaults.
-pub(super) fn read(root: &Node<'_>, tasks: &mut TasksDraft) -> Result<(), Diagnostic> {
+pub(super) fn read(root: &Node<'_>, tasks: &mut TasksBuilder) -> Result<(), Diagnostic> {
     for (name, node) in root.table("uncertain")? {
         tasks.uncertain.push((name, uncertain(&node)?));
     }
@@ -195,7 +195,7 @@ pub(super) fn read(root: &Node<'_>, tasks: &mut TasksDraft) -> Result<(), Diagno
     Ok(())
 }
 
-fn uncertain(node: &Node<'_>) -> Result<UncertainDraft, Diagnostic> {
+fn uncertain(node: &Node<'_>) -> Result<UncertainBuilder, Diagnostic> {
     let UncertainSection { min, max, tolerance, normal, log_normal, triangular } = node.read()?;
     let named = [normal.is_some(), log_normal.is_some(), triangular.is_some()].iter().filter(|&&is| is).count();
     if named > 1 {
@@ -209,23 +209,23 @@ fn uncertain(node: &Node<'_>) -> Result<UncertainDraft, Diagnostic> {
     };
     let distribution = match (normal, log_normal, triangular) {
         (Some(NormalTable { mean: Some(mean), deviation: Some(deviation), interval: None }), ..) => {
-            Some(DistributionDraft::Normal { mean, deviation })
+            Some(DistributionBuilder::Normal { mean, deviation })
         }
         (Some(NormalTable { mean: None, deviation: None, interval: Some(interval) }), ..) => {
-            Some(DistributionDraft::NormalWithin(interval))
+            Some(DistributionBuilder::NormalWithin(interval))
         }
         (Some(_), ..) => return incomplete("normal", "give either `mean` and `deviation`, or `interval`"),
         (_, Some(LogNormalTable { median: Some(median), deviation: Some(deviation), interval: None }), _) => {
-            Some(DistributionDraft::LogNormal { median, deviation })
+            Some(DistributionBuilder::LogNormal { median, deviation })
         }
         (_, Some(LogNormalTable { median: None, deviation: None, interval: Some(interval) }), _) => {
-            Some(DistributionDraft::LogNormalWithin(interval))
+            Some(DistributionBuilder::LogNormalWithin(interval))
         }
         (_, Some(_), _) => return incomplete("log-normal", "give either `median` and `deviation`, or `interval`"),
-        (_, _, Some(TriangularTable { mode })) => Some(DistributionDraft::Triangular { mode }),
+        (_, _, Some(TriangularTable { mode })) => Some(DistributionBuilder::Triangular { mode }),
         (None, None, None) => None,
     };
-    Ok(UncertainDraft { min, max, tolerance, distribution })
+    Ok(UncertainBuilder { min, max, tolerance, distribution })
 }
 
 /// Table of all uncertain parameters, for the schema.

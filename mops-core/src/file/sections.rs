@@ -10,8 +10,8 @@ use crate::criterion::Usage;
 use crate::evaluation::Objective;
 use crate::experiment::{Hold, Input, Role};
 use crate::linearised::Linearise;
-use crate::mistake::Mistake;
 use crate::study::Task;
+use crate::study_error::StudyError;
 use crate::tuner::Scale;
 use crate::unit::{Quantity, Unit};
 
@@ -182,11 +182,11 @@ pub(super) struct SineSection {
 
 impl InputSection {
     /// Returns the input, with values in `unit`. Errors have the key of the value.
-    pub fn input(&self, unit: &Unit) -> Result<Input, Mistake> {
+    pub fn input(&self, unit: &Unit) -> Result<Input, StudyError> {
         let number = |key: &'static str, quantity: &Quantity, unit: &Unit| {
-            let unitless = |m: Mistake| m.with_help(format!("a number without a unit is in `{unit}`"));
-            let value = quantity.to(unit).map_err(|why| unitless(Mistake::new(key, why)))?;
-            let finite = || Mistake::new(key, format!("expected a finite value of the input, found {value}"));
+            let unitless = |m: StudyError| m.with_help(format!("a number without a unit is in `{unit}`"));
+            let value = quantity.to(unit).map_err(|why| unitless(StudyError::new(key, why)))?;
+            let finite = || StudyError::new(key, format!("expected a finite value of the input, found {value}"));
             value.is_finite().then_some(value).ok_or_else(|| finite().with_help("give a number"))
         };
         let or_zero = |key: &'static str, quantity: &Option<Quantity>, unit: &Unit| {
@@ -196,7 +196,7 @@ impl InputSection {
         Ok(match self {
             Self::Constant(value) => Input::Constant(number("constant", value, unit)?),
             Self::Step(step) => {
-                let within = |m: Mistake| m.within("step");
+                let within = |m: StudyError| m.within("step");
                 Input::Step {
                     time: or_zero("time", &step.time, &known("s")).map_err(within)?,
                     before: or_zero("before", &step.before, unit).map_err(within)?,
@@ -204,7 +204,7 @@ impl InputSection {
                 }
             }
             Self::Sine(sine) => {
-                let within = |m: Mistake| m.within("sine");
+                let within = |m: StudyError| m.within("sine");
                 Input::Sine {
                     amplitude: number("amplitude", &sine.amplitude, &unit.difference()).map_err(within)?,
                     frequency: number("frequency", &sine.frequency, &known("Hz")).map_err(within)?,

@@ -8,11 +8,11 @@ use super::tree::Node;
 use super::{Diagnostic, read_seconds};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::suggestion;
-use crate::mistake::Mistake;
 use crate::study::{
-    AxisDraft, DiagnosisTask, ExcitationDraft, ParetoTask, Place, RegressionDraft, SensitivityMethod, SensitivityTask,
-    SweepDraft, Task, TasksDraft,
+    AxisBuilder, DiagnosisTask, ExcitationBuilder, ParetoTask, Place, RegressionBuilder, SensitivityMethod,
+    SensitivityTask, SweepBuilder, Task, TasksBuilder,
 };
+use crate::study_error::StudyError;
 use crate::unit::Quantity;
 
 /// Settings of the excitation analysis, for `task = "excitation"` and the report of every calibration.
@@ -157,16 +157,16 @@ pub(super) fn unused(root: &Node<'_>, task: Task) -> Vec<String> {
 }
 
 /// Reads the tables of all tasks; absent tables have their defaults.
-pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft, Diagnostic> {
-    let mut tasks = TasksDraft::default();
+pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksBuilder, Diagnostic> {
+    let mut tasks = TasksBuilder::default();
     if let Some(node) = root.child("excitation") {
         let section: ExcitationSection = node.read()?;
         let regression = |(name, r): (String, RegressionSection)| {
             let RegressionSection { experiment, input, output, a, b, delay, forgetting } = r;
             let (delay, forgetting) = (delay.unwrap_or(1), forgetting.unwrap_or(1.0));
-            (name, RegressionDraft { experiment, input, output, a, b, delay, forgetting })
+            (name, RegressionBuilder { experiment, input, output, a, b, delay, forgetting })
         };
-        tasks.excitation = ExcitationDraft {
+        tasks.excitation = ExcitationBuilder {
             sample_time: read_seconds(&node, "sample-time", section.sample_time.as_ref())?,
             inputs: section.inputs,
             noise: section.noise.0,
@@ -182,13 +182,13 @@ pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft,
     if let Some(node) = root.child("sweep") {
         let section: SweepSection = node.read()?;
         let points = if section.y.is_some() { 41 } else { 201 };
-        let axis = |Short(axis): Short<AxisTable>| AxisDraft {
+        let axis = |Short(axis): Short<AxisTable>| AxisBuilder {
             tuner: axis.tuner,
             min: axis.min,
             max: axis.max,
             points: axis.points.unwrap_or(points),
         };
-        tasks.sweep = Some(SweepDraft { x: axis(section.x), y: section.y.map(axis), at: section.at });
+        tasks.sweep = Some(SweepBuilder { x: axis(section.x), y: section.y.map(axis), at: section.at });
     }
     if let Some(node) = root.child("diagnosis") {
         let DiagnosisSection { max_effects, level, effects, without } = node.read()?;
@@ -208,12 +208,12 @@ pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksDraft,
 }
 
 /// Rejects names that are not effects of the catalogue.
-fn check_effects(catalogue: &Catalogue, names: &[String]) -> Result<(), Mistake> {
+fn check_effects(catalogue: &Catalogue, names: &[String]) -> Result<(), StudyError> {
     let known = || catalogue.effects.iter().map(|effect| effect.name());
     match names.iter().find(|name| !known().any(|effect| effect == **name)) {
         None => Ok(()),
         Some(name) => {
-            Err(Mistake::new(name, format!("there is no effect `{name}`")).with_help(suggestion(name, known())))
+            Err(StudyError::new(name, format!("there is no effect `{name}`")).with_help(suggestion(name, known())))
         }
     }
 }

@@ -14,7 +14,7 @@ use super::schema::documentation;
 use super::{UNIT_HELP, shape, syntax};
 use crate::catalogue::schema_of;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
-use crate::mistake::Mistake;
+use crate::study_error::StudyError;
 use crate::unit::Quantity;
 
 /// Text of a study. Every setting of the command line is appended as a separate line, so that errors in settings have a
@@ -248,7 +248,7 @@ impl<'t> Node<'t> {
     }
 
     /// Returns an error with its location: the value under its last key, or the last existing key.
-    pub fn locate(&self, mistake: &Mistake) -> Diagnostic {
+    pub fn locate(&self, mistake: &StudyError) -> Diagnostic {
         let mut node = self.clone();
         for key in &mistake.path {
             // `free = ["phi"]` has its entries as elements; the options of a kind are in the table of its name.

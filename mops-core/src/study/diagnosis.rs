@@ -2,8 +2,8 @@
 
 use super::{Study, Task};
 use crate::experiment::Role;
-use crate::mistake::Mistake;
 use crate::model::AnalysisKind;
+use crate::study_error::StudyError;
 
 /// Maximum number of effects that a diagnosis adds.
 const MOST_EFFECTS: usize = 6;
@@ -36,38 +36,38 @@ impl DiagnosisTask {
 }
 
 /// Checks the numbers. The names of effects are checked elsewhere, with the catalogue.
-pub(super) fn check(task: DiagnosisTask, study: &Study) -> Result<DiagnosisTask, Mistake> {
-    let within = |mistake: Mistake| mistake.within("diagnosis");
+pub(super) fn check(task: DiagnosisTask, study: &Study) -> Result<DiagnosisTask, StudyError> {
+    let within = |mistake: StudyError| mistake.within("diagnosis");
     if !(1..=MOST_EFFECTS).contains(&task.max_effects) {
         let fact = format!("expected 1 to {MOST_EFFECTS} effects, found {}", task.max_effects);
         let help = "most data cannot distinguish more effects than the default 3";
-        return Err(within(Mistake::new("max-effects", fact).with_help(help)));
+        return Err(within(StudyError::new("max-effects", fact).with_help(help)));
     }
     if !(task.level > 0.0 && task.level <= 0.2) {
         let fact = format!("expected a false-alarm probability above 0 and at most 0.2, found {}", task.level);
         let help = "with the default 0.01, one complete model in a hundred is reported as incomplete";
-        return Err(within(Mistake::new("level", fact).with_help(help)));
+        return Err(within(StudyError::new("level", fact).with_help(help)));
     }
     if task.effects.as_ref().is_some_and(Vec::is_empty) {
-        return Err(within(Mistake::new("effects", "`effects` is empty").with_help("omit `effects` to try all")));
+        return Err(within(StudyError::new("effects", "`effects` is empty").with_help("omit `effects` to try all")));
     }
     if let Some(name) = task.without.iter().find(|name| task.effects.iter().flatten().any(|e| e == *name)) {
         let fact = format!("`{name}` is in both `effects` and `without`");
         let help = "remove it from one of them";
-        return Err(within(Mistake::new(name, fact).with_help(help).within("without")));
+        return Err(within(StudyError::new(name, fact).with_help(help).within("without")));
     }
     if study.task == Task::Diagnosis {
         let measured = study.cases.iter().filter_map(|case| case.experiment.as_ref());
         if !measured.clone().any(|experiment| !experiment.channels.is_empty()) {
             let help = "add one under [experiments], with a `file` and the measured signals as `channels`";
-            return Err(Mistake::new(
+            return Err(StudyError::new(
                 "experiments",
                 "no experiment measures a signal over time, so that there are no residuals",
             )
             .with_help(help));
         }
         if !measured.clone().any(|e| e.role == Role::Calibration && !e.channels.is_empty()) {
-            return Err(Mistake::new("experiments", "no calibration experiment measures a signal over time")
+            return Err(StudyError::new("experiments", "no calibration experiment measures a signal over time")
                 .with_help("omit `role` in at least one experiment, or set role = \"calibration\""));
         }
     }

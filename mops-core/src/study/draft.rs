@@ -1,19 +1,19 @@
 //! Drafts: studies as written in a file or in Rust, not yet checked.
 
-use super::{Study, Task, TasksDraft};
+use super::{Study, Task, TasksBuilder};
 use crate::catalogue::Catalogue;
 use crate::criterion::{CriterionSpec, Usage};
 use crate::evaluation::Objective;
 use crate::experiment::{Input, ResponseData, Role};
-use crate::mistake::Mistake;
 use crate::model::Model;
-use crate::placement::EffectDraft;
+use crate::placement::EffectBuilder;
+use crate::study_error::StudyError;
 use crate::tuner::Scale;
 use crate::unit::{Quantity, Unit};
 
-/// A study as written, not yet checked. [`Draft::build`] checks it.
+/// A study as written, not yet checked. [`StudyBuilder::build`] checks it.
 #[derive(Default)]
-pub struct Draft {
+pub struct StudyBuilder {
     /// Name.
     pub name: String,
     /// Task.
@@ -23,46 +23,46 @@ pub struct Draft {
     /// Seed of all random streams.
     pub seed: u64,
     /// Models, by name.
-    pub models: Vec<(String, ModelDraft)>,
+    pub models: Vec<(String, ModelBuilder)>,
     /// Tuners, by name.
-    pub tuners: Vec<(String, TunerDraft)>,
+    pub tuners: Vec<(String, TunerBuilder)>,
     /// Cases and experiments.
-    pub cases: Vec<CaseDraft>,
+    pub cases: Vec<CaseBuilder>,
     /// Criteria, by name.
-    pub criteria: Vec<(String, CriterionDraft)>,
+    pub criteria: Vec<(String, CriterionBuilder)>,
     /// Settings of the tasks other than design and calibration.
-    pub tasks: TasksDraft,
+    pub tasks: TasksBuilder,
 }
 
-impl Draft {
+impl StudyBuilder {
     /// Checks all names, sizes, bounds and units.
     ///
     /// # Errors
     /// Returns the first error, with the path of keys to its location.
-    pub fn build(self) -> Result<Study, Mistake> {
+    pub fn build(self) -> Result<Study, StudyError> {
         super::build::build(self)
     }
 }
 
 /// A model with values for some of its parameters.
-pub struct ModelDraft {
+pub struct ModelBuilder {
     /// The model.
     pub model: Box<dyn Model>,
     /// Parameter values, used unless a tuner or a case sets the parameter.
     pub parameters: Vec<(String, Quantity)>,
 }
 
-impl ModelDraft {
+impl ModelBuilder {
     /// Adds effects at places of the model; each effect parameter is a model parameter `name.strength`.
     ///
     /// # Errors
     /// Returns an error as [`Catalogue::with_effects`] does.
-    pub fn with_effects(self, catalogue: &Catalogue, effects: &[EffectDraft]) -> Result<Self, Mistake> {
+    pub fn with_effects(self, catalogue: &Catalogue, effects: &[EffectBuilder]) -> Result<Self, StudyError> {
         Ok(Self { model: catalogue.with_effects(self.model.into(), effects)?, ..self })
     }
 }
 
-impl<M: Model + 'static> From<M> for ModelDraft {
+impl<M: Model + 'static> From<M> for ModelBuilder {
     fn from(model: M) -> Self {
         Self { model: Box::new(model), parameters: Vec::new() }
     }
@@ -70,7 +70,7 @@ impl<M: Model + 'static> From<M> for ModelDraft {
 
 /// A tuner as written, not yet checked.
 #[derive(Debug, Clone, Default)]
-pub struct TunerDraft {
+pub struct TunerBuilder {
     /// Initial guess.
     pub start: Option<Quantity>,
     /// Smallest value.
@@ -95,7 +95,7 @@ pub struct TunerDraft {
     pub starts: Vec<(String, Quantity)>,
 }
 
-impl TunerDraft {
+impl TunerBuilder {
     /// Creates a tuner with the initial guess `start` and the bounds `min` and `max`.
     pub fn new(start: f64, min: f64, max: f64) -> Self {
         Self { start: Some(start.into()), min: Some(min.into()), max: Some(max.into()), ..Self::default() }
@@ -111,7 +111,7 @@ impl TunerDraft {
 
 /// A case or an experiment as written, not yet checked.
 #[derive(Debug, Clone, Default)]
-pub struct CaseDraft {
+pub struct CaseBuilder {
     /// Name.
     pub name: String,
     /// Parameter values of the case.
@@ -130,7 +130,7 @@ pub struct CaseDraft {
 #[derive(Debug, Clone, Default)]
 pub struct Measured {
     /// Measured signals.
-    pub channels: Vec<ChannelDraft>,
+    pub channels: Vec<ChannelBuilder>,
     /// Measured frequency responses.
     pub responses: Vec<ResponseData>,
     /// Role of the experiment.
@@ -154,7 +154,7 @@ pub struct Free {
 
 /// A measured signal as written, not yet checked.
 #[derive(Debug, Clone, Default)]
-pub struct ChannelDraft {
+pub struct ChannelBuilder {
     /// Signal of the model.
     pub signal: String,
     /// Times, s, increasing.
@@ -168,7 +168,7 @@ pub struct ChannelDraft {
 }
 
 /// A criterion with its usage in the study.
-pub struct CriterionDraft {
+pub struct CriterionBuilder {
     /// Criterion that computes the value.
     pub criterion: Box<dyn CriterionSpec>,
     /// Model that the criterion reads; `None` for the only one.
@@ -187,7 +187,7 @@ pub struct CriterionDraft {
     pub weight: f64,
 }
 
-impl CriterionDraft {
+impl CriterionBuilder {
     /// Creates a criterion to be minimised, with a demand in its own unit.
     pub fn minimise(criterion: impl CriterionSpec + 'static, demand: f64) -> Self {
         Self {

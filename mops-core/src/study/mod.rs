@@ -16,14 +16,16 @@ use serde::{Deserialize, Serialize};
 
 pub use diagnosis::DiagnosisTask;
 pub use distribution::{Distribution, Uncertain};
-pub use draft::{CaseDraft, ChannelDraft, CriterionDraft, Draft, Free, Measured, ModelDraft, TunerDraft};
+pub use draft::{
+    CaseBuilder, ChannelBuilder, CriterionBuilder, Free, Measured, ModelBuilder, StudyBuilder, TunerBuilder,
+};
 pub use robustness::{Chosen, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
 pub use scenarios::Scenario;
 pub use tasks::{
-    Axis, AxisDraft, ExcitationDraft, ExcitationQuestion, ExcitationTask, ParetoTask, Place, RegressionDraft,
-    RegressionTask, SensitivityTask, SweepDraft, SweepTask, Tasks, TasksDraft,
+    Axis, AxisBuilder, ExcitationBuilder, ExcitationQuestion, ExcitationTask, ParetoTask, Place, RegressionBuilder,
+    RegressionTask, SensitivityTask, SweepBuilder, SweepTask, Tasks, TasksBuilder,
 };
-pub use uncertain::{DistributionDraft, UncertainDraft};
+pub use uncertain::{DistributionBuilder, UncertainBuilder};
 
 use crate::cancellation::Cancellation;
 use crate::case::Case;

@@ -7,8 +7,8 @@ use super::tasks::Place;
 use super::{Study, Task, Tasks};
 use crate::diagnostic::suggestion;
 use crate::evaluation::Objective;
-use crate::mistake::Mistake;
 use crate::statistics::Sampling;
+use crate::study_error::StudyError;
 
 /// Maximum number of samples.
 const MOST_SAMPLES: usize = 10_000_000;
@@ -131,17 +131,17 @@ impl Default for UncertaintyTask {
 }
 
 /// Checks the settings of the tasks over uncertain parameters; `tasks.uncertain` is already checked.
-pub(super) fn check(tasks: &Tasks, study: &Study) -> Result<(), Mistake> {
+pub(super) fn check(tasks: &Tasks, study: &Study) -> Result<(), StudyError> {
     let global = study.task == Task::Sensitivity && tasks.sensitivity.method != SensitivityMethod::Local;
     // Other tasks of the same study ignore the table.
     let robust = tasks.robust.is_some() && study.task == Task::Design;
     let worst = matches!(study.task, Task::WorstCase);
     if tasks.robust.is_some() && study.task == Task::Calibration {
-        return Err(Mistake::new("robust", "[robust] applies to designs, but this study is a calibration")
+        return Err(StudyError::new("robust", "[robust] applies to designs, but this study is a calibration")
             .with_help("remove [robust]; [uncertainty] reports how well the data determine the estimates"));
     }
     if robust && study.objective != Objective::Max {
-        return Err(Mistake::new(
+        return Err(StudyError::new(
             "robust",
             "a design against worst cases minimises the largest scaled value: it needs objective = \"max\"",
         )
@@ -149,22 +149,22 @@ pub(super) fn check(tasks: &Tasks, study: &Study) -> Result<(), Mistake> {
     }
     if (worst || robust || global || study.task == Task::MonteCarlo) && tasks.uncertain.is_empty() {
         let (key, table) = if robust { ("robust", None) } else { ("task", Some("study")) };
-        let mistake = Mistake::new(key, "the study has no uncertain parameter")
+        let mistake = StudyError::new(key, "the study has no uncertain parameter")
             .with_help("add [uncertain] with NAME = { min = ..., max = ... } for parameters of the model");
         return Err(table.map_or(mistake.clone(), |table| mistake.within(table)));
     }
     let morris = global && tasks.sensitivity.method == SensitivityMethod::Morris;
     for uncertain in &tasks.uncertain {
-        let within = |m: Mistake| m.within("uncertain");
+        let within = |m: StudyError| m.within("uncertain");
         if (worst || robust || morris) && !uncertain.is_bounded() {
             let fact = format!("a box needs two finite bounds, but `{}` has a missing one", uncertain.name);
-            return Err(within(Mistake::new(&uncertain.name, fact).with_help("set `min` and `max`")));
+            return Err(within(StudyError::new(&uncertain.name, fact).with_help("set `min` and `max`")));
         }
         if robust && uncertain.tuner.is_some() {
             let fact =
                 format!("`{}` is a tuner and cannot be uncertain in a design against worst cases", uncertain.name);
             let help = "remove it from [uncertain]; task = \"worst-case\" reports the effect of its tolerance";
-            return Err(within(Mistake::new(&uncertain.name, fact).with_help(help)));
+            return Err(within(StudyError::new(&uncertain.name, fact).with_help(help)));
         }
     }
     worst_case(&tasks.worst_case, study).map_err(|m| m.within("worst-case"))?;
@@ -176,20 +176,20 @@ pub(super) fn check(tasks: &Tasks, study: &Study) -> Result<(), Mistake> {
     uncertainty(tasks.uncertainty.as_ref(), study).map_err(|m| m.within("uncertainty"))
 }
 
-fn count(key: &str, number: usize, least: usize, most: usize) -> Result<(), Mistake> {
+fn count(key: &str, number: usize, least: usize, most: usize) -> Result<(), StudyError> {
     if (least..=most).contains(&number) {
         return Ok(());
     }
-    Err(Mistake::new(key, format!("expected `{key}` from {least} to {most}, found {number}"))
+    Err(StudyError::new(key, format!("expected `{key}` from {least} to {most}, found {number}"))
         .with_help("omit it for the default"))
 }
 
-fn worst_case(task: &WorstCaseTask, study: &Study) -> Result<(), Mistake> {
+fn worst_case(task: &WorstCaseTask, study: &Study) -> Result<(), StudyError> {
     let known = || study.rows.iter().map(|row| row.name.as_str());
     if let Some(name) = task.criteria.iter().flatten().find(|name| !known().any(|known| known == **name)) {
         let mut names: Vec<&str> = known().collect();
         names.dedup();
-        return Err(Mistake::new(name, format!("the study has no criterion `{name}`"))
+        return Err(StudyError::new(name, format!("the study has no criterion `{name}`"))
             .with_help(suggestion(name, names.iter().copied()))
             .within("criteria"));
     }
@@ -197,7 +197,7 @@ fn worst_case(task: &WorstCaseTask, study: &Study) -> Result<(), Mistake> {
     count("starts", task.starts, 1, 1000)
 }
 
-fn robust_design(task: &RobustTask) -> Result<(), Mistake> {
+fn robust_design(task: &RobustTask) -> Result<(), StudyError> {
     count("rounds", task.rounds, 1, 1000)?;
     count("samples", task.samples, 1, MOST_SAMPLES)?;
     count("starts", task.starts, 1, 1000)?;
@@ -205,44 +205,44 @@ fn robust_design(task: &RobustTask) -> Result<(), Mistake> {
         return Ok(());
     }
     let fact = format!("expected a tolerance between 0 and 1 in scaled values, found {}", task.tolerance);
-    Err(Mistake::new("tolerance", fact).with_help("the default 0.001 is a thousandth of a demand"))
+    Err(StudyError::new("tolerance", fact).with_help("the default 0.001 is a thousandth of a demand"))
 }
 
-fn level(level: f64) -> Result<(), Mistake> {
+fn level(level: f64) -> Result<(), StudyError> {
     if (0.5..1.0).contains(&level) {
         return Ok(());
     }
-    Err(Mistake::new("level", format!("expected a confidence level from 0.5 to below 1, found {level}"))
+    Err(StudyError::new("level", format!("expected a confidence level from 0.5 to below 1, found {level}"))
         .with_help("with the default 0.95, one interval in twenty misses the true value"))
 }
 
-fn monte_carlo(task: &MonteCarloTask) -> Result<(), Mistake> {
+fn monte_carlo(task: &MonteCarloTask) -> Result<(), StudyError> {
     count("samples", task.samples, 2, MOST_SAMPLES)?;
     if let Some(wrong) = task.quantiles.iter().find(|p| !(**p > 0.0 && **p < 1.0)) {
-        return Err(Mistake::new("quantiles", format!("expected quantile levels between 0 and 1, found {wrong}"))
+        return Err(StudyError::new("quantiles", format!("expected quantile levels between 0 and 1, found {wrong}"))
             .with_help("the 0.95 quantile is the value that 95 % of the samples do not exceed"));
     }
     level(task.level)
 }
 
-fn uncertainty(task: Option<&UncertaintyTask>, study: &Study) -> Result<(), Mistake> {
+fn uncertainty(task: Option<&UncertaintyTask>, study: &Study) -> Result<(), StudyError> {
     let Some(task) = task else { return Ok(()) };
     if study.cases.iter().all(|case| case.experiment.is_none()) {
-        return Err(Mistake::here("[uncertainty] needs a calibration: the study has no experiment")
+        return Err(StudyError::here("[uncertainty] needs a calibration: the study has no experiment")
             .with_help("remove [uncertainty]; ranges of uncertain parameters belong in [uncertain]"));
     }
     if let Chosen::Some(names) = &task.profile {
         let known = || study.tuners.iter().filter(|t| t.active).map(|t| t.name.as_str());
         if let Some(name) = names.iter().find(|name| !known().any(|known| known == **name)) {
             let fact = format!("the study has no active tuner `{name}`");
-            return Err(Mistake::new("profile", fact).with_help(suggestion(name, known())));
+            return Err(StudyError::new("profile", fact).with_help(suggestion(name, known())));
         }
     }
     if task.bootstrap > 0 {
         count("bootstrap", task.bootstrap, 20, 100_000)?;
     }
     if task.block == Some(0) {
-        return Err(Mistake::new("block", "a block has at least one sample").with_help("omit it for the default"));
+        return Err(StudyError::new("block", "a block has at least one sample").with_help("omit it for the default"));
     }
     level(task.level)
 }

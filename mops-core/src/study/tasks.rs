@@ -3,13 +3,13 @@
 use super::diagnosis::{self, DiagnosisTask};
 use super::distribution::Uncertain;
 use super::robustness::{self, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
-use super::uncertain::{self, UncertainDraft};
+use super::uncertain::{self, UncertainBuilder};
 use super::{Row, Study, Task};
 use crate::criterion::Usage;
 use crate::diagnostic::suggestion;
 use crate::evaluation::Objective;
 use crate::experiment::Role;
-use crate::mistake::Mistake;
+use crate::study_error::StudyError;
 use crate::tuner::Grid;
 use crate::unit::Quantity;
 
@@ -26,19 +26,19 @@ pub enum Place {
 
 /// Settings of the tasks of a study, not yet checked.
 #[derive(Debug, Clone, Default)]
-pub struct TasksDraft {
+pub struct TasksBuilder {
     /// Settings of `excitation`.
-    pub excitation: ExcitationDraft,
+    pub excitation: ExcitationBuilder,
     /// Settings of `sensitivity`.
     pub sensitivity: SensitivityTask,
     /// Settings of `sweep`, if given.
-    pub sweep: Option<SweepDraft>,
+    pub sweep: Option<SweepBuilder>,
     /// Settings of `diagnosis`.
     pub diagnosis: DiagnosisTask,
     /// Settings of `pareto`.
     pub pareto: ParetoTask,
     /// Uncertain parameters, by name.
-    pub uncertain: Vec<(String, UncertainDraft)>,
+    pub uncertain: Vec<(String, UncertainBuilder)>,
     /// Settings of `worst-case`.
     pub worst_case: WorstCaseTask,
     /// Settings of a design against worst cases, if given.
@@ -76,7 +76,7 @@ pub struct Tasks {
 
 /// Settings of `excitation`, not yet checked.
 #[derive(Debug, Clone, Default)]
-pub struct ExcitationDraft {
+pub struct ExcitationBuilder {
     /// Inputs; `None` for all.
     pub inputs: Option<Vec<String>>,
     /// Sample time, s.
@@ -86,7 +86,7 @@ pub struct ExcitationDraft {
     /// Number of parameters to estimate.
     pub parameters: Option<usize>,
     /// FIR and ARX models, by name.
-    pub regressions: Vec<(String, RegressionDraft)>,
+    pub regressions: Vec<(String, RegressionBuilder)>,
 }
 
 /// Settings of the excitation analysis of inputs.
@@ -113,7 +113,7 @@ pub struct ExcitationTask {
 
 /// A FIR or ARX model, not yet checked.
 #[derive(Debug, Clone)]
-pub struct RegressionDraft {
+pub struct RegressionBuilder {
     /// Name of the experiment; `None` for the first one with the output.
     pub experiment: Option<String>,
     /// Input of the model.
@@ -167,18 +167,18 @@ pub struct SensitivityTask {
 
 /// Settings of `sweep`, not yet checked.
 #[derive(Debug, Clone)]
-pub struct SweepDraft {
+pub struct SweepBuilder {
     /// Tuner along x.
-    pub x: AxisDraft,
+    pub x: AxisBuilder,
     /// Tuner along y; without it the sweep is a line.
-    pub y: Option<AxisDraft>,
+    pub y: Option<AxisBuilder>,
     /// Values of the other tuners.
     pub at: Place,
 }
 
 /// A swept tuner, not yet checked.
 #[derive(Debug, Clone)]
-pub struct AxisDraft {
+pub struct AxisBuilder {
     /// Name.
     pub tuner: String,
     /// Smallest value; `None` for the lower bound of the tuner.
@@ -230,12 +230,12 @@ const MOST_OF_FRONT: usize = 200;
 /// Maximum number of values along an axis.
 const MOST_POINTS: usize = 1000;
 
-pub(super) fn build(draft: TasksDraft, study: &Study) -> Result<Tasks, Mistake> {
+pub(super) fn build(draft: TasksBuilder, study: &Study) -> Result<Tasks, StudyError> {
     let excitation = excitation(draft.excitation, study).map_err(|m| m.within("excitation"))?;
     if let Some(zero) = draft.sensitivity.zero
         && !(zero > 0.0 && zero < 1.0)
     {
-        return Err(Mistake::new(
+        return Err(StudyError::new(
             "zero",
             format!("expected a share of the largest singular value between 0 and 1, found {zero}"),
         )
@@ -244,12 +244,12 @@ pub(super) fn build(draft: TasksDraft, study: &Study) -> Result<Tasks, Mistake> 
     }
     let sweep = draft.sweep.map(|sweep| self::sweep(sweep, study)).transpose().map_err(|m| m.within("sweep"))?;
     if study.task == Task::Sweep && sweep.is_none() {
-        return Err(Mistake::new("task", "the study has no table [sweep]")
+        return Err(StudyError::new("task", "the study has no table [sweep]")
             .with_help("add [sweep] with x = \"tuner\" and, for a surface, y = \"tuner\"")
             .within("study"));
     }
     if study.task == Task::Excitation && study.cases.iter().all(|case| case.inputs.is_empty()) {
-        return Err(Mistake::new("task", "no case and no experiment has an input signal")
+        return Err(StudyError::new("task", "no case and no experiment has an input signal")
             .with_help("add `inputs` to a case, such as inputs = { u = { step = { after = 1.0 } } }")
             .within("study"));
     }
@@ -271,16 +271,16 @@ pub(super) fn build(draft: TasksDraft, study: &Study) -> Result<Tasks, Mistake> 
     Ok(tasks)
 }
 
-fn pareto(task: ParetoTask, study: &Study) -> Result<ParetoTask, Mistake> {
+fn pareto(task: ParetoTask, study: &Study) -> Result<ParetoTask, StudyError> {
     if !(3..=MOST_OF_FRONT).contains(&task.points) {
         let fact = format!("expected 3 to {MOST_OF_FRONT} points of the front, found {}", task.points);
-        return Err(Mistake::new("points", fact).with_help("the default 30 gives a smooth curve").within("pareto"));
+        return Err(StudyError::new("points", fact).with_help("the default 30 gives a smooth curve").within("pareto"));
     }
     if study.task != Task::Pareto {
         return Ok(task);
     }
     if study.objective != Objective::Each {
-        return Err(Mistake::new("objective", "a Pareto front needs objective = \"each\"")
+        return Err(StudyError::new("objective", "a Pareto front needs objective = \"each\"")
             .with_help("remove `objective`, or set objective = \"each\"")
             .within("study"));
     }
@@ -288,7 +288,7 @@ fn pareto(task: ParetoTask, study: &Study) -> Result<ParetoTask, Mistake> {
     let minimised: Vec<&Row> = study.rows.iter().filter(counts).collect();
     if minimised.len() < 2 {
         let known = minimised.first().map_or_else(|| "none".to_owned(), |row| format!("only `{}`", row.name));
-        return Err(Mistake::new(
+        return Err(StudyError::new(
             "task",
             format!("a Pareto front needs at least two criteria to minimise, found {known}"),
         )
@@ -298,35 +298,35 @@ fn pareto(task: ParetoTask, study: &Study) -> Result<ParetoTask, Mistake> {
     Ok(task)
 }
 
-fn excitation(draft: ExcitationDraft, study: &Study) -> Result<ExcitationTask, Mistake> {
+fn excitation(draft: ExcitationBuilder, study: &Study) -> Result<ExcitationTask, StudyError> {
     let known: Vec<&str> =
         study.cases.iter().flat_map(|case| case.inputs.iter().map(|(name, _)| name.as_str())).collect();
-    let check = |name: &str| -> Result<(), Mistake> {
+    let check = |name: &str| -> Result<(), StudyError> {
         if known.contains(&name) {
             return Ok(());
         }
-        Err(Mistake::new(name, format!("no case and no experiment has an input `{name}`"))
+        Err(StudyError::new(name, format!("no case and no experiment has an input `{name}`"))
             .with_help(suggestion(name, known.iter().copied())))
     };
     for name in draft.inputs.iter().flatten() {
         check(name).map_err(|m| m.within("inputs"))?;
     }
     if let Some(time) = draft.sample_time.filter(|time| !(time.is_finite() && *time > 0.0)) {
-        return Err(Mistake::new("sample-time", format!("the time between samples must be positive, not {time} s"))
+        return Err(StudyError::new("sample-time", format!("the time between samples must be positive, not {time} s"))
             .with_help("omit it to use the sample time of the recording"));
     }
     let mut noise = Vec::new();
     for (name, quantity) in draft.noise {
-        let within = |m: Mistake| m.within("noise");
+        let within = |m: StudyError| m.within("noise");
         check(&name).map_err(within)?;
         let variables = study.models.iter().flat_map(|(_, m)| &m.interface().inputs);
         let unit = &variables.into_iter().find(|v| v.name == name).expect("inputs of cases are those of models").unit;
         let value = quantity.to(unit).map_err(|why| {
-            within(Mistake::new(&name, why).with_help(format!("a number without a unit is in `{unit}`")))
+            within(StudyError::new(&name, why).with_help(format!("a number without a unit is in `{unit}`")))
         })?;
         if !(value.is_finite() && value > 0.0) {
             return Err(within(
-                Mistake::new(&name, format!("a standard deviation must be positive, not {value}"))
+                StudyError::new(&name, format!("a standard deviation must be positive, not {value}"))
                     .with_help("omit it if the noise is unknown"),
             ));
         }
@@ -345,32 +345,35 @@ fn excitation(draft: ExcitationDraft, study: &Study) -> Result<ExcitationTask, M
     Ok(ExcitationTask { question, regressions })
 }
 
-fn regression(name: String, draft: RegressionDraft, study: &Study) -> Result<RegressionTask, Mistake> {
-    let RegressionDraft { experiment, input, output, a, b, delay, forgetting } = draft;
+fn regression(name: String, draft: RegressionBuilder, study: &Study) -> Result<RegressionTask, StudyError> {
+    let RegressionBuilder { experiment, input, output, a, b, delay, forgetting } = draft;
     let measures = |i: &usize| study.cases[*i].experiment.as_ref().is_some_and(|e| e.channel(&output).is_some());
     let case = match &experiment {
         Some(wanted) => {
             let measured = || study.cases.iter().filter(|c| c.experiment.is_some()).map(|c| c.name.as_str());
             let found =
                 study.cases.iter().position(|c| c.name == *wanted && c.experiment.is_some()).ok_or_else(|| {
-                    Mistake::new("experiment", format!("the study has no experiment `{wanted}`"))
+                    StudyError::new("experiment", format!("the study has no experiment `{wanted}`"))
                         .with_help(suggestion(wanted, measured().collect::<Vec<_>>()))
                 })?;
             let channels = study.cases[found].experiment.iter().flat_map(|e| &e.channels).map(|c| c.signal.as_str());
             if !measures(&found) {
-                return Err(Mistake::new("output", format!("the experiment `{wanted}` does not measure `{output}`"))
-                    .with_help(suggestion(&output, channels.collect::<Vec<_>>())));
+                return Err(StudyError::new(
+                    "output",
+                    format!("the experiment `{wanted}` does not measure `{output}`"),
+                )
+                .with_help(suggestion(&output, channels.collect::<Vec<_>>())));
             }
             found
         }
         None => (0..study.cases.len()).find(measures).ok_or_else(|| {
-            Mistake::new("output", format!("no experiment measures `{output}`"))
+            StudyError::new("output", format!("no experiment measures `{output}`"))
                 .with_help("add it to the `channels` of an experiment")
         })?,
     };
     let inputs = &study.cases[case].inputs;
     if !inputs.iter().any(|(known, _)| *known == input) {
-        return Err(Mistake::new(
+        return Err(StudyError::new(
             "input",
             format!("the experiment `{}` has no input `{input}`", study.cases[case].name),
         )
@@ -380,15 +383,15 @@ fn regression(name: String, draft: RegressionDraft, study: &Study) -> Result<Reg
         }));
     }
     if b == 0 {
-        return Err(Mistake::new("b", "expected at least 1 coefficient of the input, found 0")
+        return Err(StudyError::new("b", "expected at least 1 coefficient of the input, found 0")
             .with_help("`b` is the number of coefficients of the input"));
     }
     if a + b > 200 {
-        return Err(Mistake::new("b", format!("expected at most 200 coefficients, found {}", a + b))
+        return Err(StudyError::new("b", format!("expected at most 200 coefficients, found {}", a + b))
             .with_help("use a longer sample time, or an ARX model: past outputs (`a`) shorten the response"));
     }
     if !(forgetting > 0.0 && forgetting <= 1.0) {
-        return Err(Mistake::new(
+        return Err(StudyError::new(
             "forgetting",
             format!("expected a forgetting factor above 0 and at most 1, found {forgetting}"),
         )
@@ -397,44 +400,46 @@ fn regression(name: String, draft: RegressionDraft, study: &Study) -> Result<Reg
     Ok(RegressionTask { name, case, input, output, a, b, delay, forgetting })
 }
 
-fn sweep(draft: SweepDraft, study: &Study) -> Result<SweepTask, Mistake> {
+fn sweep(draft: SweepBuilder, study: &Study) -> Result<SweepTask, StudyError> {
     let x = axis(draft.x, study).map_err(|m| m.within("x"))?;
     let y = draft.y.map(|y| axis(y, study)).transpose().map_err(|m| m.within("y"))?;
     if y.as_ref().is_some_and(|y| y.tuner == x.tuner) {
-        return Err(Mistake::new("y", format!("x and y are the same tuner `{}`", study.tuners[x.tuner].name))
+        return Err(StudyError::new("y", format!("x and y are the same tuner `{}`", study.tuners[x.tuner].name))
             .with_help("name another tuner, or omit `y` for a line"));
     }
     Ok(SweepTask { x, y, at: draft.at })
 }
 
-fn axis(draft: AxisDraft, study: &Study) -> Result<Axis, Mistake> {
+fn axis(draft: AxisBuilder, study: &Study) -> Result<Axis, StudyError> {
     let name = &draft.tuner;
-    let within = |m: Mistake| m.within("tuner");
+    let within = |m: StudyError| m.within("tuner");
     let index = study.tuners.iter().position(|t| t.name == *name).ok_or_else(|| {
-        within(Mistake::here(format!("the study has no tuner `{name}`")))
+        within(StudyError::here(format!("the study has no tuner `{name}`")))
             .with_help(suggestion(name, study.tuners.iter().map(|t| t.name.as_str())))
     })?;
     let tuner = &study.tuners[index];
     if !tuner.active || tuner.tie.is_some() || tuner.grid != Grid::Continuous {
-        return Err(within(Mistake::here(format!("`{name}` cannot be swept: it is not an active, continuous tuner")))
-            .with_help("remove `active`, `tie`, `integer` or `values` from it"));
+        return Err(within(StudyError::here(format!(
+            "`{name}` cannot be swept: it is not an active, continuous tuner"
+        )))
+        .with_help("remove `active`, `tie`, `integer` or `values` from it"));
     }
     if tuner.case.is_some_and(|case| study.cases[case].role() != Role::Calibration) {
-        return Err(within(Mistake::here(format!(
+        return Err(within(StudyError::here(format!(
             "`{name}` cannot be swept: its experiment is not used for calibration"
         )))
         .with_help("sweep a tuner of the study, or of a calibration experiment"));
     }
-    let bound = |key: &str, given: &Option<Quantity>, default: f64| -> Result<f64, Mistake> {
+    let bound = |key: &str, given: &Option<Quantity>, default: f64| -> Result<f64, StudyError> {
         let Some(quantity) = given else { return Ok(default) };
         let value = quantity.to(&tuner.unit).map_err(|why| {
-            Mistake::new(key, why).with_help(format!("a number without a unit is in `{}`", tuner.unit))
+            StudyError::new(key, why).with_help(format!("a number without a unit is in `{}`", tuner.unit))
         })?;
         let [low, high] = tuner.bounds;
         if (low..=high).contains(&value) {
             return Ok(value);
         }
-        Err(Mistake::new(
+        Err(StudyError::new(
             key,
             format!("{value} is outside the bounds of `{name}`, {low} to {}", tuner.unit.amount(high)),
         )
@@ -442,14 +447,14 @@ fn axis(draft: AxisDraft, study: &Study) -> Result<Axis, Mistake> {
     };
     let range = [bound("min", &draft.min, tuner.bounds[0])?, bound("max", &draft.max, tuner.bounds[1])?];
     if range[0] >= range[1] {
-        return Err(Mistake::new(
+        return Err(StudyError::new(
             "max",
             format!("expected `max` of the sweep of `{name}` above its `min`, found {}", range[1]),
         )
         .with_help(format!("`min` is {}", tuner.unit.amount(range[0]))));
     }
     if !(2..=MOST_POINTS).contains(&draft.points) {
-        return Err(Mistake::new("points", format!("expected 2 to {MOST_POINTS} points, found {}", draft.points))
+        return Err(StudyError::new("points", format!("expected 2 to {MOST_POINTS} points, found {}", draft.points))
             .with_help("41 points along each of two tuners are 1681 evaluations"));
     }
     Ok(Axis { tuner: index, range, points: draft.points })

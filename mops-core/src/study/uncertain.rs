@@ -4,12 +4,12 @@ use super::Study;
 use super::distribution::{Distribution, Uncertain};
 use crate::diagnostic::suggestion;
 use crate::math;
-use crate::mistake::Mistake;
+use crate::study_error::StudyError;
 use crate::unit::Quantity;
 
 /// An uncertain parameter, not yet checked.
 #[derive(Debug, Clone, Default)]
-pub struct UncertainDraft {
+pub struct UncertainBuilder {
     /// Smallest value.
     pub min: Option<Quantity>,
     /// Largest value.
@@ -17,12 +17,12 @@ pub struct UncertainDraft {
     /// Largest relative deviation of a tuner from its value, in both directions, instead of `min` and `max`.
     pub tolerance: Option<f64>,
     /// Distribution between the bounds; `None` for uniform.
-    pub distribution: Option<DistributionDraft>,
+    pub distribution: Option<DistributionBuilder>,
 }
 
 /// A distribution, not yet checked.
 #[derive(Debug, Clone)]
-pub enum DistributionDraft {
+pub enum DistributionBuilder {
     /// Normal distribution, given by mean and standard deviation.
     Normal {
         /// Mean.
@@ -49,33 +49,33 @@ pub enum DistributionDraft {
 }
 
 /// Checks the uncertain parameters of a study.
-pub(super) fn check(drafts: Vec<(String, UncertainDraft)>, study: &Study) -> Result<Vec<Uncertain>, Mistake> {
-    let one = |(name, draft): (String, UncertainDraft)| {
+pub(super) fn check(drafts: Vec<(String, UncertainBuilder)>, study: &Study) -> Result<Vec<Uncertain>, StudyError> {
+    let one = |(name, draft): (String, UncertainBuilder)| {
         build(&name, draft, study).map_err(|m| m.within(&name).within("uncertain"))
     };
     drafts.into_iter().map(one).collect()
 }
 
-fn build(name: &str, draft: UncertainDraft, study: &Study) -> Result<Uncertain, Mistake> {
+fn build(name: &str, draft: UncertainBuilder, study: &Study) -> Result<Uncertain, StudyError> {
     let parameters: Vec<_> = study.models.iter().flat_map(|(_, m)| &m.interface().parameters).collect();
     let parameter = parameters.iter().find(|p| p.variable.name == name).ok_or_else(|| {
-        Mistake::here(format!("no model has a parameter `{name}`"))
+        StudyError::here(format!("no model has a parameter `{name}`"))
             .with_help(suggestion(name, parameters.iter().map(|p| p.variable.name.as_str())))
     })?;
     if study.tuners.iter().any(|t| t.parameter == name && t.case.is_some()) {
-        return Err(Mistake::here(format!("`{name}` has a separate value in every case"))
+        return Err(StudyError::here(format!("`{name}` has a separate value in every case"))
             .with_help("only parameters, and tuners of the whole study, can be uncertain"));
     }
     let tuner = study.tuners.iter().position(|t| t.parameter == name);
     let unit = tuner.map_or(&parameter.variable.unit, |t| &study.tuners[t].unit).clone();
-    let number = |key: &str, quantity: &Quantity| -> Result<f64, Mistake> {
+    let number = |key: &str, quantity: &Quantity| -> Result<f64, StudyError> {
         let value = quantity
             .to(&if key == "deviation" { unit.difference() } else { unit.clone() })
-            .map_err(|why| Mistake::new(key, why).with_help(format!("a number without a unit is in `{unit}`")))?;
+            .map_err(|why| StudyError::new(key, why).with_help(format!("a number without a unit is in `{unit}`")))?;
         if value.is_finite() {
             Ok(value)
         } else {
-            Err(Mistake::new(key, format!("expected a finite number, found {value}")))
+            Err(StudyError::new(key, format!("expected a finite number, found {value}")))
         }
     };
     let bound = |key: &str, quantity: &Option<Quantity>| quantity.as_ref().map(|q| number(key, q)).transpose();
@@ -84,12 +84,12 @@ fn build(name: &str, draft: UncertainDraft, study: &Study) -> Result<Uncertain, 
     let mut bounds = [min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)];
     if bounds[1] <= bounds[0] {
         let [min, max] = bounds;
-        return Err(Mistake::new("max", format!("the range is empty: min is {min}, max is {max}"))
+        return Err(StudyError::new("max", format!("the range is empty: min is {min}, max is {max}"))
             .with_help("swap the bounds, or widen the range"));
     }
     let distribution = distribution(&draft, bounds, number)?;
     if tolerance.is_none() && distribution == Distribution::Uniform && !bounds.iter().all(|b| b.is_finite()) {
-        return Err(Mistake::here(format!("the range of `{name}` is not bounded"))
+        return Err(StudyError::here(format!("the range of `{name}` is not bounded"))
             .with_help("give `min` and `max`, or a distribution such as normal = { mean = 1.0, deviation = 0.1 }"));
     }
     // The distribution is truncated at the range of the model parameter; explicit bounds outside that range are errors.
@@ -97,7 +97,7 @@ fn build(name: &str, draft: UncertainDraft, study: &Study) -> Result<Uncertain, 
     let range = parameter.range.map(|end| end / factor);
     for (key, given) in [("min", min), ("max", max)] {
         if let Some(value) = given.filter(|value| !(range[0]..=range[1]).contains(value)) {
-            return Err(Mistake::new(
+            return Err(StudyError::new(
                 key,
                 format!("{} is outside the range of `{name}` in the model", unit.amount(value)),
             )
@@ -108,9 +108,9 @@ fn build(name: &str, draft: UncertainDraft, study: &Study) -> Result<Uncertain, 
     Ok(Uncertain { name: name.to_owned(), tuner, unit, bounds, tolerance, distribution })
 }
 
-fn tolerance(draft: &UncertainDraft, of_tuner: bool, name: &str) -> Result<Option<f64>, Mistake> {
+fn tolerance(draft: &UncertainBuilder, of_tuner: bool, name: &str) -> Result<Option<f64>, StudyError> {
     let Some(share) = draft.tolerance else { return Ok(None) };
-    let wrong = |fact: String, help: &str| Err(Mistake::new("tolerance", fact).with_help(help));
+    let wrong = |fact: String, help: &str| Err(StudyError::new("tolerance", fact).with_help(help));
     if !of_tuner {
         return wrong(
             format!("`{name}` is not a tuner, so that a tolerance has no reference value"),
@@ -136,40 +136,41 @@ fn tolerance(draft: &UncertainDraft, of_tuner: bool, name: &str) -> Result<Optio
 const HALF95: f64 = 1.959_963_984_540_054;
 
 fn distribution(
-    draft: &UncertainDraft,
+    draft: &UncertainBuilder,
     [min, max]: [f64; 2],
-    number: impl Fn(&str, &Quantity) -> Result<f64, Mistake>,
-) -> Result<Distribution, Mistake> {
+    number: impl Fn(&str, &Quantity) -> Result<f64, StudyError>,
+) -> Result<Distribution, StudyError> {
     let positive = |key: &str, value: f64, what: &str| {
         if value.is_finite() && value > 0.0 {
             Ok(value)
         } else {
-            Err(Mistake::new(key, format!("{what} must be positive, not {value}")).with_help("write a positive number"))
+            Err(StudyError::new(key, format!("{what} must be positive, not {value}"))
+                .with_help("write a positive number"))
         }
     };
-    let ends = |interval: &[Quantity; 2]| -> Result<[f64; 2], Mistake> {
+    let ends = |interval: &[Quantity; 2]| -> Result<[f64; 2], StudyError> {
         let [from, to] = [number("interval", &interval[0])?, number("interval", &interval[1])?];
         if from < to {
             return Ok([from, to]);
         }
-        Err(Mistake::new("interval", format!("the interval is empty: from {from} to {to}"))
+        Err(StudyError::new("interval", format!("the interval is empty: from {from} to {to}"))
             .with_help("95 % of the values lie between its ends"))
     };
     let (kind, found) = match &draft.distribution {
         None => return Ok(Distribution::Uniform),
-        Some(DistributionDraft::Normal { mean, deviation }) => ("normal", {
+        Some(DistributionBuilder::Normal { mean, deviation }) => ("normal", {
             let (mean, deviation) = (number("mean", mean), number("deviation", deviation));
             mean.and_then(|mean| {
                 let deviation = positive("deviation", deviation?, "a standard deviation")?;
                 Ok(Distribution::Normal { mean, deviation })
             })
         }),
-        Some(DistributionDraft::NormalWithin(interval)) => (
+        Some(DistributionBuilder::NormalWithin(interval)) => (
             "normal",
             ends(interval)
                 .map(|[a, b]| Distribution::Normal { mean: 0.5 * (a + b), deviation: 0.5 * (b - a) / HALF95 }),
         ),
-        Some(DistributionDraft::LogNormal { median, deviation }) => (
+        Some(DistributionBuilder::LogNormal { median, deviation }) => (
             "log-normal",
             number("median", median).and_then(|median| {
                 let median = positive("median", median, "the median of a log-normal distribution")?;
@@ -177,28 +178,29 @@ fn distribution(
                 Ok(Distribution::LogNormal { median, deviation })
             }),
         ),
-        Some(DistributionDraft::LogNormalWithin(interval)) => (
+        Some(DistributionBuilder::LogNormalWithin(interval)) => (
             "log-normal",
             ends(interval).and_then(|[a, b]| {
                 positive("interval", a, "the lower end of a log-normal interval")?;
                 Ok(Distribution::LogNormal { median: (a * b).sqrt(), deviation: 0.5 * math::ln(b / a) / HALF95 })
             }),
         ),
-        Some(DistributionDraft::Triangular { mode }) => (
+        Some(DistributionBuilder::Triangular { mode }) => (
             "triangular",
             number("mode", mode).and_then(|mode| {
                 if (min..=max).contains(&mode) && min.is_finite() && max.is_finite() {
                     return Ok(Distribution::Triangular { mode });
                 }
                 let fact = format!("a triangular distribution needs a mode between `min` and `max`, found {mode}");
-                Err(Mistake::new("mode", fact).with_help("set `min` and `max` next to `triangular`, around the mode"))
+                Err(StudyError::new("mode", fact)
+                    .with_help("set `min` and `max` next to `triangular`, around the mode"))
             }),
         ),
     };
     let found = found.map_err(|m| m.within(kind))?;
     let mass = found.below(max, [min, max]) - found.below(min, [min, max]);
     if mass < 1e-6 {
-        return Err(Mistake::here(format!("less than 1e-6 of the {kind} distribution lies within its bounds"))
+        return Err(StudyError::here(format!("less than 1e-6 of the {kind} distribution lies within its bounds"))
             .with_help("widen `min` and `max`, or correct the distribution"));
     }
     Ok(found)

@@ -12,7 +12,7 @@ pub(super) use search::{Question, Region, Worst};
 use super::at;
 use super::batches::{Stage, each};
 use crate::numbers::significant;
-use crate::search::{Options, Solved, Unsuitable};
+use crate::search::{Options, SolveError, Solved};
 
 /// Values along each parameter through a worst case.
 const SLICE: usize = 61;
@@ -21,7 +21,7 @@ const SLICE: usize = 61;
 pub(super) const NO_GUARANTEE: &str =
     "These are the worst cases that were found, not a guarantee: nothing shows that the box holds no worse one.";
 
-pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let task = study.tasks.worst_case.clone();
     let mut solved = at(task.at, study, options, watch)?;
     let study = solved.problem.study();

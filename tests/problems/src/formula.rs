@@ -1,6 +1,6 @@
 //! Functions of a problem, for plain and dual numbers.
 
-use mops_core::{Along, Scalar};
+use mops_core::{Dual7, Scalar};
 
 /// Function of a problem's variables, written once for every kind of number. For functions that carry data; functions
 /// without data are plain functions ([`Functions::of`]).
@@ -14,7 +14,7 @@ pub trait Outputs: Send + Sync {
     /// Returns the outputs.
     fn values(&self, x: &[f64]) -> Vec<f64>;
     /// Returns the outputs with their derivatives along some directions.
-    fn along(&self, x: &[Along]) -> Vec<Along>;
+    fn along(&self, x: &[Dual7]) -> Vec<Dual7>;
 }
 
 impl<F: Formula> Outputs for F {
@@ -22,7 +22,7 @@ impl<F: Formula> Outputs for F {
         self.at(x)
     }
 
-    fn along(&self, x: &[Along]) -> Vec<Along> {
+    fn along(&self, x: &[Dual7]) -> Vec<Dual7> {
         self.at(x)
     }
 }
@@ -31,7 +31,7 @@ impl<F: Formula> Outputs for F {
 #[derive(Clone, Copy)]
 struct Plain {
     values: fn(&[f64]) -> Vec<f64>,
-    along: fn(&[Along]) -> Vec<Along>,
+    along: fn(&[Dual7]) -> Vec<Dual7>,
 }
 
 impl Outputs for Plain {
@@ -39,7 +39,7 @@ impl Outputs for Plain {
         (self.values)(x)
     }
 
-    fn along(&self, x: &[Along]) -> Vec<Along> {
+    fn along(&self, x: &[Dual7]) -> Vec<Dual7> {
         (self.along)(x)
     }
 }
@@ -58,7 +58,7 @@ impl Functions {
     /// let functions = mops_problems::Functions::of(circle, circle);
     /// assert_eq!(functions.values(&[3.0, 4.0]), [25.0]);
     /// ```
-    pub fn of(values: fn(&[f64]) -> Vec<f64>, along: fn(&[Along]) -> Vec<Along>) -> Self {
+    pub fn of(values: fn(&[f64]) -> Vec<f64>, along: fn(&[Dual7]) -> Vec<Dual7>) -> Self {
         Self(Box::new(Plain { values, along }))
     }
 
@@ -75,9 +75,9 @@ impl Functions {
     /// Returns the derivative of every output along every coordinate: `[output][coordinate]`.
     pub fn slopes(&self, x: &[f64]) -> Vec<Vec<f64>> {
         let mut slopes: Vec<Vec<f64>> = Vec::new();
-        for first in (0..x.len()).step_by(Along::DIRECTIONS) {
-            let end = (first + Along::DIRECTIONS).min(x.len());
-            let mut seeded: Vec<Along> = x.iter().map(|&x| Along::from(x)).collect();
+        for first in (0..x.len()).step_by(Dual7::DIRECTIONS) {
+            let end = (first + Dual7::DIRECTIONS).min(x.len());
+            let mut seeded: Vec<Dual7> = x.iter().map(|&x| Dual7::from(x)).collect();
             for j in first..end {
                 seeded[j].set_tangent(j - first, 1.0);
             }

@@ -6,20 +6,21 @@ use crate::cancellation::Cancellation;
 use crate::case::Case;
 use crate::diagnostic::suggestion;
 use crate::experiment::{Channel, Experiment, Input, ResponseData};
-use crate::mistake::Mistake;
 use crate::model::{AnalysisKind, Parameter, Variable};
-use crate::study::draft::{CaseDraft, ChannelDraft, Measured};
+use crate::study::draft::{CaseBuilder, ChannelBuilder, Measured};
+use crate::study_error::StudyError;
 use crate::unit::Unit;
 
-pub(super) fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<String>) -> Result<Case, Mistake> {
+pub(super) fn build_case(draft: &CaseBuilder, models: &Models, warnings: &mut Vec<String>) -> Result<Case, StudyError> {
     warnings.extend(draft.warnings.iter().cloned());
     let mut parameters = Vec::new();
     for (name, quantity) in &draft.parameters {
         // In a file, the parameters of an experiment are in a table of their own.
-        let within = |mistake: Mistake| if draft.measured.is_some() { mistake.within("parameters") } else { mistake };
+        let within =
+            |mistake: StudyError| if draft.measured.is_some() { mistake.within("parameters") } else { mistake };
         let known: Vec<&Parameter> = models.iter().flat_map(|(_, m)| &m.interface().parameters).collect();
         let parameter = known.iter().find(|p| p.variable.name == *name).ok_or_else(|| {
-            within(Mistake::new(name, format!("no model has a parameter `{name}`")))
+            within(StudyError::new(name, format!("no model has a parameter `{name}`")))
                 .with_help(suggestion(name, known.iter().map(|p| p.variable.name.as_str())))
         })?;
         parameters.push((name.clone(), in_range(quantity, parameter).map_err(|m| within(m.within(name)))?));
@@ -47,10 +48,10 @@ pub(super) fn build_case(draft: &CaseDraft, models: &Models, warnings: &mut Vec<
 fn build_input(
     (name, input, unit): &(String, Input, Option<Unit>),
     models: &Models,
-) -> Result<(String, Input), Mistake> {
+) -> Result<(String, Input), StudyError> {
     let known: Vec<&Variable> = models.iter().flat_map(|(_, m)| &m.interface().inputs).collect();
     let variable = known.iter().find(|v| v.name == *name).ok_or_else(|| {
-        Mistake::new(name, format!("no model has an input `{name}`"))
+        StudyError::new(name, format!("no model has an input `{name}`"))
             .with_help(suggestion(name, known.iter().map(|v| v.name.as_str())))
             .within("inputs")
     })?;
@@ -58,9 +59,12 @@ fn build_input(
     let mut input = input.clone();
     if let Some(unit) = unit {
         let difference = unit.factor_to(&variable.unit).ok_or_else(|| {
-            Mistake::new(name, format!("the input `{name}` is in `{unit}`, but the model expects `{}`", variable.unit))
-                .with_help("choose another column, or correct the unit in the file header or in `unit`")
-                .within("inputs")
+            StudyError::new(
+                name,
+                format!("the input `{name}` is in `{unit}`, but the model expects `{}`", variable.unit),
+            )
+            .with_help("choose another column, or correct the unit in the file header or in `unit`")
+            .within("inputs")
         })?;
         let convert =
             |value: &mut f64| *value = unit.convert(*value, &variable.unit).expect("the units are compatible");
@@ -75,7 +79,7 @@ fn build_input(
         }
     }
     if let Some(at) = input.uneven() {
-        return Err(Mistake::new(name, format!("the input `{name}` is not evenly sampled at {at} s"))
+        return Err(StudyError::new(name, format!("the input `{name}` is not evenly sampled at {at} s"))
             .with_help("hold = \"band-limited\" needs even sampling: cut the record with `from` and `to`, or use hold = \"first\"")
             .within("inputs"));
     }
@@ -83,18 +87,18 @@ fn build_input(
 }
 
 /// Checks that a signal or input recorded once for all models has one unit in all of them.
-fn same_unit(name: &str, unit: &Unit, known: &[&Variable]) -> Result<(), Mistake> {
+fn same_unit(name: &str, unit: &Unit, known: &[&Variable]) -> Result<(), StudyError> {
     match known.iter().find(|variable| variable.name == name && variable.unit != *unit) {
         Some(other) => {
             let fact = format!("`{name}` is in {unit} in one model and in {} in another", other.unit);
-            Err(Mistake::new(name, fact).with_help("declare it in one unit in all models"))
+            Err(StudyError::new(name, fact).with_help("declare it in one unit in all models"))
         }
         None => Ok(()),
     }
 }
 
 /// Returns notes on recordings without a unit for quantities with one: each signal or input with its experiments.
-pub(super) fn assumed_units(drafts: &[CaseDraft], models: &Models) -> Vec<String> {
+pub(super) fn assumed_units(drafts: &[CaseBuilder], models: &Models) -> Vec<String> {
     let interfaces = || models.iter().map(|(_, model)| model.interface());
     let signals: Vec<&Variable> = interfaces().flat_map(|interface| &interface.signals).collect();
     let inputs: Vec<&Variable> = interfaces().flat_map(|interface| &interface.inputs).collect();
@@ -127,12 +131,12 @@ fn build_experiment(
     draft: &Measured,
     models: &Models,
     warnings: &mut Vec<String>,
-) -> Result<Experiment, Mistake> {
+) -> Result<Experiment, StudyError> {
     let known: Vec<&Variable> = models.iter().flat_map(|(_, m)| &m.interface().signals).collect();
     let mut channels = Vec::new();
     for channel in &draft.channels {
         let variable = known.iter().find(|v| v.name == channel.signal).ok_or_else(|| {
-            Mistake::new(&channel.signal, format!("no model has a signal `{}`", channel.signal))
+            StudyError::new(&channel.signal, format!("no model has a signal `{}`", channel.signal))
                 .with_help(suggestion(&channel.signal, known.iter().map(|v| v.name.as_str())))
                 .within("channels")
         })?;
@@ -150,20 +154,20 @@ fn build_experiment(
         if !known.contains(&response.signal.as_str()) {
             let fact = format!("no linear model has an output `{}`", response.signal);
             let help = suggestion(&response.signal, known.iter().copied());
-            return Err(Mistake::new(&response.signal, fact).with_help(help).within("responses"));
+            return Err(StudyError::new(&response.signal, fact).with_help(help).within("responses"));
         }
     }
     let responses = draft.responses.iter().map(|response| build_response(response, models));
     let responses = responses.collect::<Result<_, _>>()?;
     if channels.is_empty() && draft.responses.is_empty() {
-        return Err(Mistake::new("channels", "the experiment has no channels and no responses")
+        return Err(StudyError::new("channels", "the experiment has no channels and no responses")
             .with_help("add at least one channel"));
     }
     Ok(Experiment { channels, responses, role: draft.role })
 }
 
 /// Returns a measured frequency response, converted to the units of the model that it fits.
-fn build_response(draft: &ResponseData, models: &Models) -> Result<ResponseData, Mistake> {
+fn build_response(draft: &ResponseData, models: &Models) -> Result<ResponseData, StudyError> {
     let Some(unit) = &draft.unit else { return Ok(draft.clone()) };
     let linear = models.iter().map(|(_, model)| model.interface()).filter(|i| i.analysis == AnalysisKind::Linear);
     let ratios = linear.flat_map(|interface| {
@@ -176,7 +180,7 @@ fn build_response(draft: &ResponseData, models: &Models) -> Result<ResponseData,
     let factor = ratios.iter().find_map(|ratio| unit.factor_to(ratio)).ok_or_else(|| {
         let wanted = ratios.first().map_or_else(String::new, ToString::to_string);
         let fact = format!("expected a response in `{wanted}`, found `{unit}`");
-        Mistake::new(&draft.signal, fact)
+        StudyError::new(&draft.signal, fact)
             .with_help("choose other columns, or correct the unit in the header of the file")
             .within("responses")
     })?;
@@ -184,11 +188,11 @@ fn build_response(draft: &ResponseData, models: &Models) -> Result<ResponseData,
     Ok(ResponseData { values, unit: None, ..draft.clone() })
 }
 
-fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
+fn build_channel(draft: &ChannelBuilder, to: &Unit) -> Result<Channel, StudyError> {
     let unit = draft.unit.as_ref().unwrap_or(to);
     if !unit.is_compatible(to) {
         let fact = format!("the column is in `{unit}`, but the signal `{}` is in `{to}`", draft.signal);
-        return Err(Mistake::new("column", fact)
+        return Err(StudyError::new("column", fact)
             .with_help("choose another column, or correct the unit in the file header or in `unit`"));
     }
     let noise = match &draft.noise {
@@ -196,7 +200,7 @@ fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
         Some(noise) => {
             let value = converted(noise, &to.difference()).map_err(|m| m.within("noise"))?;
             if !(value.is_finite() && value > 0.0) {
-                return Err(Mistake::new("noise", format!("a standard deviation must be positive, not {value}"))
+                return Err(StudyError::new("noise", format!("a standard deviation must be positive, not {value}"))
                     .with_help("omit `noise` if it is unknown; `mops data` estimates it"));
             }
             Some(value)
@@ -206,7 +210,7 @@ fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
     let in_model = |value: f64| unit.convert(value, to).expect("the units are compatible");
     let (times, values): (Vec<f64>, Vec<f64>) = samples.map(|(&t, &value)| (t, in_model(value))).unzip();
     if let Some(early) = times.first().filter(|&&t| t < 0.0) {
-        return Err(Mistake::new(
+        return Err(StudyError::new(
             "column",
             format!("the first sample is at {early} s, before the start of the simulation at 0 s"),
         )
@@ -214,7 +218,7 @@ fn build_channel(draft: &ChannelDraft, to: &Unit) -> Result<Channel, Mistake> {
     }
     if times.len() < 2 {
         let count = if times.is_empty() { "none" } else { "one" };
-        return Err(Mistake::new("column", format!("expected at least two samples of the column, found {count}"))
+        return Err(StudyError::new("column", format!("expected at least two samples of the column, found {count}"))
             .with_help("missing samples and samples cut off by `from`, `to` and `skip` do not count"));
     }
     Ok(Channel { signal: draft.signal.clone(), times, values, noise })

@@ -9,22 +9,22 @@ use crate::case::Case;
 use crate::criterion::{Criterion, Sense, Usage};
 use crate::demand::Demand;
 use crate::diagnostic::suggestion;
-use crate::mistake::Mistake;
 use crate::model::AnalysisKind;
-use crate::study::draft::CriterionDraft;
+use crate::study::draft::CriterionBuilder;
 use crate::study::{Row, Study};
+use crate::study_error::StudyError;
 use crate::unit::{Quantity, Unit};
 
-pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionDraft) -> Result<(), Mistake> {
+pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -> Result<(), StudyError> {
     let model = match &draft.model {
         Some(model) => study.models.iter().position(|(n, _)| n == model).ok_or_else(|| {
-            Mistake::new("model", format!("the study has no model `{model}`"))
+            StudyError::new("model", format!("the study has no model `{model}`"))
                 .with_help(suggestion(model, study.models.iter().map(|(n, _)| n.as_str())))
         })?,
         None if study.models.len() == 1 => 0,
         None => {
             let known: Vec<String> = study.models.iter().map(|(name, _)| format!("model = \"{name}\"")).collect();
-            return Err(Mistake::here("the study has several models: the criterion needs `model`")
+            return Err(StudyError::here("the study has several models: the criterion needs `model`")
                 .with_help(format!("add {}", known.join(" or "))));
         }
     };
@@ -38,7 +38,7 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionDraft) -> 
         study.notes.push(format!("`{name}`: {assumption}"));
     }
     if !(draft.weight.is_finite() && draft.weight > 0.0) {
-        return Err(Mistake::new("weight", format!("a weight must be positive, not {}", draft.weight))
+        return Err(StudyError::new("weight", format!("a weight must be positive, not {}", draft.weight))
             .with_help("usage = \"monitor\" keeps a criterion out of the objective"));
     }
     for case in cases_of(study, &draft)? {
@@ -59,7 +59,7 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionDraft) -> 
 }
 
 /// Rejects a criterion for a model whose analyses it cannot read.
-fn check_sort(reads: AnalysisKind, gives: AnalysisKind, models: &Models, model: usize) -> Result<(), Mistake> {
+fn check_sort(reads: AnalysisKind, gives: AnalysisKind, models: &Models, model: usize) -> Result<(), StudyError> {
     if reads == gives {
         return Ok(());
     }
@@ -76,10 +76,10 @@ fn check_sort(reads: AnalysisKind, gives: AnalysisKind, models: &Models, model: 
         }
         (None, AnalysisKind::Time) => "add a model that is simulated".to_owned(),
     };
-    Err(Mistake::here(fact).with_help(way_out))
+    Err(StudyError::here(fact).with_help(way_out))
 }
 
-fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake> {
+fn cases_of(study: &Study, draft: &CriterionBuilder) -> Result<Vec<usize>, StudyError> {
     let reads = draft.criterion.reads();
     let measures = |case: &Case| match (draft.criterion.needs_measurement(), &case.experiment, reads) {
         (Some(signal), Some(experiment), AnalysisKind::Time) => experiment.channel(signal).is_some(),
@@ -101,7 +101,7 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
             .iter()
             .map(|name| {
                 let found = study.cases.iter().position(|c| c.name == *name).ok_or_else(|| {
-                    Mistake::new(name, format!("the study has no case `{name}`"))
+                    StudyError::new(name, format!("the study has no case `{name}`"))
                         .with_help(suggestion(name, study.cases.iter().map(|c| c.name.as_str())))
                         .within("cases")
                 })?;
@@ -114,7 +114,7 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
                         }
                         signal => format!("`{name}` does not measure `{signal}`"),
                     };
-                    Err(Mistake::new(name, fact).with_help(way_out.clone()).within("cases"))
+                    Err(StudyError::new(name, fact).with_help(way_out.clone()).within("cases"))
                 }
             })
             .collect::<Result<_, _>>()?,
@@ -125,16 +125,16 @@ fn cases_of(study: &Study, draft: &CriterionDraft) -> Result<Vec<usize>, Mistake
             AnalysisKind::Linear => "add it to the `responses` of an experiment with `frequency`",
         };
         return Err(match signal {
-            "" => Mistake::here("no case is simulated over time: all have frequency responses only")
+            "" => StudyError::here("no case is simulated over time: all have frequency responses only")
                 .with_help("add a case under [cases]"),
-            signal => Mistake::new("signal", format!("no experiment measures `{signal}`")).with_help(help),
+            signal => StudyError::new("signal", format!("no experiment measures `{signal}`")).with_help(help),
         });
     }
     Ok(chosen)
 }
 
 /// Returns the demand of a criterion in its unit, checked against the sense and the range of its kind.
-fn demand(draft: &CriterionDraft, unit: &Unit, criterion: &dyn Criterion) -> Result<Demand, Mistake> {
+fn demand(draft: &CriterionBuilder, unit: &Unit, criterion: &dyn Criterion) -> Result<Demand, StudyError> {
     let value = |key: &str, given: &Option<Quantity>| {
         given.as_ref().map_or(Ok(()), |q| refuse_mixed_angles(key, q, unit))?;
         let value = given.as_ref().map(|q| converted(q, unit).map_err(|m| m.within(key))).transpose()?;
@@ -148,7 +148,7 @@ fn demand(draft: &CriterionDraft, unit: &Unit, criterion: &dyn Criterion) -> Res
             Demand::of(d, criterion.sense(), equal).ok_or_else(|| impossible(d, criterion.sense()))
         }
         (None, Some(good), Some(bad)) if !(good.is_finite() && bad.is_finite() && good != bad) => {
-            Err(Mistake::new("bad", "`good` and `bad` must be two different finite values")
+            Err(StudyError::new("bad", "`good` and `bad` must be two different finite values")
                 .with_help("`good` scales to 0, `bad` to 1"))
         }
         (None, Some(good), Some(bad)) => {
@@ -160,7 +160,7 @@ fn demand(draft: &CriterionDraft, unit: &Unit, criterion: &dyn Criterion) -> Res
             if against && !equal {
                 let better = if criterion.sense() == Sense::More { "more" } else { "less" };
                 let (good, bad) = (unit.amount(bad), unit.amount(good));
-                return Err(Mistake::new(
+                return Err(StudyError::new(
                     "good",
                     format!("`good` and `bad` are swapped: {better} is better for this criterion"),
                 )
@@ -168,25 +168,27 @@ fn demand(draft: &CriterionDraft, unit: &Unit, criterion: &dyn Criterion) -> Res
             }
             Ok(Demand::Pair { good, bad })
         }
-        (Some(_), _, _) => Err(Mistake::new("demand", "`demand` and the pair `good`, `bad` are mutually exclusive")
+        (Some(_), _, _) => Err(StudyError::new("demand", "`demand` and the pair `good`, `bad` are mutually exclusive")
             .with_help("remove one or the other")),
         (None, None, None) if draft.usage == Usage::Monitor => Ok(Demand::None),
         (None, None, None) => match criterion.natural_demand() {
             Some(natural) => Ok(Demand::AtMost(natural)),
-            None => Err(Mistake::here("the criterion has no demand")
+            None => Err(StudyError::here("the criterion has no demand")
                 .with_help("add `demand = ...`, or the pair `good` and `bad`")),
         },
         (None, Some(_), None) => {
-            Err(Mistake::new("good", "`good` requires `bad`").with_help("add `bad = ...`, the value that scales to 1"))
+            Err(StudyError::new("good", "`good` requires `bad`")
+                .with_help("add `bad = ...`, the value that scales to 1"))
         }
         (None, None, Some(_)) => {
-            Err(Mistake::new("bad", "`bad` requires `good`").with_help("add `good = ...`, the value that scales to 0"))
+            Err(StudyError::new("bad", "`bad` requires `good`")
+                .with_help("add `good = ...`, the value that scales to 0"))
         }
     }
 }
 
 /// Returns the error for a demand that is invalid under the sense of its kind.
-fn impossible(demand: f64, sense: Sense) -> Mistake {
+fn impossible(demand: f64, sense: Sense) -> StudyError {
     let pair = "`good` and `bad`, the values that scale to 0 and to 1";
     let (fact, way_out) = match sense {
         Sense::Target if demand.is_finite() && demand != 0.0 => (
@@ -202,12 +204,12 @@ fn impossible(demand: f64, sense: Sense) -> Mistake {
             format!("the value is divided by the demand; otherwise give {pair} instead"),
         ),
     };
-    Mistake::new("demand", fact).with_help(way_out)
+    StudyError::new("demand", fact).with_help(way_out)
 }
 
 /// Rejects an angle for a value that is not an angle, and a share for an angle. Both are pure numbers, but certainly a
 /// mistake.
-fn refuse_mixed_angles(key: &str, quantity: &Quantity, unit: &Unit) -> Result<(), Mistake> {
+fn refuse_mixed_angles(key: &str, quantity: &Quantity, unit: &Unit) -> Result<(), StudyError> {
     let Some(given) = quantity.unit.as_ref().filter(|given| given.dimension().is_none() && given.to_string() != "1")
     else {
         return Ok(());
@@ -220,11 +222,11 @@ fn refuse_mixed_angles(key: &str, quantity: &Quantity, unit: &Unit) -> Result<()
         false => format!("expected an angle, found a share in {given}"),
     };
     let way_out = if given.is_angle() { "write a pure number" } else { "write an angle, such as \"45 deg\"" };
-    Err(Mistake::new(key, fact).with_help(way_out))
+    Err(StudyError::new(key, fact).with_help(way_out))
 }
 
 /// Rejects a value outside the range of the kind.
-fn in_range(key: &str, value: f64, is_bare: bool, unit: &Unit, [low, high]: [f64; 2]) -> Result<f64, Mistake> {
+fn in_range(key: &str, value: f64, is_bare: bool, unit: &Unit, [low, high]: [f64; 2]) -> Result<f64, StudyError> {
     if value.is_nan() || (low..=high).contains(&value) {
         return Ok(value);
     }
@@ -237,5 +239,5 @@ fn in_range(key: &str, value: f64, is_bare: bool, unit: &Unit, [low, high]: [f64
         Some(_) => format!("if these are degrees, write {key} = \"{value} deg\""),
         None => "give a value within the range".to_owned(),
     };
-    Err(Mistake::new(key, fact).with_help(way_out))
+    Err(StudyError::new(key, fact).with_help(way_out))
 }

@@ -2,9 +2,9 @@
 
 use super::values::signal_names;
 use crate::diagnostic::suggestion;
-use crate::mistake::Mistake;
 use crate::model::{AnalysisKind, Interface, Variable};
 use crate::study::{JobPlan, ParameterSource, Study};
+use crate::study_error::StudyError;
 use crate::unit::Unit;
 
 /// Returns the job of a model in a case, created on first use and completed later. Adds the signals to those it computes.
@@ -14,10 +14,10 @@ pub(super) fn job(
     case: usize,
     wanted: &[String],
     signals: &[Variable],
-) -> Result<usize, Mistake> {
+) -> Result<usize, StudyError> {
     let wanted = wanted.iter().map(|name| {
         signals.iter().position(|s| s.name == *name).ok_or_else(|| {
-            Mistake::new("signal", format!("the model has no signal `{name}`"))
+            StudyError::new("signal", format!("the model has no signal `{name}`"))
                 .with_help(suggestion(name, signal_names(signals)))
         })
     });
@@ -37,7 +37,7 @@ pub(super) fn job(
 }
 
 /// Sets the horizon and the parameters of a job.
-pub(super) fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)]) -> Result<(), Mistake> {
+pub(super) fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)]) -> Result<(), StudyError> {
     let JobPlan { model, case, .. } = study.jobs[index];
     let interface = study.models[model].1.interface();
     let horizon = match (study.cases[case].horizon.or(interface.horizon), interface.analysis) {
@@ -45,7 +45,7 @@ pub(super) fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)])
         (None, AnalysisKind::Linear) => 0.0,
         (None, AnalysisKind::Time) => {
             let fact = format!("case `{}` has no horizon", study.cases[case].name);
-            return Err(Mistake::here(fact).with_help("set `horizon` in the case or in the model"));
+            return Err(StudyError::here(fact).with_help("set `horizon` in the case or in the model"));
         }
     };
     let parameters = sources(study, interface, fixed, case)?;
@@ -55,8 +55,8 @@ pub(super) fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)])
 }
 
 /// Returns the error for a parameter with incompatible units in two models.
-fn apart(name: &str, unit: &Unit, other: &Unit) -> Mistake {
-    Mistake::here(format!("`{name}` is in {unit} in one model and in {other} in another"))
+fn apart(name: &str, unit: &Unit, other: &Unit) -> StudyError {
+    StudyError::here(format!("`{name}` is in {unit} in one model and in {other} in another"))
         .with_help("give them different names, or one unit")
 }
 
@@ -67,7 +67,7 @@ fn sources(
     interface: &Interface,
     fixed: &[(String, f64)],
     case: usize,
-) -> Result<Vec<ParameterSource>, Mistake> {
+) -> Result<Vec<ParameterSource>, StudyError> {
     let find = |list: &[(String, f64)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
     interface
         .parameters
@@ -97,7 +97,7 @@ fn sources(
                 return by(tuner);
             }
             find(fixed, name).or(p.default).map(ParameterSource::Constant).ok_or_else(|| {
-                Mistake::here(format!("the parameter `{name}` has no value in case `{}`", study.cases[case].name))
+                StudyError::here(format!("the parameter `{name}` has no value in case `{}`", study.cases[case].name))
                     .with_help(format!("make `{name}` a tuner, or set it in the case or in `parameters` of the model"))
             })
         })

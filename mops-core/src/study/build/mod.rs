@@ -12,10 +12,10 @@ use std::sync::Arc;
 use crate::case::Case;
 use crate::criterion::Usage;
 use crate::evaluation::Objective;
-use crate::mistake::Mistake;
 use crate::model::{Interface, Model};
-use crate::study::draft::{CaseDraft, Draft};
+use crate::study::draft::{CaseBuilder, StudyBuilder};
 use crate::study::{JobPlan, Study, Task, Tasks, diagnosis, tasks};
+use crate::study_error::StudyError;
 use cases::{assumed_units, build_case};
 use criteria::add_rows;
 use jobs::{complete, job};
@@ -24,23 +24,23 @@ use values::{check_horizon, fixed_values, section};
 
 type Models = [(String, Arc<dyn Model>)];
 
-pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
+pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
     if draft.models.is_empty() {
-        return Err(Mistake::new("models", "the study has no model")
+        return Err(StudyError::new("models", "the study has no model")
             .with_help("add a table such as [models.loop.pid-loop]; `mops list` shows the kinds"));
     }
     let mut models: Vec<(String, Arc<dyn Model>)> = Vec::new();
     let mut fixed = Vec::new();
     for (name, draft) in draft.models {
         let Interface { parameters, horizon, .. } = draft.model.interface();
-        let within = |mistake: Mistake| mistake.within(&name).within("models");
+        let within = |mistake: StudyError| mistake.within(&name).within("models");
         check_horizon(*horizon).map_err(within)?;
         fixed.push(fixed_values(&draft.parameters, parameters).map_err(|m| within(m.within("parameters")))?);
         models.push((name, Arc::from(draft.model)));
     }
     let mut warnings = Vec::new();
     let drafts = if draft.cases.is_empty() {
-        vec![CaseDraft { name: "nominal".into(), ..CaseDraft::default() }]
+        vec![CaseBuilder { name: "nominal".into(), ..CaseBuilder::default() }]
     } else {
         draft.cases
     };
@@ -92,7 +92,7 @@ pub(super) fn build(draft: Draft) -> Result<Study, Mistake> {
     };
     // Excitation needs no criterion, and in a diagnosis every channel counts with its noise.
     if draft.criteria.is_empty() && !matches!(study.task, Task::Excitation | Task::Diagnosis) {
-        return Err(Mistake::new("criteria", "the study has no criterion").with_help(
+        return Err(StudyError::new("criteria", "the study has no criterion").with_help(
             "add one, such as [criteria] followed by overshoot = { overshoot = { signal = \"y\" }, demand = 0.1 }",
         ));
     }

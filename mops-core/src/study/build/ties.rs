@@ -2,7 +2,7 @@
 
 use crate::expression::Expression;
 use crate::expression::units::{Conflict, Dimensions, Measure, Named};
-use crate::mistake::Mistake;
+use crate::study_error::StudyError;
 use crate::tuner::Tuner;
 
 /// Checks that an expression has the dimension of the tuner `name`, which it sets. Tuners that are `loose` have no unit,
@@ -12,7 +12,7 @@ pub(super) fn check(
     name: &str,
     tuners: &[Tuner],
     loose: &dyn Fn(&str) -> bool,
-) -> Result<(), Mistake> {
+) -> Result<(), StudyError> {
     let mut dimensions = Dimensions::default();
     let mut measure = |tuner: &Tuner| match loose(&tuner.parameter) {
         true => dimensions.open(&tuner.parameter),
@@ -22,5 +22,5 @@ pub(super) fn check(
     let Some((_, wanted)) = tied.0.iter().find(|(known, _)| known == name).cloned() else { return Ok(()) };
     dimensions
         .fits(&mut tied, &wanted, expression.root(), "a tied tuner has the dimension of its expression")
-        .map_err(|Conflict { span, fact, help }| Mistake::here(fact).with_help(help).at(span))
+        .map_err(|Conflict { span, fact, help }| StudyError::here(fact).with_help(help).at(span))
 }

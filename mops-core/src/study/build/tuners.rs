@@ -7,25 +7,25 @@ use crate::diagnostic::suggestion;
 use crate::experiment::{Channel, Experiment};
 use crate::expression::Expression;
 use crate::math;
-use crate::mistake::Mistake;
 use crate::model::Parameter;
-use crate::study::draft::{Free, TunerDraft};
+use crate::study::draft::{Free, TunerBuilder};
+use crate::study_error::StudyError;
 use crate::tuner::{Grid, Scale, Tuner};
 use crate::unit::{Quantity, Unit};
 
 /// Adds the tuner, or one for every case.
 pub(super) fn build_tuner(
     name: &str,
-    draft: &TunerDraft,
+    draft: &TunerBuilder,
     models: &Models,
     cases: &[Case],
     tuners: &mut Vec<Tuner>,
-) -> Result<(), Mistake> {
+) -> Result<(), StudyError> {
     let known: Vec<&Parameter> = models.iter().flat_map(|(_, m)| &m.interface().parameters).collect();
     let parameter = known.iter().find(|p| p.variable.name == name);
     let unit = match (&draft.unit, parameter) {
         (Some(unit), Some(p)) if !unit.is_compatible(&p.variable.unit) => {
-            return Err(Mistake::new(
+            return Err(StudyError::new(
                 "unit",
                 format!("expected a unit of `{name}` that converts to `{}`, found `{unit}`", p.variable.unit),
             )
@@ -47,13 +47,13 @@ pub(super) fn build_tuner(
         let own = quantity.unit.clone().or_else(|| draft.unit.clone());
         converted(&Quantity { unit: own, ..quantity.clone() }, unit)
     };
-    let value = |key: &str, quantity: &Option<Quantity>| -> Result<Option<f64>, Mistake> {
+    let value = |key: &str, quantity: &Option<Quantity>| -> Result<Option<f64>, StudyError> {
         let Some(quantity) = quantity else { return Ok(None) };
         let value = converted(quantity, &unit).map_err(|m| m.within(key))?;
         if value.is_finite() {
             Ok(Some(value))
         } else {
-            Err(Mistake::new(key, format!("`{key}` must be a finite number, not {value}"))
+            Err(StudyError::new(key, format!("`{key}` must be a finite number, not {value}"))
                 .with_help("every tuner needs finite bounds"))
         }
     };
@@ -68,7 +68,7 @@ pub(super) fn build_tuner(
         values.sort_by(f64::total_cmp);
         values.dedup();
         if values.len() < 2 {
-            return Err(Mistake::new("values", "a tuner needs at least two different values")
+            return Err(StudyError::new("values", "a tuner needs at least two different values")
                 .with_help("add values, or set `active = false` to keep the only one"));
         }
         (min, max) = (values.first().copied(), values.last().copied());
@@ -77,27 +77,27 @@ pub(super) fn build_tuner(
     if let (Some(_), Some(key)) =
         (&draft.tie, [("start", start), ("min", min), ("max", max)].iter().find(|(_, v)| v.is_some()))
     {
-        return Err(Mistake::new(key.0, format!("`{}` is not allowed for a tied tuner", key.0))
+        return Err(StudyError::new(key.0, format!("`{}` is not allowed for a tied tuner", key.0))
             .with_help(format!("remove `{}`, or remove `tie`", key.0)));
     }
     let fixed = draft.inactive || draft.tie.is_some();
     let start = match (start, &draft.tie) {
         (Some(start), _) => start,
         (None, Some(_)) => f64::NAN,
-        (None, None) => return Err(Mistake::here("the tuner has no initial guess").with_help("add `start = ...`")),
+        (None, None) => return Err(StudyError::here("the tuner has no initial guess").with_help("add `start = ...`")),
     };
     let bounds = match (min, max) {
         (Some(min), Some(max)) => [min, max],
         _ if fixed => [min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)],
-        (None, Some(_)) => return Err(Mistake::here("the tuner has no lower bound").with_help("add `min = ...`")),
-        (Some(_), None) => return Err(Mistake::here("the tuner has no upper bound").with_help("add `max = ...`")),
+        (None, Some(_)) => return Err(StudyError::here("the tuner has no lower bound").with_help("add `min = ...`")),
+        (Some(_), None) => return Err(StudyError::here("the tuner has no upper bound").with_help("add `max = ...`")),
         (None, None) => {
-            return Err(Mistake::here("the tuner has no bounds").with_help("add `min = ...` and `max = ...`"));
+            return Err(StudyError::here("the tuner has no bounds").with_help("add `min = ...` and `max = ...`"));
         }
     };
     let [min, max] = bounds;
     if max <= min {
-        return Err(Mistake::new("max", format!("the range is empty: min is {min}, max is {max}")).with_help(
+        return Err(StudyError::new("max", format!("the range is empty: min is {min}, max is {max}")).with_help(
             if max < min { "swap the bounds" } else { "widen the range, or set `active = false` to keep the value" },
         ));
     }
@@ -106,7 +106,7 @@ pub(super) fn build_tuner(
             return Ok(());
         }
         let (start, max) = (unit.amount(start), unit.amount(max));
-        Err(Mistake::new(key, format!("the initial guess {start} is outside the bounds, {min} to {max}"))
+        Err(StudyError::new(key, format!("the initial guess {start} is outside the bounds, {min} to {max}"))
             .with_help("correct it, or widen the bounds"))
     };
     check_start("start", start)?;
@@ -120,7 +120,7 @@ pub(super) fn build_tuner(
         Grid::List(values) => (!values.contains(&start)).then_some(("start", start, "start at one of `values`")),
     };
     if let Some((key, value, way_out)) = off_grid.filter(|_| !fixed) {
-        return Err(Mistake::new(key, format!("{} is not an allowed value of the tuner", unit.amount(value)))
+        return Err(StudyError::new(key, format!("{} is not an allowed value of the tuner", unit.amount(value)))
             .with_help(way_out));
     }
     let elsewhere = own_starts(draft, cases, |case, quantity| {
@@ -129,16 +129,16 @@ pub(super) fn build_tuner(
         if fixed || grid.has(start) {
             return Ok(start);
         }
-        Err(Mistake::new(case, format!("{} is not an allowed value of the tuner", unit.amount(start)))
+        Err(StudyError::new(case, format!("{} is not an allowed value of the tuner", unit.amount(start)))
             .with_help("start at an integer, or at one of `values`"))
     })?;
     if draft.scale == Scale::Log && min <= 0.0 && max >= 0.0 {
-        return Err(Mistake::new("scale", format!("a logarithmic range must exclude zero, but `min` is {min}"))
+        return Err(StudyError::new("scale", format!("a logarithmic range must exclude zero, but `min` is {min}"))
             .with_help("raise `min`, or omit `scale`"));
     }
     let width = if draft.scale == Scale::Log { math::ln(max / min) } else { max - min };
     if !fixed && !width.is_finite() {
-        return Err(Mistake::new("max", format!("the range from {min:e} to {max:e} overflows"))
+        return Err(StudyError::new("max", format!("the range from {min:e} to {max:e} overflows"))
             .with_help("narrow the bounds to plausible values"));
     }
     if let Some(parameter) = parameter {
@@ -175,33 +175,33 @@ pub(super) fn build_tuner(
 
 /// Returns the initial guesses of single cases, by index of the case.
 fn own_starts(
-    draft: &TunerDraft,
+    draft: &TunerBuilder,
     cases: &[Case],
-    value: impl Fn(&str, &Quantity) -> Result<f64, Mistake>,
-) -> Result<Vec<(usize, f64)>, Mistake> {
+    value: impl Fn(&str, &Quantity) -> Result<f64, StudyError>,
+) -> Result<Vec<(usize, f64)>, StudyError> {
     if !draft.starts.is_empty() && !draft.per_case {
-        return Err(Mistake::new("starts", "the tuner has one value for all cases")
+        return Err(StudyError::new("starts", "the tuner has one value for all cases")
             .with_help("set `per-case = true` too, or omit `starts`"));
     }
     let one = |(name, quantity): &(String, Quantity)| {
         let index = cases.iter().position(|case| case.name == *name).ok_or_else(|| {
-            Mistake::new(name, format!("there is no case or experiment `{name}`"))
+            StudyError::new(name, format!("there is no case or experiment `{name}`"))
                 .with_help(suggestion(name, cases.iter().map(|case| case.name.as_str())))
         })?;
         Ok((index, value(name, quantity)?))
     };
-    draft.starts.iter().map(|entry| one(entry).map_err(|mistake: Mistake| mistake.within("starts"))).collect()
+    draft.starts.iter().map(|entry| one(entry).map_err(|mistake: StudyError| mistake.within("starts"))).collect()
 }
 
 /// Checks that every tuner sets a parameter or is used by one that does.
-pub(super) fn check_use(drafts: &[(String, TunerDraft)], models: &Models) -> Result<(), Mistake> {
+pub(super) fn check_use(drafts: &[(String, TunerBuilder)], models: &Models) -> Result<(), StudyError> {
     let known: Vec<&str> = models.iter().flat_map(|(_, m)| names(&m.interface().parameters)).collect();
     let ties: Vec<Expression> =
         drafts.iter().filter_map(|(_, draft)| Expression::parse(draft.tie.as_ref()?).ok()).collect();
     for (name, _) in drafts {
         let followed = ties.iter().any(|tie| tie.names().contains(name));
         if !followed && !known.contains(&name.as_str()) {
-            return Err(Mistake::new(name, format!("no model has a parameter `{name}`"))
+            return Err(StudyError::new(name, format!("no model has a parameter `{name}`"))
                 .with_help(suggestion(name, known.iter().copied()))
                 .within("tuners"));
         }
@@ -211,15 +211,15 @@ pub(super) fn check_use(drafts: &[(String, TunerDraft)], models: &Models) -> Res
 
 /// Binds the expressions of tied tuners, in an order in which each expression uses earlier tuners only.
 pub(super) fn tie_tuners(
-    drafts: &[(String, TunerDraft)],
+    drafts: &[(String, TunerBuilder)],
     tuners: &mut [Tuner],
     models: &Models,
-) -> Result<(), Mistake> {
+) -> Result<(), StudyError> {
     let parameters: Vec<&str> = models.iter().flat_map(|(_, m)| names(&m.interface().parameters)).collect();
     for (position, (name, draft)) in drafts.iter().enumerate() {
         let Some(text) = &draft.tie else { continue };
         let wrong =
-            |message: String, help: &str| Mistake::new("tie", message).with_help(help).within(name).within("tuners");
+            |message: String, help: &str| StudyError::new("tie", message).with_help(help).within(name).within("tuners");
         let expression = Expression::parse(text).map_err(|e| wrong(e.message, "as in tie = \"2*Ti + 0.1\""))?;
         let mut of = Vec::new();
         for used in expression.names() {
@@ -253,10 +253,10 @@ pub(super) fn tie_tuners(
 
 /// Returns the tuner of a free initial state; the initial guess and bounds are derived from the data if the study gives
 /// none.
-pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models) -> Result<Tuner, Mistake> {
+pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models) -> Result<Tuner, StudyError> {
     let states: Vec<_> = models.iter().flat_map(|(_, m)| m.interface().states.iter().map(move |s| (m, s))).collect();
     let (model, state) = states.iter().find(|(_, s)| s.name == free.state).ok_or_else(|| {
-        Mistake::new(&free.state, format!("no model has a state `{}`", free.state))
+        StudyError::new(&free.state, format!("no model has a state `{}`", free.state))
             .with_help(suggestion(&free.state, states.iter().map(|(_, s)| s.name.as_str())))
     })?;
     let parameter =
@@ -285,14 +285,14 @@ pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models
                 ),
                 None => format!("the initial value of `{}` is not determined by any measurement", free.state),
             };
-            return Err(Mistake::new(&free.state, fact)
+            return Err(StudyError::new(&free.state, fact)
                 .with_help(format!("write free = {{ {} = {{ start = ..., min = ..., max = ... }} }}", free.state)));
         }
     };
     let [low, high] = parameter.range;
     let bounds = [min.unwrap_or((start - spread).max(low)), max.unwrap_or((start + spread).min(high))];
     if bounds[0] >= bounds[1] || !(bounds[0]..=bounds[1]).contains(&start) {
-        return Err(Mistake::new(
+        return Err(StudyError::new(
             &free.state,
             format!(
                 "the initial guess {} is outside its bounds, {} to {}",

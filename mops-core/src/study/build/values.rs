@@ -1,12 +1,12 @@
 //! Names, units and ranges of single values.
 
 use crate::diagnostic::suggestion;
-use crate::mistake::Mistake;
 use crate::model::{Parameter, Variable};
-use crate::study::draft::CaseDraft;
+use crate::study::draft::CaseBuilder;
+use crate::study_error::StudyError;
 use crate::unit::{Quantity, Unit};
 
-pub(super) fn section(case: &CaseDraft) -> &'static str {
+pub(super) fn section(case: &CaseBuilder) -> &'static str {
     if case.measured.is_some() { "experiments" } else { "cases" }
 }
 
@@ -22,10 +22,10 @@ pub(super) fn signal_names(signals: &[Variable]) -> impl Iterator<Item = &str> +
     signals.iter().map(|s| s.name.as_str())
 }
 
-pub(super) fn check_horizon(end: Option<f64>) -> Result<(), Mistake> {
+pub(super) fn check_horizon(end: Option<f64>) -> Result<(), StudyError> {
     match end {
         Some(end) if !(end.is_finite() && end > 0.0) => {
-            Err(Mistake::new("horizon", format!("expected a positive horizon, found {end} s"))
+            Err(StudyError::new("horizon", format!("expected a positive horizon, found {end} s"))
                 .with_help("a simulation starts at 0 s; give its end time, such as \"60 s\""))
         }
         _ => Ok(()),
@@ -33,12 +33,15 @@ pub(super) fn check_horizon(end: Option<f64>) -> Result<(), Mistake> {
 }
 
 /// Returns the parameter values of a model that the study fixes, in the units of the parameters.
-pub(super) fn fixed_values(given: &[(String, Quantity)], known: &[Parameter]) -> Result<Vec<(String, f64)>, Mistake> {
+pub(super) fn fixed_values(
+    given: &[(String, Quantity)],
+    known: &[Parameter],
+) -> Result<Vec<(String, f64)>, StudyError> {
     given
         .iter()
         .map(|(name, quantity)| {
             let parameter = parameter(known, name).ok_or_else(|| {
-                Mistake::new(name, format!("the model has no parameter `{name}`"))
+                StudyError::new(name, format!("the model has no parameter `{name}`"))
                     .with_help(suggestion(name, names(known)))
             })?;
             Ok((name.clone(), in_range(quantity, parameter).map_err(|m| m.within(name))?))
@@ -47,13 +50,13 @@ pub(super) fn fixed_values(given: &[(String, Quantity)], known: &[Parameter]) ->
 }
 
 /// Returns the value of a parameter, in its unit.
-pub(super) fn in_range(quantity: &Quantity, parameter: &Parameter) -> Result<f64, Mistake> {
+pub(super) fn in_range(quantity: &Quantity, parameter: &Parameter) -> Result<f64, StudyError> {
     let value = converted(quantity, &parameter.variable.unit)?;
     check_range(value, parameter)?;
     Ok(value)
 }
 
-pub(super) fn check_range(value: f64, parameter: &Parameter) -> Result<(), Mistake> {
+pub(super) fn check_range(value: f64, parameter: &Parameter) -> Result<(), StudyError> {
     let [low, high] = parameter.range;
     if (low..=high).contains(&value) && (value.is_finite() || parameter.infinite) {
         return Ok(());
@@ -72,15 +75,15 @@ pub(super) fn check_range(value: f64, parameter: &Parameter) -> Result<(), Mista
     } else {
         "be a number".to_owned()
     };
-    Err(Mistake::here(format!("`{name}` must {wanted}, not {}", unit.amount(value)))
+    Err(StudyError::here(format!("`{name}` must {wanted}, not {}", unit.amount(value)))
         .with_help(format!("`{name}` is: {about}")))
 }
 
 /// Returns the number in `unit`.
-pub(super) fn converted(quantity: &Quantity, unit: &Unit) -> Result<f64, Mistake> {
+pub(super) fn converted(quantity: &Quantity, unit: &Unit) -> Result<f64, StudyError> {
     quantity.to(unit).map_err(|why| {
         let unit = unit.to_string();
-        Mistake::here(why).with_help(match unit.as_str() {
+        StudyError::here(why).with_help(match unit.as_str() {
             "1" => "write a pure number".to_owned(),
             _ => format!("a number without a unit is in `{unit}`"),
         })

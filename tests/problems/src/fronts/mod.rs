@@ -6,7 +6,7 @@ mod dtlz;
 mod wfg;
 mod zdt;
 
-use mops_core::Along;
+use mops_core::Dual7;
 use mops_core::front::{hypervolume, non_dominated};
 
 use crate::{Answer, Functions, Problem, Sense};
@@ -17,7 +17,7 @@ pub(crate) use wfg::SUITE as WFG;
 pub(crate) use zdt::SUITE as ZDT;
 
 /// Plain generic function, for each kind of number.
-type Plain = (fn(&[f64]) -> Vec<f64>, fn(&[Along]) -> Vec<Along>);
+type Plain = (fn(&[f64]) -> Vec<f64>, fn(&[Dual7]) -> Vec<Dual7>);
 
 /// Points of a front.
 type Points = fn(usize) -> Vec<Vec<f64>>;

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::study::Draft;
+use crate::study::StudyBuilder;
 
 /// Study that a catalogue knows by name: `mops list` shows it, and every command that takes a study file takes the name.
 #[derive(Clone)]
 #[non_exhaustive]
-pub enum KnownStudy {
+pub enum CatalogueStudy {
     /// Files in the program.
     Shipped(Shipped),
     /// Folder with `study.toml`, data, and `README.md`.
@@ -45,10 +45,10 @@ pub struct StudyFolder {
 pub struct BuiltStudy {
     name: String,
     about: String,
-    draft: Arc<dyn Fn() -> Draft + Send + Sync>,
+    draft: Arc<dyn Fn() -> StudyBuilder + Send + Sync>,
 }
 
-impl KnownStudy {
+impl CatalogueStudy {
     /// Returns the name.
     pub fn name(&self) -> &str {
         match self {
@@ -83,7 +83,7 @@ impl BuiltStudy {
     pub fn new(
         name: impl Into<String>,
         about: impl Into<String>,
-        draft: impl Fn() -> Draft + Send + Sync + 'static,
+        draft: impl Fn() -> StudyBuilder + Send + Sync + 'static,
     ) -> Self {
         Self { name: name.into(), about: about.into(), draft: Arc::new(draft) }
     }
@@ -99,24 +99,24 @@ impl BuiltStudy {
     }
 
     /// Describes the study.
-    pub fn draft(&self) -> Draft {
+    pub fn draft(&self) -> StudyBuilder {
         (self.draft)()
     }
 }
 
-impl From<Shipped> for KnownStudy {
+impl From<Shipped> for CatalogueStudy {
     fn from(shipped: Shipped) -> Self {
         Self::Shipped(shipped)
     }
 }
 
-impl From<StudyFolder> for KnownStudy {
+impl From<StudyFolder> for CatalogueStudy {
     fn from(folder: StudyFolder) -> Self {
         Self::Folder(folder)
     }
 }
 
-impl From<BuiltStudy> for KnownStudy {
+impl From<BuiltStudy> for CatalogueStudy {
     fn from(built: BuiltStudy) -> Self {
         Self::Built(built)
     }

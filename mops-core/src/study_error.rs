@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// An error in a study, with the path of keys to its location: `criteria`, `overshoot`, `overshoot`, `signal`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Mistake {
+pub struct StudyError {
     /// Keys from the root of the study.
     pub path: Vec<String>,
     /// Description of the error.
@@ -16,7 +16,7 @@ pub struct Mistake {
     pub span: Option<Range<usize>>,
 }
 
-impl Mistake {
+impl StudyError {
     /// Creates an error at a key.
     pub fn new(key: impl Into<String>, message: impl Into<String>) -> Self {
         Self { path: vec![key.into()], message: message.into(), help: None, span: None }
@@ -49,11 +49,11 @@ impl Mistake {
     }
 }
 
-impl fmt::Display for Mistake {
+impl fmt::Display for StudyError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.path.join("."), self.message)?;
         self.help.as_ref().map_or(Ok(()), |help| write!(f, "; {help}"))
     }
 }
 
-impl std::error::Error for Mistake {}
+impl std::error::Error for StudyError {}
