@@ -5,10 +5,11 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::Criterion;
+use mops::core::Job;
 use mops::models::equations::{Equations, EquationsOptions};
 use mops::models::furuta::Furuta;
 use mops::models::kernel::{Simulated, Tolerance};
-use mops::{Case, Input, Job, Model};
+use mops::{Case, Input, Model};
 
 const END: f64 = 3.0;
 /// `a`, `b`, `c`, `d`, `ba`, `bp`.

@@ -1,12 +1,11 @@
 //! Evaluations per second of shipped studies, on one thread and on two.
 
 use std::hint::black_box;
-use std::io;
 use std::sync::Arc;
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
-use mops::{Budget, Oracle, Problem, Run, Shipped, file};
+use mops::core::{Budget, Oracle, Problem, Run};
 use mops_core::math;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -108,23 +107,8 @@ fn median(mut numbers: Vec<f64>) -> f64 {
     numbers[numbers.len() / 2]
 }
 
-/// Data files of a shipped study.
-struct Inside(Shipped);
-
-impl file::Files for Inside {
-    fn read(&self, path: &str) -> io::Result<Vec<u8>> {
-        self.0.file(path).map(<[u8]>::to_vec).ok_or_else(|| io::ErrorKind::NotFound.into())
-    }
-
-    fn show(&self, path: &str) -> String {
-        path.to_owned()
-    }
-}
-
 fn shipped(name: &str) -> Problem {
-    let catalogue = mops::catalogue();
-    let study = *catalogue.studies.iter().find(|study| study.name == name).expect("it is shipped");
-    let text = std::str::from_utf8(study.file("study.toml").expect("every study has one")).expect("it is text");
-    let file = file::read(&catalogue, name, text, &[], &Inside(study)).expect("it is right");
+    let study = mops::studies::shipped().into_iter().find(|study| study.name == name).expect("it is shipped");
+    let file = study.open(&mops::catalogue(), &[]).expect("it is right");
     Problem::new(Arc::new(file.study))
 }

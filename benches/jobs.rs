@@ -6,10 +6,11 @@
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use mops::core::{Budget, Evaluation, Evaluator, Run, Shape};
 use mops::solvers::genetic::GeneticOptions;
 use mops::solvers::pattern_search::PatternSearchOptions;
 use mops::solvers::sqp::SqpOptions;
-use mops::{Budget, Evaluation, Evaluator, Run, Shape, Solver, SolverOptions, Usage};
+use mops::{Solver, SolverOptions, Usage};
 use mops_core::math;
 
 const TAKES: Duration = Duration::from_millis(200);

@@ -5,11 +5,12 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::Criterion;
+use mops::core::{DIRECTIONS, Dual, Dual7, Job, Work};
 use mops::models::furuta::{Furuta, FurutaPlant};
 use mops::models::kernel::drive::Drive;
 use mops::models::kernel::friction::Contact;
 use mops::models::kernel::{Driven, Dynamics, Sink, Step, Tolerance, integrate};
-use mops::{Analysis, Case, DIRECTIONS, Dual, Dual7, Input, Job, Model, Scalar, Work};
+use mops::{Analysis, Case, Input, Model, Scalar};
 
 const END: f64 = 3.0;
 const ABSOLUTE: f64 = 1e-8;

@@ -3,9 +3,10 @@
 use std::hint::black_box;
 
 use criterion::Criterion;
+use mops::core::Job;
 use mops::models::equations::{Equations, EquationsOptions};
 use mops::models::kernel::{Dynamics, IntegrationMethod, Simulated, Tolerance, integrate};
-use mops::{Case, Job, Model, Scalar};
+use mops::{Case, Model, Scalar};
 use mops_core::math;
 
 const CELLS: usize = 100;

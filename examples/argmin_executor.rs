@@ -1,7 +1,7 @@
 //! Runs a solver of mops under argmin's executor: a problem with argmin's traits, bounds, and CMA-ES with restarts.
 
 use argmin::core::{CostFunction, Error, Executor, State};
-use mops::math;
+use mops::core::math;
 use mops::solvers::argmin_solver::ArgminSolver;
 use mops::solvers::cma_es::CmaEsOptions;
 

@@ -4,7 +4,8 @@
 
 use std::process::ExitCode;
 
-use mops::{Catalogue, Halt, Objective, Oracle, Progress, Shape, Solver, SolverKind, SolverOptions, Stream};
+use mops::core::{Halt, Oracle, Progress, Shape, Stream};
+use mops::{Catalogue, Objective, Solver, SolverKind, SolverOptions};
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;

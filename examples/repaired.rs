@@ -5,7 +5,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use mops::file::{self, Files};
+use mops::core::file::{self, Files};
 use mops::{Study, StudyBuilder, Task, TunerBuilder};
 
 /// The folder that the paths of data count from.

@@ -5,7 +5,8 @@
 //!
 //! ```
 //! use mops::{CaseBuilder, CriterionBuilder, StudyBuilder, ModelBuilder, Options, TunerBuilder, criteria::overshoot::Overshoot};
-//! # use mops::{Analysis, Failure, Interface, Job, Model, Parameter, Response, Trace, Variable};
+//! # use mops::{Analysis, Failure, Interface, Model, Parameter, Trace, Variable};
+//! # use mops::core::{Job, Response};
 //! # struct Lag(Interface);
 //! # impl Model for Lag {
 //! #     fn interface(&self) -> &Interface { &self.0 }
@@ -45,6 +46,7 @@ mod diagnosis;
 mod files;
 mod numbers;
 mod plain;
+pub mod prelude;
 #[cfg(feature = "report")]
 pub mod report;
 mod search;
@@ -64,15 +66,20 @@ mod watch;
 #[doc = include_str!("../docs/guide/7-in-rust.md")]
 mod guide {}
 
-pub use mops_core::*;
+pub use mops_core as core;
+pub use mops_core::{
+    Analysis, BuiltStudy, Cancellation, Case, CaseBuilder, Catalogue, Criterion, CriterionBuilder, CriterionKind,
+    CriterionOptions, CriterionSpec, Diagnostic, EffectBuilder, Failure, Input, Instant, Interface, Model,
+    ModelBuilder, ModelKind, ModelOptions, Objective, Outcome, Parameter, Plant, Quantity, Scalar, Shipped, Solver,
+    SolverKind, SolverOptions, Study, StudyBuilder, StudyError, Task, Trace, TunerBuilder, Unit, Usage, Value,
+    Variable, Watch,
+};
 pub use mops_criteria as criteria;
 pub use mops_discrepancy as discrepancy;
 pub use mops_effects as effects;
 pub use mops_models as models;
 pub use mops_solvers as solvers;
 pub use mops_studies as studies;
-#[cfg(feature = "report")]
-pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report, Surface, Third, Upright};
 pub use search::{DEFAULT_EVALUATIONS, EvaluationStore, Options, SolveError, Solved, suits};
 pub use solve::solve;
 

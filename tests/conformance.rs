@@ -5,9 +5,10 @@ mod function;
 
 use std::sync::Arc;
 
+use mops::core::{Budget, Oracle, Problem, Run, Stop};
 use mops::{
-    Analysis, Budget, Case, Criterion, CriterionBuilder, CriterionSpec, Interface, Objective, Oracle, Problem, Run,
-    SolverKind, Stop, Study, StudyBuilder, StudyError, TunerBuilder, Unit, Usage, Value, Watch,
+    Analysis, Case, Criterion, CriterionBuilder, CriterionSpec, Interface, Objective, SolverKind, Study, StudyBuilder,
+    StudyError, TunerBuilder, Unit, Usage, Value, Watch,
 };
 
 use function::{End, Function};
@@ -106,7 +107,7 @@ fn solvers(problem: &Problem) -> Vec<SolverKind> {
 
 struct Solved {
     stop: Stop,
-    best: mops::Evaluation,
+    best: mops::core::Evaluation,
     points: Vec<Vec<f64>>,
 }
 
@@ -359,7 +360,7 @@ fn whole_numbers_and_few_of_them_end_at_the_best() {
     // The least of (x - 1.3)^2 over -2, -1, 0, 1, 2 is at 1.
     let whole = [Objective::Max, Objective::Each].map(|objective| {
         let mut whole = study_of(objective, 1, &[Usage::Minimise], |x| Some(vec![math::powi(x[0] - 1.3, 2)]));
-        whole.tuners[0].grid = mops::Grid::Integer;
+        whole.tuners[0].grid = mops::core::Grid::Integer;
         whole.tuners[0].start = -2.0;
         Problem::new(Arc::new(whole))
     });

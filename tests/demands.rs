@@ -177,7 +177,7 @@ fn what_may_be_meant_either_way_and_what_an_unstable_system_meets_is_refused() {
         ("c = { peak = { signal = 'y', of = 'minimum' }, demand = 1 }", "demand"),
         (
             "c = { settling-time = { signal = 'y', target = 1, relative-band = 2 }, demand = '3 s' }",
-            "if these are percent",
+            "for percent write",
         ),
     ] {
         let message = refusal(&format!("{growth}{criterion}"));

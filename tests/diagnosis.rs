@@ -1,7 +1,7 @@
 //! A few cases of the benchmark of the diagnosis: simulated experiments whose truth is known.
 
+use mops::core::file::Files;
 use mops::discrepancy::{Diagnosis, Verdict};
-use mops::file::Files;
 use mops::{Catalogue, Options, catalogue};
 use mops_testbed::{Missing, Trial, generate};
 
@@ -36,7 +36,7 @@ fn diagnosis(case: &Trial, shuffled: bool) -> Diagnosis {
 
 /// What mops says of a case with a catalogue and a seed.
 fn diagnosis_among(case: &Trial, catalogue: Catalogue, seed: u64) -> Diagnosis {
-    let file = mops::file::read(&catalogue, "study.toml", &case.study, &[], &Data(case));
+    let file = mops::core::file::read(&catalogue, "study.toml", &case.study, &[], &Data(case));
     let mut study = file.unwrap_or_else(|mistake| panic!("{}: {mistake}", case.name)).study;
     study.seed = seed;
     let options = Options { effects: catalogue.effects, ..Options::default() };

@@ -53,7 +53,7 @@ fn a_solver_of_ones_own_finds_what_the_default_one_finds_whatever_the_number_of_
     let (one, four) = (solved(1), solved(4));
     assert!(one.worst_scaled <= 1.0001 * by_default.worst_scaled, "{} {}", one.worst_scaled, by_default.worst_scaled);
     assert_eq!((one.worst_scaled.to_bits(), one.evaluations), (four.worst_scaled.to_bits(), four.evaluations));
-    let each = mops::Shape { objective: mops::Objective::Each, ..mops::Shape::default() };
+    let each = mops::core::Shape { objective: mops::Objective::Each, ..mops::core::Shape::default() };
     assert!(kind.default_choice().make().accepts(&each).is_err_and(|why| why.contains("nsga2")));
 }
 
@@ -69,7 +69,7 @@ fn a_repaired_study_as_a_program_is_the_calibration_that_its_file_is() {
     assert_eq!((start("b"), start("bp"), start("ca")), (Some(1.133e-3), None, Some(5e-4)));
     let keys: Vec<String> = study.rows.iter().map(|row| study.key(row)).collect();
     assert_eq!(keys, ["horizontal/phi", "horizontal/theta", "upright/phi", "upright/theta"]);
-    assert_eq!(study.cases[1].role(), mops::Role::Validation);
+    assert_eq!(study.cases[1].role(), mops::core::Role::Validation);
 }
 
 #[path = "../examples/argmin_executor.rs"]
@@ -85,7 +85,7 @@ fn an_executor_of_argmin_drives_a_solver_to_the_least_of_many_basins() {
 /// A file with every column that the recordings have, whatever its name.
 struct AnyRecording;
 
-impl mops::file::Files for AnyRecording {
+impl mops::core::file::Files for AnyRecording {
     fn read(&self, _: &str) -> std::io::Result<Vec<u8>> {
         let row = |i: u32| {
             let t = f64::from(i) * 0.05;
@@ -108,10 +108,14 @@ fn the_studies_of_recordings_are_read_with_the_roles_of_their_experiments() {
         ("pendulum-multiarm", include_str!("../examples/recordings/pendulum-multiarm.toml"), [9, 3, 6]),
         ("pendulum-dfki", include_str!("../examples/recordings/pendulum-dfki.toml"), [3, 0, 1]),
     ] {
-        let read = mops::file::read(&mops::catalogue(), "study.toml", text, &[], &AnyRecording);
+        let read = mops::core::file::read(&mops::catalogue(), "study.toml", text, &[], &AnyRecording);
         let study = read.unwrap_or_else(|mistake| panic!("{name}: {mistake}")).study;
         assert_eq!(study.name, name);
         let of = |role| study.cases.iter().filter(|case| case.role() == role).count();
-        assert_eq!([mops::Role::Calibration, mops::Role::Selection, mops::Role::Validation].map(of), roles, "{name}");
+        assert_eq!(
+            [mops::core::Role::Calibration, mops::core::Role::Selection, mops::core::Role::Validation].map(of),
+            roles,
+            "{name}"
+        );
     }
 }

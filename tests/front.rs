@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
-use mops::front::hypervolume;
+use mops::core::front::hypervolume;
 use mops_core::math;
 use serde_json::Value;
 

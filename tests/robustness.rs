@@ -6,12 +6,15 @@ mod function;
 use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
+use mops::core::{
+    ChannelBuilder, Chosen, DistributionBuilder, Job, Measured, MonteCarloTask, Place, Response, RobustTask,
+    SensitivityMethod, SensitivityTask, TasksBuilder, UncertainBuilder, UncertaintyTask, WorstCaseTask,
+    statistics::Sampling,
+};
 use mops::criteria::normalised_error::NormalisedError;
 use mops::{
-    Analysis, CaseBuilder, ChannelBuilder, Chosen, CriterionBuilder, DistributionBuilder, Failure, Interface, Job,
-    Measured, Model, MonteCarloTask, Options, Outcome, Parameter, Place, Response, RobustTask, SensitivityMethod,
-    SensitivityTask, StudyBuilder, Task, TasksBuilder, Trace, TunerBuilder, UncertainBuilder, UncertaintyTask, Usage,
-    Variable, WorstCaseTask, statistics::Sampling,
+    Analysis, CaseBuilder, CriterionBuilder, Failure, Interface, Model, Options, Outcome, Parameter, StudyBuilder,
+    Task, Trace, TunerBuilder, Usage, Variable,
 };
 use serde_json::Value as Json;
 
@@ -462,7 +465,7 @@ fn samples_are_written_beside_the_result() {
 /// The study has no data.
 struct NoFiles;
 
-impl mops::file::Files for NoFiles {
+impl mops::core::file::Files for NoFiles {
     fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
         panic!("{path} is not needed")
     }
@@ -486,10 +489,10 @@ fn the_pid_design_for_the_box_holds_on_an_independent_grid() {
 
     let text =
         std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("studies/pid-robust/study.toml")).unwrap();
-    let study = mops::file::read(&mops::catalogue(), "study.toml", &text, &[], &NoFiles).unwrap().study;
+    let study = mops::core::file::read(&mops::catalogue(), "study.toml", &text, &[], &NoFiles).unwrap().study;
     let design: Vec<f64> = (0..3).map(|i| result["tuners"][i]["value"].as_f64().unwrap()).collect();
     let over = study.over_uncertain(&design);
-    let problem = mops::Problem::new(std::sync::Arc::new(over.clone()));
+    let problem = mops::core::Problem::new(std::sync::Arc::new(over.clone()));
     let (mut overshoot, mut settling) = (0.0_f64, 0.0_f64);
     let along = |i: u32, middle: f64, half: f64| middle + half * (f64::from(i) / 4.5 - 1.0);
     for i in 0..1000 {

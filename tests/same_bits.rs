@@ -45,11 +45,11 @@ fn a_processor_without_fused_products_gives_the_same_bits() {
         // Frequency responses, eigenvalues and Riccati equations.
         ("multi-model", &["--max-evaluations", "60"]),
         ("pole-placement-retuning", &["--max-evaluations", "60"]),
-        ("studies/control/absorber-hinf.toml", &["--max-evaluations", "60"]),
+        ("mops-bench/control/absorber-hinf.toml", &["--max-evaluations", "60"]),
         // Least squares with tangents, standard errors and their quantiles.
         ("furuta-calibration", &["--max-evaluations", "15"]),
         ("step-identification", &["--max-evaluations", "30"]),
-        ("studies/control/misra1a.toml", &[]),
+        ("mops-bench/control/misra1a.toml", &[]),
         ("tank-level", &["--max-evaluations", "60"]),
         // Quantiles of uncertain parameters, intervals of shares.
         ("pid-robust", &["--set", "study.task=\"monte-carlo\"", "--set", "monte-carlo.samples=40"]),

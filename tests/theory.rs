@@ -91,7 +91,7 @@ fn orders_of_known_inputs_are_found_without_a_simulation() {
     let expected = [("pulse", 0, false), ("step", 1, false), ("sine", 2, true), ("five", 5, true), ("bits", 127, true)];
     assert_eq!(orders, expected);
     assert_eq!(result["simulations"], 0);
-    assert!(found[1]["words"].as_str().unwrap().contains("What happens only once (an edge) excites more"));
+    assert!(found[1]["words"].as_str().unwrap().contains("Transients such as an edge excite more"));
     let page = page(folder.path());
     assert!(page.contains("persistently exciting of order 127") && page.contains("Excitation by u in bits"));
     assert!(folder.path().join("out/plots/excitation-bits-u.png").exists());

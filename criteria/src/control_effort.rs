@@ -7,7 +7,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{NOT_NEGATIVE, optional, signal, trace};
+use crate::common::{NOT_NEGATIVE, optional, trace};
 
 /// Control effort `integral (u - offset)^2 dt` over the whole simulation, in signal^2 s; with `of = "absolute"`
 /// `integral |u - offset| dt`, in signal s.
@@ -45,8 +45,8 @@ impl CriterionOptions for ControlEffort {
 }
 
 impl CriterionSpec for ControlEffort {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        let signal = signal(signals, &self.signal)?.clone();
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+        let signal = model.signal(&self.signal)?.clone();
         let offset = optional("offset", self.offset.as_ref(), &signal.unit)?.unwrap_or(0.0);
         Ok(Box::new(Bound { signal, of: self.of, offset }))
     }

@@ -34,14 +34,14 @@ impl CriterionOptions for DelayTime {
 }
 
 impl CriterionSpec for DelayTime {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),
             from: self.from.as_ref(),
             step_time: self.step_time.as_ref(),
         };
-        let step = options.bind(signals)?;
+        let step = options.bind(model)?;
         let level = number("level", self.level.as_ref().unwrap_or(&0.5.into()), &Unit::one())?;
         if !(0.0 < level && level <= 1.0) {
             return Err(StudyError::new("level", format!("`level` must be above 0 and at most 1, not {level}")));

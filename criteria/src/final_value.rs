@@ -6,7 +6,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{signal, trace};
+use crate::common::trace;
 
 /// Final value `y(t_end)`, in the unit of the signal.
 ///
@@ -27,8 +27,8 @@ impl CriterionOptions for FinalValue {
 }
 
 impl CriterionSpec for FinalValue {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone() }))
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+        Ok(Box::new(Bound { signal: model.signal(&self.signal)?.clone() }))
     }
 }
 

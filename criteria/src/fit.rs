@@ -7,7 +7,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{NOT_NEGATIVE, compare, compared_slopes, signal};
+use crate::common::{NOT_NEGATIVE, compare, compared_slopes};
 
 /// Fit `J = weight integral (y_simulated - y_measured)^2 dt` over the measured time, in signal^2 s.
 ///
@@ -49,8 +49,8 @@ impl CriterionOptions for Fit {
 }
 
 impl CriterionSpec for Fit {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        let signal = signal(signals, &self.signal)?.clone();
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+        let signal = model.signal(&self.signal)?.clone();
         if !(self.weight.is_finite() && self.weight > 0.0) {
             return Err(StudyError::new("weight", format!("`weight` must be positive, not {}", self.weight)));
         }

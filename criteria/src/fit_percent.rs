@@ -6,7 +6,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{compare, signal};
+use crate::common::compare;
 
 /// Fit `100 (1 - |y_measured - y_simulated| / |y_measured - mean(y_measured)|)`, in percent, with the Euclidean norm
 /// over the samples.
@@ -29,8 +29,8 @@ impl CriterionOptions for FitPercent {
 }
 
 impl CriterionSpec for FitPercent {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.name.clone() }))
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+        Ok(Box::new(Bound { signal: model.signal(&self.signal)?.name.clone() }))
     }
 
     fn needs_measurement(&self) -> Option<&str> {

@@ -31,14 +31,14 @@ impl CriterionOptions for Iae {
 }
 
 impl CriterionSpec for Iae {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),
             from: None,
             step_time: self.step_time.as_ref(),
         };
-        ErrorIntegral::bind(signals, &options, [1, 1], |_, e| e)
+        ErrorIntegral::bind(model, &options, [1, 1], |_, e| e)
     }
 }
 

@@ -30,14 +30,14 @@ impl CriterionOptions for Ise {
 }
 
 impl CriterionSpec for Ise {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),
             from: None,
             step_time: self.step_time.as_ref(),
         };
-        ErrorIntegral::bind(signals, &options, [2, 1], |_, e| e * e)
+        ErrorIntegral::bind(model, &options, [2, 1], |_, e| e * e)
     }
 }
 

@@ -32,14 +32,14 @@ impl CriterionOptions for Itae {
 }
 
 impl CriterionSpec for Itae {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),
             from: None,
             step_time: self.step_time.as_ref(),
         };
-        ErrorIntegral::bind(signals, &options, [1, 2], |t, e| t * e)
+        ErrorIntegral::bind(model, &options, [1, 2], |t, e| t * e)
     }
 }
 

@@ -20,6 +20,7 @@ pub mod final_value;
 pub mod fit;
 pub mod fit_percent;
 pub mod frequency_fit;
+mod from_fn;
 pub mod gain_margin;
 pub mod h2_norm;
 pub mod hinf_norm;
@@ -47,6 +48,7 @@ mod common;
 #[cfg(test)]
 mod tests;
 
+pub use from_fn::{FnCriterion, from_fn};
 use mops_core::CriterionKind;
 
 /// Returns all kinds of criteria. A new kind needs a file and a line here.

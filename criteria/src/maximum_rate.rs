@@ -6,7 +6,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{NOT_NEGATIVE, signal, trace};
+use crate::common::{NOT_NEGATIVE, trace};
 
 /// Maximum rate `max_t |dy/dt|` over the whole simulation, in the unit of the signal per second.
 ///
@@ -28,8 +28,8 @@ impl CriterionOptions for MaximumRate {
 }
 
 impl CriterionSpec for MaximumRate {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone() }))
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+        Ok(Box::new(Bound { signal: model.signal(&self.signal)?.clone() }))
     }
 }
 

@@ -59,14 +59,14 @@ impl CriterionOptions for ModelTracking {
 }
 
 impl CriterionSpec for ModelTracking {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: Some(&self.target),
             from: self.from.as_ref(),
             step_time: self.step_time.as_ref(),
         };
-        let step = options.bind(signals)?;
+        let step = options.bind(model)?;
         let time_constant = positive("time-constant", self.time_constant.as_ref(), &second())?;
         let frequency = positive("frequency", self.frequency.as_ref(), &Unit::known("rad/s"))?;
         let damping = positive("damping", self.damping.as_ref(), &Unit::one())?;

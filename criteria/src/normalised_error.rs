@@ -7,7 +7,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{NOT_NEGATIVE, compare, compared_slopes, positive, signal};
+use crate::common::{NOT_NEGATIVE, compare, compared_slopes, positive};
 
 /// Normalised error `mean_i ((y_simulated - y_measured)(t_i)/noise)^2`, dimensionless: 1 if the residual is pure noise.
 ///
@@ -35,8 +35,8 @@ impl CriterionOptions for NormalisedError {
 }
 
 impl CriterionSpec for NormalisedError {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        let signal = signal(signals, &self.signal)?;
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+        let signal = model.signal(&self.signal)?;
         let noise = positive("noise", self.noise.as_ref(), &signal.unit)?;
         Ok(Box::new(Bound { signal: signal.name.clone(), noise }))
     }

@@ -41,14 +41,14 @@ impl CriterionOptions for Overshoot {
 }
 
 impl CriterionSpec for Overshoot {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),
             from: self.from.as_ref(),
             step_time: self.step_time.as_ref(),
         };
-        Ok(Box::new(Bound { step: options.bind(signals)?, absolute: self.absolute }))
+        Ok(Box::new(Bound { step: options.bind(model)?, absolute: self.absolute }))
     }
 }
 

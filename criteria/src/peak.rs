@@ -7,7 +7,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{NOT_NEGATIVE, signal, trace};
+use crate::common::{NOT_NEGATIVE, trace};
 
 /// Peak `max_t y`, `min_t y` or `max_t |y|` over the whole simulation, in the unit of the signal.
 ///
@@ -45,8 +45,8 @@ impl CriterionOptions for Peak {
 }
 
 impl CriterionSpec for Peak {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone(), of: self.of }))
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+        Ok(Box::new(Bound { signal: model.signal(&self.signal)?.clone(), of: self.of }))
     }
 }
 

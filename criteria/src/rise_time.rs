@@ -38,14 +38,14 @@ impl CriterionOptions for RiseTime {
 }
 
 impl CriterionSpec for RiseTime {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),
             from: self.from.as_ref(),
             step_time: self.step_time.as_ref(),
         };
-        let step = options.bind(signals)?;
+        let step = options.bind(model)?;
         let low = number("low", self.low.as_ref().unwrap_or(&0.1.into()), &Unit::one())?;
         let high = number("high", self.high.as_ref().unwrap_or(&0.9.into()), &Unit::one())?;
         if !(0.0 <= low && low < high && high <= 1.0) {

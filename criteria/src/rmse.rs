@@ -6,7 +6,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{NOT_NEGATIVE, compare, signal};
+use crate::common::{NOT_NEGATIVE, compare};
 
 /// Root mean square error `sqrt(mean_i (y_simulated - y_measured)(t_i)^2)`, in the unit of the signal.
 ///
@@ -28,8 +28,8 @@ impl CriterionOptions for Rmse {
 }
 
 impl CriterionSpec for Rmse {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        Ok(Box::new(Bound { signal: signal(signals, &self.signal)?.clone() }))
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+        Ok(Box::new(Bound { signal: model.signal(&self.signal)?.clone() }))
     }
 
     fn needs_measurement(&self) -> Option<&str> {

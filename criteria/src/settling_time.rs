@@ -45,14 +45,14 @@ impl CriterionOptions for SettlingTime {
 }
 
 impl CriterionSpec for SettlingTime {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let options = StepOptions {
             signal: &self.signal,
             target: self.target.as_ref(),
             from: self.from.as_ref(),
             step_time: self.step_time.as_ref(),
         };
-        let step = options.bind(signals)?;
+        let step = options.bind(model)?;
         let absolute = positive("band", self.band.as_ref(), &step.unit)?;
         let relative = positive("relative-band", self.relative_band.as_ref(), &Unit::one())?;
         if let Some(relative) = relative.filter(|relative| *relative >= 1.0) {

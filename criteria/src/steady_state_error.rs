@@ -7,7 +7,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{NOT_NEGATIVE, number, part, positive, second, signal, trace};
+use crate::common::{NOT_NEGATIVE, number, part, positive, second, trace};
 
 /// Steady-state error `|y(t_end) - target|`, in the unit of the signal; with a `window` of length w,
 /// `|mean of y over [t_end - w, t_end] - target|`.
@@ -32,8 +32,8 @@ impl CriterionOptions for SteadyStateError {
 }
 
 impl CriterionSpec for SteadyStateError {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        let signal = signal(signals, &self.signal)?.clone();
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+        let signal = model.signal(&self.signal)?.clone();
         let target = number("target", &self.target, &signal.unit)?;
         let window = positive("window", self.window.as_ref(), &second())?;
         Ok(Box::new(Bound { signal, target, window }))

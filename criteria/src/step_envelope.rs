@@ -7,7 +7,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{number, part, second, signal, step_time, trace};
+use crate::common::{number, part, second, step_time, trace};
 
 /// Largest violation of an envelope, `max_t max(y - upper(t), lower(t) - y)`, in the unit of the signal.
 ///
@@ -41,8 +41,8 @@ impl CriterionOptions for StepEnvelope {
 }
 
 impl CriterionSpec for StepEnvelope {
-    fn bind(&self, Interface { signals, .. }: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        let signal = signal(signals, &self.signal)?.clone();
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+        let signal = model.signal(&self.signal)?.clone();
         if self.upper.is_empty() && self.lower.is_empty() {
             return Err(StudyError::here("an envelope needs at least one bound")
                 .with_help("add `upper = [[time, value], ...]` or `lower = [[time, value], ...]`"));

@@ -72,6 +72,14 @@ mod torsional_hysteresis;
 mod viscous_friction;
 mod wind_gust;
 
+/// Names that the definition of an effect needs, to be imported at once.
+pub mod prelude {
+    pub use crate::{Definition, effect};
+    pub use mops_core::{
+        BoundEffect, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+    };
+}
+
 use std::sync::Arc;
 
 use mops_core::{BoundEffect, Dimension, Dual7, Effect, EffectClass, EffectParameter, PortKind, Scalar};

@@ -1,6 +1,7 @@
 //! Simulation kernel and models of mops, one file per model.
 
 pub mod equations;
+mod from_fn;
 pub mod furuta;
 pub mod furuta_2_joint;
 pub mod furuta_3_joint;
@@ -15,6 +16,7 @@ pub mod state_space;
 pub mod transfer_function;
 mod with_effects;
 
+pub use from_fn::{FnModel, from_fn};
 use mops_core::ModelKind;
 pub use with_effects::{Moment, WithEffects};
 

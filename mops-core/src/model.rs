@@ -6,11 +6,13 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::case::Case;
+use crate::diagnostic::suggestion;
 use crate::effect::Placement;
 use crate::failure::Failure;
 use crate::linear::StateSpace;
 use crate::plant::Open;
 use crate::port::Port;
+use crate::study_error::StudyError;
 use crate::trace::Trace;
 use crate::unit::Unit;
 
@@ -111,6 +113,26 @@ pub struct Interface {
 }
 
 impl Interface {
+    /// Returns the signal of this name.
+    ///
+    /// # Errors
+    /// Returns an error at the key `signal`, with similar names, if there is no such signal.
+    pub fn signal(&self, name: &str) -> Result<&Variable, StudyError> {
+        let index = self.signal_index(name)?;
+        Ok(&self.signals[index])
+    }
+
+    /// Returns the index of the signal of this name.
+    ///
+    /// # Errors
+    /// As [`Self::signal`].
+    pub fn signal_index(&self, name: &str) -> Result<usize, StudyError> {
+        self.signals.iter().position(|signal| signal.name == name).ok_or_else(|| {
+            StudyError::new("signal", format!("the model has no signal `{name}`"))
+                .with_help(suggestion(name, self.signals.iter().map(|signal| signal.name.as_str())))
+        })
+    }
+
     /// Returns the number of external forces: one for every [`Port::Process`].
     pub fn forces(&self) -> usize {
         self.ports.iter().filter(|port| matches!(port, Port::Process { .. })).count()

@@ -7,6 +7,7 @@ use crate::diagnostic::suggestion;
 use crate::effect::Placement;
 use crate::model::{Interface, Model};
 use crate::port::Port;
+use crate::study::ModelBuilder;
 use crate::study_error::StudyError;
 
 /// An effect at a place of a model, as written in a study and not yet checked.
@@ -51,6 +52,16 @@ impl EffectBuilder {
             port: port("place", &self.place)?,
             companion: self.companion.as_deref().map(|text| port("companion", text)).transpose()?,
         })
+    }
+}
+
+impl ModelBuilder {
+    /// Adds effects at places of the model; each effect parameter is a model parameter `name.strength`.
+    ///
+    /// # Errors
+    /// Returns an error as [`Catalogue::with_effects`] does.
+    pub fn with_effects(self, catalogue: &Catalogue, effects: &[EffectBuilder]) -> Result<Self, StudyError> {
+        Ok(Self { model: catalogue.with_effects(self.model.into(), effects)?, ..self })
     }
 }
 

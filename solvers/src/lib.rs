@@ -42,6 +42,14 @@ pub mod weighted_chebyshev;
 
 use mops_core::SolverKind;
 
+/// Names that the definition of a solver needs, to be imported at once.
+pub mod prelude {
+    pub use mops_core::{
+        Evaluation, Halt, Linearisation, Merit, Objective, Oracle, Progress, Shape, Solver, SolverKind, SolverOptions,
+        Stop, Stream,
+    };
+}
+
 pub use pareto::{Certificate, certificate, certify};
 
 /// Returns every kind of solver, the default first. A new kind is one file and one line here.

@@ -81,11 +81,7 @@ pub(super) fn open_as(
     let settings = settings.as_slice();
     let path = match home(catalogue, arguments) {
         Home::File(path) => path,
-        Home::Shipped(shipped) => {
-            let text = shipped.file("study.toml").expect("every shipped study has one");
-            let text = std::str::from_utf8(text).expect("shipped studies are text");
-            return mops_core::file::read(catalogue, &format!("{study}/study.toml"), text, settings, &shipped);
-        }
+        Home::Shipped(shipped) => return shipped.open(catalogue, settings),
         Home::Built(built) => return mops_core::file::built(catalogue, &built, settings, &program()),
     };
     let bytes = read_text(&path).map_err(|error| no_study(catalogue, study, &error))?;

@@ -13,9 +13,8 @@ use super::{FILE, Identity, Keeper, Refusal, RunState, Start, bytes, row};
 fn file(name: &str, settings: &[&str]) -> StudyFile {
     let catalogue = crate::catalogue();
     let Some(CatalogueStudy::Shipped(shipped)) = catalogue.study(name) else { panic!("{name} is shipped") };
-    let text = std::str::from_utf8(shipped.file("study.toml").unwrap()).unwrap();
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-    mops_core::file::read(&catalogue, name, text, &settings, shipped).unwrap()
+    shipped.open(&catalogue, &settings).unwrap()
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Standard errors, profiles and replicates against closed forms: of linear models, and of a rate that decays.
 
-use mops::{Chosen, CriterionBuilder, TunerBuilder, UncertaintyTask};
+use mops::core::{Chosen, UncertaintyTask};
+use mops::{CriterionBuilder, TunerBuilder};
 use nalgebra::{DMatrix, DVector};
 
 use super::models::{Calibration, Channel, Curve, fit, lines, normalised, parameters, words};
@@ -252,6 +253,6 @@ fn bootstrap_errors_are_standard_errors_where_records_differ_in_length() {
 fn a_noise_that_residuals_contradict_is_reported_and_does_not_count() {
     let of = neighbours().into_iter().find(|of| of.what == "a noise declared ten times too large").unwrap();
     let words = words(&of.calibration.run(0));
-    assert!(words.contains("The residuals of `z` in `rig` show a noise of 0.0"), "{words}");
+    assert!(words.contains("The residuals of `z` in `rig` show a noise level of 0.0"), "{words}");
     assert!(words.contains("not 0.200 as declared"), "{words}");
 }

@@ -1,6 +1,6 @@
 //! How often 95 % intervals hold the truth, over simulated calibrations whose seeds are 0, 1, 2, ...
 
-use mops::statistics::share_interval;
+use mops::core::statistics::share_interval;
 use mops::{CriterionBuilder, TunerBuilder};
 
 use super::models::{Calibration, Channel, Curve, fit, lines, normalised, parameters, words};

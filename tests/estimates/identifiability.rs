@@ -1,6 +1,7 @@
 //! What counts as determined: directions are judged by the noise, not by the stiffest of them.
 
-use mops::{Chosen, Outcome, TunerBuilder, UncertaintyTask};
+use mops::core::{Chosen, UncertaintyTask};
+use mops::{Outcome, TunerBuilder};
 
 use super::closed_forms::{Samples, scatter};
 use super::models::{Calibration, Channel, Polynomials, normalised, parameters, words};

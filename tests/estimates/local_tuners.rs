@@ -1,6 +1,7 @@
 //! Tuners that are local to a selection or validation experiment are estimated there.
 
-use mops::{CriterionBuilder, Outcome, Role, TunerBuilder, Usage};
+use mops::core::Role;
+use mops::{CriterionBuilder, Outcome, TunerBuilder, Usage};
 
 use super::models::{Calibration, Channel, Curve, fit, normalised};
 use mops_core::math;

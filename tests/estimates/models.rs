@@ -1,11 +1,13 @@
 //! Simulated experiments: models in closed form, noise of a fixed seed, and the study that calibrates them.
 
+use mops::core::{
+    ChannelBuilder, Job, Measured, ParameterReport, Response, Role, TasksBuilder, UncertaintyTask, WithTangents, stream,
+};
 use mops::criteria::fit::Fit;
 use mops::criteria::normalised_error::NormalisedError;
 use mops::{
-    Analysis, CaseBuilder, ChannelBuilder, CriterionBuilder, Failure, Interface, Job, Measured, Model, ModelBuilder,
-    Options, Outcome, Parameter, ParameterReport, Response, Role, StudyBuilder, Task, TasksBuilder, Trace,
-    TunerBuilder, UncertaintyTask, Variable, WithTangents, stream,
+    Analysis, CaseBuilder, CriterionBuilder, Failure, Interface, Model, ModelBuilder, Options, Outcome, Parameter,
+    StudyBuilder, Task, Trace, TunerBuilder, Variable,
 };
 use mops_core::math;
 use rand::Rng;

@@ -1,7 +1,8 @@
 //! Ends of profiles where the likelihood is flat up to a cliff, against profiles on a fine grid.
 
-use mops::statistics::t_quantile;
-use mops::{Chosen, Outcome, ProfileReport, TunerBuilder, UncertaintyTask};
+use mops::core::statistics::t_quantile;
+use mops::core::{Chosen, ProfileReport, UncertaintyTask};
+use mops::{Outcome, TunerBuilder};
 use nalgebra::{DMatrix, DVector};
 
 use super::models::{Calibration, Channel, Curve, normalised, words};

@@ -1,6 +1,6 @@
 //! Integral criteria of the control error, which differ in the integrand only.
 
-use mops_core::{Analysis, Case, Criterion, Sense, StudyError, Unit, Value, Variable};
+use mops_core::{Analysis, Case, Criterion, Interface, Sense, StudyError, Unit, Value};
 
 use super::{NOT_NEGATIVE, Step, StepOptions};
 
@@ -14,12 +14,12 @@ pub struct ErrorIntegral {
 impl ErrorIntegral {
     /// Creates the criterion with this integrand; its value has the unit `signal^powers[0] s^powers[1]`.
     pub fn bind(
-        signals: &[Variable],
+        model: &Interface,
         options: &StepOptions<'_>,
         powers: [i32; 2],
         integrand: fn(f64, f64) -> f64,
     ) -> Result<Box<dyn Criterion>, StudyError> {
-        let step = options.bind(signals)?;
+        let step = options.bind(model)?;
         let unit = step.unit.power(powers[0], powers[1]);
         Ok(Box::new(Self { step, unit, integrand }))
     }

@@ -8,7 +8,7 @@ mod step;
 #[cfg(test)]
 pub mod testing;
 
-use mops_core::{Analysis, Quantity, StudyError, Trace, Unit, Variable, suggestion};
+use mops_core::{Analysis, Quantity, StudyError, Trace, Unit};
 
 pub use comparison::{compare, compared_slopes};
 pub use error_integral::ErrorIntegral;
@@ -18,14 +18,6 @@ pub use step::{Step, StepOptions};
 
 /// Range of nonnegative values.
 pub const NOT_NEGATIVE: [f64; 2] = [0.0, f64::INFINITY];
-
-/// Returns the signal of that name.
-pub fn signal<'a>(signals: &'a [Variable], name: &str) -> Result<&'a Variable, StudyError> {
-    signals.iter().find(|signal| signal.name == name).ok_or_else(|| {
-        StudyError::new("signal", format!("the model has no signal `{name}`"))
-            .with_help(suggestion(name, signals.iter().map(|signal| signal.name.as_str())))
-    })
-}
 
 /// Returns an option as a number in `unit`.
 pub fn number(key: &str, option: &Quantity, unit: &Unit) -> Result<f64, StudyError> {

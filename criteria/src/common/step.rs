@@ -2,9 +2,9 @@
 
 use std::borrow::Cow;
 
-use mops_core::{Analysis, Mark, Quantity, StudyError, Trace, Unit, Value, Variable};
+use mops_core::{Analysis, Interface, Mark, Quantity, StudyError, Trace, Unit, Value};
 
-use super::{optional, part, signal, step_time, trace};
+use super::{optional, part, step_time, trace};
 
 /// Share of a step that counts as near a level.
 const NEAR: f64 = 0.01;
@@ -45,8 +45,8 @@ pub struct Answer<'a> {
 
 impl StepOptions<'_> {
     /// Checks the names and units.
-    pub fn bind(&self, signals: &[Variable]) -> Result<Step, StudyError> {
-        let unit = signal(signals, self.signal)?.unit.clone();
+    pub fn bind(&self, model: &Interface) -> Result<Step, StudyError> {
+        let unit = model.signal(self.signal)?.unit.clone();
         let target = optional("target", self.target, &unit)?;
         let from = optional("from", self.from, &unit)?;
         let time = step_time(self.step_time)?;

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use mops::{Catalogue, Diagnostic, suggestion};
+use mops::core::suggestion;
+use mops::{Catalogue, Diagnostic};
 
 use mops::terminal::{CommandError, Progress, print};
 

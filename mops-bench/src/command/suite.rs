@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
-use mops::{Catalogue, Diagnostic, SolverChoice, suggestion};
+use mops::core::{SolverChoice, suggestion};
+use mops::{Catalogue, Diagnostic};
 use mops_problems::{Answer, Slope};
 
 use mops::terminal::{CommandError, Progress, number, print, table};

@@ -7,7 +7,7 @@ mod matching;
 use std::path::{Path, PathBuf};
 
 use mops::Unit;
-use mops::file::Files;
+use mops::core::file::Files;
 
 use super::guarded;
 use super::tool::{Answer, Tools};
@@ -178,7 +178,7 @@ mod tests {
         let ports: Vec<String> = study.models[0].1.interface().ports.iter().map(ToString::to_string).collect();
         assert!(ports.contains(&"joint:x".to_owned()) && ports.contains(&"sensor:far".to_owned()), "{ports:?}");
         let experiment = study.cases[1].experiment.as_ref().unwrap();
-        assert_eq!((experiment.role, experiment.channels[0].noise), (mops::Role::Selection, Some(0.2)));
+        assert_eq!((experiment.role, experiment.channels[0].noise), (mops::core::Role::Selection, Some(0.2)));
         assert!(data.read("validation_1.csv").is_ok() && data.read("truth.json").is_err());
     }
 

@@ -11,7 +11,8 @@ mod statistics;
 mod table;
 mod tool;
 
-use mops::{Catalogue, stream};
+use mops::Catalogue;
+use mops::core::stream;
 use mops_testbed::Trial;
 use rand::seq::SliceRandom;
 

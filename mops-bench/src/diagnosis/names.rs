@@ -1,7 +1,7 @@
 //! What the test bed and the catalogue call the same things.
 
+use mops::core::math;
 use mops::effects::effects;
-use mops::math;
 use mops_testbed::TrueEffect;
 
 /// Kinds of effect in the catalogue that are this effect of the test bed.

@@ -1,6 +1,6 @@
 //! Which simulated cases are asked for.
 
-use mops::math;
+use mops::core::math;
 use mops_testbed::{Draw, Effect, Missing, Plant, Trial, effects, generate, outside, plants};
 
 /// Attempts to make a case: not every effect reaches every size in every plant.

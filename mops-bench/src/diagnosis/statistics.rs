@@ -1,6 +1,6 @@
 //! Rates with their intervals, and whether stated probabilities are what they say.
 
-use mops::math;
+use mops::core::math;
 
 /// How often something was so.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -2,9 +2,10 @@
 
 use std::time::Instant;
 
+use mops::core::Quiet;
+use mops::core::file::{self, Files};
 use mops::discrepancy::{Diagnosis, Verdict, brute_force};
-use mops::file::{self, Files};
-use mops::{Catalogue, Quiet, Study, Watch};
+use mops::{Catalogue, Study, Watch};
 
 use mops::{Options, solve};
 

@@ -1,7 +1,7 @@
 //! Fronts over seeds: mean and deviation of hypervolume and distance for every problem.
 
 use super::results::{Results, Row};
-use mops::math;
+use mops::core::math;
 
 /// What a solver reaches on a problem over all seeds.
 pub(crate) struct Spread {

@@ -11,7 +11,8 @@ mod timed;
 
 use std::time::Instant;
 
-use mops::{Catalogue, Evaluator, Merit, Shape, SolverChoice, Stop, Watch};
+use mops::core::{Evaluator, Merit, Shape, SolverChoice, Stop};
+use mops::{Catalogue, Watch};
 use mops_problems::{Posed, Slope, Truth, measure};
 
 use crate::parallel::each;

@@ -5,7 +5,8 @@
 //!
 //! Source: J. J. More, S. M. Wild, SIAM Journal on Optimization 20 (2009) 172-191, section 2.
 
-use mops::{Catalogue, FEASIBLE, Merit, SolverChoice, SolverKind};
+use mops::core::{FEASIBLE, Merit, SolverChoice};
+use mops::{Catalogue, SolverKind};
 
 use super::{Done, ROUGH};
 

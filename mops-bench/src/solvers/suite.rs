@@ -1,8 +1,8 @@
 //! The suites: problems written as formulas, and studies.
 
 use super::control::Known;
-use mops::file::Files;
-use mops::{Catalogue, Evaluator, Problem as Posing, Shape, Shipped};
+use mops::core::{Evaluator, Problem as Posing, Shape};
+use mops::Catalogue;
 use mops_problems::{Answer, Posed, Problem, Slope};
 
 /// Problems that belong together.
@@ -129,25 +129,10 @@ impl Subject {
 /// # Panics
 /// If the study is written wrongly.
 pub(super) fn posing(catalogue: &Catalogue, known: &Known, seed: u64) -> Posing {
-    let text = known.study.file("study.toml").expect("every study has one");
-    let text = std::str::from_utf8(text).expect("studies are text");
-    let file = mops::file::read(catalogue, known.study.name, text, &[], &Inside(known.study));
+    let file = known.study.open(catalogue, &[]);
     let mut study = file.unwrap_or_else(|why| panic!("{}: {why}", known.study.name)).study;
     study.seed = seed;
     Posing::new(std::sync::Arc::new(study))
-}
-
-/// The data of a study that comes with the program.
-struct Inside(Shipped);
-
-impl Files for Inside {
-    fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
-        self.0.file(path).map(<[u8]>::to_vec).ok_or_else(|| std::io::ErrorKind::NotFound.into())
-    }
-
-    fn show(&self, path: &str) -> String {
-        format!("{}/{path}", self.0.name)
-    }
 }
 
 #[cfg(test)]

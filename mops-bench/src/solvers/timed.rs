@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use mops::{Evaluation, Evaluator, Shape, Slopes};
+use mops::core::{Evaluation, Evaluator, Shape, Slopes};
 
 /// An evaluator with the time spent in it; the rest of a run is the solver's and the engine's own.
 pub(super) struct Timed<'a, E> {

@@ -77,6 +77,21 @@ impl Files for Shipped {
     }
 }
 
+impl Shipped {
+    /// Reads the study; `settings` are `key=value` pairs that replace values.
+    ///
+    /// # Errors
+    /// The first mistake, in the settings or in the file.
+    ///
+    /// # Panics
+    /// If the study has no `study.toml` in UTF-8.
+    pub fn open(&self, catalogue: &Catalogue, settings: &[String]) -> Result<StudyFile, Diagnostic> {
+        let text = self.file("study.toml").expect("every shipped study has a study.toml");
+        let text = std::str::from_utf8(text).expect("shipped studies are UTF-8");
+        read(catalogue, &format!("{}/study.toml", self.name), text, settings, self)
+    }
+}
+
 impl Study {
     /// Reads the study file at `path`; data files are relative to its folder.
     ///

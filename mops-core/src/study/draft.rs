@@ -1,12 +1,10 @@
 //! Drafts: studies as written in a file or in Rust, not yet checked.
 
 use super::{Study, Task, TasksBuilder};
-use crate::catalogue::Catalogue;
 use crate::criterion::{CriterionSpec, Usage};
 use crate::evaluation::Objective;
 use crate::experiment::{Input, ResponseData, Role};
 use crate::model::Model;
-use crate::placement::EffectBuilder;
 use crate::study_error::StudyError;
 use crate::tuner::Scale;
 use crate::unit::{Quantity, Unit};
@@ -50,16 +48,6 @@ pub struct ModelBuilder {
     pub model: Box<dyn Model>,
     /// Parameter values, used unless a tuner or a case sets the parameter.
     pub parameters: Vec<(String, Quantity)>,
-}
-
-impl ModelBuilder {
-    /// Adds effects at places of the model; each effect parameter is a model parameter `name.strength`.
-    ///
-    /// # Errors
-    /// Returns an error as [`Catalogue::with_effects`] does.
-    pub fn with_effects(self, catalogue: &Catalogue, effects: &[EffectBuilder]) -> Result<Self, StudyError> {
-        Ok(Self { model: catalogue.with_effects(self.model.into(), effects)?, ..self })
-    }
 }
 
 impl<M: Model + 'static> From<M> for ModelBuilder {

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::sync::Arc;
 
-use mops::Effect;
+use mops::core::Effect;
 use mops::discrepancy::{Diagnosis, ExperimentError, Prediction};
 use serde_json::{Map, Value, json};
 

@@ -1,0 +1,84 @@
+//! The program knows its additions in every command.
+
+use assert_cmd::Command;
+use assert_cmd::cargo::cargo_bin_cmd;
+use serde_json::Value;
+
+fn plugin(arguments: &[&str]) -> Command {
+    let mut command = cargo_bin_cmd!("mops-plugin");
+    command.args(arguments);
+    command
+}
+
+fn text(arguments: &[&str]) -> String {
+    let done = plugin(arguments).output().unwrap();
+    assert!(done.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&done.stderr));
+    String::from_utf8(done.stdout).unwrap()
+}
+
+#[test]
+fn the_additions_are_listed_and_described() {
+    let list = text(&["list"]);
+    for name in ["quarter-car", "ride-comfort", "shrinking-box", "eddy-brake", "suspension", "pid-design"] {
+        assert!(list.contains(&format!("  {name}")), "{name}: {list}");
+    }
+    assert!(list.contains("Spring and damper of a wheel, built in Rust"));
+    assert!(text(&["describe", "ride-comfort"]).contains("ISO 2631"));
+    assert!(text(&["describe", "suspension"]).contains("Built in Rust"));
+}
+
+/// Runs a study into a folder; the result.
+fn run(folder: &std::path::Path, arguments: &[&str]) -> Value {
+    let out = folder.to_str().unwrap();
+    let done = plugin(&[&["run"], arguments, &["--json", "--out", out]].concat()).output().unwrap();
+    serde_json::from_slice(&done.stdout).unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&done.stderr)))
+}
+
+#[test]
+fn a_study_built_in_rust_is_run_resumed_reported_and_changed_by_settings() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let first = run(&out, &["suspension", "--max-evaluations", "40"]);
+    assert_eq!((first["study"].as_str(), first["evaluations"].as_u64()), (Some("suspension"), Some(40)));
+    // A larger budget extends the run, and simulates no known point again.
+    let longer = run(&out, &["suspension", "--max-evaluations", "200", "--resume"]);
+    assert!(longer["evaluations"].as_u64().unwrap() > 40);
+    let whole = run(&folder.path().join("whole"), &["suspension", "--max-evaluations", "200"]);
+    assert_eq!(longer["tuners"], whole["tuners"]);
+    assert!(text(&["report", out.to_str().unwrap()]).contains("report.html"));
+    // Settings replace start, bounds, seed and task.
+    let other =
+        run(&folder.path().join("other"), &["suspension", "--max-evaluations", "40", "--set", "tuners.k.min=3e4"]);
+    assert!(other["tuners"][0]["value"].as_f64().unwrap() >= 3e4, "{other}");
+    let wrong = plugin(&["check", "suspension", "--set", "tuners.q.min=3"]).output().unwrap();
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&wrong.stderr).contains("the study has no tuner `q`"));
+    let wrong = plugin(&["check", "suspension", "--set", "criteria.shaking.demand=3"]).output().unwrap();
+    assert!(String::from_utf8_lossy(&wrong.stderr).contains("built in Rust"));
+}
+
+#[test]
+fn a_study_in_the_program_uses_its_model_and_criterion_and_the_solver() {
+    let folder = tempfile::tempdir().unwrap();
+    let by_default = run(&folder.path().join("default"), &["quarter-car"]);
+    let own = run(&folder.path().join("own"), &["quarter-car", "--solver", "shrinking-box"]);
+    let of = |result: &Value| result["worst_scaled"].as_f64().unwrap();
+    assert!(of(&by_default) < 1.0 && of(&own) <= 1.01 * of(&by_default), "{} {}", of(&by_default), of(&own));
+}
+
+#[test]
+fn folders_of_studies_are_known_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let mine = folder.path().join("mine");
+    std::fs::create_dir_all(&mine).unwrap();
+    std::fs::write(mine.join("study.toml"), include_str!("../studies/quarter-car/study.toml")).unwrap();
+    std::fs::write(mine.join("README.md"), "# Mine\n").unwrap();
+    let studies = folder.path().to_str().unwrap();
+    assert!(text(&["list", "studies", "--studies", studies]).contains("Mine"));
+    assert!(text(&["check", "mine", "--studies", studies]).contains("comfort"));
+    let by_variable = plugin(&["check", "mine"]).env("MOPS_STUDIES", studies).output().unwrap();
+    assert!(by_variable.status.success());
+    let nowhere = plugin(&["list", "--studies", "nowhere"]).output().unwrap();
+    assert_eq!(nowhere.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&nowhere.stderr).contains("nowhere"));
+}
