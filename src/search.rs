@@ -113,13 +113,13 @@ fn accepts(choice: &SolverChoice, solver: &dyn Solver, shape: &Shape) -> Result<
 
 /// Whether the task of a study needs a solver.
 pub(crate) fn solves(study: &Study) -> bool {
-    match study.task {
+    match study.task() {
         Task::Design | Task::Calibration | Task::Pareto => true,
         Task::Excitation | Task::Diagnosis => false,
-        Task::Sensitivity => study.tasks.sensitivity.at == Place::Optimum,
-        Task::Sweep => study.tasks.sweep.as_ref().is_none_or(|sweep| sweep.at == Place::Optimum),
-        Task::WorstCase => study.tasks.worst_case.at == Place::Optimum,
-        Task::MonteCarlo => study.tasks.monte_carlo.at == Place::Optimum,
+        Task::Sensitivity => study.tasks().sensitivity.at == Place::Optimum,
+        Task::Sweep => study.tasks().sweep.as_ref().is_none_or(|sweep| sweep.at == Place::Optimum),
+        Task::WorstCase => study.tasks().worst_case.at == Place::Optimum,
+        Task::MonteCarlo => study.tasks().monte_carlo.at == Place::Optimum,
     }
 }
 
@@ -185,7 +185,7 @@ const NEAR: f64 = 1e-4;
 /// How the criteria of a design change with its tuners at the best point; nothing where the user does not want to wait.
 fn slopes(run: &Run<'_>, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Option<SlopesReport> {
     let problem = run.problem();
-    if problem.study().task != Task::Design || watch.wants_stop() {
+    if problem.study().task() != Task::Design || watch.wants_stop() {
         return None;
     }
     let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, watch).keeping(store);

@@ -214,7 +214,7 @@ fn one_tuner_is_enough() {
 fn no_active_tuner_leaves_the_start() {
     let fixed = [Objective::Max, Objective::Each].map(|objective| {
         let mut fixed = study_of(objective, 1, MINIMISE, kink);
-        fixed.tuners[0].active = false;
+        fixed.fix(0);
         Problem::new(Arc::new(fixed))
     });
     for (problem, kind) in both(fixed) {
@@ -359,10 +359,11 @@ fn a_watched_criterion_without_a_value_takes_nothing_from_the_others() {
 fn whole_numbers_and_few_of_them_end_at_the_best() {
     // The least of (x - 1.3)^2 over -2, -1, 0, 1, 2 is at 1.
     let whole = [Objective::Max, Objective::Each].map(|objective| {
-        let mut whole = study_of(objective, 1, &[Usage::Minimise], |x| Some(vec![math::powi(x[0] - 1.3, 2)]));
-        whole.tuners[0].grid = mops::core::Grid::Integer;
-        whole.tuners[0].start = -2.0;
-        Problem::new(Arc::new(whole))
+        let whole = study_of(objective, 1, &[Usage::Minimise], |x| Some(vec![math::powi(x[0] - 1.3, 2)]));
+        let mut parts = whole.into_parts();
+        parts.tuners[0].grid = mops::core::Grid::Integer;
+        parts.tuners[0].start = -2.0;
+        Problem::new(Arc::new(Study::from_parts(parts)))
     });
     for (problem, kind) in both(whole) {
         let solved = solve(&problem, &kind, 5000, &());

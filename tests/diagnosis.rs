@@ -38,7 +38,7 @@ fn diagnosis(case: &Trial, shuffled: bool) -> Diagnosis {
 fn diagnosis_among(case: &Trial, catalogue: Catalogue, seed: u64) -> Diagnosis {
     let file = mops::core::file::read(&catalogue, "study.toml", &case.study, &[], &Data(case));
     let mut study = file.unwrap_or_else(|mistake| panic!("{}: {mistake}", case.name)).study;
-    study.seed = seed;
+    study.set_seed(seed);
     let options = Options { effects: catalogue.effects, ..Options::default() };
     let solved = mops::solve(study, &options, &()).unwrap_or_else(|why| panic!("{}: {why}", case.name));
     solved.diagnosis.expect("that was the task")

@@ -63,13 +63,13 @@ mod repaired;
 #[test]
 fn a_repaired_study_as_a_program_is_the_calibration_that_its_file_is() {
     let study = repaired::study().unwrap();
-    assert_eq!((study.name.as_str(), study.task), ("furuta-swing-repaired", mops::Task::Calibration));
+    assert_eq!((study.name(), study.task()), ("furuta-swing-repaired", mops::Task::Calibration));
     // Start values are those found, the term that is not needed is no tuner, experiments and criteria are the user's.
-    let start = |name: &str| study.tuners.iter().find(|tuner| tuner.name == name).map(|tuner| tuner.start);
+    let start = |name: &str| study.tuners().iter().find(|tuner| tuner.name == name).map(|tuner| tuner.start);
     assert_eq!((start("b"), start("bp"), start("ca")), (Some(1.133e-3), None, Some(5e-4)));
-    let keys: Vec<String> = study.rows.iter().map(|row| study.key(row)).collect();
+    let keys: Vec<String> = study.rows().iter().map(|row| study.key(row)).collect();
     assert_eq!(keys, ["horizontal/phi", "horizontal/theta", "upright/phi", "upright/theta"]);
-    assert_eq!(study.cases[1].role(), mops::core::Role::Validation);
+    assert_eq!(study.cases()[1].role(), mops::core::Role::Validation);
 }
 
 #[path = "../examples/argmin_executor.rs"]
@@ -110,8 +110,8 @@ fn the_studies_of_recordings_are_read_with_the_roles_of_their_experiments() {
     ] {
         let read = mops::core::file::read(&mops::catalogue(), "study.toml", text, &[], &AnyRecording);
         let study = read.unwrap_or_else(|mistake| panic!("{name}: {mistake}")).study;
-        assert_eq!(study.name, name);
-        let of = |role| study.cases.iter().filter(|case| case.role() == role).count();
+        assert_eq!(study.name(), name);
+        let of = |role| study.cases().iter().filter(|case| case.role() == role).count();
         assert_eq!(
             [mops::core::Role::Calibration, mops::core::Role::Selection, mops::core::Role::Validation].map(of),
             roles,

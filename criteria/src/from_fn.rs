@@ -4,12 +4,15 @@ use std::sync::Arc;
 
 use mops_core::{Analysis, Case, Criterion, CriterionSpec, Interface, StudyError, Trace, Unit, Value};
 
+/// Value of the time responses.
+type ValueFn = Arc<dyn Fn(&[&Trace]) -> f64 + Send + Sync>;
+
 /// Criterion given by a closure over time responses; see [`from_fn`].
 #[derive(Clone)]
 pub struct FnCriterion {
     unit: Unit,
     signals: Vec<String>,
-    value: Arc<dyn Fn(&[&Trace]) -> f64 + Send + Sync>,
+    value: ValueFn,
 }
 
 /// Creates a criterion from a closure. The closure receives the time responses of `signals`, in this order, and returns the

@@ -187,7 +187,7 @@ pub fn noticeable(rounds: &[Arc<Round<'_>>], subject: &Subject, level: f64) -> V
 
 pub fn moves(subject: &Subject, before: &Calibrated<'_>, after: &Calibrated<'_>) -> Vec<ParameterMove> {
     let one = |(k, &tuner): (usize, &usize)| {
-        let tuner = &subject.study.tuners[tuner];
+        let tuner = &subject.study.tuners()[tuner];
         let variance = after.covariance[(k, k)];
         ParameterMove {
             name: tuner.name.clone(),
@@ -203,7 +203,7 @@ pub fn moves(subject: &Subject, before: &Calibrated<'_>, after: &Calibrated<'_>)
 /// Tuners at a bound, but for those of declared terms that went: a bound may be what is missing.
 pub fn at_bounds(subject: &Subject, before: &Calibrated<'_>, after: &Calibrated<'_>, held: &[usize]) -> Vec<String> {
     let one = |k: usize| {
-        let tuner = &subject.study.tuners[subject.globals[k]];
+        let tuner = &subject.study.tuners()[subject.globals[k]];
         let [declared, repaired] = [before, after].map(|model| tuner.at_bound(model.tuners[k]));
         let (side, of) = match (declared, repaired) {
             (Some(side), Some(_)) => (side, "of the declared and of the repaired model"),

@@ -13,7 +13,7 @@ use crate::windows::{cut, whole};
 /// The unknowns of the study as globals of a fit.
 pub fn globals(subject: &Subject) -> Vec<Global> {
     let global = |(k, &index): (usize, &usize)| {
-        let tuner = &subject.study.tuners[index];
+        let tuner = &subject.study.tuners()[index];
         let log = subject.is_log(k);
         let scale = (tuner.bounds[1] - tuner.bounds[0])
             .abs()

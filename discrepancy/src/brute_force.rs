@@ -41,7 +41,7 @@ pub fn brute_force(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<BruteFo
     let subject = Subject::new(study)?;
     let simulations = Meter::new(&());
     let failed = || StudyError::here("the model cannot be simulated near its start values");
-    let declared = base::fit(&subject, study.seed, &simulations).ok_or_else(failed)?;
+    let declared = base::fit(&subject, study.seed(), &simulations).ok_or_else(failed)?;
     subject.take_pace(&declared.point.globals);
     let point = &declared.point;
     let of = |added: &[Added]| {

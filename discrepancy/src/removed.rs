@@ -18,7 +18,7 @@ impl Search<'_> {
             return Vec::new();
         }
         let scene = Scene::new(&declared.fit, &declared.variant.model, &declared.fitted);
-        let name = |k: usize| self.subject.study.tuners[self.subject.globals[k]].parameter.clone();
+        let name = |k: usize| self.subject.study.tuners()[self.subject.globals[k]].parameter.clone();
         let place = |k: usize| scene.as_ref().and_then(|scene| self.acts_at(k, declared, scene)).unwrap_or_default();
         held.iter().map(|&k| Removed { term: name(k), place: place(k) }).collect()
     }

@@ -80,39 +80,41 @@ impl Subject {
     /// No experiment for calibration, no channels, several models, or a model that does not open its equations.
     pub fn new(study: &Study) -> Result<Self, StudyError> {
         let measured = |job: &usize| {
-            let case = &study.cases[study.jobs[*job].case];
+            let case = &study.cases()[study.jobs()[*job].case];
             case.experiment.as_ref().is_some_and(|e| !e.channels.is_empty())
         };
-        let jobs: Vec<usize> = (0..study.jobs.len()).filter(measured).collect();
+        let jobs: Vec<usize> = (0..study.jobs().len()).filter(measured).collect();
         let Some(&first) = jobs.first() else {
             return Err(StudyError::new("experiments", "a diagnosis needs measured channels")
                 .with_help("add an experiment with `channels`"));
         };
-        let index = study.jobs[first].model;
-        if jobs.iter().any(|&job| study.jobs[job].model != index) {
+        let index = study.jobs()[first].model;
+        if jobs.iter().any(|&job| study.jobs()[job].model != index) {
             return Err(StudyError::new(
                 "models",
                 "a diagnosis looks at one model, and the experiments belong to several",
             )
             .with_help("keep one model in the study"));
         }
-        let (name, model) = &study.models[index];
+        let (name, model) = &study.models()[index];
         if model.ported().is_none() && model.augmented().is_none() {
             let fact = format!("the model `{name}` does not open its equations: no effect can be added to it");
             return Err(
                 StudyError::new("models", fact).with_help("`mops check` tells which places the models of a study have")
             );
         }
-        let globals: Vec<usize> = (0..study.tuners.len())
-            .filter(|&i| study.tuners[i].case.is_none() && study.tuners[i].active && study.tuners[i].tie.is_none())
+        let globals: Vec<usize> = (0..study.tuners().len())
+            .filter(|&i| {
+                study.tuners()[i].case.is_none() && study.tuners()[i].active && study.tuners()[i].tie.is_none()
+            })
             .collect();
         let mut notes = Vec::new();
         // By signal and unit, of every experiment that gives none.
         let mut estimated: BTreeMap<(String, String), Vec<(String, f64)>> = BTreeMap::new();
         let mut measurements = Vec::new();
         for job in jobs {
-            let plan = &study.jobs[job];
-            let case = &study.cases[plan.case];
+            let plan = &study.jobs()[job];
+            let case = &study.cases()[plan.case];
             let experiment = case.experiment.as_ref().expect("it was looked for");
             let mut series = Vec::new();
             for channel in &experiment.channels {
@@ -145,7 +147,7 @@ impl Subject {
             let mut locals = Vec::new();
             for (parameter, source) in plan.parameters.iter().enumerate() {
                 let ParameterSource::Tuner { tuner, factor } = *source else { continue };
-                let t = &study.tuners[tuner];
+                let t = &study.tuners()[tuner];
                 if t.case == Some(plan.case) && t.active && t.tie.is_none() {
                     let mut bounds = t.bounds.map(|b| b * factor);
                     let scale = ((bounds[1] - bounds[0]) / 20.0).abs();
@@ -221,17 +223,17 @@ impl Subject {
 
     /// Start values of the global unknowns.
     pub fn start(&self) -> Vec<f64> {
-        self.globals.iter().map(|&g| self.study.tuners[g].start).collect()
+        self.globals.iter().map(|&g| self.study.tuners()[g].start).collect()
     }
 
     /// Whether an unknown is looked for in its logarithm.
     pub fn is_log(&self, global: usize) -> bool {
-        self.study.tuners[self.globals[global]].scale == Scale::Log
+        self.study.tuners()[self.globals[global]].scale == Scale::Log
     }
 
     /// Values of all tuners for given globals; those of cases at their start.
     fn tuners(&self, globals: &[f64]) -> Vec<f64> {
-        let mut tuners: Vec<f64> = self.study.tuners.iter().map(|t| t.start).collect();
+        let mut tuners: Vec<f64> = self.study.tuners().iter().map(|t| t.start).collect();
         self.globals.iter().zip(globals).for_each(|(&g, &value)| tuners[g] = value);
         self.study.apply_ties(&mut tuners);
         tuners
@@ -239,17 +241,17 @@ impl Subject {
 
     /// The parameters of the declared model in an experiment, its locals at their start.
     pub fn parameters(&self, measurement: usize, globals: &[f64]) -> Vec<f64> {
-        self.study.parameters(&self.study.jobs[self.measurements[measurement].job], &self.tuners(globals))
+        self.study.parameters(&self.study.jobs()[self.measurements[measurement].job], &self.tuners(globals))
     }
 
     /// The derivative of these by one of the globals.
     pub fn slopes(&self, measurement: usize, globals: &[f64], global: usize) -> Vec<f64> {
-        let mut tuners: Vec<Dual<1>> = self.study.tuners.iter().map(|t| Dual::from(t.start)).collect();
+        let mut tuners: Vec<Dual<1>> = self.study.tuners().iter().map(|t| Dual::from(t.start)).collect();
         for (i, (&g, &value)) in self.globals.iter().zip(globals).enumerate() {
             tuners[g] = if i == global { Dual::variable(value, 0) } else { Dual::from(value) };
         }
         self.study.apply_ties(&mut tuners);
-        let job = &self.study.jobs[self.measurements[measurement].job];
+        let job = &self.study.jobs()[self.measurements[measurement].job];
         let tangents: Vec<f64> = tuners.iter().map(|t| t.tangents()[0]).collect();
         self.study.parameter_slopes(job, &tangents)
     }

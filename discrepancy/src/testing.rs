@@ -4,8 +4,8 @@ use std::sync::{Arc, OnceLock};
 
 use mops_core::math;
 use mops_core::{
-    Case, Channel, Effect, Experiment, Grid, Input, JobPlan, Model, ModelOptions, Objective, ParameterSource, Role,
-    Scale, Study, Task, Tasks, Tuner, Unit, stream,
+    Case, Channel, Effect, Experiment, Grid, Input, JobPlan, Model, ModelOptions, ParameterSource, Role, Scale, Study,
+    StudyParts, Task, Tuner, Unit, stream,
 };
 use mops_effects::effects;
 use mops_models::equations::EquationsOptions;
@@ -90,20 +90,16 @@ pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Recor
         jobs.push(JobPlan { model: 0, case: index, parameters, signals: Vec::new(), horizon });
         cases.push(case);
     }
-    let study = Study {
+    let study = Study::from_parts(StudyParts {
         name: "test".to_owned(),
         task: Task::Diagnosis,
-        objective: Objective::default(),
         seed: 1,
         models: vec![("plant".to_owned(), Arc::clone(&model))],
         cases,
         tuners: parameters[..globals].iter().enumerate().map(tuner).collect(),
-        rows: Vec::new(),
         jobs,
-        tasks: Tasks::default(),
-        warnings: Vec::new(),
-        notes: Vec::new(),
-    };
+        ..StudyParts::default()
+    });
     Subject {
         study: Arc::new(study),
         model,
@@ -116,7 +112,7 @@ pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Recor
 
 /// The study that a subject could have been taken from, with a seed of its own.
 pub fn study(subject: &Subject) -> Study {
-    let mut study = Study::clone(&subject.study);
+    let mut parts = Study::clone(&subject.study).into_parts();
     for (index, m) in subject.measurements.iter().enumerate() {
         let channel = |s: &Series| Channel {
             signal: s.name.clone(),
@@ -125,12 +121,12 @@ pub fn study(subject: &Subject) -> Study {
             noise: Some(s.noise),
         };
         let channels = m.series.iter().map(channel).collect();
-        study.cases[index].experiment = Some(Experiment { channels, role: m.role, ..Experiment::default() });
+        parts.cases[index].experiment = Some(Experiment { channels, role: m.role, ..Experiment::default() });
         for local in &m.locals {
-            study.jobs[index].parameters[local.parameter] =
-                ParameterSource::Tuner { tuner: study.tuners.len(), factor: 1.0 };
+            parts.jobs[index].parameters[local.parameter] =
+                ParameterSource::Tuner { tuner: parts.tuners.len(), factor: 1.0 };
             let parameter = subject.model.interface().parameters[local.parameter].variable.name.clone();
-            study.tuners.push(Tuner {
+            parts.tuners.push(Tuner {
                 name: format!("{}/{parameter}", m.name),
                 parameter,
                 start: local.start,
@@ -145,7 +141,7 @@ pub fn study(subject: &Subject) -> Study {
             });
         }
     }
-    study
+    Study::from_parts(parts)
 }
 
 /// The subject's model fitted to its records, and what a screening sees of it.

@@ -104,8 +104,8 @@ pub use study::{
     Axis, AxisBuilder, CaseBuilder, ChannelBuilder, Chosen, CriterionBuilder, DiagnosisTask, Distribution,
     DistributionBuilder, ExcitationBuilder, ExcitationTask, Free, JobPlan, Measured, ModelBuilder, MonteCarloTask,
     ParameterSource, Place, RegressionBuilder, RegressionTask, RobustTask, Row, Scenario, SensitivityMethod,
-    SensitivityTask, Study, StudyBuilder, SweepBuilder, SweepTask, Task, Tasks, TasksBuilder, TunerBuilder, Uncertain,
-    UncertainBuilder, UncertaintyTask, WorstCaseTask,
+    SensitivityTask, Study, StudyBuilder, StudyParts, SweepBuilder, SweepTask, Task, Tasks, TasksBuilder, TunerBuilder,
+    Uncertain, UncertainBuilder, UncertaintyTask, WorstCaseTask,
 };
 pub use study_error::StudyError;
 pub use tolerance::{IntegrationMethod, Tolerance};

@@ -25,9 +25,9 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     let file = open(catalogue, &arguments.study)?;
     let study = &file.study;
     suits(study, &file.solver).map_err(|why| file.locate(&why.0))?;
-    let mut text = format!("{}: ok\n\n", study.name);
+    let mut text = format!("{}: ok\n\n", study.name());
     let start = study.start();
-    let tuners = study.tuners.iter().zip(&start).map(|(t, &start)| {
+    let tuners = study.tuners().iter().zip(&start).map(|(t, &start)| {
         let [low, high] = t.bounds.map(|bound| if bound.is_finite() { number(bound) } else { String::new() });
         let kind = match (&t.tie, t.active, &t.grid, t.scale) {
             (Some(_), ..) => "tied".to_owned(),
@@ -42,27 +42,27 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         vec![t.name.clone(), number(start), low, high, t.unit.to_string(), kind]
     });
     text += &table(&["tuner", "start", "min", "max", "unit", ""], &[1, 2, 3], folded(tuners.collect(), 0));
-    let rows = study.rows.iter().map(|row| {
-        let plan = &study.jobs[row.job];
+    let rows = study.rows().iter().map(|row| {
+        let plan = &study.jobs()[row.job];
         let usage = format!("{:?}", row.usage).to_lowercase();
-        vec![study.key(row), study.models[plan.model].0.clone(), usage, demand(row.demand), row.unit.to_string()]
+        vec![study.key(row), study.models()[plan.model].0.clone(), usage, demand(row.demand), row.unit.to_string()]
     });
     text += &section(&["criterion", "model", "usage", "demand", "unit"], &[3], rows.collect());
     text += &section(
         &["experiment", "role", "channel", "samples", "until", "noise", "unit"],
         &[3, 4, 5],
-        study.cases.iter().flat_map(|case| channels(study, case)).collect(),
+        study.cases().iter().flat_map(|case| channels(study, case)).collect(),
     );
     text += &section(&["case", "fixed parameter", "value", "unit"], &[2], fixed(study));
-    if !study.tasks.uncertain.is_empty() {
+    if !study.tasks().uncertain.is_empty() {
         text += &super::robustness::parameters(&uncertain_reports(&study.over_uncertain(&start)));
     }
-    let models = study.models.iter().map(|(name, model)| vec![name.clone(), places(model.interface())]);
+    let models = study.models().iter().map(|(name, model)| vec![name.clone(), places(model.interface())]);
     text += &section(&["model", "places for effects"], &[], models.filter(|row| !row[1].is_empty()).collect());
-    for warning in &study.warnings {
+    for warning in study.warnings() {
         text += &format!("\nwarning: {warning}\n");
     }
-    for note in &study.notes {
+    for note in study.notes() {
         text += &format!("\nnote: {note}\n");
     }
     print(&text)?;
@@ -76,7 +76,7 @@ fn section(header: &[&str], right: &[usize], rows: Vec<Vec<String>>) -> String {
 
 /// What an experiment measures.
 fn channels(study: &Study, case: &Case) -> Vec<Vec<String>> {
-    let signals = || study.models.iter().flat_map(|(_, model)| &model.interface().signals);
+    let signals = || study.models().iter().flat_map(|(_, model)| &model.interface().signals);
     let of = |experiment: &Experiment| {
         let one = |(k, channel): (usize, &Channel)| {
             let once = |text: &str| if k == 0 { text.to_owned() } else { String::new() };
@@ -99,7 +99,7 @@ fn channels(study: &Study, case: &Case) -> Vec<Vec<String>> {
 /// Parameters that no tuner moves; one that is the same in all cases is one row.
 fn fixed(study: &Study) -> Vec<Vec<String>> {
     let of_job = |job: &JobPlan| {
-        let names = &study.models[job.model].1.interface().parameters;
+        let names = &study.models()[job.model].1.interface().parameters;
         let one = |(p, source): (&Parameter, &ParameterSource)| match source {
             ParameterSource::Constant(value) => {
                 Some(vec![p.variable.name.clone(), number(*value), p.variable.unit.to_string()])
@@ -108,13 +108,13 @@ fn fixed(study: &Study) -> Vec<Vec<String>> {
         };
         names.iter().zip(&job.parameters).filter_map(one).collect::<Vec<_>>()
     };
-    let of_jobs: Vec<Vec<Vec<String>>> = study.jobs.iter().map(of_job).collect();
+    let of_jobs: Vec<Vec<Vec<String>>> = study.jobs().iter().map(of_job).collect();
     let everywhere = |row: &&Vec<String>| of_jobs.len() > 1 && of_jobs.iter().all(|rows| rows.contains(row));
     let row = |case: &str, row: &Vec<String>| [&[case.to_owned()], row.as_slice()].concat();
     let alike = of_jobs.first().into_iter().flatten().filter(everywhere).map(|r| row("all", r));
     let own =
-        study.jobs.iter().zip(&of_jobs).flat_map(|(job, rows)| {
-            rows.iter().filter(|r| !everywhere(r)).map(|r| row(&study.cases[job.case].name, r))
+        study.jobs().iter().zip(&of_jobs).flat_map(|(job, rows)| {
+            rows.iter().filter(|r| !everywhere(r)).map(|r| row(&study.cases()[job.case].name, r))
         });
     folded(alike.chain(own).collect(), 1)
 }

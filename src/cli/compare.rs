@@ -172,7 +172,7 @@ fn at_result(catalogue: &Catalogue, run: &Past, result: &Value) -> Result<(Probl
         tuner["value"].as_f64()
     };
     let missing = |folder: &Path| Diagnostic::new(format!("the result in {} has not every tuner", folder.display()));
-    let tuners = study.tuners.iter().map(|tuner| of(&tuner.name)).collect::<Option<Vec<f64>>>();
+    let tuners = study.tuners().iter().map(|tuner| of(&tuner.name)).collect::<Option<Vec<f64>>>();
     let tuners = tuners.ok_or_else(|| missing(&run.folder))?;
     Ok((Problem::new(Arc::new(study)), tuners))
 }

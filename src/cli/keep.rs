@@ -51,14 +51,14 @@ impl From<Refusal> for CommandError {
 
 /// Whether a study asks for points that can be kept: those of a search, a sweep, or samples of uncertain parameters.
 pub(super) fn keeps(study: &Study) -> bool {
-    solves(study) || study.task == Task::Sweep || samples(study)
+    solves(study) || study.task() == Task::Sweep || samples(study)
 }
 
 /// Whether the task asks for points at values of the uncertain parameters.
 pub(super) fn samples(study: &Study) -> bool {
-    match study.task {
-        Task::Design => study.tasks.robust.is_some(),
-        Task::Sensitivity => study.tasks.sensitivity.method != SensitivityMethod::Local,
+    match study.task() {
+        Task::Design => study.tasks().robust.is_some(),
+        Task::Sensitivity => study.tasks().sensitivity.method != SensitivityMethod::Local,
         task => matches!(task, Task::WorstCase | Task::MonteCarlo),
     }
 }
@@ -82,14 +82,14 @@ pub(super) fn open(
         Home::Built(built) => PathBuf::from(built.name()),
         Home::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
     };
-    let task = serde_json::to_value(file.study.task).expect("a task is a word");
+    let task = serde_json::to_value(file.study.task()).expect("a task is a word");
     let run = RunRow {
         home,
         settings: study.settings.clone(),
-        name: file.study.name.clone(),
+        name: file.study.name().to_owned(),
         task: task.as_str().unwrap_or_default().to_owned(),
         text: file.source.text.clone(),
-        seed: file.study.seed,
+        seed: file.study.seed(),
         solver: options.solver.kind.to_owned(),
         max_evaluations: options.max_evaluations,
         ..row(&identity)

@@ -65,16 +65,16 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
     or_end(arguments.limit);
     let study = open(catalogue, &arguments.study)?.study;
     let (job, model) = chosen(&study, arguments)?;
-    let (name, case) = (&study.models[model].0, &study.cases[study.jobs[job].case]);
+    let (name, case) = (&study.models()[model].0, &study.cases()[study.jobs()[job].case]);
     let (parameters, at) = values(&study, job, &arguments.at)?;
     let found = found(&study, job, &parameters, at, arguments)?;
-    let interface = study.models[model].1.interface();
+    let interface = study.models()[model].1.interface();
     let system = narrowed(&found.system, arguments)?;
 
     let wanted = Wanted::of(&system, arguments)?;
 
     print(&format!("{name} in case {}\n", case.name))?;
-    let states = study.models[model].1.equation_states();
+    let states = study.models()[model].1.equation_states();
     if !states.is_empty() {
         print(&format!("\n{}", text::operating_point(&states, &interface.inputs, &found)))?;
         for joint in &found.frictionless {
@@ -158,7 +158,7 @@ const WHERE: &str = "linearised.json (--out DIR)";
 
 /// The job of the model and the case that are asked for.
 fn chosen(study: &Study, arguments: &Arguments) -> Result<(usize, usize), Diagnostic> {
-    let models: Vec<&str> = study.models.iter().map(|(name, _)| name.as_str()).collect();
+    let models: Vec<&str> = study.models().iter().map(|(name, _)| name.as_str()).collect();
     let model = match &arguments.model {
         Some(name) => models.iter().position(|m| m == name).ok_or_else(|| {
             let help = suggestion(name, models.iter().copied());
@@ -170,8 +170,8 @@ fn chosen(study: &Study, arguments: &Arguments) -> Result<(usize, usize), Diagno
             return Err(Diagnostic::new("the study has several models").with_help(help));
         }
     };
-    let jobs: Vec<usize> = (0..study.jobs.len()).filter(|&job| study.jobs[job].model == model).collect();
-    let cases: Vec<&str> = jobs.iter().map(|&job| study.cases[study.jobs[job].case].name.as_str()).collect();
+    let jobs: Vec<usize> = (0..study.jobs().len()).filter(|&job| study.jobs()[job].model == model).collect();
+    let cases: Vec<&str> = jobs.iter().map(|&job| study.cases()[study.jobs()[job].case].name.as_str()).collect();
     let place = match &arguments.case {
         None if !jobs.is_empty() => 0,
         None => {
@@ -190,8 +190,8 @@ type Named = Vec<(String, Quantity)>;
 
 /// The parameters of the job, and what is left of `--at`: states and inputs.
 fn values(study: &Study, job: usize, given: &[String]) -> Result<(Vec<f64>, Named), Diagnostic> {
-    let plan = &study.jobs[job];
-    let interface = study.models[plan.model].1.interface();
+    let plan = &study.jobs()[job];
+    let interface = study.models()[plan.model].1.interface();
     let mut tuners = study.start();
     let (mut direct, mut rest) = (Vec::new(), Vec::new());
     for text in given {
@@ -200,8 +200,8 @@ fn values(study: &Study, job: usize, given: &[String]) -> Result<(Vec<f64>, Name
             Diagnostic::new(format!("`--at {text}` names no value")).with_help("write it as --at theta=0.1")
         })?;
         let (name, quantity) = (name.trim(), Quantity::parse(value).map_err(wrong)?);
-        if let Some(i) = study.tuners.iter().position(|t| t.name == name) {
-            tuners[i] = quantity.to(&study.tuners[i].unit).map_err(wrong)?;
+        if let Some(i) = study.tuners().iter().position(|t| t.name == name) {
+            tuners[i] = quantity.to(&study.tuners()[i].unit).map_err(wrong)?;
         } else if let Some(i) = interface.parameters.iter().position(|p| p.variable.name == name) {
             direct.push((i, quantity.to(&interface.parameters[i].variable.unit).map_err(wrong)?));
         } else {
@@ -222,8 +222,8 @@ fn found(
     at: Named,
     arguments: &Arguments,
 ) -> Result<Resting, CommandError> {
-    let plan = &study.jobs[job];
-    let (model, case) = (&study.models[plan.model].1, &study.cases[plan.case]);
+    let plan = &study.jobs()[job];
+    let (model, case) = (&study.models()[plan.model].1, &study.cases()[plan.case]);
     let undefined =
         |failure: Failure| CommandError::Failure(format!("the model cannot be linearised there: {failure}"));
     if model.interface().analysis == AnalysisKind::Linear {

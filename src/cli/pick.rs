@@ -124,11 +124,11 @@ fn front(folder: &Path) -> Result<Vec<Value>, Diagnostic> {
 
 /// Refuses the name of a criterion that is not on the front.
 fn known(study: &Study, name: &str) -> Result<(), Diagnostic> {
-    let minimised = || study.rows.iter().filter(|row| row.usage == Usage::Minimise).map(|row| row.name.as_str());
+    let minimised = || study.rows().iter().filter(|row| row.usage == Usage::Minimise).map(|row| row.name.as_str());
     if minimised().any(|known| known == name) {
         return Ok(());
     }
-    if study.rows.iter().any(|row| row.name == name) {
+    if study.rows().iter().any(|row| row.name == name) {
         return Err(Diagnostic::new(format!("`{name}` is not minimised, and so has no say on the front"))
             .with_help("change its demand in the study, and find the front again"));
     }
@@ -144,7 +144,7 @@ fn written(value: &str) -> String {
 
 /// The point of the front with the least worst scaled value under the demands of the problem, and its place.
 fn nearest(problem: &Problem, front: &[Value], study: &Path) -> Result<(usize, Evaluation), Diagnostic> {
-    let tuners = &problem.study().tuners;
+    let tuners = problem.study().tuners();
     let mut best: Option<(usize, Evaluation)> = None;
     for (i, point) in front.iter().enumerate() {
         let values: Option<Vec<f64>> = tuners.iter().map(|tuner| point["tuners"][&tuner.name].as_f64()).collect();
@@ -198,7 +198,7 @@ fn told(study: &Study, (index, of): (usize, usize), at: &Evaluation, refined: Op
     let second = if refined.is_some() { "refined" } else { "" };
     let criteria =
         with(&["case", "criterion", "demand", "point", second, "unit", "scaled", "met"], &[2, 3, 4, 6], rows.collect());
-    let active = study.tuners.iter().enumerate().filter(|(_, tuner)| tuner.active);
+    let active = study.tuners().iter().enumerate().filter(|(_, tuner)| tuner.active);
     let rows = active.map(|(i, tuner)| {
         let refined = refined.map_or_else(String::new, |refined| number(refined.tuners[i]));
         vec![tuner.name.clone(), number(at.tuners[i]), refined, tuner.unit.to_string()]
@@ -224,18 +224,18 @@ fn picked(text: &str, file: &StudyFile, at: &Evaluation, demands: &[(String, Str
     for (name, value) in demands {
         text.set(&["criteria", name, "demand"], &written(value));
     }
-    for (tuner, value) in file.study.tuners.iter().zip(&at.tuners) {
+    for (tuner, value) in file.study.tuners().iter().zip(&at.tuners) {
         let place = ["tuners", tuner.name.as_str(), "start"];
         if tuner.active && tuner.tie.is_none() && text.has(&place[..2]) {
             text.set(&place, &toml_text::number(*value));
         }
     }
-    text.set(&["study", "name"], &quoted(&format!("{}-picked", file.study.name)));
+    text.set(&["study", "name"], &quoted(&format!("{}-picked", file.study.name())));
     text.set(&["study", "task"], "\"design\"");
     if text.has(&["study", "objective"]) {
         text.set(&["study", "objective"], "\"max\"");
     }
     let asked: Vec<String> = demands.iter().map(|(name, value)| format!("{name} = {value}")).collect();
-    text.head(&format!("A point of the front of {}, for {}.", file.study.name, asked.join(", ")));
+    text.head(&format!("A point of the front of {}, for {}.", file.study.name(), asked.join(", ")));
     text.into_text()
 }

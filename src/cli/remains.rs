@@ -101,8 +101,8 @@ fn write_samples(path: &Path, found: &MonteCarloReport) -> io::Result<()> {
 fn write_evaluations(path: &Path, solved: &Solved) -> io::Result<()> {
     let study = solved.problem.study();
     files::write_csv(path, |writer| {
-        let tuners = study.tuners.iter().map(|t| format!("{}[{}]", t.name, t.unit));
-        let rows = study.rows.iter().map(|row| format!("{}[{}]", study.key(row), row.unit));
+        let tuners = study.tuners().iter().map(|t| format!("{}[{}]", t.name, t.unit));
+        let rows = study.rows().iter().map(|row| format!("{}[{}]", study.key(row), row.unit));
         writer.write_record(tuners.chain(rows).chain(["objective".into(), "violation".into()]))?;
         for record in &solved.archive {
             let merit = [&record.merit.objective, &record.merit.violation];
@@ -222,7 +222,7 @@ mod tests {
             assert!(folder.path().join(name).is_file(), "{name}");
         }
         let again = open(&catalogue, &arguments(folder.path().join("repaired.toml").to_str().unwrap())).unwrap();
-        assert_eq!((again.study.cases.len(), again.study.tuners.len()), (2, file.study.tuners.len() - 1));
+        assert_eq!((again.study.cases().len(), again.study.tuners().len()), (2, file.study.tuners().len() - 1));
         // The effect of a study in a file: its data stay where they are.
         let below = folder.path().join("below");
         fs::create_dir(&below).unwrap();

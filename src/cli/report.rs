@@ -66,7 +66,7 @@ fn again(catalogue: &Catalogue, past: &Past) -> Result<Again, CommandError> {
         .with_help(format!("`{} --resume` ends it, and simulates no known point again", plainly(run)))
         .into());
     }
-    file.study.seed = run.seed;
+    file.study.set_seed(run.seed);
     let options = options(catalogue, &file.solver, run)?;
     let identity = Identity::of(&file, &file.study, options.solver.kind);
     let keeper = Keeper::look(folder, &file.study, &identity, &options.cancellation)?;

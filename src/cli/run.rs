@@ -125,7 +125,7 @@ pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
 /// Runs the study and leaves the result behind.
 pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>) -> Result<ExitCode, CommandError> {
     let mut file = open_as(catalogue, &arguments.study, &search.settings())?;
-    if arguments.export.is_some() && file.study.task != Task::Diagnosis {
+    if arguments.export.is_some() && file.study.task() != Task::Diagnosis {
         return Err(Diagnostic::new(
             "`--export` writes the repaired model of a diagnosis, and this study is for something else",
         )
@@ -133,7 +133,7 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
         .into());
     }
     if let Some(seed) = arguments.seed {
-        file.study.seed = seed;
+        file.study.set_seed(seed);
     }
     let (chosen, limit) = search.effort().map_or((None, None), |e| (e.solver.as_deref(), e.max_evaluations));
     let start = search.effort().map_or(Start::Fresh, |effort| effort.keep.start());
@@ -162,13 +162,13 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     suits(&file.study, &options.solver).map_err(|why| refused(&why.0, &file, options.solver.kind))?;
     let talks = !arguments.quiet && !arguments.json;
     // N.B.: the name of a study is no path, wherever the study comes from.
-    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(file_name(&file.study.name)));
+    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(file_name(file.study.name())));
     let mut progress = Progress::new(talks, options.max_evaluations, &options.cancellation);
     if arguments.dashboard {
         progress = progress.with_criteria_of(&file.study);
     }
     if talks {
-        for warning in &file.study.warnings {
+        for warning in file.study.warnings() {
             say(&format!("warning: {warning}"));
         }
     }
@@ -310,21 +310,21 @@ fn refused(why: &StudyError, file: &StudyFile, solver: &str) -> Diagnostic {
 }
 
 fn introduction(study: &Study, options: &Options) -> String {
-    let active = study.tuners.iter().filter(|t| t.active).count();
-    if study.task == Task::Diagnosis {
-        let experiments = study.cases.iter().filter_map(|case| case.experiment.as_ref());
+    let active = study.tuners().iter().filter(|t| t.active).count();
+    if study.task() == Task::Diagnosis {
+        let experiments = study.cases().iter().filter_map(|case| case.experiment.as_ref());
         let (count, channels) = experiments.fold((0, 0), |(n, m), e| (n + 1, m + e.channels.len()));
-        let model = &study.name;
+        let model = &study.name();
         return format!(
             "{model}: {active} tuners, {count} experiments with {channels} channels; looking for what the model lacks\n"
         );
     }
     format!(
         "{}: {} tuners, {} criteria over {} cases, solver {}\n",
-        study.name,
+        study.name(),
         active,
-        study.rows.len(),
-        study.cases.len(),
+        study.rows().len(),
+        study.cases().len(),
         if solves(study) { options.solver.kind } else { "none (nothing is solved)" }
     )
 }

@@ -41,7 +41,7 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     study.cancelled_by(&within(arguments.limit));
     let tuners = values(&study, &arguments.at)?;
     if let Some(case) = &arguments.case {
-        let names = study.cases.iter().map(|c| c.name.as_str());
+        let names = study.cases().iter().map(|c| c.name.as_str());
         if !names.clone().any(|name| name == case) {
             return Err(Diagnostic::new(format!("the study has no case `{case}`"))
                 .with_help(suggestion(case, names))
@@ -59,17 +59,16 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         reports
     };
     print(&criteria(&pick(&start), &pick(&here), "here"))?;
-    let criteria = here
-        .failures
-        .iter()
-        .filter(|(job, why)| matches!(why, Failure::Criterion(_)) && wanted(&study.cases[study.jobs[*job].case].name));
+    let criteria = here.failures.iter().filter(|(job, why)| {
+        matches!(why, Failure::Criterion(_)) && wanted(&study.cases()[study.jobs()[*job].case].name)
+    });
     let mut failed = here.scaled.is_none();
     let mut names = FileNames::default();
     for (job, why) in criteria {
-        print(&format!("no value in case {}: {why}\n", study.cases[study.jobs[*job].case].name))?;
+        print(&format!("no value in case {}: {why}\n", study.cases()[study.jobs()[*job].case].name))?;
     }
-    for (job, plan) in study.jobs.iter().enumerate() {
-        let (model, case) = (&study.models[plan.model].0, &study.cases[plan.case].name);
+    for (job, plan) in study.jobs().iter().enumerate() {
+        let (model, case) = (&study.models()[plan.model].0, &study.cases()[plan.case].name);
         if !wanted(case) {
             continue;
         }
@@ -108,16 +107,16 @@ fn values(study: &Study, given: &[String]) -> Result<Vec<f64>, CommandError> {
         let (name, value) = text.split_once('=').ok_or_else(|| {
             Diagnostic::new(format!("`--at {text}` names no value")).with_help("write it as --at k=5.48")
         })?;
-        let names = study.tuners.iter().map(|t| t.name.as_str());
-        let index = study.tuners.iter().position(|t| t.name == name.trim()).ok_or_else(|| {
+        let names = study.tuners().iter().map(|t| t.name.as_str());
+        let index = study.tuners().iter().position(|t| t.name == name.trim()).ok_or_else(|| {
             Diagnostic::new(format!("the study has no tuner `{}`", name.trim()))
                 .with_help(suggestion(name.trim(), names))
         })?;
         let quantity = Quantity::parse(value).map_err(|why| Diagnostic::new(format!("`--at {text}`: {why}")))?;
         values[index] =
-            quantity.to(&study.tuners[index].unit).map_err(|why| Diagnostic::new(format!("`--at {text}`: {why}")))?;
+            quantity.to(&study.tuners()[index].unit).map_err(|why| Diagnostic::new(format!("`--at {text}`: {why}")))?;
     }
-    for (tuner, &value) in study.tuners.iter().zip(&values) {
+    for (tuner, &value) in study.tuners().iter().zip(&values) {
         let [low, high] = tuner.bounds;
         let on_grid = tuner.tie.is_some()
             || !tuner.active
@@ -137,7 +136,7 @@ fn values(study: &Study, given: &[String]) -> Result<Vec<f64>, CommandError> {
 }
 
 fn summary(study: &Study, model: usize, response: &Response) -> String {
-    let units = &study.models[model].1.interface().signals;
+    let units = &study.models()[model].1.interface().signals;
     let rows = response.traces.iter().zip(units).map(|((name, trace), signal)| {
         let ((high, high_at), (low, low_at)) = (trace.maximum(), trace.minimum());
         vec![
@@ -182,7 +181,7 @@ impl Simulated<'_> {
         std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
         let end = response.traces.first().map_or(0.0, |(_, trace)| trace.end());
         let times: Vec<f64> = (0..samples).map(|i| end * f64::from(i) / f64::from(samples - 1)).collect();
-        let units = &study.models[*model].1.interface().signals;
+        let units = &study.models()[*model].1.interface().signals;
         let columns: Vec<Vec<f64>> = response.traces.iter().map(|(_, trace)| trace.sample(&times)).collect();
         let path = folder.join(names.unique(name) + ".csv");
         let written = files::write_csv(&path, |writer| {

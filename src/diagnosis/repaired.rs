@@ -29,7 +29,7 @@ const REACH: f64 = 10.0;
 /// to the path as it counts from where the repaired study will stand.
 pub(crate) fn repaired(original: &Original<'_>, diagnosis: &Diagnosis, locate: &dyn Fn(&str) -> String) -> String {
     let mut text = settled(original.text, original.settings, locate);
-    text.set(&["study", "name"], &quoted(&format!("{}-repaired", original.study.name)));
+    text.set(&["study", "name"], &quoted(&format!("{}-repaired", original.study.name())));
     text.set(&["study", "task"], "\"calibration\"");
     noise_and_criteria(&mut text, diagnosis);
     parameters(&mut text, original.study, diagnosis);
@@ -77,14 +77,15 @@ fn parameters(text: &mut TomlText, study: &Study, diagnosis: &Diagnosis) {
         let term = &removed.term;
         text.remove(&["tuners", term], &format!("The data show that {term} is not needed."));
         let takes = |model: &&(String, _)| has_parameter(study, &model.0, term);
-        if let Some((model, _)) = study.models.iter().find(takes) {
+        if let Some((model, _)) = study.models().iter().find(takes) {
             text.set(&["models", model, "parameters", term], "0.0");
         }
     }
 }
 
 fn has_parameter(study: &Study, model: &str, parameter: &str) -> bool {
-    let parameters = study.models.iter().filter(|(name, _)| name == model).flat_map(|(_, m)| &m.interface().parameters);
+    let parameters =
+        study.models().iter().filter(|(name, _)| name == model).flat_map(|(_, m)| &m.interface().parameters);
     parameters.into_iter().any(|p| p.variable.name == parameter)
 }
 
@@ -119,7 +120,7 @@ type FreeStart = (String, Vec<(&'static str, f64)>);
 
 /// The state that a parameter is the start value of, where it starts, and for one of an effect where it may.
 fn free_start(original: &Original<'_>, diagnosis: &Diagnosis, parameter: &str, value: f64) -> Option<FreeStart> {
-    let states = original.study.models.iter().flat_map(|(_, model)| &model.interface().states);
+    let states = original.study.models().iter().flat_map(|(_, model)| &model.interface().states);
     if let Some(state) = states.into_iter().find(|state| state.start == parameter) {
         return Some((state.name.clone(), vec![("start", value)]));
     }
@@ -159,9 +160,9 @@ fn effect(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diagnosis, f
 
 /// The model that has the place.
 pub(super) fn model_of<'a>(study: &'a Study, place: &str) -> &'a str {
-    let simulated = || study.models.iter().filter(|(_, model)| model.interface().analysis == AnalysisKind::Time);
+    let simulated = || study.models().iter().filter(|(_, model)| model.interface().analysis == AnalysisKind::Time);
     let has = |(_, model): &&(String, _)| ports(model).any(|port| port == place);
-    let found = simulated().find(has).or_else(|| simulated().next()).or_else(|| study.models.first());
+    let found = simulated().find(has).or_else(|| simulated().next()).or_else(|| study.models().first());
     &found.expect("a study has a model").0
 }
 
@@ -272,12 +273,12 @@ free     = [\"phi\", \"theta\"]
         // Without the effect, which needs nothing that is tested here.
         let diagnosis = Diagnosis { found: Vec::new(), ..made_up::coulomb() };
         let study = read(&made(&diagnosis, &[])).study;
-        assert_eq!((study.name.as_str(), study.task), ("swing-repaired", mops_core::Task::Calibration));
-        let start = |name: &str| study.tuners.iter().find(|t| t.name == name).unwrap().start;
+        assert_eq!((study.name(), study.task()), ("swing-repaired", mops_core::Task::Calibration));
+        let start = |name: &str| study.tuners().iter().find(|t| t.name == name).unwrap().start;
         assert_eq!([start("b"), start("d"), start("c"), start("swing/phi0")], [1.133e-3, 2.5267e-2, 4e-4, 0.98]);
-        let keys: Vec<String> = study.rows.iter().map(|row| study.key(row)).collect();
+        let keys: Vec<String> = study.rows().iter().map(|row| study.key(row)).collect();
         assert_eq!(keys, ["swing/phi", "swing/theta"]);
-        let channels = &study.cases[0].experiment.as_ref().unwrap().channels;
+        let channels = &study.cases()[0].experiment.as_ref().unwrap().channels;
         assert!(channels.iter().all(|channel| channel.noise == Some(0.003)));
     }
 
@@ -306,7 +307,7 @@ free     = [\"phi\", \"theta\"]
         let one = "c  = { start = 4e-4, min = 1e-4, max = 1e-3 }";
         let own = "c  = { start = 4e-4, min = 1e-4, max = 1e-3, per-case = true, starts = { swing = 6e-4 } }";
         let study = read(&STUDY.replace("swing.csv", "../data/swing.csv").replace(one, own)).study;
-        let start = |name: &str| study.tuners.iter().find(|tuner| tuner.name == name).map(|tuner| tuner.start);
+        let start = |name: &str| study.tuners().iter().find(|tuner| tuner.name == name).map(|tuner| tuner.start);
         assert_eq!((start("swing/c"), start("c")), (Some(6e-4), None));
     }
 

@@ -20,7 +20,7 @@ pub(super) fn group(study: &Study, archive: &[Record]) -> Group {
     let best = improvements(archive);
     let feasible = Merit::is_feasible;
     let first_feasible = best.iter().find(|(_, merit)| feasible(merit));
-    let constrained = study.rows.iter().any(|row| matches!(row.usage, Usage::Inequality | Usage::Equality));
+    let constrained = study.rows().iter().any(|row| matches!(row.usage, Usage::Inequality | Usage::Equality));
     if constrained {
         about.push(match first_feasible {
             Some((1, _)) => "The start already satisfies every constraint.".to_owned(),
@@ -48,7 +48,7 @@ fn improvements(archive: &[Record]) -> Vec<(usize, Merit)> {
 }
 
 fn objective(study: &Study, archive: &[Record], best: &[(usize, Merit)]) -> Plot {
-    let name = match study.objective {
+    let name = match study.objective() {
         Objective::Max | Objective::Each => "worst scaled criterion",
         Objective::Sum => "sum of weighted scaled criteria",
     };
@@ -76,8 +76,8 @@ fn objective(study: &Study, archive: &[Record], best: &[(usize, Merit)]) -> Plot
         Curve { name: "best so far".into(), points: after, ..Curve::default() },
     ];
     // Only without weights is a worst scaled value of 1 the demand itself.
-    let weighted = study.rows.iter().any(|row| row.usage == Usage::Minimise && row.weight != 1.0);
-    let demanded = study.task == Task::Design && study.objective == Objective::Max && !weighted;
+    let weighted = study.rows().iter().any(|row| row.usage == Usage::Minimise && row.weight != 1.0);
+    let demanded = study.task() == Task::Design && study.objective() == Objective::Max && !weighted;
     let levels = if demanded { vec![Level { name: "demand".into(), value: 1.0 }] } else { Vec::new() };
     Plot {
         title: "Objective of the best point".into(),

@@ -23,8 +23,8 @@ pub(super) fn demand(criterion: &CriterionReport) -> Option<String> {
 /// All criteria in all cases, at the start and at the reported point.
 pub(super) fn table(report: &Report<'_>) -> Markup {
     let (outcome, best) = (report.outcome, report.best_name());
-    let models = report.problem.study().models.len() > 1;
-    let cases = report.problem.study().cases.len() > 1;
+    let models = report.problem.study().models().len() > 1;
+    let cases = report.problem.study().cases().len() > 1;
     // Where nothing was solved there is but one point; a sum has no demand to meet.
     let (two, demands) = (outcome.solver != "none", outcome.task != Task::Calibration);
     let shape = report.problem.shape();

@@ -32,11 +32,11 @@ pub(super) struct Figure {
 /// A group for every job, or for the most interesting ones where there are many; and a sentence if some are left out.
 pub(super) fn responses(report: &Report<'_>) -> (Vec<Group>, Option<String>) {
     let study = report.problem.study();
-    let mut jobs: Vec<usize> = (0..study.jobs.len()).collect();
+    let mut jobs: Vec<usize> = (0..study.jobs().len()).collect();
     let all = jobs.len();
     if all > MOST_JOBS {
         let worst = |job: usize| {
-            let of_job = study.rows.iter().zip(&report.best.readings).filter(|(row, _)| row.job == job);
+            let of_job = study.rows().iter().zip(&report.best.readings).filter(|(row, _)| row.job == job);
             of_job.map(|(_, reading)| reading.map_or(f64::INFINITY, |r| r.scaled)).fold(f64::NEG_INFINITY, f64::max)
         };
         jobs.sort_by(|&a, &b| worst(b).total_cmp(&worst(a)));
@@ -51,14 +51,14 @@ pub(super) fn responses(report: &Report<'_>) -> (Vec<Group>, Option<String>) {
 
 fn of_job(report: &Report<'_>, job: usize) -> Group {
     let study = report.problem.study();
-    let plan = &study.jobs[job];
-    let (case, (model_name, model)) = (&study.cases[plan.case], &study.models[plan.model]);
+    let plan = &study.jobs()[job];
+    let (case, (model_name, model)) = (&study.cases()[plan.case], &study.models()[plan.model]);
     let mut title = match &case.experiment {
         Some(experiment) => format!("Experiment `{}` ({})", case.name, experiment.role.name()),
         None => format!("Case `{}`", case.name),
     };
     // Names of models are told apart only where there is more than one.
-    let place = if study.models.len() > 1 {
+    let place = if study.models().len() > 1 {
         title.push_str(&format!(", model `{model_name}`"));
         format!("{}-{model_name}", case.name)
     } else {
@@ -77,7 +77,7 @@ fn of_job(report: &Report<'_>, job: usize) -> Group {
     let of_front = front::analyses(report, job);
     let signals = &model.interface().signals;
     let captions = |signal: &str| -> Vec<String> {
-        let of_job = study.rows.iter().enumerate().filter(|(_, row)| row.job == job);
+        let of_job = study.rows().iter().enumerate().filter(|(_, row)| row.job == job);
         of_job
             .filter(|(_, row)| row.criterion.signals().iter().any(|s| s == signal))
             .map(|(i, row)| caption(report, i, row))
@@ -107,7 +107,7 @@ fn of_job(report: &Report<'_>, job: usize) -> Group {
             group.figures.push(Figure { plots, caption: captions(&signal.name) });
             continue;
         }
-        let rows: Vec<&Row> = study.rows.iter().filter(|row| row.job == job).collect();
+        let rows: Vec<&Row> = study.rows().iter().filter(|row| row.job == job).collect();
         let mut plot = both.response(signal, &case.name, &rows);
         plot.curves.splice(0..0, front::responses(&of_front, &signal.name));
         let plots = vec![(format!("response-{place}-{}", signal.name), plot)];

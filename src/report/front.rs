@@ -67,10 +67,14 @@ fn criteria(report: &Report<'_>, found: &TradeOffs) -> Vec<Quantity> {
     let study = report.problem.study();
     let quantity = |k: usize| {
         let criterion = &found.criteria[k];
-        let row = study.rows.iter().position(|row| study.key(row) == criterion.key).expect("a row of the study");
-        let demand = study.rows[row].demand.limit();
+        let row = study.rows().iter().position(|row| study.key(row) == criterion.key).expect("a row of the study");
+        let demand = study.rows()[row].demand.limit();
         Quantity {
-            name: if study.cases.len() > 1 { criterion.key.replace('/', ", ") } else { study.rows[row].name.clone() },
+            name: if study.cases().len() > 1 {
+                criterion.key.replace('/', ", ")
+            } else {
+                study.rows()[row].name.clone()
+            },
             unit: criterion.unit.clone(),
             values: report.front.iter().map(|at| at.readings[row].map_or(f64::NAN, |r| r.value)).collect(),
             log: false,
@@ -89,7 +93,7 @@ fn tuners(report: &Report<'_>) -> Vec<Quantity> {
         log: tuner.scale == mops_core::Scale::Log,
         demand: None,
     };
-    study.tuners.iter().enumerate().filter(|(_, tuner)| tuner.active).map(quantity).collect()
+    study.tuners().iter().enumerate().filter(|(_, tuner)| tuner.active).map(quantity).collect()
 }
 
 /// A dot for every point, and dots of other colours on those worth a look.
@@ -176,7 +180,7 @@ const COLUMNS: f64 = 150.0;
 
 /// What a job gives at every point of the front; nothing where there is none, or where there are too many.
 pub(super) fn analyses(report: &Report<'_>, job: usize) -> Vec<Option<Analysis>> {
-    if report.front.len() * report.problem.study().jobs.len() > MOST_RESPONSES {
+    if report.front.len() * report.problem.study().jobs().len() > MOST_RESPONSES {
         return Vec::new();
     }
     report.front.iter().map(|at| report.problem.analyse_all(job, &at.tuners, None).ok()).collect()

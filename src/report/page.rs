@@ -85,7 +85,7 @@ pub(super) fn of(report: &Report<'_>, pictures: &Pictures) -> Markup {
             @if !outcome.criteria.is_empty() { (section("Criteria", criteria::table(report))) }
             @if !outcome.tuners.is_empty() && report.diagnosis.is_none() { (section("Tuners", tuners::table(report))) }
             @if let Some(found) = &outcome.found.slopes {
-                @let one_case = report.problem.study().cases.len() == 1;
+                @let one_case = report.problem.study().cases().len() == 1;
                 (section("Sensitivities", slopes::section(found, report.best_name(), one_case)))
             }
             @if !pictures.responses.is_empty() {

@@ -106,12 +106,12 @@ fn plots(runs: &[Responses]) -> Vec<Plot> {
 fn curves(index: usize, run: &Responses) -> Vec<Drawn> {
     let study = run.problem.study();
     let mut drawn = Vec::new();
-    for (job, plan) in study.jobs.iter().enumerate() {
-        let (model_name, model) = &study.models[plan.model];
+    for (job, plan) in study.jobs().iter().enumerate() {
+        let (model_name, model) = &study.models()[plan.model];
         let Ok(Analysis::Time(response)) = run.problem.analyse_all(job, &run.tuners, None) else { continue };
         for signal in plan.signals.iter().map(|&i| &model.interface().signals[i]) {
             let Some(trace) = response.trace(&signal.name) else { continue };
-            let place = [study.cases[plan.case].name.clone(), model_name.clone(), signal.name.clone()];
+            let place = [study.cases()[plan.case].name.clone(), model_name.clone(), signal.name.clone()];
             let ink = Ink::Series(index % 6);
             let curve = Curve { name: run.name.clone(), points: sampling::points(trace), ink, ..Curve::default() };
             drawn.push((place, labelled(&signal.name, &signal.unit.to_string()), curve));

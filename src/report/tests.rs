@@ -169,7 +169,7 @@ fn criteria(problem: &Problem, at: &Evaluation) -> Vec<CriterionReport> {
             note: reading.and_then(|r| r.note),
         }
     };
-    study.rows.iter().zip(&at.readings).map(report).collect()
+    study.rows().iter().zip(&at.readings).map(report).collect()
 }
 
 /// Writes the report into a folder that lives as long as the answer.

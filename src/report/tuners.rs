@@ -11,7 +11,7 @@ use crate::numbers::number;
 pub(super) fn table(report: &Report<'_>) -> Markup {
     let study = report.problem.study();
     let two = report.outcome.solver != "none";
-    let log = study.tuners.iter().any(|t| t.scale == Scale::Log);
+    let log = study.tuners().iter().any(|t| t.scale == Scale::Log);
     let rows_and_head = html! {
         table {
             thead {
@@ -27,7 +27,7 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
                 }
             }
             tbody {
-                @for (now, tuner) in report.outcome.tuners.iter().zip(&study.tuners) {
+                @for (now, tuner) in report.outcome.tuners.iter().zip(study.tuners()) {
                     tr {
                         th scope="row" { (now.name) }
                         @if two { td class="number" { (number(now.start)) } }
@@ -36,7 +36,7 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
                         td class="number" { @if now.bounds[0].is_finite() { (number(now.bounds[0])) } }
                         td { @if now.active { (position(tuner, now.start, now.value)) } }
                         td class="number" { @if now.bounds[1].is_finite() { (number(now.bounds[1])) } }
-                        td { (remark(tuner, now.at_bound, |i| &study.tuners[i].name)) }
+                        td { (remark(tuner, now.at_bound, |i| &study.tuners()[i].name)) }
                     }
                 }
             }

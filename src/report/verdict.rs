@@ -217,7 +217,7 @@ pub(super) fn warnings(report: &Report<'_>) -> Vec<String> {
     for (job, failure) in &report.best.failures {
         all.push(format!(
             "at the reported point, case `{}` failed: {failure}",
-            study.cases[study.jobs[*job].case].name
+            study.cases()[study.jobs()[*job].case].name
         ));
     }
     let failed: usize = report.archive.iter().filter(|r| r.merit.objective.is_infinite()).count();

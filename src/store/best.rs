@@ -10,7 +10,7 @@ use super::database::Points;
 pub(super) fn best(points: &Points, problem: &Problem) -> Option<Vec<f64>> {
     let mut best: Option<(Merit, &Vec<u64>, Vec<f64>)> = None;
     for (key, known) in points {
-        if key.len() != problem.study().tuners.len() {
+        if key.len() != problem.study().tuners().len() {
             continue;
         }
         let tuners: Vec<f64> = key.iter().map(|&bits| f64::from_bits(bits)).collect();
@@ -31,7 +31,7 @@ pub(super) fn best(points: &Points, problem: &Problem) -> Option<Vec<f64>> {
 
 /// The place of a tuner's value within its bounds, to the bit: the place from which that very value comes, if there is one.
 fn position(problem: &Problem, tuner: usize, value: f64) -> f64 {
-    let tuner = &problem.study().tuners[tuner];
+    let tuner = &problem.study().tuners()[tuner];
     let near = tuner.position_of(value);
     let (mut up, mut down) = (near, near);
     for _ in 0..64 {

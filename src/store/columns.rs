@@ -81,7 +81,7 @@ pub(super) fn known(
     let of = |key: &str, index: usize| failures.iter().find(|failure| failure[key].as_u64() == Some(index as u64));
 
     let mut known = Known::default();
-    for job in 0..study.jobs.len() {
+    for job in 0..study.jobs().len() {
         if let Some(failure) = of("job", job) {
             known.jobs.push((job, Err(failure_of(failure))));
             continue;
@@ -99,7 +99,7 @@ pub(super) fn known(
             let note = written.as_str().or(written[0].as_str()).map(&mut *intern);
             Some(Ok(Value { number, residuals: residuals.remove(&index).unwrap_or_default(), note, missed }))
         };
-        let rows = (0..study.rows.len()).filter(|&index| study.rows[index].job == job);
+        let rows = (0..study.rows().len()).filter(|&index| study.rows()[index].job == job);
         let values: Vec<_> = rows.filter_map(|index| Some((index, value(index)?))).collect();
         if !values.is_empty() {
             known.jobs.push((job, JobValues::Ok(values)));

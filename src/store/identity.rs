@@ -53,11 +53,11 @@ impl Identity {
             mops: env!("CARGO_PKG_VERSION").to_owned(),
             study: file.content.clone(),
             data: file.data.clone(),
-            tuners: study.tuners.iter().map(|tuner| tuner.name.clone()).collect(),
-            rows: study.rows.iter().map(|row| study.key(row)).collect(),
-            uncertain: study.tasks.uncertain.iter().map(|u| format!("{}[{}]", u.name, u.unit)).collect(),
+            tuners: study.tuners().iter().map(|tuner| tuner.name.clone()).collect(),
+            rows: study.rows().iter().map(|row| study.key(row)).collect(),
+            uncertain: study.tasks().uncertain.iter().map(|u| format!("{}[{}]", u.name, u.unit)).collect(),
             solver: solver.to_owned(),
-            seed: study.seed,
+            seed: study.seed(),
         }
     }
 

@@ -117,7 +117,7 @@ impl Keeper {
                     drop(source);
                     let database = opened(folder, true)?;
                     if !before.has_uncertain_of(identity) {
-                        database.forget_beyond(study.tuners.len()).map_err(|error| trouble(folder, &error))?;
+                        database.forget_beyond(study.tuners().len()).map_err(|error| trouble(folder, &error))?;
                     }
                     if !before.has_coordinates_of(identity) {
                         database.forget_slopes().map_err(|error| trouble(folder, &error))?;
@@ -161,7 +161,7 @@ impl Keeper {
         database.write_ahead().and_then(|()| database.waits(false)).map_err(cannot)?;
         Ending::clear(folder);
         let (memory, messages) = memory((points, slopes), known.is_some(), taken, None);
-        let rows = study.rows.len();
+        let rows = study.rows().len();
         Ok(Self { database, run, rows, memory, messages, new, note, id, begun, begin, claim: Some(claim) })
     }
 
@@ -176,7 +176,7 @@ impl Keeper {
         let (memory, messages) = memory(known, false, 0, Some(end.clone()));
         let begin = source.last_run().map_err(cannot)?.and_then(|run| run.begin);
         let database = Database::in_memory().map_err(cannot)?;
-        let rows = study.rows.len();
+        let rows = study.rows().len();
         let id = String::new();
         Ok(Self { database, run: 0, rows, memory, messages, new: false, note: None, id, begun: 0, begin, claim: None })
     }
@@ -328,8 +328,8 @@ fn read(database: &Database, study: &Study, identity: &Identity) -> rusqlite::Re
     let alike = before.as_ref().is_some_and(|before| before.has_coordinates_of(identity));
     let mut slopes = if alike { database.slopes()? } else { Slopes::new() };
     if before.is_none_or(|before| !before.has_uncertain_of(identity)) {
-        points.retain(|key, _| key.len() == study.tuners.len());
-        slopes.retain(|(key, _), _| key.len() == study.tuners.len());
+        points.retain(|key, _| key.len() == study.tuners().len());
+        slopes.retain(|(key, _), _| key.len() == study.tuners().len());
     }
     Ok((points, slopes))
 }

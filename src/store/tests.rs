@@ -35,7 +35,7 @@ fn written(study: &Study, points: &[PointRow], slopes: &[(Vec<u64>, f64, Option<
     let file = file("pid-design", &[]);
     let mut database = Database::in_memory().unwrap();
     let run = database.begin(&row(&Identity::of(&file, &file.study, "auto"))).unwrap();
-    database.write(run, study.rows.len(), points, slopes, Some(points.len())).unwrap();
+    database.write(run, study.rows().len(), points, slopes, Some(points.len())).unwrap();
     database
 }
 
@@ -46,7 +46,7 @@ fn read(database: &Database, study: &Study) -> super::database::Points {
 #[test]
 fn what_is_written_of_a_point_is_read_bit_by_bit() {
     let study = file("pid-design-multi-case", &[]).study;
-    let all = &study.rows;
+    let all = study.rows();
     let rows_of = |job: usize| (0..all.len()).filter(move |&row| all[row].job == job);
     let odd = [0.1 + 0.2, -0.0, f64::MIN_POSITIVE / 3.0, 1e308];
     let value = |(i, row): (usize, usize)| -> RowValue {

@@ -28,23 +28,23 @@ impl Copies {
         let keeping = options.keeping.as_ref().filter(|keeping| keeping.study.measures_as(study))?;
         let mut parts: Vec<Vec<f64>> = Vec::new();
         let mut jobs = Vec::new();
-        for job in &made.jobs {
-            let scenario = job.case.checked_sub(study.cases.len()).map(|index| &scenarios[index]);
+        for job in made.jobs() {
+            let scenario = job.case.checked_sub(study.cases().len()).map(|index| &scenarios[index]);
             let case = scenario.map_or(job.case, |scenario| scenario.case);
             let values = scenario.map_or_else(Vec::new, |scenario| scenario.values.clone());
             let part = parts.iter().position(|part| *part == values).unwrap_or(parts.len());
             if part == parts.len() {
                 parts.push(values);
             }
-            jobs.push((part, study.jobs.iter().position(|of| (of.model, of.case) == (job.model, case))?));
+            jobs.push((part, study.jobs().iter().position(|of| (of.model, of.case) == (job.model, case))?));
         }
-        let rows = made.rows.iter().map(|row| {
+        let rows = made.rows().iter().map(|row| {
             let (part, job) = jobs[row.job];
             let of = |of: &mops_core::Row| of.job == job && of.name == row.name;
-            Some((part, study.rows.iter().position(of)?))
+            Some((part, study.rows().iter().position(of)?))
         });
         let rows = rows.collect::<Option<_>>()?;
-        let same_coordinates = made.tuners.len() == study.tuners.len();
+        let same_coordinates = made.tuners().len() == study.tuners().len();
         Some(Self { store: Arc::clone(&keeping.store), parts, jobs, rows, same_coordinates })
     }
 

@@ -22,9 +22,9 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 
 /// The search itself, over the effects that the task leaves.
 fn search(study: &Study, options: &Options, watch: &dyn Watch) -> Result<Diagnosis, SolveError> {
-    let task = &study.tasks.diagnosis;
+    let task = &study.tasks().diagnosis;
     let effects = effects(task, &options.effects)?;
-    let asked = mops_discrepancy::Options { max_effects: task.max_effects, level: task.level, seed: study.seed };
+    let asked = mops_discrepancy::Options { max_effects: task.max_effects, level: task.level, seed: study.seed() };
     mops_discrepancy::diagnose(study, &effects, &asked, watch).map_err(SolveError)
 }
 
@@ -46,10 +46,8 @@ fn effects(task: &DiagnosisTask, all: &[Arc<dyn Effect>]) -> Result<Vec<Arc<dyn 
 }
 
 /// The outcome of a diagnosis that was ended: nothing was found out.
-fn ended(mut study: Study, options: &Options, watch: &dyn Watch) -> Solved {
-    study.rows.clear();
-    study.jobs.clear();
-    let mut solved = look(study, options, watch);
+fn ended(study: Study, options: &Options, watch: &dyn Watch) -> Solved {
+    let mut solved = look(study.without_criteria(), options, watch);
     let outcome = &mut solved.outcome;
     (outcome.solver, outcome.evaluations, outcome.calibration) = ("discrepancy".to_owned(), 0, None);
     outcome.front.clear();
@@ -58,18 +56,16 @@ fn ended(mut study: Study, options: &Options, watch: &dyn Watch) -> Solved {
 }
 
 /// The outcome of a diagnosis: its tuners are those of the repaired model.
-pub(crate) fn of(mut study: Study, options: &Options, diagnosis: Diagnosis) -> Solved {
+pub(crate) fn of(study: Study, options: &Options, diagnosis: Diagnosis) -> Solved {
     // Criteria have no say in this: every channel counts with its noise.
-    study.rows.clear();
-    study.jobs.clear();
-    let mut solved = look(study, options, &());
+    let mut solved = look(study.without_criteria(), options, &());
     let outcome = &mut solved.outcome;
     let study = solved.problem.study();
-    for (report, tuner) in outcome.tuners.iter_mut().zip(&study.tuners) {
+    for (report, tuner) in outcome.tuners.iter_mut().zip(study.tuners()) {
         let moved = diagnosis.parameters.iter().find(|p| p.name == report.name).map(|p| p.after);
         let start = tuner.case.and_then(|case| {
             let of_tuner = |(experiment, parameter, _): &&(String, String, f64)| {
-                *experiment == study.cases[case].name && *parameter == tuner.parameter
+                *experiment == study.cases()[case].name && *parameter == tuner.parameter
             };
             diagnosis.starts.iter().find(of_tuner).map(|(_, _, value)| *value)
         });

@@ -5,13 +5,11 @@ use mops_core::{ExcitationFindings, Study, Watch};
 
 use crate::search::{Options, Solved, look};
 
-pub(super) fn perform(mut study: Study, options: &Options, watch: &dyn Watch) -> Solved {
-    let inputs = excitations(&study, &study.tasks.excitation.question);
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Solved {
+    let inputs = excitations(&study, &study.tasks().excitation.question);
     let regressions = regressions(&study);
     // Criteria have no say in this: nothing is simulated.
-    study.rows.clear();
-    study.jobs.clear();
-    let mut solved = look(study, options, watch);
+    let mut solved = look(study.without_criteria(), options, watch);
     solved.outcome.calibration = None;
     solved.outcome.found.excitation = Some(ExcitationFindings { inputs, regressions });
     solved

@@ -23,13 +23,13 @@ const REPLICATES: usize = 500;
 
 /// The effects at the design that was found; the points of a sample stay together.
 pub(super) fn add(solved: &mut Solved, options: &Options, watch: &dyn Watch) {
-    let task = solved.problem.study().tasks.sensitivity;
+    let task = solved.problem.study().tasks().sensitivity;
     let over = Arc::new(solved.problem.study().over_uncertain(&solved.best.tuners));
     let problem = Problem::new(Arc::clone(&over));
     let store = Copies::of(options, solved.problem.study(), &over, &[]);
-    let inputs = over.tasks.uncertain.len();
-    let first = over.tuners.len() - inputs;
-    let mut random = stream(over.seed, "global-sensitivity");
+    let inputs = over.tasks().uncertain.len();
+    let first = over.tuners().len() - inputs;
+    let mut random = stream(over.seed(), "global-sensitivity");
     let (points, samples) = match task.method {
         SensitivityMethod::Morris => {
             let samples = task.samples.unwrap_or(TRAJECTORIES);
@@ -42,7 +42,7 @@ pub(super) fn add(solved: &mut Solved, options: &Options, watch: &dyn Watch) {
     };
     let evaluate = |u: &Vec<f64>| -> Vec<Option<f64>> {
         let mut tuners = over.start();
-        for ((value, uncertain), &u) in tuners[first..].iter_mut().zip(&over.tasks.uncertain).zip(u) {
+        for ((value, uncertain), &u) in tuners[first..].iter_mut().zip(&over.tasks().uncertain).zip(u) {
             *value = uncertain.quantile(u);
         }
         evaluate_at(&problem, &tuners, store.as_ref()).readings.iter().map(|reading| reading.map(|r| r.value)).collect()
@@ -53,7 +53,7 @@ pub(super) fn add(solved: &mut Solved, options: &Options, watch: &dyn Watch) {
         solved.outcome.stop = watch.halt().into();
     }
     let nominal = evaluate_at(&problem, &over.start(), store.as_ref());
-    let simulations = (answers.iter().map(Vec::len).sum::<usize>() + 1) * over.jobs.len();
+    let simulations = (answers.iter().map(Vec::len).sum::<usize>() + 1) * over.jobs().len();
     solved.outcome.simulations += simulations;
     let sound = |row: usize| {
         let whole = points.iter().zip(&answers).filter(move |(_, a)| a.iter().all(|values| values[row].is_some()));
@@ -61,7 +61,7 @@ pub(super) fn add(solved: &mut Solved, options: &Options, watch: &dyn Watch) {
             (p.clone(), a.iter().map(|values| values[row].expect("just seen")).collect::<Vec<f64>>())
         })
     };
-    let criteria = over.rows.iter().enumerate().map(|(i, row)| {
+    let criteria = over.rows().iter().enumerate().map(|(i, row)| {
         let (points, values): (Vec<_>, Vec<_>) = sound(i).unzip();
         let of = Subject::of(&over, row, nominal.readings[i].map_or(f64::NAN, |r| r.value));
         EffectsReport { of, effects: effects(&over, (i, row), task.method, &points, &values) }
@@ -97,7 +97,7 @@ fn effects(
         first: None,
         total: None,
     };
-    let names = study.tasks.uncertain.iter().map(|uncertain| empty(&uncertain.name));
+    let names = study.tasks().uncertain.iter().map(|uncertain| empty(&uncertain.name));
     if values.len() < 3 {
         return Vec::new();
     }
@@ -111,7 +111,7 @@ fn effects(
         };
         return names.zip(found).map(one).collect();
     }
-    let mut random = stream(study.seed, &format!("bootstrap {index} {}", row.name));
+    let mut random = stream(study.seed(), &format!("bootstrap {index} {}", row.name));
     let found = variance_shares(values, LEVEL, REPLICATES, &mut random).unwrap_or_default();
     let one = |(report, shares): (EffectReport, mops_core::statistics::VarianceShares)| EffectReport {
         first: Some(Estimated { value: shares.first, interval: shares.first_interval }),

@@ -25,8 +25,8 @@ use crate::search::{Options, SolveError, Solved, look, search};
 /// The solver cannot treat the problem.
 pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let begun = Instant::now();
-    let mut solved = match study.task {
-        Task::Design if study.tasks.robust.is_some() => robust::perform(study, options, watch)?,
+    let mut solved = match study.task() {
+        Task::Design if study.tasks().robust.is_some() => robust::perform(study, options, watch)?,
         Task::Design => search(study, options, watch)?,
         Task::Calibration => {
             let mut solved = search(study, options, watch)?;

@@ -15,14 +15,14 @@ use crate::numbers::significant;
 use crate::search::{Options, SolveError, Solved};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
-    let task = study.tasks.monte_carlo.clone();
+    let task = study.tasks().monte_carlo.clone();
     let mut solved = at(task.at, study, options, watch)?;
     let over = Arc::new(solved.problem.study().over_uncertain(&solved.best.tuners));
     let problem = Problem::new(Arc::clone(&over));
     let store = Copies::of(options, solved.problem.study(), &over, &[]);
-    let uncertain = &over.tasks.uncertain;
-    let first = over.tuners.len() - uncertain.len();
-    let mut random = stream(over.seed, "monte-carlo");
+    let uncertain = &over.tasks().uncertain;
+    let first = over.tuners().len() - uncertain.len();
+    let mut random = stream(over.seed(), "monte-carlo");
     let samples: Vec<Vec<f64>> = draw(task.method, task.samples, uncertain.len(), &mut random)
         .into_iter()
         .map(|u| uncertain.iter().zip(u).map(|(uncertain, u)| uncertain.quantile(u)).collect())
@@ -32,7 +32,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         tuners[first..].copy_from_slice(values);
         evaluate_at(&problem, &tuners, store.as_ref())
     };
-    let nominal = evaluate(&over.tuners[first..].iter().map(|tuner| tuner.start).collect());
+    let nominal = evaluate(&over.tuners()[first..].iter().map(|tuner| tuner.start).collect());
     let stage = Stage { what: "sampling", from: 0.0, to: 1.0 };
     let answers = each(&samples, stage, watch, evaluate);
     if answers.len() < samples.len() {
@@ -41,14 +41,14 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     if answers.is_empty() {
         return Ok(solved);
     }
-    solved.outcome.simulations += (answers.len() + 1) * over.jobs.len();
-    let rows = over.rows.iter().enumerate();
+    solved.outcome.simulations += (answers.len() + 1) * over.jobs().len();
+    let rows = over.rows().iter().enumerate();
     let criteria: Vec<DistributionReport> =
         rows.map(|(i, row)| distribution(&over, (i, row), &nominal, &answers, &task)).collect();
     let demanded = |row: &Row| row.usage != Usage::Monitor && row.demand != Demand::None;
-    let all_met = |e: &&Evaluation| over.rows.iter().enumerate().all(|(i, row)| !demanded(row) || met(row, e, i));
+    let all_met = |e: &&Evaluation| over.rows().iter().enumerate().all(|(i, row)| !demanded(row) || met(row, e, i));
     let all = over
-        .rows
+        .rows()
         .iter()
         .any(demanded)
         .then(|| share(answers.iter().filter(all_met).count(), answers.len(), task.level));
@@ -56,7 +56,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let table = samples
         .iter()
         .zip(&answers)
-        .map(|(sample, e)| (sample.clone(), (0..over.rows.len()).map(|i| value(e, i)).collect()));
+        .map(|(sample, e)| (sample.clone(), (0..over.rows().len()).map(|i| value(e, i)).collect()));
     let report = MonteCarloReport {
         words: words(&criteria, all, &task, answers.len()),
         parameters: uncertain_reports(&over),

@@ -49,7 +49,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 /// Values of all tuners of a point as the result has it.
 fn tuners(problem: &Problem, point: &serde_json::Value) -> Vec<f64> {
     let value = |tuner: &mops_core::Tuner| point["tuners"][&tuner.name].as_f64().expect("every tuner has a value");
-    problem.study().tuners.iter().map(value).collect()
+    problem.study().tuners().iter().map(value).collect()
 }
 
 /// The front in sentences.
@@ -69,7 +69,7 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<Strin
         let tuner = |(tuner, value): (&mops_core::Tuner, &f64)| {
             format!("`{}` = {}", tuner.name, amount(*value, &tuner.unit.to_string()))
         };
-        let active = of_study.tuners.iter().zip(&at.tuners).filter(|(tuner, _)| tuner.active);
+        let active = of_study.tuners().iter().zip(&at.tuners).filter(|(tuner, _)| tuner.active);
         active.map(tuner).collect::<Vec<_>>().join(", ")
     };
     let values = |i: usize| {
@@ -138,7 +138,7 @@ fn name(found: &TradeOffs, k: usize) -> String {
 
 fn value(found: &TradeOffs, front: &[Certified], problem: &Problem, i: usize, k: usize) -> f64 {
     let study = problem.study();
-    let row = study.rows.iter().position(|row| study.key(row) == found.criteria[k].key);
+    let row = study.rows().iter().position(|row| study.key(row) == found.criteria[k].key);
     row.and_then(|row| front[i].at.readings[row]).map_or(f64::NAN, |reading| reading.value)
 }
 

@@ -20,7 +20,7 @@ use crate::search::{EvaluationStore, Options, SolveError, Solved, search};
 /// Source: J. W. Blankenship, J. E. Falk, Journal of Optimization Theory and Applications 19 (1976) 261-281 (algorithm 2.1).
 /// N.B.: there the worst case is found exactly; here it is searched, so that a promise is left out.
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
-    let task = study.tasks.robust.clone().expect("the study asks for it");
+    let task = study.tasks().robust.clone().expect("the study asks for it");
     let mut rounds = Rounds { study, task, scenarios: Vec::new(), done: Vec::new(), worst: Vec::new() };
     let mut left = options.max_evaluations;
     let (mut stop, mut archive, mut simulations, mut reused) = (Stop::Stalled, Vec::new(), 0, 0);
@@ -59,7 +59,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     (solved.outcome.evaluations, solved.outcome.simulations) = (archive.len(), simulations);
     solved.outcome.reused = options.keeping.as_ref().and_then(|keeping| keeping.begin.as_ref()).map(|_| reused);
     // Cases are added at the end: what a round did not know has no value.
-    let rows = solved.problem.study().rows.len();
+    let rows = solved.problem.study().rows().len();
     archive.iter_mut().for_each(|record: &mut Record| record.values.resize(rows, f64::NAN));
     solved.archive = archive;
     Ok(solved)
@@ -117,8 +117,10 @@ impl Rounds {
     fn to_solve(&self) -> Study {
         let mut study = self.study.with_scenarios(&self.scenarios);
         if let Some(before) = self.done.last() {
-            for (tuner, &value) in study.tuners.iter_mut().zip(&before.tuners).filter(|(t, _)| t.active) {
-                tuner.start = value;
+            for (tuner, &value) in before.tuners.iter().enumerate() {
+                if study.tuners()[tuner].active {
+                    study.set_start(tuner, value);
+                }
             }
         }
         study
@@ -146,7 +148,7 @@ impl Rounds {
         let largest = |list: &mut dyn Iterator<Item = f64>| list.reduce(f64::max);
         let violated = largest(&mut worst.iter().filter(|w| constrained(w)).map(|w| violation(w).max(0.0)));
         let found = largest(&mut worst.iter().filter(|w| !constrained(w)).map(|w| w.weight * w.scaled));
-        let cases = solved.problem.study().cases.len();
+        let cases = solved.problem.study().cases().len();
         let mut added = Vec::new();
         for worst in &worst {
             let excess = match constrained(worst) {
@@ -193,7 +195,7 @@ impl Rounds {
     /// A name that no case has.
     fn name(&self, criterion: &str) -> String {
         let taken = |name: &String| {
-            self.study.cases.iter().any(|c| c.name == *name) || self.scenarios.iter().any(|s| s.name == *name)
+            self.study.cases().iter().any(|c| c.name == *name) || self.scenarios.iter().any(|s| s.name == *name)
         };
         (1..)
             .map(|i| format!("worst-{criterion}-{i}"))

@@ -8,7 +8,7 @@ use super::{at, global_sensitivity};
 use crate::search::{Options, SolveError, Solved};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
-    let task = study.tasks.sensitivity;
+    let task = study.tasks().sensitivity;
     let mut solved = at(task.at, study, options, watch)?;
     if task.method != SensitivityMethod::Local {
         global_sensitivity::add(&mut solved, options, watch);

@@ -10,7 +10,7 @@ use crate::search::{Options, SolveError, Solved};
 const VALLEY: f64 = 0.05;
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
-    let task = study.tasks.sweep.clone().expect("a study with this task says what is swept");
+    let task = study.tasks().sweep.clone().expect("a study with this task says what is swept");
     let mut solved = at(task.at, study, options, watch)?;
     let problem = &solved.problem;
     let axes: Vec<&Axis> = std::iter::once(&task.x).chain(&task.y).collect();
@@ -27,7 +27,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let moved = |x: f64, y: Option<f64>| {
         let mut point = centre.clone();
         for ((&at, axis), value) in coordinates.iter().zip(&axes).zip([Some(x), y].into_iter().flatten()) {
-            point[at] = problem.study().tuners[axis.tuner].position_of(value);
+            point[at] = problem.study().tuners()[axis.tuner].position_of(value);
         }
         point
     };
@@ -62,7 +62,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let finite = |value: f64| if value.is_finite() { value } else { f64::NAN };
     let pick = |f: fn(&Merit) -> f64| merits.iter().map(|row| row.iter().map(|m| finite(f(m))).collect()).collect();
     let mut axes_report = axes.iter().zip(&values).map(|(axis, values)| {
-        let tuner = &problem.study().tuners[axis.tuner];
+        let tuner = &problem.study().tuners()[axis.tuner];
         let log = tuner.scale == Scale::Log;
         SweepAxis { tuner: tuner.name.clone(), unit: tuner.unit.to_string(), log, values: values.clone() }
     });
@@ -87,7 +87,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 /// The values along an axis, evenly as the tuner's range is spread.
 #[allow(clippy::cast_precision_loss)]
 fn spread(problem: &Problem, axis: &Axis) -> Vec<f64> {
-    let tuner = &problem.study().tuners[axis.tuner];
+    let tuner = &problem.study().tuners()[axis.tuner];
     let [from, to] = axis.range.map(|value| tuner.position_of(value));
     let last = (axis.points - 1) as f64;
     (0..axis.points).map(|i| tuner.value_at(from + (to - from) * i as f64 / last)).collect()

@@ -122,7 +122,7 @@ impl Live {
             .map(|(at, merit)| json!([at, merit.objective, merit.violation, merit.is_feasible()]))
             .collect();
         json!({
-            "study": self.study.name, "task": self.study.task, "solver": self.solver,
+            "study": self.study.name(), "task": self.study.task(), "solver": self.solver,
             "evaluations": run.evaluations, "budget": run.budget, "failed": run.failed,
             "seconds": seconds, "left": left, "share": share,
             "stage": newest.stage.as_ref().map(|(what, _)| what),
@@ -151,7 +151,7 @@ impl Live {
     }
 
     fn tuners(&self, best: &Evaluation) -> Vec<Value> {
-        let tuners = self.study.tuners.iter().zip(&best.tuners);
+        let tuners = self.study.tuners().iter().zip(&best.tuners);
         let told = |(tuner, value): (&mops_core::Tuner, &f64)| {
             json!({
                 "name": tuner.name, "value": value, "unit": tuner.unit.to_string(), "active": tuner.active,

@@ -40,10 +40,10 @@ pub fn swings() -> Study {
     for (measurement, start) in subject.measurements.iter_mut().zip([2.4, 1.6, 2.0]) {
         measurement.locals[0].start = start;
     }
-    let mut study = study(&subject);
+    let mut parts = study(&subject).into_parts();
     // Friction takes energy: the coefficient is not negative.
-    study.tuners[1].bounds = [0.0, 1.0];
-    study
+    parts.tuners[1].bounds = [0.0, 1.0];
+    Study::from_parts(parts)
 }
 
 #[test]

@@ -116,7 +116,7 @@ fn reply(folder: &Path, tools: Tools<'_>, against: bool) -> Reply {
 
 fn diagnosed(name: &str, text: &str, declared: &Declared, folder: &Path, tools: Tools<'_>) -> Result<Said, String> {
     let study = tools.study(&format!("{name}.toml"), text, &Data { folder, declared })?;
-    let times: Vec<(String, Vec<f64>)> = study.cases.iter().filter_map(times).collect();
+    let times: Vec<(String, Vec<f64>)> = study.cases().iter().filter_map(times).collect();
     let (diagnosis, seconds) = tools.diagnose(study)?;
     let after = |name: &str| diagnosis.after.iter().find(|e| e.name == name).map_or(f64::NAN, |e| e.normalised);
     Ok(Said {
@@ -175,9 +175,9 @@ mod tests {
         let tools = Tools { catalogue: &catalogue, watch: &(), seed: 1 };
         let data = Data { folder, declared: &declared };
         let study = tools.study("c.toml", &text, &data).unwrap_or_else(|why| panic!("{why}\n{text}"));
-        let ports: Vec<String> = study.models[0].1.interface().ports.iter().map(ToString::to_string).collect();
+        let ports: Vec<String> = study.models()[0].1.interface().ports.iter().map(ToString::to_string).collect();
         assert!(ports.contains(&"joint:x".to_owned()) && ports.contains(&"sensor:far".to_owned()), "{ports:?}");
-        let experiment = study.cases[1].experiment.as_ref().unwrap();
+        let experiment = study.cases()[1].experiment.as_ref().unwrap();
         assert_eq!((experiment.role, experiment.channels[0].noise), (mops::core::Role::Selection, Some(0.2)));
         assert!(data.read("validation_1.csv").is_ok() && data.read("truth.json").is_err());
     }

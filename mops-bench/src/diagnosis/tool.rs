@@ -42,7 +42,7 @@ impl Tools<'_> {
     pub fn study(&self, name: &str, text: &str, files: &dyn Files) -> Result<Study, String> {
         let file = file::read(self.catalogue, name, text, &[], files);
         let mut study = file.map_err(|mistake| mistake.to_string())?.study;
-        study.seed = self.seed;
+        study.set_seed(self.seed);
         Ok(study)
     }
 

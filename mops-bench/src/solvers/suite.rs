@@ -1,8 +1,8 @@
 //! The suites: problems written as formulas, and studies.
 
 use super::control::Known;
-use mops::core::{Evaluator, Problem as Posing, Shape};
 use mops::Catalogue;
+use mops::core::{Evaluator, Problem as Posing, Shape};
 use mops_problems::{Answer, Posed, Problem, Slope};
 
 /// Problems that belong together.
@@ -131,7 +131,7 @@ impl Subject {
 pub(super) fn posing(catalogue: &Catalogue, known: &Known, seed: u64) -> Posing {
     let file = known.study.open(catalogue, &[]);
     let mut study = file.unwrap_or_else(|why| panic!("{}: {why}", known.study.name)).study;
-    study.seed = seed;
+    study.set_seed(seed);
     Posing::new(std::sync::Arc::new(study))
 }
 

@@ -62,32 +62,160 @@ pub enum Task {
     Pareto,
 }
 
-/// A study with all names, sizes, bounds and units checked.
+/// A study with all names, sizes, bounds and units checked. Built by [`StudyBuilder::build`] or read from a file; what may be
+/// changed afterwards has a method.
 #[derive(Clone)]
 pub struct Study {
-    /// Name.
+    pub(crate) name: String,
+    pub(crate) task: Task,
+    pub(crate) objective: Objective,
+    pub(crate) seed: u64,
+    pub(crate) models: Vec<(String, Arc<dyn Model>)>,
+    pub(crate) cases: Vec<Case>,
+    pub(crate) tuners: Vec<Tuner>,
+    pub(crate) rows: Vec<Row>,
+    pub(crate) jobs: Vec<JobPlan>,
+    pub(crate) tasks: Tasks,
+    pub(crate) warnings: Vec<String>,
+    pub(crate) notes: Vec<String>,
+}
+
+/// Access to the parts of a study.
+impl Study {
+    /// Returns the name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Returns the task.
+    pub fn task(&self) -> Task {
+        self.task
+    }
+
+    /// Returns the combination of the scaled values into the objective.
+    pub fn objective(&self) -> Objective {
+        self.objective
+    }
+
+    /// Returns the seed of all random streams.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Returns the models with their names.
+    pub fn models(&self) -> &[(String, Arc<dyn Model>)] {
+        &self.models
+    }
+
+    /// Returns the cases: situations in which the criteria are evaluated.
+    pub fn cases(&self) -> &[Case] {
+        &self.cases
+    }
+
+    /// Returns the tuners: first those of the study, then those of single cases.
+    pub fn tuners(&self) -> &[Tuner] {
+        &self.tuners
+    }
+
+    /// Returns the rows: one per criterion and case.
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// Returns the jobs: one per model and case with at least one row.
+    pub fn jobs(&self) -> &[JobPlan] {
+        &self.jobs
+    }
+
+    /// Returns the settings of the tasks other than design and calibration.
+    pub fn tasks(&self) -> &Tasks {
+        &self.tasks
+    }
+
+    /// Returns the warnings shown before a run, such as a suspicious first sample.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Returns the assumptions made where the study specifies nothing, such as the unit of a column.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Sets the seed of all random streams.
+    pub fn set_seed(&mut self, seed: u64) {
+        self.seed = seed;
+    }
+
+    /// Sets the initial value of a tuner, by index into [`Self::tuners`].
+    pub fn set_start(&mut self, tuner: usize, value: f64) {
+        self.tuners[tuner].start = value;
+    }
+
+    /// Fixes a tuner at its initial value, by index into [`Self::tuners`].
+    pub fn fix(&mut self, tuner: usize) {
+        self.tuners[tuner].active = false;
+    }
+
+    /// Returns the study without criteria, and so without simulations.
+    #[must_use]
+    pub fn without_criteria(self) -> Self {
+        Self { rows: Vec::new(), jobs: Vec::new(), ..self }
+    }
+
+    /// Returns the study with these rows in place of its own.
+    ///
+    /// # Panics
+    /// If a row reads a job that the study does not have.
+    #[must_use]
+    pub fn with_rows(self, rows: Vec<Row>) -> Self {
+        assert!(rows.iter().all(|row| row.job < self.jobs.len()), "every row reads a job of the study");
+        Self { rows, ..self }
+    }
+
+    /// Replaces the measured values of a channel, by indices of the case and of the channel in its experiment.
+    ///
+    /// # Panics
+    /// If the case is no experiment, or the number of samples changes.
+    pub fn set_samples(&mut self, case: usize, channel: usize, values: Vec<f64>) {
+        let experiment = self.cases[case].experiment.as_mut().expect("the case is an experiment");
+        let channel = &mut experiment.channels[channel];
+        assert_eq!(channel.values.len(), values.len(), "every sample is replaced");
+        channel.values = values;
+    }
+
+    /// Assembles a study from parts that nobody has checked, for tests.
+    #[doc(hidden)]
+    pub fn from_parts(parts: StudyParts) -> Self {
+        let StudyParts { name, task, objective, seed, models, cases, tuners, rows, jobs, tasks, warnings, notes } =
+            parts;
+        Self { name, task, objective, seed, models, cases, tuners, rows, jobs, tasks, warnings, notes }
+    }
+
+    /// Returns the parts, to change what has no method, for tests.
+    #[doc(hidden)]
+    pub fn into_parts(self) -> StudyParts {
+        let Self { name, task, objective, seed, models, cases, tuners, rows, jobs, tasks, warnings, notes } = self;
+        StudyParts { name, task, objective, seed, models, cases, tuners, rows, jobs, tasks, warnings, notes }
+    }
+}
+
+/// Parts of [`Study::from_parts`]; their meaning is that of the methods of [`Study`].
+#[doc(hidden)]
+#[allow(missing_docs)]
+#[derive(Clone, Default)]
+pub struct StudyParts {
     pub name: String,
-    /// Task.
     pub task: Task,
-    /// Combination of the scaled values into the objective.
     pub objective: Objective,
-    /// Seed of all random streams.
     pub seed: u64,
-    /// Models, by name.
     pub models: Vec<(String, Arc<dyn Model>)>,
-    /// Cases: situations in which the criteria are evaluated.
     pub cases: Vec<Case>,
-    /// Tuners: first those of the study, then those of single cases.
     pub tuners: Vec<Tuner>,
-    /// Rows: one per criterion and case.
     pub rows: Vec<Row>,
-    /// Jobs: one per model and case with at least one row.
     pub jobs: Vec<JobPlan>,
-    /// Settings of the tasks other than design and calibration.
     pub tasks: Tasks,
-    /// Warnings shown before a run, such as a suspicious first sample.
     pub warnings: Vec<String>,
-    /// Assumptions made where the study specifies nothing, such as the unit of a column.
     pub notes: Vec<String>,
 }
 

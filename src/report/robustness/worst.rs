@@ -79,13 +79,13 @@ fn coordinate(at: &CoordinateReport) -> Markup {
 /// The signals that a criterion reads, without uncertainty and at its worst.
 fn responses(report: &Report<'_>, found: &WorstCaseReport) -> Vec<Figure> {
     let study = report.problem.study().over_uncertain(&report.best.tuners);
-    let first = study.tuners.len() - study.tasks.uncertain.len();
+    let first = study.tuners().len() - study.tasks().uncertain.len();
     let problem = Problem::new(Arc::new(study.clone()));
     let mut figures = Vec::new();
     for worst in found.criteria.iter().filter(|worst| !worst.at.is_empty()) {
         let of = &worst.of;
         let here = |row: &&mops_core::Row| row.name == of.criterion && study.case_of(row).name == of.case;
-        let Some(row) = study.rows.iter().find(here) else { continue };
+        let Some(row) = study.rows().iter().find(here) else { continue };
         let mut tuners = study.start();
         let analyses = [
             ("without uncertainty", CurveStyle::Dashed, Ink::Start, false),
@@ -97,7 +97,7 @@ fn responses(report: &Report<'_>, found: &WorstCaseReport) -> Vec<Figure> {
             }
             (name, style, ink, problem.analyse_all(row.job, &tuners, None).ok())
         });
-        let signals = &study.models[study.jobs[row.job].model].1.interface().signals;
+        let signals = &study.models()[study.jobs()[row.job].model].1.interface().signals;
         for signal in row.criterion.signals() {
             let curve = |(name, style, ink, analysis): &(&str, CurveStyle, Ink, Option<mops_core::Analysis>)| {
                 let trace = analysis.as_ref()?.response()?.trace(&signal)?;

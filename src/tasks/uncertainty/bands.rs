@@ -18,9 +18,9 @@ pub(super) fn bands(calibrated: &Calibrated<'_>, tuners: &[f64]) -> Vec<BandRepo
     let problem = calibrated.problem;
     let study = problem.study();
     let mut bands = Vec::new();
-    for (job, plan) in study.jobs.iter().enumerate() {
-        let case = &study.cases[plan.case];
-        let signals = &study.models[plan.model].1.interface().signals;
+    for (job, plan) in study.jobs().iter().enumerate() {
+        let case = &study.cases()[plan.case];
+        let signals = &study.models()[plan.model].1.interface().signals;
         for channel in case.experiment.iter().flat_map(|experiment| &experiment.channels) {
             let Some(signal) = signals.iter().find(|s| s.name == channel.signal) else { continue };
             let every = channel.times.len().div_ceil(MOST_TIMES);

@@ -43,7 +43,7 @@ pub(super) fn bootstrap(
     let numbers: Vec<usize> = (0..task.bootstrap).collect();
     let stage = Stage { what: "bootstrap replicates", from: 0.0, to: 1.0 };
     let found = each(&numbers, stage, watch, |number| {
-        let mut random = stream(study.seed, &format!("bootstrap {number}"));
+        let mut random = stream(study.seed(), &format!("bootstrap {number}"));
         let mut replicate = held_at(problem, &calibrated.best.tuners, None);
         draw_anew(&mut replicate, &measured, &mut random);
         refit(replicate, LevenbergMarquardtOptions::default().local(), watch)
@@ -61,7 +61,7 @@ pub(super) fn bootstrap(
         let mut sorted = draws.clone();
         sorted.sort_by(f64::total_cmp);
         let Summary { mean, deviation, .. } = Summary::of(&draws);
-        let (tuner, value) = (&study.tuners[index], calibrated.best.tuners[index]);
+        let (tuner, value) = (&study.tuners()[index], calibrated.best.tuners[index]);
         BootstrapParameter {
             parameter: tuner.name.clone(),
             unit: tuner.unit.to_string(),
@@ -86,8 +86,8 @@ fn measured(calibrated: &Calibrated<'_>, task: &UncertaintyTask) -> Result<Vec<M
     let problem = calibrated.problem;
     let study = problem.study();
     let mut all = Vec::new();
-    for (job, plan) in study.jobs.iter().enumerate() {
-        let case = &study.cases[plan.case];
+    for (job, plan) in study.jobs().iter().enumerate() {
+        let case = &study.cases()[plan.case];
         let Some(experiment) = case.experiment.as_ref().filter(|e| e.role == Role::Calibration) else { continue };
         if !experiment.responses.is_empty() {
             return Err(format!(
@@ -133,7 +133,6 @@ fn draw_anew(study: &mut Study, measured: &[Measured], random: &mut Stream) {
         }
         let errors = order.iter().map(|&i| of.residuals[i]);
         let values = of.fitted.iter().zip(errors).map(|(fitted, error)| fitted + error).collect();
-        let experiment = study.cases[of.case].experiment.as_mut().expect("it was measured there");
-        experiment.channels[of.channel].values = values;
+        study.set_samples(of.case, of.channel, values);
     }
 }

@@ -24,7 +24,7 @@ struct Calibrated<'a> {
 
 /// Adds what the study asks for.
 pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
-    let Some(task) = solved.problem.study().tasks.uncertainty.clone() else { return };
+    let Some(task) = solved.problem.study().tasks().uncertainty.clone() else { return };
     if watch.wants_stop() {
         return;
     }
@@ -99,9 +99,11 @@ fn refit(study: Study, mut solver: Box<dyn Solver>, watch: &dyn Watch) -> (Optio
 /// The study with its tuners at given values, and one of them held there.
 fn held_at(problem: &Problem, tuners: &[f64], held: Option<usize>) -> Study {
     let mut study = Study::clone(problem.study());
-    for (i, tuner) in study.tuners.iter_mut().enumerate() {
-        tuner.start = tuners[i];
-        tuner.active &= Some(i) != held && problem.active().contains(&i);
+    for (i, &value) in tuners.iter().enumerate() {
+        study.set_start(i, value);
+        if Some(i) == held || !problem.active().contains(&i) {
+            study.fix(i);
+        }
     }
     study
 }

@@ -53,7 +53,7 @@ pub(super) fn profiles(calibrated: &Calibrated<'_>, chosen: &Chosen, watch: &dyn
     let problem = calibrated.problem;
     let study = problem.study();
     let picked: Vec<usize> =
-        (0..problem.active().len()).filter(|&k| chosen.has(&study.tuners[problem.active()[k]].name)).collect();
+        (0..problem.active().len()).filter(|&k| chosen.has(&study.tuners()[problem.active()[k]].name)).collect();
     let sides: Vec<(usize, f64)> = picked.iter().flat_map(|&k| [(k, -1.0), (k, 1.0)]).collect();
     let stage = Stage { what: "profiling the likelihood", from: 0.0, to: 1.0 };
     let mut reference = calibrated.best.clone();
@@ -75,7 +75,7 @@ pub(super) fn profiles(calibrated: &Calibrated<'_>, chosen: &Chosen, watch: &dyn
     };
     let report = |(&k, sides): (&usize, &[Side])| {
         let [below, above] = sides else { unreachable!("two sides of every profile") };
-        let tuner = &study.tuners[problem.active()[k]];
+        let tuner = &study.tuners()[problem.active()[k]];
         let value = calibrated.best.tuners[problem.active()[k]];
         let half = calibrated.covariance.of_tuner(k).half_width(calibrated.level);
         let mut points: Vec<(f64, f64)> = below.points.iter().rev().copied().collect();
@@ -161,7 +161,7 @@ impl<'a> Search<'a> {
         sign: f64,
         watch: &'a dyn Watch,
     ) -> Self {
-        let tuner = &calibrated.problem.study().tuners[calibrated.problem.active()[k]];
+        let tuner = &calibrated.problem.study().tuners()[calibrated.problem.active()[k]];
         let least = reference.clone();
         let side = Side { points: Vec::new(), end: f64::NAN, why: "open", simulations: 0, least };
         Self { calibrated, reference, watch, k, sign, tuner, limit: limit(calibrated, k), side }

@@ -22,20 +22,20 @@ pub(super) struct Goal {
 impl Goal {
     /// The row of a study over its uncertain parameters, upwards or downwards.
     pub(super) fn new(study: &Study, row: usize, upwards: bool, store: Option<&Copies>) -> Self {
-        let mut only = study.rows[row].clone();
+        let mut only = study.rows()[row].clone();
         (only.usage, only.weight) = (Usage::Minimise, 1.0);
         only.reversed = upwards;
         if only.demand == Demand::None {
             only.demand = Demand::AtMost(1.0);
         }
-        let study = Study { rows: vec![only], ..study.clone() };
+        let study = study.clone().with_rows(vec![only]);
         let store = store.map(|store| store.of_row(row));
         Self { row, problem: Problem::new(Arc::new(study)), upwards, store }
     }
 
     /// Searches for the worst of all rows: every one upwards, equalities downwards too.
     pub(super) fn all(study: &Study, store: Option<&Copies>) -> Vec<Self> {
-        let rows = study.rows.iter().enumerate();
+        let rows = study.rows().iter().enumerate();
         rows.flat_map(|(i, row)| {
             let down = (row.usage == Usage::Equality).then(|| Self::new(study, i, false, store));
             std::iter::once(Self::new(study, i, true, store)).chain(down)

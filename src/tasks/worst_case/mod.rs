@@ -22,10 +22,10 @@ pub(super) const NO_GUARANTEE: &str =
     "These are the worst cases that were found, not a guarantee: nothing shows that the box holds no worse one.";
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
-    let task = study.tasks.worst_case.clone();
+    let task = study.tasks().worst_case.clone();
     let mut solved = at(task.at, study, options, watch)?;
     let study = solved.problem.study();
-    let none_counts = study.rows.iter().all(|row| row.usage == Usage::Monitor);
+    let none_counts = study.rows().iter().all(|row| row.usage == Usage::Monitor);
     let wanted = |row: &Row| match &task.criteria {
         Some(names) => names.contains(&row.name),
         None => none_counts || row.usage != Usage::Monitor,
@@ -53,12 +53,12 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 #[allow(clippy::cast_precision_loss)]
 fn slices(region: &Region, worst: &[Worst], watch: &dyn Watch) -> Vec<Vec<Slice>> {
     let study = region.study();
-    let first = study.tuners.len() - study.tasks.uncertain.len();
+    let first = study.tuners().len() - study.tasks().uncertain.len();
     let problem = Problem::new(std::sync::Arc::new(study.clone()));
     let mut points = Vec::new();
     for (w, worst) in worst.iter().enumerate().filter(|(_, worst)| !worst.at.is_empty()) {
         for parameter in 0..worst.at.len() {
-            let tuner = &study.tuners[first + parameter];
+            let tuner = &study.tuners()[first + parameter];
             for i in 0..SLICE {
                 let mut tuners = study.start();
                 tuners[first..].copy_from_slice(&worst.at);
@@ -69,13 +69,13 @@ fn slices(region: &Region, worst: &[Worst], watch: &dyn Watch) -> Vec<Vec<Slice>
     }
     let stage = Stage { what: "drawing the worst cases", from: 0.9, to: 1.0 };
     let values = each(&points, stage, watch, |(w, _, tuners)| {
-        let row = &study.rows[worst[*w].row];
+        let row = &study.rows()[worst[*w].row];
         problem.value_at(row, tuners).unwrap_or(f64::NAN)
     });
     let mut slices = vec![Vec::new(); worst.len()];
     for (chunk, values) in points.chunks(SLICE).zip(values.chunks_exact(SLICE)) {
         let (w, parameter, _) = chunk[0];
-        let tuner = &study.tuners[first + parameter];
+        let tuner = &study.tuners()[first + parameter];
         slices[w].push(Slice {
             parameter: tuner.name.clone(),
             unit: tuner.unit.to_string(),

@@ -78,12 +78,11 @@ fn severity(usage: Usage, scaled: f64) -> f64 {
 impl Region {
     /// The box around a design, and the rows that `wanted` picks.
     pub fn new(study: &Study, design: &[f64], wanted: impl Fn(&Row) -> bool, question: Question) -> Self {
-        let mut over = study.over_uncertain(design);
+        let over = study.over_uncertain(design);
         let counts = |row: &Row, study: &Study| study.case_of(row).role() == Role::Calibration;
-        let keep: Vec<bool> = over.rows.iter().map(|row| wanted(row) && counts(row, &over)).collect();
-        let mut keep = keep.into_iter();
-        over.rows.retain(|_| keep.next().expect("one for every row"));
-        Self { fixed: over.tuners.len() - over.tasks.uncertain.len(), study: over, store: None, question }
+        let rows = over.rows().iter().filter(|row| wanted(row) && counts(row, &over)).cloned().collect();
+        let over = over.with_rows(rows);
+        Self { fixed: over.tuners().len() - over.tasks().uncertain.len(), study: over, store: None, question }
     }
 
     /// The same, which keeps its points with those of the study that it was made from.
@@ -109,7 +108,7 @@ impl Region {
         if n <= MOST_CORNERS {
             points.extend((0..1usize << n).map(|corner| (0..n).map(|j| f64::from((corner >> j & 1) as u8)).collect()));
         }
-        let mut random = stream(self.study.seed, "worst-case");
+        let mut random = stream(self.study.seed(), "worst-case");
         points.extend(draw(Sampling::Sobol, self.question.samples, n, &mut random));
         points
     }
@@ -147,19 +146,19 @@ impl Region {
             let of_row = searches.iter().zip(&ends).filter(|((g, ..), _)| goals[*g].row == row);
             self.worst(row, &seen, &of_row.map(|(_, end)| end).collect::<Vec<_>>())
         };
-        ((0..self.study.rows.len()).map(worst).collect(), simulations)
+        ((0..self.study.rows().len()).map(worst).collect(), simulations)
     }
 
     /// The problem in which every row counts and has a scaled value.
     fn every(&self) -> Problem {
-        let mut study = self.study.clone();
-        for row in &mut study.rows {
+        let mut rows = self.study.rows().to_vec();
+        for row in &mut rows {
             row.usage = Usage::Minimise;
             if row.demand == Demand::None {
                 row.demand = Demand::AtMost(1.0);
             }
         }
-        Problem::new(Arc::new(study))
+        Problem::new(Arc::new(self.study.clone().with_rows(rows)))
     }
 
     /// The worst points that were seen, apart from each other where there are enough.
@@ -181,7 +180,7 @@ impl Region {
 
     /// The worst of a row, of all that was seen and of the ends of its searches.
     fn worst(&self, index: usize, seen: &[Evaluation], ends: &[&End]) -> Worst {
-        let row = &self.study.rows[index];
+        let row = &self.study.rows()[index];
         let nominal = seen[0].readings[index].map_or(f64::NAN, |r| r.value);
         let mut reached: Vec<(f64, f64, &Evaluation)> = Vec::new();
         for evaluation in ends.iter().filter_map(|end| end.evaluation.as_ref()) {
@@ -217,12 +216,12 @@ impl Region {
             failure: failed.first().map(|(why, at)| FailedAt { why: why.clone(), at: self.coordinates(at) }),
             slices: Vec::new(),
         };
-        Worst { subject, row: index, case: self.study.jobs[row.job].case, weight: row.weight, scaled, at, report }
+        Worst { subject, row: index, case: self.study.jobs()[row.job].case, weight: row.weight, scaled, at, report }
     }
 
     /// Why simulations failed that would have given a row its value, and where.
     fn failed(&self, index: usize, seen: &[Evaluation], ends: &[&End]) -> Vec<(String, Vec<f64>)> {
-        let job = self.study.rows[index].job;
+        let job = self.study.rows()[index].job;
         let why = |e: &Evaluation| {
             let of_job = e.failures.iter().find(|(of, _)| *of == job);
             of_job.map_or_else(String::new, |(_, failure)| failure.to_string())
@@ -240,7 +239,7 @@ impl Region {
             unit: tuner.unit.to_string(),
             at_bound: tuner.at_bound(value),
         };
-        self.study.tuners[self.fixed..].iter().zip(at).map(of).collect()
+        self.study.tuners()[self.fixed..].iter().zip(at).map(of).collect()
     }
 }
 
