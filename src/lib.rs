@@ -72,7 +72,7 @@ pub use mops_models as models;
 pub use mops_solvers as solvers;
 pub use mops_studies as studies;
 #[cfg(feature = "report")]
-pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report, Surface, Third, Upright};
+pub use report::{Band, Color, Curve, CurveStyle, Level, ParallelAxis, Plot, Report, Surface, ZAxis};
 pub use search::{DEFAULT_EVALUATIONS, Keeping, Options, Solved, Unsuitable, suits};
 pub use solve::solve;
 

@@ -4,11 +4,11 @@ use mops_core::linear::{Complex, zeros};
 use mops_core::math::{self, complex};
 use mops_core::{Analysis, Failure, StateSpace};
 
-use super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::plot::{Color, Curve, CurveStyle, Plot};
 
 /// One response at the frequencies of a plot.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Sweep<'a> {
+pub(crate) struct FrequencyCurve<'a> {
     /// Name in the legend.
     pub(crate) name: String,
     /// The response.
@@ -16,7 +16,7 @@ pub(crate) struct Sweep<'a> {
     /// How its curves are drawn.
     pub(crate) style: CurveStyle,
     /// What they stand for.
-    pub(crate) ink: Ink,
+    pub(crate) color: Color,
 }
 
 /// Angular frequencies around everything that happens, two decades to both sides; dense around sharp resonances.
@@ -44,7 +44,7 @@ pub(crate) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
 }
 
 /// Magnitude and phase of responses at the same frequencies.
-pub(crate) fn bode(omegas: &[f64], sweeps: &[Sweep<'_>], name: &str) -> [Plot; 2] {
+pub(crate) fn bode(omegas: &[f64], sweeps: &[FrequencyCurve<'_>], name: &str) -> [Plot; 2] {
     let of = |title: &str, y_label: &str, y: &dyn Fn(&[Complex]) -> Vec<f64>| Plot {
         title: format!("{title} of {name}"),
         x_label: "frequency (rad/s)".into(),
@@ -55,8 +55,8 @@ pub(crate) fn bode(omegas: &[f64], sweeps: &[Sweep<'_>], name: &str) -> [Plot; 2
                 name: sweep.name.clone(),
                 points: omegas.iter().copied().zip(y(sweep.values)).collect(),
                 style: sweep.style,
-                ink: sweep.ink,
-                may_leave: sweep.ink == Ink::Start,
+                color: sweep.color,
+                may_leave: sweep.color == Color::Start,
                 ..Curve::default()
             })
             .collect(),
@@ -99,10 +99,10 @@ pub(super) fn compared(
         };
         let (first, last) = (values(&start), values(&found));
         let sweeps = [
-            Sweep { name: "start".into(), values: &first, style: CurveStyle::Dashed, ink: Ink::Start },
-            Sweep { name: best.1.into(), values: &last, style: CurveStyle::Line, ink: Ink::Result },
+            FrequencyCurve { name: "start".into(), values: &first, style: CurveStyle::Dashed, color: Color::Start },
+            FrequencyCurve { name: best.1.into(), values: &last, style: CurveStyle::Line, color: Color::Result },
         ];
-        let drawn: Vec<Sweep<'_>> = sweeps.into_iter().filter(|sweep| !sweep.values.is_empty()).collect();
+        let drawn: Vec<FrequencyCurve<'_>> = sweeps.into_iter().filter(|sweep| !sweep.values.is_empty()).collect();
         let [magnitude, phase] = bode(&omegas, &drawn, &format!("{output}/{name} in case {case}"));
         plots.extend([(format!("magnitude-{output}-{name}"), magnitude), (format!("phase-{output}-{name}"), phase)]);
     }

@@ -2,7 +2,7 @@
 
 use mops_core::{Analysis, Channel, Failure, Row, Trace, Variable};
 
-use super::plot::{Band, Curve, CurveStyle, Ink, Level, Plot};
+use super::plot::{Band, Color, Curve, CurveStyle, Level, Plot};
 use super::sampling;
 use crate::numbers::{labelled, with_unit};
 
@@ -26,12 +26,19 @@ impl Both {
     }
 
     fn curves(&self, signal: &str) -> Vec<Curve> {
-        let curve = |name: &str, analysis: &Result<Analysis, Failure>, style, ink| {
+        let curve = |name: &str, analysis: &Result<Analysis, Failure>, style, color| {
             let points = sampling::points(trace(analysis, signal)?);
-            Some(Curve { name: name.to_owned(), points, style, ink, may_leave: ink == Ink::Start, ..Curve::default() })
+            Some(Curve {
+                name: name.to_owned(),
+                points,
+                style,
+                color,
+                may_leave: color == Color::Start,
+                ..Curve::default()
+            })
         };
-        let start = curve("start", &self.start, CurveStyle::Dashed, Ink::Start);
-        start.into_iter().chain(curve(self.best_name, &self.best, CurveStyle::Line, Ink::Result)).collect()
+        let start = curve("start", &self.start, CurveStyle::Dashed, Color::Start);
+        start.into_iter().chain(curve(self.best_name, &self.best, CurveStyle::Line, Color::Result)).collect()
     }
 
     /// A signal at both points.
@@ -59,7 +66,7 @@ impl Both {
             name: "measured".to_owned(),
             points,
             style: CurveStyle::Dots,
-            ink: Ink::Measured,
+            color: Color::Measured,
             ..Curve::default()
         }];
         curves.extend(self.curves(&signal.name));
@@ -78,7 +85,7 @@ impl Both {
             ..Curve::default()
         };
         let ends = [trace.start(), trace.end()];
-        let zero = Curve { points: ends.map(|t| (t, 0.0)).to_vec(), ink: Ink::Faint, ..Curve::default() };
+        let zero = Curve { points: ends.map(|t| (t, 0.0)).to_vec(), color: Color::Faint, ..Curve::default() };
         let band = |noise: f64| Band {
             name: format!("\u{b1}2 noise, {}", with_unit(2.0 * noise, &signal.unit.to_string())),
             range: [-2.0 * noise, 2.0 * noise],

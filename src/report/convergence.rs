@@ -3,7 +3,7 @@
 use mops_core::{FEASIBLE, Merit, Objective, Record, Study, Task, Usage};
 
 use super::figures::{Figure, Group};
-use super::plot::{Curve, CurveStyle, Ink, Level, Plot};
+use super::plot::{Color, Curve, CurveStyle, Level, Plot};
 use crate::numbers::counted;
 
 /// The plots of objective and violation over evaluations.
@@ -63,14 +63,14 @@ fn objective(study: &Study, archive: &[Record], best: &[(usize, Merit)]) -> Plot
             name: "every point".into(),
             points: all,
             style: CurveStyle::Dots,
-            ink: Ink::Start,
+            color: Color::Start,
             may_leave: true,
             ..Curve::default()
         },
         Curve {
             name: "best so far, a constraint violated".into(),
             points: before,
-            ink: Ink::Measured,
+            color: Color::Measured,
             ..Curve::default()
         },
         Curve { name: "best so far".into(), points: after, ..Curve::default() },
@@ -107,7 +107,7 @@ fn violation(best: &[(usize, Merit)], evaluations: usize) -> Plot {
         curves: vec![Curve {
             name: "best so far, a constraint violated".into(),
             points,
-            ink: Ink::Measured,
+            color: Color::Measured,
             ..Curve::default()
         }],
         ..Plot::default()

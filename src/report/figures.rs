@@ -43,10 +43,10 @@ pub(super) fn responses(report: &Report<'_>) -> (Vec<Group>, Option<String>) {
         jobs.truncate(MOST_JOBS);
         jobs.sort_unstable();
     }
-    let left_out = (all > MOST_JOBS).then(|| {
+    let omitted = (all > MOST_JOBS).then(|| {
         format!("Of {}, the {MOST_JOBS} with the largest scaled values are shown.", counted(all, "simulation"))
     });
-    (jobs.into_iter().map(|job| of_job(report, job)).collect(), left_out)
+    (jobs.into_iter().map(|job| of_job(report, job)).collect(), omitted)
 }
 
 fn of_job(report: &Report<'_>, job: usize) -> Group {

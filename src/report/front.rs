@@ -7,7 +7,7 @@ use mops_core::{Analysis, Pareto, TradeOffs, Tuner};
 use super::Report;
 use super::figures::{Figure, Group};
 use super::page::scrolling;
-use super::plot::{Curve, CurveStyle, Ink, Level, Plot, Third, Upright};
+use super::plot::{Color, Curve, CurveStyle, Level, ParallelAxis, Plot, ZAxis};
 use super::sampling::{points, within_columns};
 use crate::numbers::{labelled, number, significant};
 
@@ -109,28 +109,38 @@ fn pair(found: &TradeOffs, x: &Quantity, y: &Quantity) -> Plot {
 
 /// The dots of a picture, each with the point that it stands for.
 fn dots(found: &TradeOffs, x: &Quantity, y: &Quantity) -> Vec<(usize, Curve)> {
-    let one = |i: usize, name: &str, ink| {
+    let one = |i: usize, name: &str, color| {
         let points = vec![(x.values[i], y.values[i])];
-        (i, Curve { name: name.to_owned(), points, style: CurveStyle::Dots, ink, of: Some(i), ..Curve::default() })
+        (
+            i,
+            Curve {
+                name: name.to_owned(),
+                points,
+                style: CurveStyle::Dots,
+                color,
+                front_point: Some(i),
+                ..Curve::default()
+            },
+        )
     };
     let name = |i| if i == 0 { "points of the front" } else { "" };
-    let mut all: Vec<(usize, Curve)> = (0..x.values.len()).map(|i| one(i, name(i), Ink::Result)).collect();
-    all.extend(found.knee.map(|i| one(i, "knee", Ink::Measured)));
-    all.push(one(found.nearest, "nearest to the demands", Ink::Demand));
+    let mut all: Vec<(usize, Curve)> = (0..x.values.len()).map(|i| one(i, name(i), Color::Result)).collect();
+    all.extend(found.knee.map(|i| one(i, "knee", Color::Measured)));
+    all.push(one(found.nearest, "nearest to the demands", Color::Demand));
     all
 }
 
 /// The same over three criteria.
 fn space(found: &TradeOffs, [x, y, z]: [&Quantity; 3]) -> Plot {
     let dots = dots(found, x, y);
-    let third =
-        Third { label: labelled(&z.name, &z.unit), values: dots.iter().map(|(i, _)| vec![z.values[*i]]).collect() };
+    let z_axis =
+        ZAxis { label: labelled(&z.name, &z.unit), values: dots.iter().map(|(i, _)| vec![z.values[*i]]).collect() };
     Plot {
         title: format!("{}, {} and {}", x.name, y.name, z.name),
         x_label: labelled(&x.name, &x.unit),
         y_label: labelled(&y.name, &y.unit),
         curves: dots.into_iter().map(|(_, curve)| curve).collect(),
-        third: Some(third),
+        z_axis: Some(z_axis),
         ..Plot::default()
     }
 }
@@ -145,17 +155,18 @@ fn parallel(found: &TradeOffs, criteria: &[Quantity], tuners: &[Quantity]) -> Pl
         if high > low { (drawn(quantity.values[i]) - low) / (high - low) } else { 0.5 }
     };
     #[allow(clippy::cast_precision_loss)]
-    let line = |i: usize, ink| Curve {
+    let line = |i: usize, color| Curve {
         points: all.iter().zip(&ends).enumerate().map(|(at, (q, ends))| (at as f64, height(q, *ends, i))).collect(),
-        ink,
-        of: Some(i),
+        color,
+        front_point: Some(i),
         ..Curve::default()
     };
-    let mut curves: Vec<Curve> = (0..criteria[0].values.len()).map(|i| line(i, Ink::Result)).collect();
-    let worth = [(found.knee, "knee", Ink::Measured), (Some(found.nearest), "nearest to the demands", Ink::Demand)];
-    curves
-        .extend(worth.into_iter().filter_map(|(i, name, ink)| Some(Curve { name: name.to_owned(), ..line(i?, ink) })));
-    let upright = |(quantity, ends): (&&Quantity, &[f64; 2])| Upright {
+    let mut curves: Vec<Curve> = (0..criteria[0].values.len()).map(|i| line(i, Color::Result)).collect();
+    let worth = [(found.knee, "knee", Color::Measured), (Some(found.nearest), "nearest to the demands", Color::Demand)];
+    curves.extend(
+        worth.into_iter().filter_map(|(i, name, color)| Some(Curve { name: name.to_owned(), ..line(i?, color) })),
+    );
+    let axis = |(quantity, ends): (&&Quantity, &[f64; 2])| ParallelAxis {
         name: labelled(&quantity.name, &quantity.unit),
         ends: ends.map(|end| significant(end, 3)),
     };
@@ -163,7 +174,7 @@ fn parallel(found: &TradeOffs, criteria: &[Quantity], tuners: &[Quantity]) -> Pl
         title: "Parallel coordinates".to_owned(),
         x_label: "quantity".to_owned(),
         y_label: "From least to largest".to_owned(),
-        uprights: all.iter().zip(&ends).map(upright).collect(),
+        parallel_axes: all.iter().zip(&ends).map(axis).collect(),
         curves,
         ..Plot::default()
     }
@@ -188,7 +199,7 @@ pub(super) fn responses(analyses: &[Option<Analysis>], signal: &str) -> Vec<Curv
         let Some(Analysis::Time(response)) = analysis else { return None };
         let (_, trace) = response.traces.iter().find(|(name, _)| name == signal)?;
         let points = within_columns(points(trace), COLUMNS);
-        Some(Curve { points, ink: Ink::Start, of: Some(i), may_leave: true, ..Curve::default() })
+        Some(Curve { points, color: Color::Start, front_point: Some(i), may_leave: true, ..Curve::default() })
     };
     let mut curves: Vec<Curve> = analyses.iter().enumerate().filter_map(curve).collect();
     if let Some(first) = curves.first_mut() {

@@ -15,8 +15,9 @@ mod front;
 mod legend;
 mod matrix;
 mod page;
-mod pictures;
+mod parallel_axes;
 mod plot;
+mod plot_files;
 mod png;
 mod range;
 mod robustness;
@@ -33,7 +34,6 @@ mod sweep;
 mod tests;
 mod tuners;
 mod uncertainty;
-mod uprights;
 mod verdict;
 
 use std::fs;
@@ -46,10 +46,10 @@ use mops_discrepancy::Diagnosis;
 use crate::files;
 use crate::numbers::FileNames;
 
-pub(crate) use bode::{Sweep, bode, frequencies};
+pub(crate) use bode::{FrequencyCurve, bode, frequencies};
 pub use page::page;
-use pictures::Pictures;
-pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface, Third, Upright};
+pub use plot::{Band, Color, Curve, CurveStyle, Level, ParallelAxis, Plot, Surface, ZAxis};
+use plot_files::PlotFiles;
 pub(crate) use sampling::points;
 pub(crate) use sensitivity::combination;
 pub(crate) use side_by_side::{Responses, Rows, comparison_page};
@@ -83,7 +83,7 @@ impl Report<'_> {
     pub fn write(&self, folder: &Path) -> io::Result<()> {
         let plots = folder.join("plots");
         fs::create_dir_all(&plots)?;
-        let (responses, left_out) = figures::responses(self);
+        let (responses, omitted) = figures::responses(self);
         let convergence = self.searched().then(|| convergence::group(self.problem.study(), self.archive));
         let front = front::group(self);
         let sweep = self.outcome.found.sweep.as_ref().map(|sweep| sweep::group(sweep, self.best_name()));
@@ -92,12 +92,12 @@ impl Report<'_> {
             None => self.outcome.calibration.as_ref().map(|calibration| &calibration.excitation),
         };
         let excitation = inputs.filter(|inputs| !inputs.is_empty()).map(|inputs| excitation::group(inputs));
-        let diagnosis = self.diagnosis.map(diagnosis::Pictures::of);
+        let diagnosis = self.diagnosis.map(diagnosis::Plots::of);
         let robustness = robustness::sections(self);
         let uncertainty = self.outcome.found.uncertainty.as_ref().map(uncertainty::group);
-        let pictures = page::Pictures {
+        let pictures = page::Plots {
             responses,
-            left_out,
+            omitted,
             convergence,
             front,
             sweep,
@@ -110,11 +110,11 @@ impl Report<'_> {
             [&pictures.convergence, &pictures.front, &pictures.sweep, &pictures.excitation, &pictures.uncertainty];
         let groups = pictures.responses.iter().chain(findings.into_iter().flatten());
         let groups = groups.chain(pictures.robustness.iter().map(|section| &section.group));
-        let groups = groups.chain(pictures.diagnosis.iter().flat_map(diagnosis::Pictures::groups));
+        let groups = groups.chain(pictures.diagnosis.iter().flat_map(diagnosis::Plots::groups));
         let mut names = FileNames::default();
-        let pictures_of_all = groups.flat_map(|group| &group.figures).flat_map(|figure| &figure.plots);
-        let all: Vec<(String, &Plot)> = pictures_of_all.map(|(name, plot)| (names.unique(name), plot)).collect();
-        let earlier = Pictures::of(&plots);
+        let figures = groups.flat_map(|group| &group.figures).flat_map(|figure| &figure.plots);
+        let all: Vec<(String, &Plot)> = figures.map(|(name, plot)| (names.unique(name), plot)).collect();
+        let earlier = PlotFiles::of(&plots);
         earlier.note(all.iter().map(|(name, _)| name.as_str()))?;
         for (name, plot) in &all {
             files::write(&plots.join(format!("{name}.svg")), plot.svg())?;

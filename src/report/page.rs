@@ -12,15 +12,15 @@ use super::{
 use crate::numbers::significant;
 
 /// What the page shows beside the tables.
-pub(super) struct Pictures {
+pub(super) struct Plots {
     pub(super) responses: Vec<Group>,
     /// A sentence where responses are left out.
-    pub(super) left_out: Option<String>,
+    pub(super) omitted: Option<String>,
     pub(super) convergence: Option<Group>,
     pub(super) front: Option<Group>,
     pub(super) sweep: Option<Group>,
     pub(super) excitation: Option<Group>,
-    pub(super) diagnosis: Option<diagnosis::Pictures>,
+    pub(super) diagnosis: Option<diagnosis::Plots>,
     pub(super) robustness: Vec<robustness::Section>,
     pub(super) uncertainty: Option<Group>,
 }
@@ -53,7 +53,7 @@ pub(super) fn document(title: &str, body: Markup) -> Markup {
 }
 
 /// The whole page.
-pub(super) fn of(report: &Report<'_>, pictures: &Pictures) -> Markup {
+pub(super) fn of(report: &Report<'_>, plots: &Plots) -> Markup {
     let outcome = report.outcome;
     let warnings = verdict::warnings(report);
     let body = html! {
@@ -62,23 +62,23 @@ pub(super) fn of(report: &Report<'_>, pictures: &Pictures) -> Markup {
             @if !warnings.is_empty() {
                 (section("Warnings", html! { ul class="warnings" { @for text in &warnings { li { (rich(text)) } } } }))
             }
-            @if let (Some(found), Some(pictures)) = (report.diagnosis, &pictures.diagnosis) {
-                (diagnosis::sections(found, pictures))
+            @if let (Some(found), Some(plots)) = (report.diagnosis, &plots.diagnosis) {
+                (diagnosis::sections(found, plots))
             }
-            @for one in &pictures.robustness {
+            @for one in &plots.robustness {
                 (section(one.title, html! { (one.content) (figures(&one.group)) }))
             }
-            @if let (Some(found), Some(group)) = (&outcome.found.trade_offs, &pictures.front) {
+            @if let (Some(found), Some(group)) = (&outcome.found.trade_offs, &plots.front) {
                 (section("Front", html! { (figures(group)) (front::table(report, found)) }))
             }
-            @if let Some(group) = &pictures.sweep { (section("Sweep", figures(group))) }
+            @if let Some(group) = &plots.sweep { (section("Sweep", figures(group))) }
             @if let Some(found) = &outcome.found.sensitivity {
                 (section(sensitivity::title(found), sensitivity::section(found)))
             }
             @if let Some(found) = &outcome.found.excitation {
                 (section("Excitation", html! {
                     (excitation::section(found))
-                    @if let Some(group) = &pictures.excitation { (figures(group)) }
+                    @if let Some(group) = &plots.excitation { (figures(group)) }
                 }))
             }
             @if let Some(table) = matrix::section(outcome) { (section("Criteria by case", table)) }
@@ -88,23 +88,23 @@ pub(super) fn of(report: &Report<'_>, pictures: &Pictures) -> Markup {
                 @let one_case = report.problem.study().cases.len() == 1;
                 (section("Sensitivities", slopes::section(found, report.best_name(), one_case)))
             }
-            @if !pictures.responses.is_empty() {
+            @if !plots.responses.is_empty() {
                 (section("Responses", html! {
-                    @if let Some(text) = &pictures.left_out { p { (text) } }
-                    @for group in &pictures.responses { (figures(group)) }
+                    @if let Some(text) = &plots.omitted { p { (text) } }
+                    @for group in &plots.responses { (figures(group)) }
                 }))
             }
-            @if let Some(group) = &pictures.convergence { (section("Convergence", figures(group))) }
+            @if let Some(group) = &plots.convergence { (section("Convergence", figures(group))) }
             @if let Some(results) = &outcome.calibration {
                 (section("Calibration", calibration::section(results)))
                 @if let Some(found) = &outcome.found.uncertainty {
                     (section(uncertainty::TITLE, html! {
                         (uncertainty::section(found))
-                        @if let Some(group) = &pictures.uncertainty { (figures(group)) }
+                        @if let Some(group) = &plots.uncertainty { (figures(group)) }
                     }))
                 }
                 @if results.sensitivity.is_some() || !results.excitation.is_empty() {
-                    (section("What the data can tell", told(results, pictures)))
+                    (section("What the data can tell", told(results, plots)))
                 }
             }
             @if !outcome.failures.is_empty() { (section("Failures", calibration::failures(&outcome.failures))) }
@@ -116,13 +116,13 @@ pub(super) fn of(report: &Report<'_>, pictures: &Pictures) -> Markup {
             }))
         }
         footer { "Written by mops " (outcome.mops) ". The numbers of this page are in result.json, its plots in the folder plots." }
-        @if pictures.front.is_some() { @for text in front::SCRIPTS { script { (PreEscaped(text)) } } }
+        @if plots.front.is_some() { @for text in front::SCRIPTS { script { (PreEscaped(text)) } } }
     };
     document(&format!("{}: {}", outcome.study, task(outcome.task)), body)
 }
 
 /// What the data of a calibration tell of its tuners, and how rich its inputs are.
-fn told(results: &CalibrationReport, pictures: &Pictures) -> Markup {
+fn told(results: &CalibrationReport, plots: &Plots) -> Markup {
     html! {
         @if let Some(found) = &results.sensitivity { (sensitivity::section(found)) }
         h3 { "Inputs" }
@@ -130,7 +130,7 @@ fn told(results: &CalibrationReport, pictures: &Pictures) -> Markup {
             p { "No experiment is driven by an input: what there is to learn comes from the start values." }
         } @else {
             (excitation::inputs(&results.excitation))
-            @if let Some(group) = &pictures.excitation { (figures(group)) }
+            @if let Some(group) = &plots.excitation { (figures(group)) }
         }
     }
 }

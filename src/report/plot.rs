@@ -8,7 +8,7 @@ use super::{png, svg};
 
 /// What a mark stands for; this gives it its colour, on white paper and on a dark page.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Ink {
+pub enum Color {
     /// Titles and labels.
     Text,
     /// Numbers at the axes.
@@ -54,9 +54,9 @@ pub struct Curve {
     /// How they are drawn.
     pub style: CurveStyle,
     /// What they stand for.
-    pub ink: Ink,
+    pub color: Color,
     /// The point of a front that it belongs to, by index: a page marks it where that point is chosen.
-    pub of: Option<usize>,
+    pub front_point: Option<usize>,
     /// Whether the curve may leave the picture: it widens the shown range to three times that of the others at most.
     pub may_leave: bool,
 }
@@ -98,7 +98,7 @@ pub struct Surface {
 
 /// A third axis, upwards, for points in space.
 #[derive(Debug, Clone, Default)]
-pub struct Third {
+pub struct ZAxis {
     /// Quantity and unit along it.
     pub label: String,
     /// For every curve the values that belong to its points.
@@ -107,7 +107,7 @@ pub struct Third {
 
 /// An upright axis of parallel coordinates, on which curves run from 0 at its foot to 1 at its head.
 #[derive(Debug, Clone, Default)]
-pub struct Upright {
+pub struct ParallelAxis {
     /// The quantity.
     pub name: String,
     /// What stands at its foot and at its head.
@@ -144,9 +144,9 @@ pub struct Plot {
     /// A surface behind the curves; its grid is then what is shown of x and y.
     pub surface: Option<Surface>,
     /// A third axis: the points of all curves are then dots in a box.
-    pub third: Option<Third>,
+    pub z_axis: Option<ZAxis>,
     /// Axes of parallel coordinates, at x = 0, 1, 2, ..., instead of the others.
-    pub uprights: Vec<Upright>,
+    pub parallel_axes: Vec<ParallelAxis>,
 }
 
 impl Plot {

@@ -4,7 +4,7 @@ use maud::{Markup, PreEscaped, html};
 use mops_core::{Analysis, Problem};
 
 use super::page::{document, scrolling, section};
-use super::plot::{Curve, Ink, Plot};
+use super::plot::{Color, Curve, Plot};
 use super::sampling;
 use crate::numbers::labelled;
 
@@ -112,8 +112,8 @@ fn curves(index: usize, run: &Responses) -> Vec<Drawn> {
         for signal in plan.signals.iter().map(|&i| &model.interface().signals[i]) {
             let Some(trace) = response.trace(&signal.name) else { continue };
             let place = [study.cases[plan.case].name.clone(), model_name.clone(), signal.name.clone()];
-            let ink = Ink::Series(index % 6);
-            let curve = Curve { name: run.name.clone(), points: sampling::points(trace), ink, ..Curve::default() };
+            let color = Color::Series(index % 6);
+            let curve = Curve { name: run.name.clone(), points: sampling::points(trace), color, ..Curve::default() };
             drawn.push((place, labelled(&signal.name, &signal.unit.to_string()), curve));
         }
     }

@@ -2,13 +2,13 @@
 
 use super::axis::Axis;
 use super::clip::Point;
-use super::plot::{Ink, Plot};
+use super::plot::{Color, Plot};
 use super::range::{drawable, range_of};
 use super::scene::{ADVANCE, Anchor, Mark, SIZE, Scene};
 use mops_core::math;
 
 /// A place in the box, whose sides reach from -1 to 1: along x, along y, upwards.
-pub(super) type Place = [f64; 3];
+pub(super) type Point3 = [f64; 3];
 
 /// From where a box is seen, in parallel projection.
 #[derive(Debug, Clone, Copy)]
@@ -29,7 +29,7 @@ impl View {
     const FIRST: Self = Self { turn: -0.6, height: 0.42, scale: 70.0, middle: [0.5 * SIZE[0], 0.56 * SIZE[1]] };
 
     /// Where a place lies on the drawing.
-    pub(super) fn project(&self, [x, y, z]: Place) -> Point {
+    pub(super) fn project(&self, [x, y, z]: Point3) -> Point {
         let (across, depth) =
             (x * math::cos(self.turn) - y * math::sin(self.turn), x * math::sin(self.turn) + y * math::cos(self.turn));
         let up = z * math::cos(self.height) + depth * math::sin(self.height);
@@ -45,8 +45,8 @@ impl Scene {
     /// Draws the curves over x, y and the third axis; all of them are dots.
     pub(super) fn space(plot: &Plot) -> Self {
         let mut scene = Self { view: Some(View::FIRST), ..Self::default() };
-        let Some(third) = &plot.third else { return scene };
-        scene.text(&plot.title, [10.0, 16.0], Anchor::Start, Ink::Text);
+        let Some(z_axis) = &plot.z_axis else { return scene };
+        scene.text(&plot.title, [10.0, 16.0], Anchor::Start, Color::Text);
         scene.legend(plot, 38.0);
         let xy =
             |pick: fn(&(f64, f64)) -> f64| plot.curves.iter().flat_map(|c| &c.points).map(pick).collect::<Vec<_>>();
@@ -57,22 +57,22 @@ impl Scene {
         let axes = [
             axis(xy(|p| p.0), plot.log_x),
             axis(xy(|p| p.1), plot.log_y),
-            axis(third.values.iter().flatten().copied().collect(), false),
+            axis(z_axis.values.iter().flatten().copied().collect(), false),
         ];
         scene.walls();
-        scene.rulers(&axes, [&plot.x_label, &plot.y_label, &third.label]);
-        for (curve, heights) in plot.curves.iter().zip(&third.values) {
+        scene.rulers(&axes, [&plot.x_label, &plot.y_label, &z_axis.label]);
+        for (curve, heights) in plot.curves.iter().zip(&z_axis.values) {
             for (&(x, y), &z) in curve.points.iter().zip(heights) {
                 let at = [x, y, z];
                 let on = |k: usize| axes[k].position(at[k]).map(|p| 2.0 * p - 1.0);
                 let (Some(x), Some(y), Some(z)) = (on(0), on(1), on(2)) else { continue };
                 // How high a dot hangs is seen by the line from it to the floor.
-                scene.line_in_space([x, y, z], [x, y, -1.0], Ink::Grid);
+                scene.line_in_space([x, y, z], [x, y, -1.0], Color::Grid);
                 let view = View::FIRST;
-                let dot = Mark::Dots { centres: vec![view.project([x, y, z])], ink: curve.ink, radius: 3.0 };
-                let dot = Mark::InSpace { places: vec![[x, y, z]], mark: Box::new(dot) };
-                scene.marks.push(match curve.of {
-                    Some(point) => Mark::Of { point, marks: vec![dot] },
+                let dot = Mark::Dots { centres: vec![view.project([x, y, z])], color: curve.color, radius: 3.0 };
+                let dot = Mark::InSpace { points: vec![[x, y, z]], mark: Box::new(dot) };
+                scene.marks.push(match curve.front_point {
+                    Some(point) => Mark::FrontPoint { point, marks: vec![dot] },
                     None => dot,
                 });
             }
@@ -91,7 +91,7 @@ impl Scene {
                     place[(axis + 2) % 3] = b;
                     place
                 };
-                self.line_in_space(end(-1.0), end(1.0), Ink::Grid);
+                self.line_in_space(end(-1.0), end(1.0), Color::Grid);
             }
         }
     }
@@ -106,10 +106,10 @@ impl Scene {
         };
         let on = [1.0, 1.0];
         for (k, axis) in axes.iter().enumerate() {
-            self.line_in_space(edge(k, -1.0, on), edge(k, 1.0, on), Ink::Faint);
+            self.line_in_space(edge(k, -1.0, on), edge(k, 1.0, on), Color::Faint);
             for (at, label) in &axis.ticks {
                 let along = 2.0 * at - 1.0;
-                self.line_in_space(edge(k, along, on), edge(k, along, [1.05, 1.0]), Ink::Faint);
+                self.line_in_space(edge(k, along, on), edge(k, along, [1.05, 1.0]), Color::Faint);
                 self.text_in_space(label, edge(k, along, NUMBERS));
             }
             let name = match &axis.factor {
@@ -122,22 +122,22 @@ impl Scene {
         }
     }
 
-    fn line_in_space(&mut self, from: Place, to: Place, ink: Ink) {
+    fn line_in_space(&mut self, from: Point3, to: Point3, color: Color) {
         let points = [from, to].map(|place| View::FIRST.project(place)).to_vec();
-        let width = if ink == Ink::Faint { 1.0 } else { 0.7 };
-        let line = Mark::Line { points, ink, width, dashed: false };
-        self.marks.push(Mark::InSpace { places: vec![from, to], mark: Box::new(line) });
+        let width = if color == Color::Faint { 1.0 } else { 0.7 };
+        let line = Mark::Line { points, color, width, dashed: false };
+        self.marks.push(Mark::InSpace { points: vec![from, to], mark: Box::new(line) });
     }
 
-    fn text_in_space(&mut self, text: &str, place: Place) {
+    fn text_in_space(&mut self, text: &str, place: Point3) {
         let mut at = View::FIRST.project(place);
         // Long names stay on the paper.
         let half = 0.5 * ADVANCE * text.chars().count() as f64;
         at[0] = at[0].clamp(half.min(0.5 * SIZE[0]), (SIZE[0] - half).max(0.5 * SIZE[0]));
         let before = self.marks.len();
-        self.text(text, at, Anchor::Middle, Ink::Faint);
+        self.text(text, at, Anchor::Middle, Color::Faint);
         if let Some(mark) = self.marks.get(before).cloned() {
-            self.marks[before] = Mark::InSpace { places: vec![place], mark: Box::new(mark) };
+            self.marks[before] = Mark::InSpace { points: vec![place], mark: Box::new(mark) };
         }
     }
 }

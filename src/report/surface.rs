@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::clip::{Frame, Point};
 use super::contour::contour;
-use super::plot::{Ink, Surface};
+use super::plot::{Color, Surface};
 use super::range::{drawable, range_of};
 use super::scene::{Anchor, Mark, Scene};
 
@@ -11,7 +11,7 @@ use super::scene::{Anchor, Mark, Scene};
 pub(super) const SCALE_WIDTH: f64 = 84.0;
 
 /// Number of colours, and of the lines between some of them.
-const COLOURS: usize = 32;
+const COLORS: usize = 32;
 const LINES: usize = 8;
 
 /// Heights above this share of all others, or so many decades above the lowest, are drawn as if they were there: what
@@ -34,7 +34,7 @@ const VIRIDIS: [[f64; 3]; 9] = [
 ];
 
 /// The colour of a height between 0 and 1.
-fn colour(height: f64) -> [u8; 3] {
+fn viridis(height: f64) -> [u8; 3] {
     let at = height.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
     let i = (at as usize).min(VIRIDIS.len() - 2);
     let s = at - i as f64;
@@ -63,7 +63,7 @@ impl Scene {
         let Some([low, high]) = surface.heights() else { return };
         let Frame { from: [left, top], to: [right, bottom] } = frame;
         let height = |value: f64| drawable(value, surface.log).map(|v| ((v - low) / (high - low)).clamp(0.0, 1.0));
-        let band = |value: f64| height(value).map(|h| ((h * COLOURS as f64) as usize).min(COLOURS - 1));
+        let band = |value: f64| height(value).map(|h| ((h * COLORS as f64) as usize).min(COLORS - 1));
         let xs: Vec<f64> = surface.x.iter().map(|&v| left + x.position(v).unwrap_or(0.0) * (right - left)).collect();
         let ys: Vec<f64> = surface.y.iter().map(|&v| bottom - y.position(v).unwrap_or(0.0) * (bottom - top)).collect();
         let edges = |at: &[f64], i: usize| {
@@ -81,7 +81,7 @@ impl Scene {
                 let end = (c..row.len()).find(|&k| band(row[k]) != of).unwrap_or(row.len());
                 if let Some(of) = of {
                     let box_ = Frame { from: [edges(&xs, c)[0], upper], to: [edges(&xs, end - 1)[1], lower] };
-                    self.marks.push(Mark::Cell { frame: box_, rgb: colour((of as f64 + 0.5) / COLOURS as f64) });
+                    self.marks.push(Mark::Cell { frame: box_, rgb: viridis((of as f64 + 0.5) / COLORS as f64) });
                 }
                 c = end;
             }
@@ -91,7 +91,7 @@ impl Scene {
         for line in 1..LINES {
             for segment in contour(&raised, line as f64 / LINES as f64) {
                 let points = segment.map(|p| [along(&xs, p[0]), along(&ys, p[1])]).to_vec();
-                self.marks.push(Mark::Line { points, ink: Ink::Faint, width: 0.7, dashed: false });
+                self.marks.push(Mark::Line { points, color: Color::Faint, width: 0.7, dashed: false });
             }
         }
         self.scale(surface, [low, high], frame);
@@ -100,18 +100,18 @@ impl Scene {
     fn scale(&mut self, surface: &Surface, range: [f64; 2], Frame { from: [_, top], to: [right, bottom] }: Frame) {
         let at = |share: f64| bottom - share * (bottom - top);
         let [left, end] = [right + 14.0, right + 26.0];
-        for i in 0..COLOURS {
-            let [from, to] = [i, i + 1].map(|i| at(i as f64 / COLOURS as f64));
+        for i in 0..COLORS {
+            let [from, to] = [i, i + 1].map(|i| at(i as f64 / COLORS as f64));
             let frame = Frame { from: [left, to], to: [end, from] };
-            self.marks.push(Mark::Cell { frame, rgb: colour((i as f64 + 0.5) / COLOURS as f64) });
+            self.marks.push(Mark::Cell { frame, rgb: viridis((i as f64 + 0.5) / COLORS as f64) });
         }
         let axis = Axis::new(range, surface.log, 6.0);
         for (share, label) in &axis.ticks {
-            self.text(label, [end + 5.0, at(*share)], Anchor::Start, Ink::Faint);
+            self.text(label, [end + 5.0, at(*share)], Anchor::Start, Color::Faint);
         }
         let factor = axis.factor.as_deref().map_or_else(String::new, |factor| format!(" {factor}"));
         let label = format!("{}{factor}", surface.label);
-        self.text(&label, [right + SCALE_WIDTH - 4.0, top - 14.0], Anchor::End, Ink::Faint);
+        self.text(&label, [right + SCALE_WIDTH - 4.0, top - 14.0], Anchor::End, Color::Faint);
     }
 }
 

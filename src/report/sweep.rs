@@ -3,7 +3,7 @@
 use mops_core::{FEASIBLE, SweepAxis, SweepReport};
 
 use super::figures::{Figure, Group};
-use super::plot::{Curve, CurveStyle, Ink, Plot, Surface};
+use super::plot::{Color, Curve, CurveStyle, Plot, Surface};
 use super::surface::border;
 use crate::numbers::labelled;
 
@@ -31,8 +31,8 @@ fn violated(sweep: &SweepReport) -> bool {
     sweep.violation.iter().flatten().any(|&v| v > FEASIBLE)
 }
 
-fn dot(name: &str, [x, y]: [f64; 2], ink: Ink) -> Curve {
-    Curve { name: name.into(), points: vec![(x, y)], style: CurveStyle::Dots, ink, ..Curve::default() }
+fn dot(name: &str, [x, y]: [f64; 2], color: Color) -> Curve {
+    Curve { name: name.into(), points: vec![(x, y)], style: CurveStyle::Dots, color, ..Curve::default() }
 }
 
 fn surface(sweep: &SweepReport, y: &SweepAxis, best_name: &str) -> Plot {
@@ -46,10 +46,15 @@ fn surface(sweep: &SweepReport, y: &SweepAxis, best_name: &str) -> Plot {
     let mut curves = Vec::new();
     if violated(sweep) {
         let points = border(&surface, &sweep.violation, FEASIBLE);
-        curves.push(Curve { name: "constraints hold up to here".into(), points, ink: Ink::Demand, ..Curve::default() });
+        curves.push(Curve {
+            name: "constraints hold up to here".into(),
+            points,
+            color: Color::Demand,
+            ..Curve::default()
+        });
     }
-    curves.push(dot("best of the sweep", [sweep.best[0], sweep.best[1]], Ink::Measured));
-    curves.push(dot(best_name, [sweep.centre[0], sweep.centre[1]], Ink::Demand));
+    curves.push(dot("best of the sweep", [sweep.best[0], sweep.best[1]], Color::Measured));
+    curves.push(dot(best_name, [sweep.centre[0], sweep.centre[1]], Color::Demand));
     Plot {
         title: format!("Objective over {} and {}", sweep.x.tuner, y.tuner),
         x_label: labelled(&sweep.x.tuner, &sweep.x.unit),
@@ -68,9 +73,9 @@ fn line(sweep: &SweepReport, best_name: &str) -> Plot {
     if violated(sweep) {
         let broken = |((x, y), v): ((f64, f64), &f64)| if *v > FEASIBLE { (x, y) } else { (x, f64::NAN) };
         let points = points().zip(&sweep.violation[0]).map(broken).collect();
-        curves.push(Curve { name: "a constraint violated".into(), points, ink: Ink::Measured, ..Curve::default() });
+        curves.push(Curve { name: "a constraint violated".into(), points, color: Color::Measured, ..Curve::default() });
     }
-    curves.push(dot(best_name, [sweep.centre[0], sweep.centre[2]], Ink::Demand));
+    curves.push(dot(best_name, [sweep.centre[0], sweep.centre[2]], Color::Demand));
     Plot {
         title: format!("Objective over {}", sweep.x.tuner),
         x_label: labelled(&sweep.x.tuner, &sweep.x.unit),

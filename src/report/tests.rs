@@ -10,7 +10,7 @@ use mops_core::{
     TunerDraft, TunerReport, Unit, Usage, Value, Variable,
 };
 
-use super::plot::{Curve, CurveStyle, Plot, Third};
+use super::plot::{Curve, CurveStyle, Plot, ZAxis};
 use super::{Level, Report};
 use crate::numbers;
 
@@ -293,9 +293,10 @@ fn cases_and_slopes_are_shown_as_tables_of_shades() {
 
 #[test]
 fn a_third_axis_keeps_the_places_that_a_page_turns() {
-    let dot = |x| Curve { points: vec![(x, 2.0 * x)], style: CurveStyle::Dots, of: Some(0), ..Curve::default() };
-    let third = Third { label: "z (s)".into(), values: vec![vec![0.0], vec![4.0]] };
-    let plot = Plot { curves: vec![dot(0.0), dot(1.0)], third: Some(third), ..Plot::default() };
+    let dot =
+        |x| Curve { points: vec![(x, 2.0 * x)], style: CurveStyle::Dots, front_point: Some(0), ..Curve::default() };
+    let z_axis = ZAxis { label: "z (s)".into(), values: vec![vec![0.0], vec![4.0]] };
+    let plot = Plot { curves: vec![dot(0.0), dot(1.0)], z_axis: Some(z_axis), ..Plot::default() };
     let svg = plot.svg();
     assert!(svg.contains("data-view=") && svg.contains(">z (s)</text>") && !svg.contains("NaN"));
     assert_eq!(svg.matches("class=\"dot\" data-point=\"0\"").count(), 2);

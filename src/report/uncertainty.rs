@@ -5,7 +5,7 @@ use mops_core::{BandReport, BootstrapReport, ProfileReport, UncertaintyReport};
 
 use super::figures::{Figure, Group};
 use super::page::scrolling;
-use super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::plot::{Color, Curve, CurveStyle, Plot};
 use super::sensitivity::sentences;
 use crate::numbers::{labelled, number, significant};
 
@@ -129,17 +129,17 @@ pub(super) fn group(found: &UncertaintyReport) -> Group {
         let n = sorted.len() as f64;
         let steps =
             sorted.iter().enumerate().flat_map(|(i, &v)| [(v, i as f64 / n), (v, (i + 1) as f64 / n)]).collect();
-        let upright = |name: &str, x: f64, ink, style| Curve {
+        let upright = |name: &str, x: f64, color, style| Curve {
             name: name.into(),
             points: vec![(x, 0.0), (x, 1.0)],
-            ink,
+            color,
             style,
             ..Curve::default()
         };
         let mut curves = vec![Curve { name: "share of replicates up to".into(), points: steps, ..Curve::default() }];
-        curves.push(upright("estimate", one.value, Ink::Start, CurveStyle::Dashed));
-        curves.push(upright("interval", one.interval[0], Ink::Demand, CurveStyle::Line));
-        curves.push(upright("", one.interval[1], Ink::Demand, CurveStyle::Line));
+        curves.push(upright("estimate", one.value, Color::Start, CurveStyle::Dashed));
+        curves.push(upright("interval", one.interval[0], Color::Demand, CurveStyle::Line));
+        curves.push(upright("", one.interval[1], Color::Demand, CurveStyle::Line));
         let plot = Plot {
             title: format!("Bootstrap of {}", one.parameter),
             x_label: labelled(&one.parameter, &one.unit),
@@ -153,24 +153,24 @@ pub(super) fn group(found: &UncertaintyReport) -> Group {
 }
 
 fn profile(one: &ProfileReport) -> Figure {
-    let line = |name: &str, points: Vec<(f64, f64)>, ink, style| Curve {
+    let line = |name: &str, points: Vec<(f64, f64)>, color, style| Curve {
         name: name.into(),
         points,
-        ink,
+        color,
         style,
         ..Curve::default()
     };
     let half = (one.linear_interval[1] - one.value) / one.limit;
     let ends = [one.points.first(), one.points.last()].map(|p| p.map_or(one.value, |p| p.0));
     let first_order = ends.map(|x| (x, (x - one.value) / half)).to_vec();
-    let first_order = line("to first order", first_order, Ink::Start, CurveStyle::Dashed);
+    let first_order = line("to first order", first_order, Color::Start, CurveStyle::Dashed);
     let ends = |y: f64| ends.map(|x| (x, y)).to_vec();
     let mut curves: Vec<Curve> = half.is_finite().then_some(first_order).into_iter().collect();
     curves.extend([
-        line("root of the likelihood ratio", one.points.clone(), Ink::Result, CurveStyle::Line),
-        line("", one.points.clone(), Ink::Result, CurveStyle::Dots),
-        line("t quantile", ends(one.limit), Ink::Demand, CurveStyle::Line),
-        line("", ends(-one.limit), Ink::Demand, CurveStyle::Line),
+        line("root of the likelihood ratio", one.points.clone(), Color::Result, CurveStyle::Line),
+        line("", one.points.clone(), Color::Result, CurveStyle::Dots),
+        line("t quantile", ends(one.limit), Color::Demand, CurveStyle::Line),
+        line("", ends(-one.limit), Color::Demand, CurveStyle::Line),
     ]);
     let plot = Plot {
         title: format!("Profile of {}", one.parameter),
@@ -197,15 +197,15 @@ pub(super) fn bands(found: &UncertaintyReport, experiment: &str, channel: &str, 
         return Vec::new();
     };
     let percent = significant(100.0 * found.level, 4);
-    let curve = |name: String, half: &[f64], sign: f64, ink: Ink| Curve {
+    let curve = |name: String, half: &[f64], sign: f64, color: Color| Curve {
         name,
         points: points(band, half, sign, around),
-        ink,
+        color,
         style: CurveStyle::Dashed,
         may_leave: true,
-        of: None,
+        front_point: None,
     };
-    let (response, measurement) = (Ink::Series(2), Ink::Series(3));
+    let (response, measurement) = (Color::Series(2), Color::Series(3));
     vec![
         curve(format!("{percent} % of responses"), &band.response, 1.0, response),
         curve(String::new(), &band.response, -1.0, response),

@@ -18,7 +18,7 @@ use crate::diagnosis::words;
 use crate::numbers::significant;
 
 /// The plots of a diagnosis, in the order of the page.
-pub(super) struct Pictures {
+pub(super) struct Plots {
     /// Residuals, by experiment.
     pub(super) residuals: Vec<Group>,
     /// What would explain them, by place.
@@ -27,7 +27,7 @@ pub(super) struct Pictures {
     pub(super) predictions: Vec<Group>,
 }
 
-impl Pictures {
+impl Plots {
     pub(super) fn of(diagnosis: &Diagnosis) -> Self {
         Self {
             residuals: residuals::groups(diagnosis),
@@ -60,21 +60,21 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> [(String, String); 2] {
 }
 
 /// The sections of the page, in the order in which they convince.
-pub(super) fn sections(diagnosis: &Diagnosis, pictures: &Pictures) -> Markup {
+pub(super) fn sections(diagnosis: &Diagnosis, plots: &Plots) -> Markup {
     let groups = |groups: &[Group]| html! { @for group in groups { (figures(group)) } };
     html! {
         @if !diagnosis.found.is_empty() || !diagnosis.removed.is_empty() { (section("What is missing", missing(diagnosis))) }
         @if !diagnosis.before.is_empty() { (section(if diagnosis.verdict == Verdict::None { "Error beside the noise" } else { "Before and after" }, errors::table(diagnosis))) }
-        @if !pictures.residuals.is_empty() {
+        @if !plots.residuals.is_empty() {
             (section("What the declared model leaves", html! {
                 p { (residuals::EXPLAINED) }
-                (groups(&pictures.residuals))
+                (groups(&plots.residuals))
             }))
         }
         @if !diagnosis.evidence.is_empty() {
             (section("Where it comes from", html! {
                 (places::table(diagnosis))
-                (groups(&pictures.places))
+                (groups(&plots.places))
             }))
         }
         @if !diagnosis.ranked.is_empty() { (section("What it could be", ranking::table(diagnosis))) }
@@ -84,7 +84,7 @@ pub(super) fn sections(diagnosis: &Diagnosis, pictures: &Pictures) -> Markup {
         }
         @if !diagnosis.noticeable.is_empty() { (section("What would have been noticed", ranking::noticeable(diagnosis))) }
         @if let Some(next) = &diagnosis.next_experiment { (section("What to measure next", html! { p { (rich(next)) } })) }
-        @if !pictures.predictions.is_empty() { (section("Measured and predicted", groups(&pictures.predictions))) }
+        @if !plots.predictions.is_empty() { (section("Measured and predicted", groups(&plots.predictions))) }
         @if !diagnosis.notes.is_empty() {
             (section("Notes", html! { ul class="findings" { @for note in &diagnosis.notes { li { (rich(note)) } } } }))
         }

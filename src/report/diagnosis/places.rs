@@ -5,7 +5,7 @@ use mops_discrepancy::{Curve as Points, Diagnosis, Evidence};
 
 use super::super::figures::{Figure, Group};
 use super::super::page::{rich, scrolling};
-use super::super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::super::plot::{Color, Curve, CurveStyle, Plot};
 use super::super::sampling::thinned;
 use crate::diagnosis::words;
 use crate::numbers::{labelled, significant};
@@ -78,10 +78,10 @@ fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
     let effects = effects.join(" and ");
     let y_label = labelled("missing signal", &evidence.unit);
     // The estimate, and what the effects make of it.
-    let both = |points: &Points, drawn: fn(&str, &[f64], &[f64], Ink) -> Curve| {
-        let mut curves = vec![drawn("estimated, without any formula", &points.x, &points.estimated, Ink::Measured)];
+    let both = |points: &Points, drawn: fn(&str, &[f64], &[f64], Color) -> Curve| {
+        let mut curves = vec![drawn("estimated, without any formula", &points.x, &points.estimated, Color::Measured)];
         if !points.found.is_empty() {
-            curves.push(drawn(&effects, &points.x, &points.found, Ink::Result));
+            curves.push(drawn(&effects, &points.x, &points.found, Color::Result));
         }
         curves
     };
@@ -94,7 +94,7 @@ fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
         let mut curves = both(points, dots);
         if let Some(unexplained) = sketched.filter(|u| u.over == *over) {
             let [x, y] = [0, 1].map(|k| unexplained.table.iter().map(|point| point[k]).collect::<Vec<f64>>());
-            curves.push(line("table, linear between its points", &x, &y, Ink::Demand));
+            curves.push(line("table, linear between its points", &x, &y, Color::Demand));
         }
         let title = format!("missing signal at {} over {over}", evidence.place);
         figures.push(figure(over, title, labelled(over, unit), curves));
@@ -116,13 +116,13 @@ fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
     Group { title, about, figures }
 }
 
-fn dots(name: &str, x: &[f64], y: &[f64], ink: Ink) -> Curve {
+fn dots(name: &str, x: &[f64], y: &[f64], color: Color) -> Curve {
     let points = x.iter().copied().zip(y.iter().copied()).collect();
-    Curve { name: name.into(), points, ink, style: CurveStyle::Dots, ..Curve::default() }
+    Curve { name: name.into(), points, color, style: CurveStyle::Dots, ..Curve::default() }
 }
 
-fn line(name: &str, x: &[f64], y: &[f64], ink: Ink) -> Curve {
-    let dots = dots(name, x, y, ink);
+fn line(name: &str, x: &[f64], y: &[f64], color: Color) -> Curve {
+    let dots = dots(name, x, y, color);
     Curve { points: thinned(dots.points), style: CurveStyle::Line, ..dots }
 }
 

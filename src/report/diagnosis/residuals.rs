@@ -4,7 +4,7 @@ use mops_core::Role;
 use mops_discrepancy::{Diagnosis, Prediction};
 
 use super::super::figures::{Figure, Group};
-use super::super::plot::{Band, Curve, CurveStyle, Ink, Level, Plot};
+use super::super::plot::{Band, Color, Curve, CurveStyle, Level, Plot};
 use super::super::sampling::thinned;
 use super::spectrum::{autocorrelation, band, even, spectrum};
 use crate::numbers::{labelled, with_unit};
@@ -35,10 +35,10 @@ fn title(channels: &[Prediction]) -> String {
 pub(super) fn groups(diagnosis: &Diagnosis) -> Vec<Group> {
     let all = diagnosis.predictions.chunk_by(|a, b| a.experiment == b.experiment).count();
     let shown = drawn(diagnosis);
-    let left_out = (all > shown.len()).then(|| format!("Of {all} experiments {} are drawn.", shown.len()));
+    let omitted = (all > shown.len()).then(|| format!("Of {all} experiments {} are drawn.", shown.len()));
     let group = |(i, channels): (usize, &&[Prediction])| Group {
         title: title(channels),
-        about: left_out.iter().filter(|_| i == 0).cloned().collect(),
+        about: omitted.iter().filter(|_| i == 0).cloned().collect(),
         // Once is enough: spectra and autocorrelations of other experiments say the same.
         figures: channels.iter().map(|channel| figure(channel, i == 0)).collect(),
     };
@@ -51,11 +51,11 @@ fn difference(prediction: &Prediction, model: &[f64]) -> Vec<f64> {
 
 /// Two curves of one kind, the declared model below the repaired one; only one where they are the same.
 fn both(before: Vec<(f64, f64)>, after: Vec<(f64, f64)>, style: CurveStyle) -> Vec<Curve> {
-    let curve = |name: &str, points, ink| Curve { name: name.into(), points, style, ink, ..Curve::default() };
+    let curve = |name: &str, points, color| Curve { name: name.into(), points, style, color, ..Curve::default() };
     if before == after {
-        return vec![curve("declared model", before, Ink::Result)];
+        return vec![curve("declared model", before, Color::Result)];
     }
-    vec![curve("declared model", before, Ink::Measured), curve("repaired model", after, Ink::Result)]
+    vec![curve("declared model", before, Color::Measured), curve("repaired model", after, Color::Result)]
 }
 
 fn figure(prediction: &Prediction, whole: bool) -> Figure {
@@ -116,7 +116,7 @@ pub(super) fn predictions(diagnosis: &Diagnosis) -> Vec<Group> {
             name: "measured".into(),
             points: points(&p.measured),
             style: CurveStyle::Dots,
-            ink: Ink::Start,
+            color: Color::Start,
             ..Curve::default()
         }];
         curves.extend(both(points(&p.before), points(&p.after), CurveStyle::Line));

@@ -6,7 +6,7 @@ use mops_core::{DistributionReport, MonteCarloReport, ShareReport};
 
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;
-use super::super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::super::plot::{Color, Curve, CurveStyle, Plot};
 use super::super::sensitivity::sentences;
 use super::{Section, parameters};
 use crate::numbers::{labelled, number, significant};
@@ -108,7 +108,7 @@ fn figures(found: &MonteCarloReport, criterion: &DistributionReport, index: usiz
             ends.map(|ends| Curve {
                 name: "demand".into(),
                 points: ends.map(|x| (x, demand)).to_vec(),
-                ink: Ink::Demand,
+                color: Color::Demand,
                 may_leave: true,
                 ..Curve::default()
             })
@@ -144,7 +144,7 @@ fn histogram(criterion: &DistributionReport, sorted: &[f64]) -> Plot {
     points.push((high, 0.0));
     let highest = bins.iter().copied().max().unwrap_or(1) as f64;
     let mut curves = vec![Curve { name: "samples per bin".into(), points, ..Curve::default() }];
-    curves.extend(uprights(criterion, highest));
+    curves.extend(parallel_axes(criterion, highest));
     Plot {
         title: format!("Histogram of {} in case {}", criterion.of.criterion, criterion.of.case),
         x_label: labelled(&criterion.of.criterion, &criterion.of.unit),
@@ -155,19 +155,19 @@ fn histogram(criterion: &DistributionReport, sorted: &[f64]) -> Plot {
 }
 
 /// The demand and the value without uncertainty, as lines from bottom to top.
-fn uprights(criterion: &DistributionReport, top: f64) -> Vec<Curve> {
-    let line = |name: &str, x: f64, ink: Ink, style: CurveStyle| Curve {
+fn parallel_axes(criterion: &DistributionReport, top: f64) -> Vec<Curve> {
+    let line = |name: &str, x: f64, color: Color, style: CurveStyle| Curve {
         name: name.into(),
         points: vec![(x, 0.0), (x, top)],
-        ink,
+        color,
         style,
         may_leave: true,
-        of: None,
+        front_point: None,
     };
-    let demand = criterion.of.demand.map(|x| line("demand", x, Ink::Demand, CurveStyle::Line));
+    let demand = criterion.of.demand.map(|x| line("demand", x, Color::Demand, CurveStyle::Line));
     let nominal = Some(criterion.of.nominal)
         .filter(|x| x.is_finite())
-        .map(|x| line("without uncertainty", x, Ink::Start, CurveStyle::Dashed));
+        .map(|x| line("without uncertainty", x, Color::Start, CurveStyle::Dashed));
     demand.into_iter().chain(nominal).collect()
 }
 
@@ -179,7 +179,7 @@ fn ecdf(criterion: &DistributionReport, sorted: &[f64]) -> Plot {
     let points =
         kept.flat_map(|i| [(sorted[i], i as f64 / n as f64), (sorted[i], (i + 1) as f64 / n as f64)]).collect();
     let mut curves = vec![Curve { name: "share of samples up to".into(), points, ..Curve::default() }];
-    curves.extend(uprights(criterion, 1.0));
+    curves.extend(parallel_axes(criterion, 1.0));
     Plot {
         title: format!("Distribution of {} in case {}", criterion.of.criterion, criterion.of.case),
         x_label: labelled(&criterion.of.criterion, &criterion.of.unit),

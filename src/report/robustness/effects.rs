@@ -5,7 +5,7 @@ use mops_core::{EffectReport, EffectsReport, Estimated, GlobalSensitivityReport,
 
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;
-use super::super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::super::plot::{Color, Curve, CurveStyle, Plot};
 use super::super::sensitivity::sentences;
 use super::{Section, parameters};
 use crate::numbers::{labelled, significant};
@@ -85,7 +85,7 @@ fn plane(criterion: &EffectsReport) -> Figure {
         name: effect.parameter.clone(),
         points: vec![(effect.magnitude.unwrap_or(f64::NAN), effect.deviation.unwrap_or(f64::NAN))],
         style: CurveStyle::Dots,
-        ink: Ink::Series(i),
+        color: Color::Series(i),
         ..Curve::default()
     };
     let longest = criterion.effects.iter().filter_map(|e| e.magnitude).fold(0.0, f64::max);
@@ -93,7 +93,7 @@ fn plane(criterion: &EffectsReport) -> Figure {
         name: "as large as the magnitude".into(),
         points: vec![(0.0, 0.0), (longest, longest)],
         style: CurveStyle::Dashed,
-        ink: Ink::Faint,
+        color: Color::Faint,
         ..Curve::default()
     };
     let plot = Plot {
@@ -112,7 +112,7 @@ fn plane(criterion: &EffectsReport) -> Figure {
 /// Shares with their intervals, side by side; the parameters are counted along x.
 #[allow(clippy::cast_precision_loss)]
 fn shares(criterion: &EffectsReport) -> Figure {
-    let of = |name: &str, ink: Ink, aside: f64, pick: fn(&EffectReport) -> Option<Estimated>| {
+    let of = |name: &str, color: Color, aside: f64, pick: fn(&EffectReport) -> Option<Estimated>| {
         let known: Vec<(f64, Estimated)> = criterion
             .effects
             .iter()
@@ -123,13 +123,13 @@ fn shares(criterion: &EffectsReport) -> Figure {
         let bars = known.iter().flat_map(bar).collect();
         let dots = known.iter().map(|(x, share)| (*x, share.value)).collect();
         [
-            Curve { points: bars, ink, ..Curve::default() },
-            Curve { name: name.into(), points: dots, style: CurveStyle::Dots, ink, ..Curve::default() },
+            Curve { points: bars, color, ..Curve::default() },
+            Curve { name: name.into(), points: dots, style: CurveStyle::Dots, color, ..Curve::default() },
         ]
     };
     let mut curves = Vec::new();
-    curves.extend(of("alone", Ink::Result, -0.08, |e| e.first));
-    curves.extend(of("alone and with others", Ink::Measured, 0.08, |e| e.total));
+    curves.extend(of("alone", Color::Result, -0.08, |e| e.first));
+    curves.extend(of("alone and with others", Color::Measured, 0.08, |e| e.total));
     let names: Vec<String> =
         criterion.effects.iter().enumerate().map(|(i, e)| format!("{} {}", i + 1, e.parameter)).collect();
     let plot = Plot {

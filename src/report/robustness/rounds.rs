@@ -5,7 +5,7 @@ use mops_core::RobustReport;
 
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;
-use super::super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::super::plot::{Color, Curve, CurveStyle, Plot};
 use super::super::sensitivity::sentences;
 use super::{Section, parameters, worst};
 use crate::numbers::{number, significant};
@@ -72,21 +72,21 @@ fn rounds(found: &RobustReport) -> Markup {
 
 #[allow(clippy::cast_precision_loss)]
 fn bounds(found: &RobustReport) -> Figure {
-    let curve = |name: &str, ink: Ink, style: CurveStyle, of: &dyn Fn(&mops_core::RoundReport) -> f64| Curve {
+    let curve = |name: &str, color: Color, style: CurveStyle, of: &dyn Fn(&mops_core::RoundReport) -> f64| Curve {
         name: name.into(),
         points: found.rounds.iter().enumerate().map(|(i, round)| ((i + 1) as f64, of(round))).collect(),
-        ink,
+        color,
         style,
         ..Curve::default()
     };
     let mut curves = vec![
-        curve("worst found in the box", Ink::Measured, CurveStyle::Line, &|round| round.found),
-        curve("", Ink::Measured, CurveStyle::Dots, &|round| round.found),
-        curve("worst over the cases at hand", Ink::Result, CurveStyle::Line, &|round| round.for_cases),
-        curve("", Ink::Result, CurveStyle::Dots, &|round| round.for_cases),
+        curve("worst found in the box", Color::Measured, CurveStyle::Line, &|round| round.found),
+        curve("", Color::Measured, CurveStyle::Dots, &|round| round.found),
+        curve("worst over the cases at hand", Color::Result, CurveStyle::Line, &|round| round.for_cases),
+        curve("", Color::Result, CurveStyle::Dots, &|round| round.for_cases),
     ];
     if found.rounds.iter().any(|round| round.violation_found > 0.0) {
-        curves.push(curve("violation found in the box", Ink::Demand, CurveStyle::Dashed, &|round| {
+        curves.push(curve("violation found in the box", Color::Demand, CurveStyle::Dashed, &|round| {
             round.violation_found.max(0.0)
         }));
     }

@@ -8,7 +8,7 @@ use mops_core::{CoordinateReport, Problem, UncertainReport, WorstCaseReport, Wor
 use super::super::Report;
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;
-use super::super::plot::{Curve, CurveStyle, Ink, Level, Plot};
+use super::super::plot::{Color, Curve, CurveStyle, Level, Plot};
 use super::super::sampling;
 use super::super::sensitivity::sentences;
 use super::{Section, parameters};
@@ -88,24 +88,24 @@ fn responses(report: &Report<'_>, found: &WorstCaseReport) -> Vec<Figure> {
         let Some(row) = study.rows.iter().find(here) else { continue };
         let mut tuners = study.start();
         let analyses = [
-            ("without uncertainty", CurveStyle::Dashed, Ink::Start, false),
-            ("at worst", CurveStyle::Line, Ink::Result, true),
+            ("without uncertainty", CurveStyle::Dashed, Color::Start, false),
+            ("at worst", CurveStyle::Line, Color::Result, true),
         ]
-        .map(|(name, style, ink, moved)| {
+        .map(|(name, style, color, moved)| {
             if moved {
                 tuners[first..].iter_mut().zip(&worst.at).for_each(|(value, at)| *value = at.value);
             }
-            (name, style, ink, problem.analyse_all(row.job, &tuners, None).ok())
+            (name, style, color, problem.analyse_all(row.job, &tuners, None).ok())
         });
         let signals = &study.models[study.jobs[row.job].model].1.interface().signals;
         for signal in row.criterion.signals() {
-            let curve = |(name, style, ink, analysis): &(&str, CurveStyle, Ink, Option<mops_core::Analysis>)| {
+            let curve = |(name, style, color, analysis): &(&str, CurveStyle, Color, Option<mops_core::Analysis>)| {
                 let trace = analysis.as_ref()?.response()?.trace(&signal)?;
                 Some(Curve {
                     name: (*name).into(),
                     points: sampling::points(trace),
                     style: *style,
-                    ink: *ink,
+                    color: *color,
                     ..Curve::default()
                 })
             };
@@ -139,7 +139,7 @@ fn slices(worst: &WorstReport) -> Vec<Figure> {
             name: "worst".into(),
             points: vec![(at.value, worst.value)],
             style: CurveStyle::Dots,
-            ink: Ink::Demand,
+            color: Color::Demand,
             ..Curve::default()
         };
         let plot = Plot {

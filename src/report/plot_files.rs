@@ -12,13 +12,13 @@ use crate::numbers::file_name;
 /// The file that lists the pictures of a folder, a name without ending in each line.
 const LIST: &str = ".pictures";
 
-/// Pictures that an earlier report left in its folder.
-pub(super) struct Pictures {
+/// PlotFiles that an earlier report left in its folder.
+pub(super) struct PlotFiles {
     folder: PathBuf,
     names: BTreeSet<String>,
 }
 
-impl Pictures {
+impl PlotFiles {
     /// Those of a folder; none where nothing was noted.
     pub(super) fn of(folder: &Path) -> Self {
         let list = files::read(&folder.join(LIST)).unwrap_or_default();
@@ -70,7 +70,7 @@ mod tests {
         fs::create_dir(&plots).unwrap();
         fs::write(folder.path().join("outside.svg"), "").unwrap();
         let draw = |names: &[&str]| {
-            let earlier = Pictures::of(&plots);
+            let earlier = PlotFiles::of(&plots);
             earlier.note(names.iter().copied()).unwrap();
             for name in names {
                 ["svg", "png"].iter().for_each(|end| fs::write(at(&format!("{name}.{end}")), "").unwrap());
@@ -92,7 +92,7 @@ mod tests {
             assert_eq!(at(name).exists(), there, "{name}");
         }
         // Of one that was killed while it drew, the next one knows all.
-        Pictures::of(&plots).note(["d"].into_iter()).unwrap();
+        PlotFiles::of(&plots).note(["d"].into_iter()).unwrap();
         fs::write(at("d.svg"), "").unwrap();
         fs::write(at(LIST), fs::read_to_string(at(LIST)).unwrap() + "../outside\n/etc/passwd\n").unwrap();
         draw(&["c"]);
