@@ -1,4 +1,4 @@
-//! Start and reported point beside each other: a signal in both, and measurements with them.
+//! Plots of a signal at the initial guess and at the reported point, with measurements if there are any.
 
 use mops_core::{Analysis, Channel, Failure, Row, Trace, Variable};
 
@@ -6,23 +6,27 @@ use super::plot::{Band, Color, Curve, CurveStyle, Level, Plot};
 use super::sampling;
 use crate::numbers::{labelled, with_unit};
 
-/// The two analyses that are compared.
-pub(super) struct Both {
+/// Analyses at the initial guess and at the reported point.
+pub(super) struct Comparison {
     pub(super) start: Result<Analysis, Failure>,
     pub(super) best: Result<Analysis, Failure>,
     pub(super) best_name: &'static str,
 }
 
-impl Both {
-    /// Sentences for the simulations that failed.
+impl Comparison {
+    /// Returns a sentence for each failed simulation.
     pub(super) fn failures(&self) -> Vec<String> {
-        let told = |at: &str, analysis: &Result<Analysis, Failure>| {
+        let sentence = |at: &str, analysis: &Result<Analysis, Failure>| {
             analysis
                 .as_ref()
                 .err()
                 .map(|failure| format!("No response at the {at}: the simulation failed ({failure})."))
         };
-        told("start values", &self.start).into_iter().chain(told(self.best_name, &self.best)).collect()
+        let start = sentence("initial guess", &self.start);
+        let mut all: Vec<String> = start.into_iter().chain(sentence(self.best_name, &self.best)).collect();
+        // Without a solver, both points are the initial guess.
+        all.dedup();
+        all
     }
 
     fn curves(&self, signal: &str) -> Vec<Curve> {
@@ -37,11 +41,11 @@ impl Both {
                 ..Curve::default()
             })
         };
-        let start = curve("start", &self.start, CurveStyle::Dashed, Color::Start);
+        let start = curve("initial guess", &self.start, CurveStyle::Dashed, Color::Start);
         start.into_iter().chain(curve(self.best_name, &self.best, CurveStyle::Line, Color::Result)).collect()
     }
 
-    /// A signal at both points.
+    /// Returns the plot of a signal at both points.
     pub(super) fn response(&self, signal: &Variable, case: &str, rows: &[&Row]) -> Plot {
         Plot {
             title: format!("{} in case {case}", signal.name),
@@ -51,7 +55,7 @@ impl Both {
         }
     }
 
-    /// The levels that criteria look at: limits of demands, edges of bands.
+    /// Returns the levels of criteria on a signal: limits of demands, edges of bands.
     fn levels(&self, signal: &str, rows: &[&Row]) -> Vec<Level> {
         let Ok(analysis) = &self.best else { return Vec::new() };
         let marks = rows.iter().flat_map(|row| row.criterion.marks(row.demand.limit(), analysis));
@@ -59,7 +63,7 @@ impl Both {
         of_signal.map(|mark| Level { name: mark.label, value: mark.level }).collect()
     }
 
-    /// A measured signal at both points, and the measurement.
+    /// Returns the plot of a measured signal: the measurement, and the simulation at both points.
     pub(super) fn fit(&self, channel: &Channel, signal: &Variable, case: &str) -> Plot {
         let points = channel.times.iter().copied().zip(channel.values.iter().copied()).collect();
         let mut curves = vec![Curve {
@@ -73,7 +77,7 @@ impl Both {
         Plot { title: format!("{} in experiment {case}", signal.name), curves, ..over_time(signal) }
     }
 
-    /// Measured - simulated at the reported point; `None` where that failed.
+    /// Returns the plot of measured - simulated at the reported point; `None` if the simulation failed.
     pub(super) fn residual(&self, channel: &Channel, signal: &Variable, case: &str) -> Option<Plot> {
         let trace = trace(&self.best, &signal.name)?;
         let simulated = trace.sample(&channel.times);
@@ -93,7 +97,7 @@ impl Both {
         Some(Plot {
             title: format!("residual of {} in experiment {case}", signal.name),
             curves: vec![zero, curve],
-            // Over the whole simulation, as the plot above.
+            // The range of the plot above.
             x_range: Some(ends),
             bands: channel.noise.map(band).into_iter().collect(),
             ..over_time(signal)

@@ -1,4 +1,4 @@
-//! The legend of a plot, and dots without those that cover each other.
+//! Legend and markers of a plot.
 
 use std::collections::HashSet;
 
@@ -7,16 +7,16 @@ use super::plot::{Color, CurveStyle, Plot};
 use super::scene::{ADVANCE, Anchor, Mark, SIZE, Scene};
 
 impl Scene {
-    /// Dots, of those that cover each other only one.
+    /// Draws dots; of coinciding dots only one.
     pub(super) fn dots(&mut self, points: impl Iterator<Item = Point>, color: Color) {
         let mut seen = HashSet::new();
         let centres: Vec<Point> = points.filter(|p| seen.insert(p.map(|v| v.round() as i64))).collect();
-        // Few dots are drawn larger than many.
+        // Dots are larger if there are few.
         let radius = if centres.len() < 60 { 2.4 } else { 1.5 };
         self.marks.push(Mark::Dots { centres, color, radius });
     }
 
-    /// A cross.
+    /// Draws a cross.
     pub(super) fn cross(&mut self, at: Point, color: Color) {
         for turn in [-1.0, 1.0] {
             let points = vec![[at[0] - 4.0, at[1] - 4.0 * turn], [at[0] + 4.0, at[1] + 4.0 * turn]];
@@ -24,7 +24,7 @@ impl Scene {
         }
     }
 
-    /// The legend, in rows; returns where it ends.
+    /// Draws the legend in rows, the first at `row`. Returns the position of its end.
     pub(super) fn legend(&mut self, plot: &Plot, mut row: f64) -> f64 {
         let bands = plot.bands.iter().map(|band| (band.name.as_str(), Color::Band, CurveStyle::Line));
         let curves = plot.curves.iter().filter(|c| !c.points.is_empty()).map(|c| (c.name.as_str(), c.color, c.style));

@@ -1,4 +1,4 @@
-//! The page: one HTML file that needs no network. Scripts sort its tables and move about in a front; it reads well without.
+//! Page of the report: one HTML file without external resources. Scripts only sort tables and select points of a front.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use mops_core::{CalibrationReport, Task};
@@ -11,10 +11,10 @@ use super::{
 };
 use crate::numbers::significant;
 
-/// What the page shows beside the tables.
+/// Plots of the page, by section.
 pub(super) struct Plots {
     pub(super) responses: Vec<Group>,
-    /// A sentence where responses are left out.
+    /// Sentence on omitted responses.
     pub(super) omitted: Option<String>,
     pub(super) convergence: Option<Group>,
     pub(super) front: Option<Group>,
@@ -25,16 +25,16 @@ pub(super) struct Plots {
     pub(super) uncertainty: Option<Group>,
 }
 
-/// The script that makes tables sortable.
+/// Script that makes tables sortable.
 const TABLES: &str = include_str!("tables.js");
 
-/// Wraps HTML as a page of its own in the style of the reports: one file, light and dark, its tables sortable.
+/// Wraps HTML into a page in the style of the reports: one file, light and dark scheme, sortable tables.
 #[must_use]
 pub fn page(title: &str, body: &str) -> String {
     document(title, PreEscaped(body.to_owned())).into_string()
 }
 
-/// The frame that all pages have: one file, light and dark, its tables sortable.
+/// Returns a page with the common head: one file, light and dark scheme, sortable tables.
 pub(super) fn document(title: &str, body: Markup) -> Markup {
     html! {
         (DOCTYPE)
@@ -52,7 +52,7 @@ pub(super) fn document(title: &str, body: Markup) -> Markup {
     }
 }
 
-/// The whole page.
+/// Returns the page of a report.
 pub(super) fn of(report: &Report<'_>, plots: &Plots) -> Markup {
     let outcome = report.outcome;
     let warnings = verdict::warnings(report);
@@ -104,30 +104,30 @@ pub(super) fn of(report: &Report<'_>, plots: &Plots) -> Markup {
                     }))
                 }
                 @if results.sensitivity.is_some() || !results.excitation.is_empty() {
-                    (section("What the data can tell", told(results, plots)))
+                    (section(sensitivity::IDENTIFIABILITY, identifiability(results, plots)))
                 }
             }
             @if !outcome.failures.is_empty() { (section("Failures", calibration::failures(&outcome.failures))) }
             (section("Study", html! {
                 details {
-                    summary { "The study file this page belongs to" }
+                    summary { "Study file with its settings" }
                     pre tabindex="0" { code { (report.text) } }
                 }
             }))
         }
-        footer { "Written by mops " (outcome.mops) ". The numbers of this page are in result.json, its plots in the folder plots." }
+        footer { "Written by mops " (outcome.mops) ". All numbers are in result.json, the plots in the folder plots." }
         @if plots.front.is_some() { @for text in front::SCRIPTS { script { (PreEscaped(text)) } } }
     };
     document(&format!("{}: {}", outcome.study, task(outcome.task)), body)
 }
 
-/// What the data of a calibration tell of its tuners, and how rich its inputs are.
-fn told(results: &CalibrationReport, plots: &Plots) -> Markup {
+/// Returns the identifiability of the tuners of a calibration, and the excitation of its inputs.
+fn identifiability(results: &CalibrationReport, plots: &Plots) -> Markup {
     html! {
         @if let Some(found) = &results.sensitivity { (sensitivity::section(found)) }
         h3 { "Inputs" }
         @if results.excitation.is_empty() {
-            p { "No experiment is driven by an input: what there is to learn comes from the start values." }
+            p { "No experiment is driven by an input: all information comes from the initial states." }
         } @else {
             (excitation::inputs(&results.excitation))
             @if let Some(group) = &plots.excitation { (figures(group)) }
@@ -135,7 +135,7 @@ fn told(results: &CalibrationReport, plots: &Plots) -> Markup {
     }
 }
 
-/// A table that can be scrolled sideways where the screen is narrow.
+/// Wraps a table for horizontal scrolling on narrow screens.
 pub(super) fn scrolling(name: &str, table: Markup) -> Markup {
     html! { div class="wide" role="region" tabindex="0" aria-label=(name) { (table) } }
 }
@@ -164,7 +164,7 @@ fn header(report: &Report<'_>) -> Markup {
                 } @else {
                     (fact("Solver", &verdict::solver(outcome)))
                     (fact("Evaluations", &outcome.evaluations.to_string()))
-                    @if let Some(reused) = outcome.reused { (fact("Known before", &reused.to_string())) }
+                    @if let Some(reused) = outcome.reused { (fact("Reused evaluations", &reused.to_string())) }
                 }
                 (fact("Simulations", &outcome.simulations.to_string()))
                 (fact("Time", &format!("{} s", significant(outcome.seconds, 3))))
@@ -185,7 +185,7 @@ fn fact(name: &str, value: &str) -> Markup {
 fn task(task: Task) -> &'static str {
     match task {
         Task::Design => "Design",
-        Task::Pareto => "Front",
+        Task::Pareto => "Pareto front",
         Task::Calibration => "Calibration",
         Task::Excitation => "Excitation",
         Task::Sensitivity => "Sensitivity",
@@ -215,7 +215,7 @@ fn figure(figure: &Figure) -> Markup {
     }
 }
 
-/// A text in which names stand between backticks.
+/// Returns a text as markup; names between backticks become code.
 pub(super) fn rich(text: &str) -> Markup {
     let parts: Vec<&str> = text.split('`').collect();
     if parts.len().is_multiple_of(2) {

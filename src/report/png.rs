@@ -1,4 +1,4 @@
-//! A scene as a PNG: strokes by their distance from every pixel, letters by the bundled font, so that it needs no system font.
+//! Scene as a PNG: strokes with anti-aliasing by distance, letters in the bundled font, so that no system font is needed.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -19,14 +19,14 @@ use mops_core::math;
 /// Pixels per unit of the scene.
 const SCALE: f64 = 2.0;
 const FONT: &str = "DejaVu Sans";
-/// Height of a line of DejaVu Sans (ascender to descender), which plotters calls the size of a font, by its em.
+/// Line height of DejaVu Sans (ascender to descender), which plotters calls the size of a font, in units of the em.
 const LINE: f64 = 1.164;
 
-/// Draws the scene into a file.
+/// Writes the scene into a file.
 pub(super) fn write(scene: &Scene, path: &Path) -> io::Result<()> {
     static FONT_ONCE: Once = Once::new();
     FONT_ONCE.call_once(|| {
-        // Fails only for bytes that are no font.
+        // Fails only if the bytes are not a font.
         let _ = register_font(FONT, FontStyle::Normal, include_bytes!("../../assets/DejaVuSans.ttf"));
     });
     let [width, height] = SIZE.map(|length| (SCALE * length) as u32);
@@ -84,7 +84,7 @@ fn draw(paper: &mut BitMapBackend<'_>, mark: &Mark) -> io::Result<()> {
             let font = if *upwards { font.transform(FontTransform::Rotate270) } else { font };
             let rgb = rgb_color(*color);
             let style = TextStyle::from(font).color(&rgb).pos(Pos::new(h_pos, VPos::Top));
-            // plotters puts the line on which letters stand half a font size below the top; ours lies 0.35 em below the middle.
+            // plotters places the baseline half a font size below the top; ours is 0.35 em below the middle.
             let lift = SCALE * size * (0.35 - 0.5 * LINE);
             let [x, y] = at.map(|v| SCALE * v);
             let [x, y] = if *upwards { [x + lift, y] } else { [x, y + lift] };
@@ -98,10 +98,10 @@ fn rgb_color(color: Color) -> RGBColor {
     RGBColor(r, g, b)
 }
 
-/// Paints every pixel within `half` of one of the segments, those at the edge in part.
+/// Paints the pixels within `half` of the segments, with anti-aliasing at the edge.
 fn stroke(paper: &mut BitMapBackend<'_>, segments: &[[Point; 2]], half: f64, color: Color) -> io::Result<()> {
     let half = SCALE * half;
-    // Corners of pixels to their middles.
+    // From pixel corners to pixel centres.
     let segments: Vec<[Point; 2]> = segments.iter().map(|s| s.map(|p| p.map(|v| SCALE * v - 0.5))).collect();
     let reach = |points: &[Point], i: usize| {
         let (low, high) = points.iter().fold((f64::MAX, 0.0f64), |(low, high), p| (low.min(p[i]), high.max(p[i])));
@@ -128,7 +128,7 @@ fn stroke(paper: &mut BitMapBackend<'_>, segments: &[[Point; 2]], half: f64, col
     Ok(())
 }
 
-/// The parts of a line that a dashed pen draws.
+/// Returns the parts of a dashed line.
 fn dashes(points: &[Point], on: f64, off: f64) -> Vec<Vec<Point>> {
     let mut parts: Vec<Vec<Point>> = points.first().map(|p| vec![*p]).into_iter().collect();
     let (mut drawing, mut left) = (true, on);
@@ -140,7 +140,7 @@ fn dashes(points: &[Point], on: f64, off: f64) -> Vec<Vec<Point>> {
             at += left;
             let p = [a[0] + at / length * (b[0] - a[0]), a[1] + at / length * (b[1] - a[1])];
             if drawing {
-                parts.last_mut().expect("a line that is drawn has a part").push(p);
+                parts.last_mut().expect("a drawn line has a part").push(p);
             } else {
                 parts.push(vec![p]);
             }
@@ -149,7 +149,7 @@ fn dashes(points: &[Point], on: f64, off: f64) -> Vec<Vec<Point>> {
         }
         left -= length - at;
         if drawing {
-            parts.last_mut().expect("a line that is drawn has a part").push(b);
+            parts.last_mut().expect("a drawn line has a part").push(b);
         }
     }
     parts

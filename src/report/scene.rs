@@ -1,4 +1,4 @@
-//! A plot laid out on paper: lines, dots, rectangles and texts at their points, the same for SVG and PNG.
+//! Layout of a plot: lines, dots, rectangles and texts with their coordinates, for SVG and PNG alike.
 
 use super::axis::Axis;
 use super::clip::{Frame, Point, visible};
@@ -7,13 +7,14 @@ use super::range::{drawable, equal, range_of, y_range};
 use super::space::{Point3, View};
 use super::surface::SCALE_WIDTH;
 
-/// Size of every plot; one unit is a pixel of a page at its natural size.
+/// Width and height of every plot; one unit is a CSS pixel.
 pub(super) const SIZE: Point = [560.0, 300.0];
-/// Size of the letters, and how wide one is on average.
+/// Font size.
 const LETTER: f64 = 12.0;
+/// Mean width of a letter.
 pub(super) const ADVANCE: f64 = 0.6 * LETTER;
 
-/// Something drawn.
+/// Element of a drawing.
 #[derive(Debug, Clone)]
 pub(super) enum Mark {
     Line {
@@ -31,12 +32,12 @@ pub(super) enum Mark {
         frame: Frame,
         color: Color,
     },
-    /// A box of a colour of its own, the same on every page.
+    /// Box of a fixed colour, independent of the colour scheme.
     Cell {
         frame: Frame,
         rgb: [u8; 3],
     },
-    /// `at` is the middle of the height, and the left end, the middle or the right end by `anchor`.
+    /// Text. `at` is at mid-height; horizontally at the left end, middle or right end, according to `anchor`.
     Text {
         text: String,
         at: Point,
@@ -45,19 +46,19 @@ pub(super) enum Mark {
         color: Color,
         upwards: bool,
     },
-    /// What belongs to a point of a front: a line, or a dot.
+    /// Marks of a point of a front: a line or a dot.
     FrontPoint {
         point: usize,
         marks: Vec<Self>,
     },
-    /// What has its points in a box that can be turned, as it is seen at first.
+    /// Mark in the box of a three-dimensional plot: its points in the box, and the mark in the initial view.
     InSpace {
         points: Vec<Point3>,
         mark: Box<Self>,
     },
 }
 
-/// Which end of a text stands at its place.
+/// Part of a text that its position refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -65,11 +66,11 @@ pub(super) enum Anchor {
     End,
 }
 
-/// All that is drawn, from back to front.
+/// Drawing: all marks, from back to front.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scene {
     pub(super) marks: Vec<Mark>,
-    /// From where the box of [`Mark::InSpace`] is seen.
+    /// View of the box of [`Mark::InSpace`].
     pub(super) view: Option<View>,
 }
 
@@ -91,7 +92,7 @@ impl Scene {
         };
         let shown = [x_range.unwrap_or([0.0, 1.0]), y_range.unwrap_or([0.0, 1.0])];
         let top = scene.legend(plot, 38.0) + 12.0;
-        // Wide enough for numbers of five letters.
+        // With margins for numbers of five letters.
         let room = [SIZE[0] - 54.0 - 5.0 * ADVANCE, SIZE[1] - 46.0 - top];
         let [x_shown, y_shown] = if plot.equal { equal(shown[0], shown[1], room[0] / room[1]) } else { shown };
         let x = x_axis(x_shown, plot.log_x);
@@ -162,13 +163,13 @@ impl Scene {
         for (at, name) in descending(levels) {
             let line = vec![[left, height(at)], [frame.to[0], height(at)]];
             scene.marks.push(Mark::Line { points: line, color: Color::Demand, width: 1.2, dashed: true });
-            // Labels of neighbouring levels are pushed apart.
+            // Labels of neighbouring levels must not overlap.
             lowest = if lowest.is_finite() { height(at).max(lowest + 14.0) } else { height(at) };
             scene.text(name, [frame.to[0] + 6.0, lowest], Anchor::Start, Color::Demand);
         }
         if y_range.is_none() {
             let middle = [0.5 * (left + frame.to[0]), 0.5 * (top + frame.to[1])];
-            scene.text("nothing to show", middle, Anchor::Middle, Color::Faint);
+            scene.text("no data", middle, Anchor::Middle, Color::Faint);
         }
         scene
     }
@@ -180,7 +181,7 @@ impl Scene {
         }
     }
 
-    /// Grid, frame, ticks and labels of both axes.
+    /// Draws grid, frame, ticks and labels of both axes.
     fn axes(&mut self, plot: &Plot, x: &Axis, y: &Axis, Frame { from, to }: Frame) {
         let line =
             |a: Point, b: Point, width| Mark::Line { points: vec![a, b], color: Color::Grid, width, dashed: false };
@@ -219,7 +220,7 @@ impl Scene {
     }
 }
 
-/// The axis along x: fewer ticks where their labels would touch.
+/// Returns the axis along x, with fewer ticks if their labels would touch.
 fn x_axis(range: [f64; 2], log: bool) -> Axis {
     let labels = |axis: &Axis| {
         ADVANCE * (longest(axis.ticks.iter().map(|(_, label)| label.as_str())) + 1.5) * axis.ticks.len() as f64

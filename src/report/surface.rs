@@ -1,4 +1,4 @@
-//! A surface seen from above: coloured by height, with lines of equal height and a scale.
+//! Surface plots: values as colours, with contour lines and a colour scale.
 
 use super::axis::Axis;
 use super::clip::{Frame, Point};
@@ -7,19 +7,22 @@ use super::plot::{Color, Surface};
 use super::range::{drawable, range_of};
 use super::scene::{Anchor, Mark, Scene};
 
-/// Room to the right of the picture for the scale.
+/// Width of the colour scale to the right of the frame.
 pub(super) const SCALE_WIDTH: f64 = 84.0;
 
-/// Number of colours, and of the lines between some of them.
+/// Number of colours.
 const COLORS: usize = 32;
+/// Number of intervals between contour lines.
 const LINES: usize = 8;
 
-/// Heights above this share of all others, or so many decades above the lowest, are drawn as if they were there: what
-/// blows up next to a failure would flatten the rest.
+/// Quantile of the values at which the colour scale ends. Values above it have the same colour, as large values next to a
+/// failure would compress the scale.
 const HIGHEST: f64 = 0.9;
+/// Largest number of decades of a logarithmic colour scale.
 const DECADES: f64 = 4.0;
 
-/// Red, green and blue from low to high; their lightness grows evenly, also for readers who see fewer colours.
+/// Red, green and blue of the colour scale, from low to high values. Lightness increases evenly, also for colour-blind
+/// readers.
 /// Source: S. van der Walt, N. Smith, viridis, Matplotlib 1.5 (2015), every 32nd colour.
 const VIRIDIS: [[f64; 3]; 9] = [
     [68.0, 1.0, 84.0],
@@ -33,7 +36,7 @@ const VIRIDIS: [[f64; 3]; 9] = [
     [253.0, 231.0, 37.0],
 ];
 
-/// The colour of a height between 0 and 1.
+/// Returns the colour of a height from 0 to 1.
 fn viridis(height: f64) -> [u8; 3] {
     let at = height.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
     let i = (at as usize).min(VIRIDIS.len() - 2);
@@ -42,12 +45,12 @@ fn viridis(height: f64) -> [u8; 3] {
 }
 
 impl Surface {
-    /// Range of a coordinate, or of its logarithm.
+    /// Returns the range of a coordinate, or of its logarithm.
     pub(super) fn range(values: &[f64], log: bool) -> Option<[f64; 2]> {
         range_of(values.iter().filter_map(|&v| drawable(v, log)))
     }
 
-    /// Range of the heights that are told apart, or of their logarithms.
+    /// Returns the range of the colour scale: of the values, or of their logarithms.
     fn heights(&self) -> Option<[f64; 2]> {
         let mut all: Vec<f64> = self.values.iter().flatten().filter_map(|&v| drawable(v, self.log)).collect();
         all.sort_by(f64::total_cmp);
@@ -58,7 +61,7 @@ impl Surface {
 }
 
 impl Scene {
-    /// Draws the surface into the frame, and its scale beside it.
+    /// Draws the surface into the frame, and its colour scale to the right.
     pub(super) fn surface(&mut self, surface: &Surface, x: &Axis, y: &Axis, frame: Frame) {
         let Some([low, high]) = surface.heights() else { return };
         let Frame { from: [left, top], to: [right, bottom] } = frame;
@@ -76,7 +79,7 @@ impl Scene {
             let [upper, lower] = edges(&ys, r);
             let mut c = 0;
             while c < row.len() {
-                // Neighbours of one colour are one box.
+                // Neighbours of equal colour are merged into one box.
                 let of = band(row[c]);
                 let end = (c..row.len()).find(|&k| band(row[k]) != of).unwrap_or(row.len());
                 if let Some(of) = of {
@@ -115,13 +118,13 @@ impl Scene {
     }
 }
 
-/// The place between grid points.
+/// Interpolates between grid points, at a fractional index.
 fn along(places: &[f64], index: f64) -> f64 {
     let i = (index as usize).min(places.len().saturating_sub(2));
     places[i] + (index - i as f64) * (places[i + 1] - places[i])
 }
 
-/// The line where heights cross a level, as points over x and y with gaps between its segments.
+/// Returns the contour line at a level, as points over x and y with gaps between the segments.
 pub(super) fn border(surface: &Surface, heights: &[Vec<f64>], level: f64) -> Vec<(f64, f64)> {
     let gap = (f64::NAN, f64::NAN);
     let place = |p: Point| (along(&surface.x, p[0]), along(&surface.y, p[1]));
@@ -140,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn failed_points_are_left_blank_and_one_high_point_does_not_flatten_the_rest() {
+    fn failed_points_are_left_blank_and_one_high_point_does_not_compress_the_scale() {
         let mut values: Vec<Vec<f64>> = (0..10).map(|r| (0..10).map(|c| f64::from(r * c)).collect()).collect();
         values[9][9] = 1e9;
         values[0][0] = f64::NAN;

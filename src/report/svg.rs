@@ -1,4 +1,4 @@
-//! A scene as an SVG document: light colours as attributes, so that it stands alone, and classes for the page's colours.
+//! Scene as an SVG document: light colours as attributes for standalone use, and classes for the colours of a page.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use super::plot::Color;
 use super::scene::{Anchor, Mark, SIZE, Scene};
 use super::space::View;
 
-/// The document, with a title and a description for readers that cannot see it.
+/// Returns the document, with a title and a description for screen readers.
 pub(super) fn document(scene: &Scene, title: &str, description: &str) -> String {
     let [width, height] = SIZE;
     let markup = html! {
@@ -25,10 +25,10 @@ pub(super) fn document(scene: &Scene, title: &str, description: &str) -> String 
     markup.into_string()
 }
 
-/// From where a box is seen, as the page that turns it reads it: turn, height, scale, middle.
+/// Returns the view of a three-dimensional plot for the script of the page: azimuth, elevation, scale, centre.
 fn view(scene: &Scene) -> Option<String> {
-    let View { turn, height, scale, middle: [x, y] } = scene.view?;
-    Some(format!("{turn} {height} {scale} {x} {y}"))
+    let View { azimuth, elevation, scale, centre: [x, y] } = scene.view?;
+    Some(format!("{azimuth} {elevation} {scale} {x} {y}"))
 }
 
 fn element(mark: &Mark) -> Markup {
@@ -50,7 +50,7 @@ fn element(mark: &Mark) -> Markup {
             };
             html! { g class=(kind) data-point=(point) { @for mark in marks { (element(mark)) } } }
         }
-        // A line of no length with round ends is a dot, and the shortest way to write one.
+        // A zero-length line with round ends is the shortest dot.
         Mark::Dots { centres, color, radius } => html! {
             path class=(class(*color)) d=(dots(centres)) fill="none" stroke=(hex(*color)) stroke-width=(2.0 * radius) {}
         },
@@ -64,7 +64,7 @@ fn element(mark: &Mark) -> Markup {
                 shape-rendering="crispEdges" {}
         },
         Mark::Text { text, at: [x, y], anchor, size, color, upwards } => {
-            // The middle of the letters lies about a third of their size above the line they stand on.
+            // The middle of the letters is about a third of the font size above the baseline.
             let place = if *upwards {
                 format!("translate({} {}) rotate(-90)", short(x + 0.35 * size), short(*y))
             } else {
@@ -98,12 +98,12 @@ fn dots(centres: &[Point]) -> String {
     path
 }
 
-/// A coordinate to a tenth of a unit.
+/// Rounds a coordinate to a tenth of a unit.
 fn short(value: f64) -> f64 {
     (value * 10.0).round() / 10.0
 }
 
-/// Class of an color in the page's style sheet.
+/// Returns the class of a colour in the style sheet of a page.
 fn class(color: Color) -> String {
     match color {
         Color::Text => "text".to_owned(),
@@ -118,11 +118,11 @@ fn class(color: Color) -> String {
     }
 }
 
-/// Colours of curves of equal rank, told apart by readers with any colour vision.
+/// Colours of curves of equal rank, distinguishable with any colour vision.
 /// Source: M. Okabe, K. Ito, Color Universal Design (2008), darkened for lines on white.
 const SERIES: [[u8; 3]; 6] = [[0, 92, 170], [200, 80, 0], [0, 125, 90], [165, 70, 130], [60, 140, 190], [140, 110, 0]];
 
-/// Red, green and blue of an color on white paper.
+/// Returns red, green and blue of a colour on a white background.
 pub(super) fn rgb(color: Color) -> [u8; 3] {
     match color {
         Color::Text => [27, 31, 36],

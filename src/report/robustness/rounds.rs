@@ -1,4 +1,4 @@
-//! How a design against worst cases came about: rounds, bounds, cases that were added.
+//! Robust design against worst cases: rounds, bounds, added cases.
 
 use maud::{Markup, html};
 use mops_core::RobustReport;
@@ -16,8 +16,9 @@ pub(super) fn section(found: &RobustReport) -> Section {
         (parameters(&found.parameters))
         h3 { "Rounds" }
         p {
-            "Each round makes the best design for the cases at hand, and searches the box for worse ones. The worst over the "
-            "cases at hand can only rise; the worst that is found in the box is what the design of the round would do."
+            "Each round solves the design for the present cases, then searches the box for worse ones. The worst scaled value over "
+            "the present cases is a lower bound for the box if each solution is optimal; it rises as cases are added. The worst "
+            "value found in the box is that of the design of the round."
         }
         (rounds(found))
         h3 { "Worst cases of the design" }
@@ -39,9 +40,9 @@ fn rounds(found: &RobustReport) -> Markup {
                     tr {
                         th scope="col" class="number" { "round" }
                         th scope="col" class="number" { "cases" }
-                        th scope="col" class="number" { "worst of these" }
-                        th scope="col" class="number" { "worst found" }
-                        th scope="col" class="number" { "violation found" }
+                        th scope="col" class="number" { "worst over the cases" }
+                        th scope="col" class="number" { "worst found in the box" }
+                        th scope="col" class="number" { "violation in the box" }
                         th scope="col" class="number" { "evaluations" }
                         th scope="col" { "added" }
                     }
@@ -82,7 +83,7 @@ fn bounds(found: &RobustReport) -> Figure {
     let mut curves = vec![
         curve("worst found in the box", Color::Measured, CurveStyle::Line, &|round| round.found),
         curve("", Color::Measured, CurveStyle::Dots, &|round| round.found),
-        curve("worst over the cases at hand", Color::Result, CurveStyle::Line, &|round| round.for_cases),
+        curve("worst over the present cases", Color::Result, CurveStyle::Line, &|round| round.for_cases),
         curve("", Color::Result, CurveStyle::Dots, &|round| round.for_cases),
     ];
     if found.rounds.iter().any(|round| round.violation_found > 0.0) {
@@ -91,9 +92,9 @@ fn bounds(found: &RobustReport) -> Figure {
         }));
     }
     let plot = Plot {
-        title: "Worst scaled value by rounds".into(),
+        title: "Worst scaled value by round".into(),
         x_label: "round".into(),
-        y_label: "scaled value".into(),
+        y_label: "worst scaled value".into(),
         curves,
         ..Plot::default()
     };
