@@ -70,11 +70,14 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
         p {
             @if outcome.task == Task::Calibration {
                 "The objective is the sum of the scaled values (value / demand) of the calibration data: "
-                strong { (number(outcome.objective)) } @if two { ", at the initial guess " (number(outcome.start.objective)) } ". "
+                strong { (number(outcome.objective)) }
+                @if two { ", at the initial guess " (number(outcome.start.objective)) } ". "
             } @else {
                 "Scaled value = value / demand: 0 is ideal, at most 1 means the demand is met. "
             }
-            @if outcome.task == Task::Design { "The objective is the largest weighted scaled value among the minimised criteria." }
+            @if outcome.task == Task::Design {
+                "The objective is the largest weighted scaled value among the minimised criteria."
+            }
         }
         (scrolling("Criteria", rows_and_head))
     }

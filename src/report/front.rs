@@ -243,7 +243,8 @@ pub(super) fn table(report: &Report<'_>, found: &TradeOffs) -> Markup {
     };
     html! {
         p class="hint" hidden {
-            "Hover over a point or use the arrow keys; click or press Enter to select it, Escape to deselect. Click a column header to sort."
+            "Hover over a point or use the arrow keys; click or press Enter to select it, Escape to deselect. Click a column header "
+            "to sort."
             @if found.criteria.len() == 3 { " Drag the box, or press Shift and an arrow key, to rotate it." }
         }
         (scrolling("Points of the front", rows))

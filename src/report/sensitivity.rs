@@ -44,9 +44,9 @@ pub(super) fn section(found: &SensitivityReport) -> Markup {
             (scrolling("Correlation of the estimates", correlations(found)))
             h3 { "Directions" }
             p {
-                "Eigenvectors of the sensitivity matrix by decreasing eigenvalue, for relative changes of the tuners (relative to "
-                "the range for a value of 0). A joint change of the tuners along a direction with a small eigenvalue has little "
-                "effect. Derivatives are "
+                "Eigenvectors of the sensitivity matrix by decreasing eigenvalue, for relative changes of the tuners (relative "
+                "to the range for a value of 0). A joint change of the tuners along a direction with a small eigenvalue has "
+                "little effect. Derivatives are "
                 (if found.slopes == "tangents" { "exact (automatic differentiation)" } else { "central differences" })
                 "; they resolve singular values down to " (number(found.zero)) " of the largest."
                 @if measured {

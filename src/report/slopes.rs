@@ -36,10 +36,10 @@ pub(super) fn section(found: &SlopesReport, best: &str, one_case: bool) -> Marku
     };
     html! {
         p {
-            "First-order change of each scaled value at the " (best) " when a tuner is increased by 1 % of its range (1 % of its log "
-            "range for logarithmic tuners). Negative means better. Darker shades mark the tuners with the largest influence on a "
-            "criterion. At a non-differentiable point the value is one-sided; very large values indicate a discontinuity, such as "
-            "that of a settling time if the response just touches the band."
+            "First-order change of each scaled value at the " (best) " when a tuner is increased by 1 % of its range (1 % of its "
+            "log range for logarithmic tuners). Negative means better. Darker shades mark the tuners with the largest influence "
+            "on a criterion. At a non-differentiable point the value is one-sided; very large values indicate a discontinuity, "
+            "such as that of a settling time if the response just touches the band."
         }
         (scrolling("Sensitivities", table))
     }

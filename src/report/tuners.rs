@@ -43,7 +43,12 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
         }
     };
     html! {
-        p { "Filled mark: value" @if two { "; hollow mark: initial guess" } @if log { "; positions of logarithmic tuners are on a logarithmic scale" } "." }
+        p {
+            "Filled mark: value"
+            @if two { "; hollow mark: initial guess" }
+            @if log { "; positions of logarithmic tuners are on a logarithmic scale" }
+            "."
+        }
         (scrolling("Tuners", rows_and_head))
     }
 }

@@ -20,8 +20,8 @@ pub(super) fn section(found: &UncertaintyReport) -> Markup {
             h3 { "Likelihood profiles" }
             p {
                 "One parameter is fixed at a time, and all others are re-estimated. The signed root of the likelihood ratio is a "
-                "straight line if the model is linear; if it is curved, the first-order interval is inaccurate. The interval ends "
-                "where the root reaches the t quantile. A parameter that is not identifiable has no first-order interval."
+                "straight line if the model is linear; if it is curved, the first-order interval is inaccurate. The interval "
+                "ends where the root reaches the t quantile. A parameter that is not identifiable has no first-order interval."
             }
             (scrolling("Profiles", profiles(&found.profiles)))
         }
@@ -29,8 +29,8 @@ pub(super) fn section(found: &UncertaintyReport) -> Markup {
             h3 { "Bootstrap" }
             p {
                 "Residuals, scaled to the noise level of the standard errors, are resampled in blocks of " (blocks(bootstrap))
-                " samples, and all estimates are repeated. This is valid if the correlation time of the residuals is shorter than a "
-                "block. Intervals are percentiles of the replicates."
+                " samples, and all estimates are repeated. This is valid if the correlation time of the residuals is shorter "
+                "than a block. Intervals are percentiles of the replicates."
             }
             (scrolling("Bootstrap", replicates(bootstrap)))
         }

@@ -98,7 +98,10 @@ fn missing(diagnosis: &Diagnosis) -> Markup {
         @for dropped in &diagnosis.removed {
             p { "The term " (rich(&words::term(dropped))) " of the nominal model is not needed and was dropped." }
         }
-        p { "The recalibrated study is " code { "repaired.toml" } ", next to this page; it runs by itself. Its predictions are in the folder " code { "predictions" } "." }
+        p {
+            "The recalibrated study is " code { "repaired.toml" } ", next to this page; it runs by itself. Its predictions are in "
+            "the folder " code { "predictions" } "."
+        }
     }
 }
 

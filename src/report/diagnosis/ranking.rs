@@ -84,7 +84,10 @@ pub(super) fn steps(diagnosis: &Diagnosis) -> Markup {
     windows.dedup();
     html! {
         @if windows.len() > 1 {
-            p class="quiet" { "Each window has its own initial states. Errors over more windows are therefore smaller, and not comparable with errors over whole records." }
+            p class="quiet" {
+                "Each window has its own initial states. Errors over more windows are therefore smaller, and not comparable with "
+                "errors over whole records."
+            }
         }
         table {
             thead { tr { th scope="col" { "step" } th scope="col" { "effects in the model" } th scope="col" class="number" { "error / noise" } } }

@@ -117,7 +117,8 @@ fn an_unexplained_residual_with_an_effect_refers_to_the_place_in_the_nominal_mod
         "Even with <code>coulomb-friction</code>, the model lacks something that no tested effect explains: "
     ));
     assert!(page.contains(
-        ". In the nominal model, an unknown input in the equation of <code>x</code> explains 80 % of the residual above the noise."
+        ". In the nominal model, an unknown input in the equation of <code>x</code> explains 80 % of the residual above the \
+         noise."
     ));
 }
 

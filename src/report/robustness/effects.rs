@@ -17,9 +17,9 @@ pub(super) fn section(found: &GlobalSensitivityReport) -> Section {
         (parameters(&found.parameters))
         p {
             @if morris {
-                "Elementary effects over " (found.samples) " trajectories, each of which moves every parameter once by two thirds "
-                "of its range. The magnitude is the mean absolute effect per range; in the mean, effects of opposite sign cancel. "
-                "A standard deviation as large as the magnitude indicates nonlinearity or interactions. "
+                "Elementary effects over " (found.samples) " trajectories, each of which moves every parameter once by two "
+                "thirds of its range. The magnitude is the mean absolute effect per range; in the mean, effects of opposite "
+                "sign cancel. A standard deviation as large as the magnitude indicates nonlinearity or interactions. "
             } @else {
                 "Sobol indices: first-order share of the variance, and total share with interactions. Brackets contain "
                 (significant(100.0 * found.level, 3)) " % bootstrap intervals over " (found.samples) " samples. Estimates may be "

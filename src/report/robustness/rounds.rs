@@ -16,9 +16,9 @@ pub(super) fn section(found: &RobustReport) -> Section {
         (parameters(&found.parameters))
         h3 { "Rounds" }
         p {
-            "Each round solves the design for the present cases, then searches the box for worse ones. The worst scaled value over "
-            "the present cases is a lower bound for the box if each solution is optimal; it rises as cases are added. The worst "
-            "value found in the box is that of the design of the round."
+            "Each round solves the design for the present cases, then searches the box for worse ones. The worst scaled value "
+            "over the present cases is a lower bound on the worst case of any design, if the solution is optimal. It increases as "
+            "cases are added. The worst value found in the box is that of the design of the round."
         }
         (rounds(found))
         h3 { "Worst cases of the design" }
