@@ -9,7 +9,7 @@ use mops::models::furuta::{Furuta, FurutaPlant};
 use mops::models::kernel::drive::Drive;
 use mops::models::kernel::friction::Contact;
 use mops::models::kernel::{Driven, Dynamics, Sink, Step, Tolerance, integrate};
-use mops::{Along, Analysis, Case, DIRECTIONS, Dual, Input, Job, Model, Scalar, Work};
+use mops::{Analysis, Case, DIRECTIONS, Dual, Dual7, Input, Job, Model, Scalar, Work};
 
 const END: f64 = 3.0;
 const ABSOLUTE: f64 = 1e-8;
@@ -64,7 +64,7 @@ type Variant = (&'static str, Box<dyn Fn() -> f64>);
 /// Returns the variants: the hand-written method, then the kernel and the model in several configurations.
 fn variants() -> Vec<Variant> {
     let (viscous, sampled, dry) = (analysis(VISCOUS), analysis(VISCOUS), analysis(DRY));
-    let tangents: [Along; 8] =
+    let tangents: [Dual7; 8] =
         std::array::from_fn(|i| if i < DIRECTIONS { Dual::variable(VISCOUS[i], i) } else { VISCOUS[i].into() });
     let times: Vec<f64> = (0..SAMPLES).map(sample_time).collect();
     vec![

@@ -6,7 +6,7 @@ use std::error::Error;
 use std::path::Path;
 
 use mops::file::{self, Files};
-use mops::{Draft, Study, Task, TunerDraft};
+use mops::{Study, StudyBuilder, Task, TunerBuilder};
 
 /// Folder that data paths are relative to.
 const FOLDER: &str = "studies/furuta-swing";
@@ -83,16 +83,16 @@ impl Files for Data {
 pub fn study() -> Result<Study, Box<dyn Error>> {
     let catalogue = mops::catalogue();
     let models = vec![("rig".into(), file::model(&catalogue, MODEL_RIG)?)];
-    let draft = Draft {
+    let draft = StudyBuilder {
         name: "furuta-swing-repaired".into(),
         task: Task::Calibration,
         tuners: vec![
-            ("b".into(), TunerDraft::new(0.001133, 0.0005, 0.01).log()),
-            ("c".into(), TunerDraft::new(0.0004, 0.0001, 0.001).log()),
-            ("d".into(), TunerDraft::new(0.025267, 0.005, 0.1).log()),
-            ("ba".into(), TunerDraft::new(0.0001, 0.0, 0.001)),
-            ("ca".into(), TunerDraft::new(0.0005, 0.0, 0.006)),
-            ("cp".into(), TunerDraft::new(0.0001, 0.0, 0.001)),
+            ("b".into(), TunerBuilder::new(0.001133, 0.0005, 0.01).log()),
+            ("c".into(), TunerBuilder::new(0.0004, 0.0001, 0.001).log()),
+            ("d".into(), TunerBuilder::new(0.025267, 0.005, 0.1).log()),
+            ("ba".into(), TunerBuilder::new(0.0001, 0.0, 0.001)),
+            ("ca".into(), TunerBuilder::new(0.0005, 0.0, 0.006)),
+            ("cp".into(), TunerBuilder::new(0.0001, 0.0, 0.001)),
         ],
         cases: vec![
             file::experiment("horizontal", EXPERIMENT_HORIZONTAL, &Data)?,
@@ -103,7 +103,7 @@ pub fn study() -> Result<Study, Box<dyn Error>> {
             ("theta".into(), file::criterion(&catalogue, CRITERION_THETA)?),
         ],
         models,
-        ..Draft::default()
+        ..StudyBuilder::default()
     };
     Ok(draft.build()?)
 }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use mops_core::math;
-use mops_core::{AnalysisKind, Effect, Scope, Strength, Study};
+use mops_core::{AnalysisKind, Effect, EffectParameter, Scope, Study};
 use mops_discrepancy::{Diagnosis, Found, StrengthValue};
 
 use super::words;
@@ -142,7 +142,7 @@ fn effect(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diagnosis, f
     text.set(&["models", model, "effects", name], &value);
     let known = original.effects.iter().find(|effect| effect.name() == found.effect);
     for strength in &found.strengths {
-        let same_name = |known: &&Strength| known.name == strength.name;
+        let same_name = |known: &&EffectParameter| known.name == strength.name;
         let known = known.and_then(|effect| effect.strengths().iter().find(same_name));
         let tuner_name = format!("{name}.{}", strength.name);
         let own = diagnosis.starts.iter().filter(|(_, parameter, value)| *parameter == tuner_name && value.is_finite());
@@ -172,7 +172,7 @@ fn ports(model: &Arc<dyn mops_core::Model>) -> impl Iterator<Item = String> {
 
 /// Returns the tuner of an effect's parameter, within its physical bounds. `own` lists the values by experiment, if the
 /// parameter differs between experiments.
-fn tuner(strength: &StrengthValue, known: Option<&Strength>, own: &[(String, f64)]) -> String {
+fn tuner(strength: &StrengthValue, known: Option<&EffectParameter>, own: &[(String, f64)]) -> String {
     let bounds = known.map_or([f64::NEG_INFINITY, f64::INFINITY], |known| known.bounds);
     let largest =
         own.iter().map(|(_, value)| *value).chain([strength.value]).max_by(|a, b| a.abs().total_cmp(&b.abs()));

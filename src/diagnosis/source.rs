@@ -14,7 +14,7 @@ pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String 
     // N.B.: names in a study are untrusted text. In comments they are kept on one line, elsewhere they are literals.
     let about = line(&words::verdict(diagnosis).replace('`', ""));
     let name = study.get("study").and_then(|s| s.get("name")).and_then(Value::as_str).unwrap_or_default();
-    let mut imports = vec!["Draft", "Study", "Task", "TunerDraft"];
+    let mut imports = vec!["StudyBuilder", "Study", "Task", "TunerBuilder"];
     let tuners = entries(&study, "tuners").map(|(name, tuner)| entry(name, &self::tuner(tuner)));
     let tuners = items(tuners.collect(), 8);
     imports.extend(["Quantity", "Scale", "Unit"].iter().filter(|name| tuners.contains(&format!("{name}::"))));
@@ -70,14 +70,14 @@ impl Files for Data {{
 pub fn study() -> Result<Study, Box<dyn Error>> {{
     let catalogue = mops::catalogue();
     let models = {models};
-    let draft = Draft {{
+    let draft = StudyBuilder {{
         name: {name:?}.into(),
         task: Task::Calibration,
 {seed}        tuners: {tuners},
         cases: {cases},
         criteria: {criteria},
         models,
-        ..Draft::default()
+        ..StudyBuilder::default()
     }};
     Ok(draft.build()?)
 }}
@@ -155,7 +155,7 @@ fn unique(name: String, taken: &mut HashSet<String>) -> String {
 
 /// Returns the code of a tuner.
 fn tuner(tuner: &Value) -> String {
-    let Some(table) = tuner.as_table() else { return "TunerDraft::default()".to_owned() };
+    let Some(table) = tuner.as_table() else { return "TunerBuilder::default()".to_owned() };
     let number = |key: &str| match table.get(key) {
         Some(Value::Float(value)) => Some(*value),
         #[allow(clippy::cast_precision_loss)]
@@ -165,7 +165,7 @@ fn tuner(tuner: &Value) -> String {
     let log = table.get("scale").and_then(Value::as_str) == Some("log");
     let plain = table.keys().all(|key| ["start", "min", "max", "scale"].contains(&key.as_str()));
     if let (Some(start), Some(min), Some(max), true) = (number("start"), number("min"), number("max"), plain) {
-        return format!("TunerDraft::new({start:?}, {min:?}, {max:?}){}", if log { ".log()" } else { "" });
+        return format!("TunerBuilder::new({start:?}, {min:?}, {max:?}){}", if log { ".log()" } else { "" });
     }
     let quantity = |value: &Value| match value {
         Value::String(text) => format!("Quantity::parse({text:?})?"),
@@ -197,12 +197,12 @@ fn tuner(tuner: &Value) -> String {
             _ => format!("per_case: {value}"),
         });
     }
-    format!("TunerDraft {{ {}, ..TunerDraft::default() }}", fields.join(", "))
+    format!("TunerBuilder {{ {}, ..TunerBuilder::default() }}", fields.join(", "))
 }
 
 #[cfg(test)]
 mod tests {
-    use mops_core::KnownStudy;
+    use mops_core::CatalogueStudy;
     use mops_discrepancy::Removed;
 
     use super::super::made_up;
@@ -213,7 +213,7 @@ mod tests {
     #[test]
     fn the_example_is_the_program_for_the_swinging_pendulum() {
         let catalogue = crate::catalogue();
-        let Some(KnownStudy::Shipped(shipped)) = catalogue.study("furuta-swing") else {
+        let Some(CatalogueStudy::Shipped(shipped)) = catalogue.study("furuta-swing") else {
             panic!("`furuta-swing` is a shipped study")
         };
         let text = std::str::from_utf8(shipped.file("study.toml").unwrap()).unwrap();
@@ -301,21 +301,21 @@ mod tests {
     #[test]
     fn every_key_of_a_tuner_is_in_the_program() {
         let of = |text: &str| tuner(&Value::Table(text.parse().unwrap()));
-        assert_eq!(of("start = 1\nmin = 0.5\nmax = 2.0\nscale = \"log\""), "TunerDraft::new(1.0, 0.5, 2.0).log()");
+        assert_eq!(of("start = 1\nmin = 0.5\nmax = 2.0\nscale = \"log\""), "TunerBuilder::new(1.0, 0.5, 2.0).log()");
         assert_eq!(
             of("start = \"3 cm\"\nmin = 0\nmax = 1.0\nunit = \"m\"\nactive = false\nper-case = true"),
-            "TunerDraft { start: Some(Quantity::parse(\"3 cm\")?), min: Some(0.0.into()), max: Some(1.0.into()), \
-             unit: Some(Unit::parse(\"m\")?), inactive: true, per_case: true, ..TunerDraft::default() }"
+            "TunerBuilder { start: Some(Quantity::parse(\"3 cm\")?), min: Some(0.0.into()), max: Some(1.0.into()), \
+             unit: Some(Unit::parse(\"m\")?), inactive: true, per_case: true, ..TunerBuilder::default() }"
         );
         assert_eq!(
             of("start = 1\nper-case = true\nstarts = { push = 2.0 }"),
-            "TunerDraft { start: Some(1.0.into()), per_case: true, starts: vec![(\"push\".into(), 2.0.into())], \
-             ..TunerDraft::default() }"
+            "TunerBuilder { start: Some(1.0.into()), per_case: true, starts: vec![(\"push\".into(), 2.0.into())], \
+             ..TunerBuilder::default() }"
         );
-        assert_eq!(of("tie = \"2*k\""), "TunerDraft { tie: Some(\"2*k\".into()), ..TunerDraft::default() }");
+        assert_eq!(of("tie = \"2*k\""), "TunerBuilder { tie: Some(\"2*k\".into()), ..TunerBuilder::default() }");
         assert_eq!(
             of("start = 2\nvalues = [1, 2]\ninteger = true"),
-            "TunerDraft { start: Some(2.0.into()), values: Some(vec![1.0.into(), 2.0.into()]), integer: true, ..TunerDraft::default() }"
+            "TunerBuilder { start: Some(2.0.into()), values: Some(vec![1.0.into(), 2.0.into()]), integer: true, ..TunerBuilder::default() }"
         );
     }
 }

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use mops_core::math;
 use mops_core::{
-    Analysis, CalibrationReport, Case, CaseDraft, ChannelDraft, Criterion, CriterionDraft, CriterionReport,
-    CriterionSlopes, CriterionSpec, Draft, Evaluation, Failure, Findings, Interface, Job, Measured, Mistake, Model,
-    Outcome, Parameter, Pareto, Problem, Record, Response, Role, SlopesReport, StartReport, Stop, Task, Trace,
-    TunerDraft, TunerReport, Unit, Usage, Value, Variable,
+    Analysis, CalibrationReport, Case, CaseBuilder, ChannelBuilder, Criterion, CriterionBuilder, CriterionReport,
+    CriterionSlopes, CriterionSpec, Evaluation, Failure, Findings, Interface, Job, Measured, Model, Outcome, Parameter,
+    Pareto, Problem, Record, Response, Role, SlopesReport, StartReport, Stop, StudyBuilder, StudyError, Task, Trace,
+    TunerBuilder, TunerReport, Unit, Usage, Value, Variable,
 };
 
 use super::plot::{Curve, CurveStyle, Plot, ZAxis};
@@ -52,7 +52,7 @@ impl Model for Lag {
 struct End;
 
 impl CriterionSpec for End {
-    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, Mistake> {
+    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         Ok(Box::new(*self))
     }
 }
@@ -76,18 +76,18 @@ fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome,
     let times: Vec<f64> = (0..100).map(|i| 0.05 * f64::from(i)).collect();
     let values = times.iter().map(|t| 1.0 - math::exp(-t / 1.3f64) + 0.01 * math::sin(40.0 * t)).collect();
     let channel =
-        ChannelDraft { signal: "y".into(), times, values, noise: Some(0.01.into()), ..ChannelDraft::default() };
+        ChannelBuilder { signal: "y".into(), times, values, noise: Some(0.01.into()), ..ChannelBuilder::default() };
     let measured = Measured { channels: vec![channel], role: Role::Calibration, ..Measured::default() };
-    let draft = Draft {
+    let draft = StudyBuilder {
         name: name.into(),
         models: vec![("lag".into(), Lag::new().into())],
-        tuners: vec![("T".into(), TunerDraft::new(start, 0.1, 20.0))],
+        tuners: vec![("T".into(), TunerBuilder::new(start, 0.1, 20.0))],
         cases: vec![
-            CaseDraft { name: "nominal & more".into(), ..CaseDraft::default() },
-            CaseDraft { name: "step/1".into(), measured: Some(measured), ..CaseDraft::default() },
+            CaseBuilder { name: "nominal & more".into(), ..CaseBuilder::default() },
+            CaseBuilder { name: "step/1".into(), measured: Some(measured), ..CaseBuilder::default() },
         ],
-        criteria: vec![("end".into(), CriterionDraft::minimise(End, 0.5).used_as(usage))],
-        ..Draft::default()
+        criteria: vec![("end".into(), CriterionBuilder::minimise(End, 0.5).used_as(usage))],
+        ..StudyBuilder::default()
     };
     let problem = Problem::new(Arc::new(draft.build().unwrap()));
     let best = problem.evaluate_at(&[2.0]);

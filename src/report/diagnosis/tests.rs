@@ -1,6 +1,6 @@
 //! Tests of the whole report, with made-up diagnoses.
 
-use mops_core::{CaseDraft, ChannelDraft, Draft, Measured, Task, TunerDraft};
+use mops_core::{CaseBuilder, ChannelBuilder, Measured, StudyBuilder, Task, TunerBuilder};
 use mops_discrepancy::Diagnosis;
 
 use super::super::Report;
@@ -12,15 +12,15 @@ use crate::tasks::diagnosis::of;
 /// Writes the report; returns its temporary folder and the page.
 fn written(diagnosis: Diagnosis) -> (tempfile::TempDir, String) {
     let times: Vec<f64> = (0..100).map(|i| 0.05 * f64::from(i)).collect();
-    let channel = ChannelDraft { signal: "y".into(), values: times.clone(), times, ..ChannelDraft::default() };
+    let channel = ChannelBuilder { signal: "y".into(), values: times.clone(), times, ..ChannelBuilder::default() };
     let measured = Measured { channels: vec![channel], ..Measured::default() };
-    let draft = Draft {
+    let draft = StudyBuilder {
         name: "swing".into(),
         task: Task::Diagnosis,
         models: vec![("lag".into(), Lag::new().into())],
-        tuners: vec![("T".into(), TunerDraft::new(2.0, 0.1, 20.0))],
-        cases: vec![CaseDraft { name: "step".into(), measured: Some(measured), ..CaseDraft::default() }],
-        ..Draft::default()
+        tuners: vec![("T".into(), TunerBuilder::new(2.0, 0.1, 20.0))],
+        cases: vec![CaseBuilder { name: "step".into(), measured: Some(measured), ..CaseBuilder::default() }],
+        ..StudyBuilder::default()
     };
     let solved = of(draft.build().unwrap(), &Options::default(), diagnosis);
     let folder = tempfile::tempdir().unwrap();
