@@ -1,4 +1,4 @@
-//! A model from text beside the compiled one: a Furuta pendulum with the same parameters, over 3 s.
+//! Model given by equations compared with the compiled model: a Furuta pendulum with the same parameters, over 3 s.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -12,14 +12,14 @@ use mops::models::kernel::{Simulated, Tolerance};
 use mops::{Case, Input, Model};
 
 const END: f64 = 3.0;
-/// `a`, `b`, `c`, `d`, `ba`, `bp`.
+/// Parameters `a`, `b`, `c`, `d`, `ba`, `bp`.
 const PARAMETERS: [f64; 6] = [0.0044, 0.0075, 0.0036, 0.21, 9e-4, 2e-4];
-/// Equations as on paper, derivatives within them.
+/// Implicit equations, with derivatives on both sides.
 const IMPLICIT: &str = include_str!("../models/tests/equations/furuta-free.toml");
-/// Forces and a mass matrix.
+/// Equations with forces and a mass matrix.
 const MASS: &str = include_str!("../models/tests/equations/furuta-driven.toml");
 
-/// A model, and its parameters.
+/// Model with its parameters.
 struct Variant {
     name: &'static str,
     model: Box<dyn Model>,
@@ -30,11 +30,11 @@ fn variants() -> Vec<Variant> {
     let tolerance = Tolerance { relative: 1e-6, absolute: Some(1e-8), ..Tolerance::default() };
     let text = |text: &str| {
         let options = format!("{text}\n[tolerance]\nrelative = 1e-6\nabsolute = 1e-8\n");
-        let options: EquationsOptions = toml::from_str(&options).expect("the text is right");
-        Box::new(Simulated::new(Equations::new(&options).expect("so are its equations")))
+        let options: EquationsOptions = toml::from_str(&options).expect("the options are valid");
+        Box::new(Simulated::new(Equations::new(&options).expect("the equations are valid")))
     };
     let [a, b, c, d, ba, bp] = PARAMETERS;
-    // Start values: the pendulum at 2 rad, the arm at 0.3 rad.
+    // Initial state: the pendulum at 2 rad, the arm at 0.3 rad.
     vec![
         Variant {
             name: "compiled",
@@ -52,9 +52,9 @@ fn variants() -> Vec<Variant> {
 
 fn simulate(variant: &Variant, case: &Case) -> f64 {
     let angle = variant.model.interface().signals.iter().position(|s| ["theta", "th"].contains(&s.name.as_str()));
-    let signals = [angle.expect("it has an angle")];
+    let signals = [angle.expect("the model has the angle of the pendulum")];
     let job = Job { case, parameters: black_box(&variant.parameters), signals: &signals, horizon: END };
-    let analysis = variant.model.analyse(&job).expect("it simulates");
+    let analysis = variant.model.analyse(&job).expect("the simulation succeeds");
     let (_, trace) = &analysis.response().expect("a simulation").traces[0];
     trace.last()
 }
@@ -82,18 +82,18 @@ fn main() {
     }
 }
 
-/// Every variant in turn, again and again, so that whatever else the machine does meets all alike; medians.
+/// Prints medians over rounds of all variants in turn, so that other load of the machine affects all variants equally.
 fn print_ratios(what: &str, variants: &[Variant], case: &Case) {
     const ROUNDS: usize = 101;
     const RUNS: u32 = 20;
     let mut rounds: Vec<Vec<f64>> = Vec::new();
     for _ in 0..ROUNDS {
         let time = |variant: &Variant| {
-            let begun = Instant::now();
+            let start = Instant::now();
             for _ in 0..RUNS {
                 black_box(simulate(variant, case));
             }
-            begun.elapsed().as_secs_f64() / f64::from(RUNS) * 1e6
+            start.elapsed().as_secs_f64() / f64::from(RUNS) * 1e6
         };
         rounds.push(variants.iter().map(time).collect());
     }

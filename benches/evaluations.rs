@@ -1,4 +1,4 @@
-//! Evaluations per second of shipped studies, on one thread and on two.
+//! Evaluations per second of shipped studies, on one and on two threads.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -28,35 +28,35 @@ fn main() {
     group.finish();
     criterion.final_summary();
     print_ratios();
-    print_slopes();
+    print_derivatives();
 }
 
-/// Slopes at the start values, from tangents and from central differences in turn, on one thread; medians.
-fn print_slopes() {
+/// Prints median times of the derivatives at the initial guess on one thread, exact and by central differences in turn.
+fn print_derivatives() {
     let pool = pool(1);
     for name in STUDIES {
         let problem = shipped(name);
         let start = problem.start();
-        let slopes = |exact: bool| {
+        let derivatives = |exact: bool| {
             let run = Run::new(&problem, Budget { evaluations: usize::MAX }, &());
             let mut run = if exact { run } else { run.by_differences() };
-            let begun = Instant::now();
-            let slopes = pool.install(|| run.linearise(&start, 1e-4));
-            assert!(black_box(slopes).is_ok_and(|slopes| slopes.is_some()), "the start values simulate");
-            begun.elapsed().as_secs_f64() * 1e6
+            let clock = Instant::now();
+            let found = pool.install(|| run.linearise(&start, 1e-4));
+            assert!(black_box(found).is_ok_and(|found| found.is_some()), "the initial guess can be simulated");
+            clock.elapsed().as_secs_f64() * 1e6
         };
-        let rounds: Vec<[f64; 2]> = (0..101).map(|_| [true, false].map(slopes)).collect();
+        let rounds: Vec<[f64; 2]> = (0..101).map(|_| [true, false].map(derivatives)).collect();
         let [exact, differences] = [0, 1].map(|i| median(rounds.iter().map(|round| round[i]).collect()));
         let ratio = median(rounds.iter().map(|[exact, differences]| differences / exact).collect());
         println!(
-            "{name:22} slopes along {:2} tuners: {exact:6.0} us from tangents, {differences:6.0} us from differences, \
-             ratio differences / tangents: {ratio:.2}",
+            "{name:22} derivatives for {:2} tuners: {exact:6.0} us exact, {differences:6.0} us by differences, \
+             ratio differences / exact: {ratio:.2}",
             start.len()
         );
     }
 }
 
-/// One thread and two in turn, so that whatever else the machine does meets both alike; medians.
+/// Prints medians over rounds on one and two threads in turn, so that other load of the machine affects both equally.
 fn print_ratios() {
     let pools = [pool(1), pool(2)];
     for name in STUDIES {
@@ -65,9 +65,9 @@ fn print_ratios() {
         let mut rounds = Vec::new();
         for _ in 0..31 {
             rounds.push(pools.each_ref().map(|pool| {
-                let begun = Instant::now();
+                let start = Instant::now();
                 pool.install(|| evaluate(&problem, &points));
-                f64::from(POINTS) / begun.elapsed().as_secs_f64()
+                f64::from(POINTS) / start.elapsed().as_secs_f64()
             }));
         }
         let [one, two] = [0, 1].map(|i| median(rounds.iter().map(|round| round[i]).collect()));
@@ -81,17 +81,17 @@ fn print_ratios() {
     }
 }
 
-/// All points through a new run, which has none of them yet.
+/// Evaluates all points in a new run, which has none of them in its cache.
 fn evaluate(problem: &Problem, points: &[Vec<f64>]) {
     let mut run = Run::new(problem, Budget { evaluations: usize::MAX }, &());
     black_box(run.evaluate(points)).expect("the budget suffices");
 }
 
-/// The same points each time, spread over the unit box: the R-sequence.
+/// Returns fixed points spread over the unit box: the R-sequence.
 ///
 /// Source: M. Roberts, The unreasonable effectiveness of quasirandom sequences (2018).
 fn points(dimension: usize) -> Vec<Vec<f64>> {
-    // The positive root of g^(d + 1) = g + 1.
+    // Positive root of g^(d + 1) = g + 1.
     #[allow(clippy::cast_precision_loss)]
     let root = (0..60).fold(2.0_f64, |g, _| math::powf(1.0 + g, 1.0 / (dimension + 1) as f64));
     let coordinate = |i: u32, j: i32| (0.5 + f64::from(i) * math::powi(root, -1 - j)).fract();

@@ -1,7 +1,7 @@
-//! What a second thread gains where every evaluation takes 0.2 s: generations, polls of patterns, slopes by differences.
+//! Speed-up by a second thread for evaluations of 0.2 s: generations, polls of pattern search, gradients by differences.
 //!
-//! An evaluation waits instead of computing, so that the ratio is that of the solver and the engine, whatever else the
-//! machine does.
+//! An evaluation sleeps instead of computing. The speed-up is then that of the solver and the engine, independent of other
+//! load of the machine.
 
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -13,16 +13,17 @@ use mops::solvers::sqp::SqpOptions;
 use mops::{Solver, SolverOptions, Usage};
 use mops_core::math;
 
-const TAKES: Duration = Duration::from_millis(200);
+/// Duration of an evaluation.
+const DURATION: Duration = Duration::from_millis(200);
 
-/// Numbers of tuners, and of evaluations. Between polls and slopes single points are tried: the fewer tuners, the larger their
-/// share.
+/// Numbers of tuners and of evaluations. Single points are evaluated between polls and gradients; their share is larger for
+/// fewer tuners.
 const SIZES: [(usize, usize); 2] = [(6, 80), (20, 160)];
 
-/// A solver's name, and how it is built.
+/// Name and constructor of a solver.
 type Named = (&'static str, fn() -> Box<dyn Solver>);
 
-/// Two bowls whose larger value counts.
+/// Maximum of two paraboloids.
 struct Slow(Shape);
 
 impl Evaluator for Slow {
@@ -31,9 +32,9 @@ impl Evaluator for Slow {
     }
 
     fn evaluate(&self, point: &[f64]) -> Evaluation {
-        sleep(TAKES);
-        let bowl = |centre: f64| point.iter().map(|u| math::powi(u - centre, 2)).sum::<f64>() + 1.0;
-        let scaled = vec![bowl(0.3), bowl(0.6)];
+        sleep(DURATION);
+        let paraboloid = |centre: f64| point.iter().map(|u| math::powi(u - centre, 2)).sum::<f64>() + 1.0;
+        let scaled = vec![paraboloid(0.3), paraboloid(0.6)];
         Evaluation {
             point: point.to_vec(),
             tuners: point.to_vec(),
@@ -54,15 +55,15 @@ impl Evaluator for Slow {
     }
 }
 
-/// Seconds for the budget on so many threads, and the best objective.
-fn take(problem: &Slow, evaluations: usize, solver: &mut dyn Solver, threads: usize) -> (f64, f64) {
+/// Returns the time, s, for a number of evaluations on `threads` threads, and the best objective.
+fn timed(problem: &Slow, evaluations: usize, solver: &mut dyn Solver, threads: usize) -> (f64, f64) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
     pool.install(|| {
-        let begun = Instant::now();
+        let start = Instant::now();
         let mut run = Run::new(problem, Budget { evaluations }, &());
         run.solve(solver, &vec![0.9; problem.0.spacing.len()]);
         let best = run.archive().iter().map(|record| record.merit.objective).fold(f64::INFINITY, f64::min);
-        (begun.elapsed().as_secs_f64(), best)
+        (start.elapsed().as_secs_f64(), best)
     })
 }
 
@@ -70,17 +71,17 @@ fn main() {
     let solvers: [Named; 3] = [
         ("genetic", || GeneticOptions::default().build()),
         ("pattern-search", || PatternSearchOptions::default().build()),
-        ("sqp, slopes by differences", || SqpOptions::default().build()),
+        ("sqp, gradients by differences", || SqpOptions::default().build()),
     ];
     for (tuners, evaluations) in SIZES {
         let shape = Shape { spacing: vec![0.0; tuners], rows: vec![(Usage::Minimise, 1.0); 2], ..Shape::default() };
         let problem = Slow(shape);
         for (name, build) in solvers {
             let [(one, best), (two, same)] =
-                [1, 2].map(|threads| take(&problem, evaluations, build().as_mut(), threads));
+                [1, 2].map(|threads| timed(&problem, evaluations, build().as_mut(), threads));
             assert_eq!(best.to_bits(), same.to_bits(), "{name}: threads change no bit");
             let ratio = one / two;
-            println!("{name:28} {tuners:2} tuners  1 thread {one:6.2} s, 2 threads {two:6.2} s, ratio {ratio:.2}");
+            println!("{name:30} {tuners:2} tuners  1 thread {one:6.2} s, 2 threads {two:6.2} s, ratio {ratio:.2}");
         }
     }
 }

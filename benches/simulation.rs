@@ -1,4 +1,4 @@
-//! The simulation kernel beside a Dormand-Prince method written by hand for one plant: a Furuta pendulum over 3 s.
+//! Simulation kernel compared with a hand-written Dormand-Prince method for one plant: a Furuta pendulum over 3 s.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -16,15 +16,15 @@ const END: f64 = 3.0;
 const ABSOLUTE: f64 = 1e-8;
 const TOLERANCE: Tolerance =
     Tolerance { relative: 1e-6, absolute: Some(ABSOLUTE), max_steps: 100_000, ..Tolerance::DEFAULT };
-/// `a`, `b`, `c`, `d`, `ba`, `bp`, `ca`, `cp`, in the units of the model.
+/// Parameters `a`, `b`, `c`, `d`, `ba`, `bp`, `ca`, `cp`, in the units of the model.
 const VISCOUS: [f64; 8] = [0.0044, 0.0118, 0.0036, 0.105, 0.002, 0.0003, 0.0, 0.0];
-/// The same with dry friction: 10 mN m in the arm, 2 mN m in the pendulum.
+/// Parameters with dry friction: 10 mN m in the arm, 2 mN m in the pendulum.
 const DRY: [f64; 8] = [0.0044, 0.0118, 0.0036, 0.105, 0.002, 0.0003, 0.01, 0.002];
-/// `phi`, `phi'`, `theta`, `theta'`.
+/// Initial state `phi`, `phi'`, `theta`, `theta'`.
 const START: [f64; 4] = [0.0, 0.0, 1.68, 1.78];
 const SAMPLES: usize = 301;
 
-/// `u = 0.05 sin 4t`.
+/// Returns the input `u = 0.05 sin 4t`.
 fn torque() -> Input {
     Input::Sine { amplitude: 0.05, frequency: 4.0 / TAU, phase: 0.0, offset: 0.0 }
 }
@@ -42,7 +42,7 @@ fn main() {
     print_ratios(&variants);
 }
 
-/// Both methods do the same work and get to the same place.
+/// Checks that both methods end in the same state; prints their numbers of right-hand sides.
 fn compare_results() {
     let (by_hand, count) = hand_written::simulate(&VISCOUS, START, END);
     let input = torque();
@@ -59,10 +59,10 @@ fn compare_results() {
     assert!(events.0 > 0);
 }
 
-/// What is measured, under its name.
+/// Name and code of a measured variant.
 type Variant = (&'static str, Box<dyn Fn() -> f64>);
 
-/// The hand-written method first, then the kernel and the model in their uses.
+/// Returns the variants: the hand-written method, then the kernel and the model in several configurations.
 fn variants() -> Vec<Variant> {
     let (viscous, sampled, dry) = (analysis(VISCOUS), analysis(VISCOUS), analysis(DRY));
     let tangents: [Dual7; 8] =
@@ -94,22 +94,22 @@ fn variants() -> Vec<Variant> {
     ]
 }
 
-/// Every variant in turn, again and again, so that whatever else the machine does meets all alike; medians.
+/// Prints medians over rounds of all variants in turn, so that other load of the machine affects all variants equally.
 fn print_ratios(variants: &[Variant]) {
     const ROUNDS: usize = 101;
     const RUNS: u32 = 20;
     let mut rounds: Vec<Vec<f64>> = Vec::new();
     for _ in 0..ROUNDS {
         let time = |(_, run): &Variant| {
-            let begun = Instant::now();
+            let start = Instant::now();
             for _ in 0..RUNS {
                 black_box(run());
             }
-            begun.elapsed().as_secs_f64() / f64::from(RUNS) * 1e6
+            start.elapsed().as_secs_f64() / f64::from(RUNS) * 1e6
         };
         rounds.push(variants.iter().map(time).collect());
     }
-    println!("medians, and of the ratio to the hand-written method in the same round:");
+    println!("median times, and median ratios to the hand-written method in the same round:");
     for (i, (name, _)) in variants.iter().enumerate() {
         let time = median(rounds.iter().map(|round| round[i]).collect());
         let ratio = median(rounds.iter().map(|round| round[i] / round[0]).collect());
@@ -124,7 +124,7 @@ fn median(mut numbers: Vec<f64>) -> f64 {
     numbers[numbers.len() / 2]
 }
 
-/// The kernel on the plant of the model.
+/// Simulates the plant of the model with the kernel.
 fn simulate<S: Scalar>(
     parameters: [S; 8],
     input: &Input,
@@ -134,17 +134,17 @@ fn simulate<S: Scalar>(
     let start = START.map(S::from);
     let plant = FurutaPlant { a, b, c, d, viscous: [bp, ba], coulomb: [cp, ca], start, contact: [Contact::Forward; 2] };
     let mut driven = Driven::new(plant, vec![Drive::new(Some(input))], 2, &[]);
-    integrate(&mut driven, 0.0, END, &start, &TOLERANCE, sink).expect("it simulates")
+    integrate(&mut driven, 0.0, END, &start, &TOLERANCE, sink).expect("the simulation succeeds")
 }
 
-/// The model as a study uses it, with traces of all signals.
+/// Returns the analysis by the model as in a study, with traces of all signals.
 fn analysis(physical: [f64; 8]) -> impl Fn() -> Analysis {
     let model = Furuta::model(None, TOLERANCE);
     let case = Case { inputs: vec![("u".into(), torque())], ..Case::default() };
     let parameters: Vec<f64> = physical.into_iter().chain(START).collect();
     move || {
         let job = Job { case: &case, parameters: &parameters, signals: &[0, 1, 2, 3, 4], horizon: END };
-        model.analyse(&job).expect("it simulates")
+        model.analyse(&job).expect("the simulation succeeds")
     }
 }
 
@@ -178,14 +178,14 @@ impl<D: Dynamics<f64>> Sink<f64, D> for Samples {
     }
 }
 
-/// Plain arrays, one plant, one tolerance; no events, no failures, no dense output.
+/// Hand-written method: plain arrays, one plant, one tolerance; no events, no failures, no dense output.
 mod hand_written {
     use super::{ABSOLUTE, TOLERANCE};
     use mops_core::math;
 
     type State = [f64; 4];
 
-    /// The pendulum with viscous friction under `u = 0.05 sin 4t`; states as in the model.
+    /// Returns the derivatives of the pendulum with viscous friction for `u = 0.05 sin 4t`; states as in the model.
     fn derivative(&[a, b, c, d, ba, bp, ..]: &[f64; 8], t: f64, &[_, dphi, theta, dtheta]: &State) -> State {
         let u = 0.05 * math::sin(4.0 * t);
         let (sin, cos) = math::sin_cos(theta);
@@ -196,19 +196,19 @@ mod hand_written {
         [dphi, (a * f2 - m12 * f1) / determinant, dtheta, (m22 * f1 - m12 * f2) / determinant]
     }
 
-    /// `x + h sum_i c_i k_i`.
+    /// Returns `x + h sum_i c_i k_i`.
     #[inline(always)]
     fn combine<const N: usize>(x: &State, h: f64, terms: [(f64, &State); N]) -> State {
         std::array::from_fn(|j| x[j] + h * terms.iter().map(|(c, k)| c * k[j]).sum::<f64>())
     }
 
-    /// Root mean square of `v` in units of the tolerance at `scale`.
+    /// Returns the root mean square of `v` in units of the tolerance at `scale`.
     fn norm(v: &State, scale: &State) -> f64 {
         let ratio = |j: usize| v[j] / (ABSOLUTE + TOLERANCE.relative * scale[j].abs());
         ((0..4).map(|j| math::powi(ratio(j), 2)).sum::<f64>() / 4.0).sqrt()
     }
 
-    /// The state at the end, and the number of right-hand sides.
+    /// Returns the state at the end, and the number of right-hand sides.
     ///
     /// Source: DOPRI5 in E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (1993).
     #[rustfmt::skip]

@@ -1,4 +1,4 @@
-//! A stiff model of a hundred states: a rod that is heated at one end, radiates, and is insulated at the other.
+//! Stiff model with 100 states: a rod that is heated at one end, insulated at the other, and radiates.
 
 use std::hint::black_box;
 
@@ -10,16 +10,17 @@ use mops::{Case, Model, Scalar};
 use mops_core::math;
 
 const CELLS: usize = 100;
-/// Exchange of heat between neighbouring cells, 1/s.
+/// Heat exchange between neighbouring cells, 1/s.
 const EXCHANGE: f64 = 1000.0;
-/// Radiation, 1/(K3 s).
+/// Radiation coefficient, 1/(K3 s).
 const RADIATION: f64 = 1e-10;
-/// Temperature of the heated end and of the surroundings, K.
+/// Temperature of the heated end, K.
 const HOT: f64 = 400.0;
+/// Temperature of the surroundings, K.
 const COLD: f64 = 300.0;
 const END: f64 = 10.0;
 
-/// `T[i]' = EXCHANGE (T[i - 1] - 2 T[i] + T[i + 1]) - RADIATION (T[i]^4 - COLD^4)`.
+/// Heat equation `T[i]' = EXCHANGE (T[i - 1] - 2 T[i] + T[i + 1]) - RADIATION (T[i]^4 - COLD^4)`.
 struct Rod;
 
 impl<S: Scalar> Dynamics<S> for Rod {
@@ -38,7 +39,7 @@ impl<S: Scalar> Dynamics<S> for Rod {
     }
 }
 
-/// The same from a study file.
+/// Heat equation as in a study file.
 const TEXT: &str = r#"
 horizon = 10.0
 states  = { "T[1..100]" = "K" }
@@ -62,18 +63,20 @@ fn main() {
     let mut criterion = Criterion::default().configure_from_args();
     let tolerance =
         Tolerance { relative: 1e-6, absolute: Some(1e-6), method: IntegrationMethod::Stiff, ..Tolerance::default() };
-    let compiled = || integrate(&mut Rod, 0.0, END, black_box(&[COLD; CELLS]), &tolerance, &mut ()).expect("it ends");
+    let compiled = || {
+        integrate(&mut Rod, 0.0, END, black_box(&[COLD; CELLS]), &tolerance, &mut ()).expect("the simulation succeeds")
+    };
     let (end, work) = compiled();
     println!("compiled: {work:?}, end {:.9}, {:.9}, {:.9}", end[0], end[CELLS / 2], end[CELLS - 1]);
 
-    let options: EquationsOptions = toml::from_str(TEXT).expect("the text is right");
-    let model = Simulated::new(Equations::new(&options).expect("so are its equations"));
+    let options: EquationsOptions = toml::from_str(TEXT).expect("the options are valid");
+    let model = Simulated::new(Equations::new(&options).expect("the equations are valid"));
     let case = Case::default();
-    // Start values that are expressions are parameters without a value of their own.
+    // An initial value given by an expression is a parameter without a default.
     let parameters: Vec<f64> = model.interface().parameters.iter().map(|p| p.default.unwrap_or(f64::NAN)).collect();
     let signals = [0, CELLS / 2, CELLS - 1];
     let job = Job { case: &case, parameters: &parameters, signals: &signals, horizon: END };
-    let equations = || model.analyse(black_box(&job)).expect("it ends");
+    let equations = || model.analyse(black_box(&job)).expect("the simulation succeeds");
     let analysis = equations();
     let response = analysis.response().expect("a simulation");
     let ends: Vec<f64> = response.traces.iter().map(|(_, trace)| trace.last()).collect();

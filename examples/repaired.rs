@@ -1,6 +1,6 @@
-//! The model does not need bp: the error falls from 4.20 to 1.00 times the noise on calibration data and from 15.40 to 1.02 on validation data.
+//! The model does not need bp: the error falls from 4.20 to 1.00 times the noise level on calibration data and from 15.40 to 1.02 on validation data.
 //!
-//! Written by `mops diagnose --export rust`. It needs the crate `mops`, and the data that its experiments name.
+//! Written by `mops diagnose --export rust`. Requires the crate `mops` and the data files of the experiments.
 
 use std::error::Error;
 use std::path::Path;
@@ -8,7 +8,7 @@ use std::path::Path;
 use mops::core::file::{self, Files};
 use mops::{Study, StudyBuilder, Task, TunerBuilder};
 
-/// The folder that the paths of data count from.
+/// Folder that data paths are relative to.
 const FOLDER: &str = "studies/furuta-swing";
 
 /// `rig`.
@@ -66,7 +66,7 @@ demand = 0.001
 signal = "theta"
 "#;
 
-/// Data files in the folder.
+/// Data files in [`FOLDER`].
 struct Data;
 
 impl Files for Data {
@@ -79,7 +79,7 @@ impl Files for Data {
     }
 }
 
-/// The repaired study.
+/// Builds the recalibrated study.
 pub fn study() -> Result<Study, Box<dyn Error>> {
     let catalogue = mops::catalogue();
     let models = vec![("rig".into(), file::model(&catalogue, MODEL_RIG)?)];

@@ -184,7 +184,7 @@ fn a_calibration_tells_what_its_data_can_tell() {
         assert_eq!((&parameter["name"], &parameter["std_error"]), (&tuner["name"], &tuner["std_error"]));
     }
     let page = page(folder.path());
-    assert!(page.contains("What the data can tell") && page.contains("No experiment is driven by an input"));
+    assert!(page.contains("Identifiability") && page.contains("No experiment is driven by an input"));
 }
 
 #[test]

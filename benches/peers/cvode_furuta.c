@@ -1,4 +1,4 @@
-/* The simulation of benches/simulation.rs by CVODE (Adams, fixed point), for comparison. Needs SUNDIALS 6:
+/* Simulation of benches/simulation.rs with CVODE (Adams, fixed point), for comparison. Requires SUNDIALS 6:
    cc -O3 cvode_furuta.c -o cvode_furuta -lsundials_cvode -lsundials_nvecserial -lm && ./cvode_furuta */
 
 #include <cvode/cvode.h>
@@ -26,9 +26,9 @@ static int derivative(realtype t, N_Vector x, N_Vector dx, void *data) {
 
 static double simulate(double *end) {
     SUNContext context;
-    struct timespec begun, done;
+    struct timespec start, done;
     realtype t;
-    clock_gettime(CLOCK_MONOTONIC, &begun);
+    clock_gettime(CLOCK_MONOTONIC, &start);
     SUNContext_Create(NULL, &context);
     N_Vector x = N_VNew_Serial(4, context);
     NV_Ith_S(x, 0) = 0, NV_Ith_S(x, 1) = 0, NV_Ith_S(x, 2) = 1.68, NV_Ith_S(x, 3) = 1.78;
@@ -46,7 +46,7 @@ static double simulate(double *end) {
     N_VDestroy(x);
     SUNContext_Free(&context);
     clock_gettime(CLOCK_MONOTONIC, &done);
-    return 1e6 * (done.tv_sec - begun.tv_sec) + 1e-3 * (done.tv_nsec - begun.tv_nsec);
+    return 1e6 * (done.tv_sec - start.tv_sec) + 1e-3 * (done.tv_nsec - start.tv_nsec);
 }
 
 int main(void) {

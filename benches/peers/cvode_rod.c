@@ -1,4 +1,4 @@
-/* The heat rod of benches/stiff.rs by CVODE (BDF, banded and dense Newton), for comparison. Needs SUNDIALS 6:
+/* Heat rod of benches/stiff.rs with CVODE (BDF, banded and dense Newton), for comparison. Requires SUNDIALS 6:
    cc -O3 cvode_rod.c -o cvode_rod -lsundials_cvode -lsundials_nvecserial -lsundials_sunmatrixband \
       -lsundials_sunmatrixdense -lsundials_sunlinsolband -lsundials_sunlinsoldense -lm && ./cvode_rod */
 
@@ -13,7 +13,7 @@
 
 #define N 100
 
-/* Temperatures, K: left end held at 400 K, right end insulated, heat radiated to 300 K. */
+/* Temperatures, K: left end fixed at 400 K, right end insulated, radiation to 300 K. */
 static int derivative(realtype t, N_Vector x, N_Vector dx, void *data) {
     (void)t, (void)data;
     const double *T = NV_DATA_S(x);
@@ -28,9 +28,9 @@ static int derivative(realtype t, N_Vector x, N_Vector dx, void *data) {
 
 static double simulate(int banded, double *end, long *steps, long *evaluations) {
     SUNContext context;
-    struct timespec begun, done;
+    struct timespec start, done;
     realtype t;
-    clock_gettime(CLOCK_MONOTONIC, &begun);
+    clock_gettime(CLOCK_MONOTONIC, &start);
     SUNContext_Create(NULL, &context);
     N_Vector x = N_VNew_Serial(N, context);
     N_VConst(300.0, x);
@@ -52,7 +52,7 @@ static double simulate(int banded, double *end, long *steps, long *evaluations) 
     N_VDestroy(x);
     SUNContext_Free(&context);
     clock_gettime(CLOCK_MONOTONIC, &done);
-    return 1e6 * (done.tv_sec - begun.tv_sec) + 1e-3 * (done.tv_nsec - begun.tv_nsec);
+    return 1e6 * (done.tv_sec - start.tv_sec) + 1e-3 * (done.tv_nsec - start.tv_nsec);
 }
 
 int main(void) {

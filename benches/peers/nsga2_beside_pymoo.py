@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Processor time of NSGA-II on ZDT1 (100 members, 250 generations): mops as a ratio to pymoo, both in this run.
+"""Compare the processor times of NSGA-II in mops and in pymoo on ZDT1 (100 members, 250 generations).
 
     pip install pymoo
     cargo build --release
@@ -28,13 +28,13 @@ MEMBERS, GENERATIONS = 100, 250
 
 
 def of_children():
-    """Processor time of the processes that have ended, s."""
+    """Return the processor time of the child processes that have ended, s."""
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     return usage.ru_utime + usage.ru_stime
 
 
 def of_mops(program, problem, seeds):
-    """Processor time of a run, its hypervolume and its evaluations, in the mean; the whole process counts."""
+    """Return the means of processor time, hypervolume and evaluations per run; the time is of the whole process."""
     with tempfile.TemporaryDirectory() as folder:
         before = of_children()
         command = [program, "bench", "zdt", "--problems", problem, "--solver", "nsga2", "--quiet"]
@@ -48,7 +48,7 @@ def of_mops(program, problem, seeds):
 
 
 def of_pymoo(problem, seeds):
-    """The same of pymoo; the import and the hypervolume do not count."""
+    """Return the means for pymoo; the time excludes the import and the hypervolume."""
     volume = HV(ref_point=numpy.array([1.1, 1.1]))
     seconds, volumes = [], []
     for seed in range(1, seeds + 1):
@@ -61,9 +61,9 @@ def of_pymoo(problem, seeds):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("mops", help="the program, as cargo build --release leaves it")
+    parser.add_argument("mops", help="path of the release build")
     parser.add_argument("--problem", default="ZDT1", help="a problem of the suite zdt")
-    parser.add_argument("--seeds", type=int, default=5, help="runs of each")
+    parser.add_argument("--seeds", type=int, default=5, help="number of runs of each")
     arguments = parser.parse_args()
     rows = [
         ("mops", *of_mops(arguments.mops, arguments.problem, arguments.seeds)),

@@ -1,6 +1,6 @@
-"""The simulation of `benches/equations.rs` by SciPy, for comparison; needs `pip install scipy`.
+"""Simulate `benches/equations.rs` with SciPy, for comparison; requires `pip install scipy`.
 
-The equations are compiled by Python from text once, as a study's are."""
+Python compiles the equations from text once, as mops does."""
 
 import math
 import time
@@ -19,7 +19,7 @@ VALUES = {"a": 0.0044, "b": 0.0075, "c": 0.0036, "d": 0.21, "ba": 9e-4, "bp": 2e
 
 
 def derivative(torque):
-    """From text, states th, th', ph, ph'."""
+    """Return the right-hand side from text; states th, th', ph, ph'."""
 
     def f(t, x):
         th, thd, ph, phd = x
@@ -32,7 +32,7 @@ def derivative(torque):
 
 
 def by_hand(torque):
-    """The same as a Python function."""
+    """Return the right-hand side as a Python function."""
     a, b, c, d, ba, bp = (VALUES[k] for k in ["a", "b", "c", "d", "ba", "bp"])
 
     def f(t, x):
@@ -52,9 +52,9 @@ def main():
         for kind, f in [("text", derivative(torque)), ("function", by_hand(torque))]:
             times = []
             for _ in range(10):
-                begun = time.perf_counter()
+                start = time.perf_counter()
                 done = solve_ivp(f, (0, 3), [2.0, 0, 0.3, 0], method="RK45", rtol=1e-6, atol=1e-8)
-                times.append(time.perf_counter() - begun)
+                times.append(time.perf_counter() - start)
             times.sort()
             print(f"{what:18} {kind:9} {1e6 * times[5]:9.1f} us, {done.nfev} derivatives, th {done.y[0, -1]:.9f}")
 

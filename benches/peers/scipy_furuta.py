@@ -1,4 +1,4 @@
-"""The simulation of `benches/simulation.rs` by SciPy, for comparison; needs `pip install scipy`."""
+"""Simulate `benches/simulation.rs` with SciPy, for comparison; requires `pip install scipy`."""
 
 import math
 import time
@@ -9,7 +9,7 @@ A, B, C, D, BA, BP = 0.0044, 0.0118, 0.0036, 0.105, 0.002, 0.0003
 
 
 def derivative(t, x):
-    """States phi, phi', theta, theta'; the torque on the arm is 0.05 sin 4t N m."""
+    """Return the right-hand side; states phi, phi', theta, theta'; the torque on the arm is 0.05 sin 4t N m."""
     _, v, theta, w = x
     s, c = math.sin(theta), math.cos(theta)
     m11, m12 = B + A * s * s, C * c
@@ -23,9 +23,9 @@ def main():
     for method in ["RK45", "LSODA", "DOP853"]:
         times = []
         for _ in range(20):
-            begun = time.perf_counter()
+            start = time.perf_counter()
             done = solve_ivp(derivative, (0, 3), [0, 0, 1.68, 1.78], method=method, rtol=1e-6, atol=1e-8)
-            times.append(time.perf_counter() - begun)
+            times.append(time.perf_counter() - start)
         times.sort()
         end = ", ".join(f"{x:.9f}" for x in done.y[:, -1])
         print(f"{method:7} {1e6 * times[len(times) // 2]:9.1f} us, {done.nfev:5} derivatives, end {end}")

@@ -4,7 +4,7 @@ use mops_core::StateSpace;
 use mops_core::linear::{Complex, FrequencyResponse, eigenvalues, zeros};
 use mops_core::math::{self, complex};
 
-use crate::report::{Curve, CurveStyle, Ink, Plot, Sweep, bode, frequencies};
+use crate::report::{Color, Curve, CurveStyle, FrequencyCurve, Plot, bode, frequencies};
 
 /// The plots of a system with one input and one output, with the names of their files; or why one is not drawn.
 pub(super) fn plots(system: &StateSpace, name: &str) -> Vec<(&'static str, Result<Plot, String>)> {
@@ -22,7 +22,7 @@ fn of_frequencies(system: &StateSpace, name: &str) -> Result<[Plot; 3], String> 
     let response = system.response()?;
     let omegas = frequencies(system)?;
     let values: Vec<Complex> = omegas.iter().map(|&omega| response.scalar(omega)).collect();
-    let of_result = Sweep { name: String::new(), values: &values, ..Sweep::default() };
+    let of_result = FrequencyCurve { name: String::new(), values: &values, ..FrequencyCurve::default() };
     let [magnitude, phase] = bode(&omegas, &[of_result], name);
     Ok([magnitude, phase, nyquist(&response, &values, name)])
 }
@@ -36,16 +36,17 @@ fn nyquist(response: &FrequencyResponse, values: &[Complex], name: &str) -> Plot
         values.iter().map(|z| if inside(z) { (z.re, sign * z.im) } else { (f64::NAN, f64::NAN) }).collect()
     };
     let circle = (0..=200).map(|i| math::sin_cos(std::f64::consts::TAU * f64::from(i) / 200.0));
-    let curve = |name: &str, points, style, ink| Curve { name: name.into(), points, style, ink, ..Curve::default() };
+    let curve =
+        |name: &str, points, style, color| Curve { name: name.into(), points, style, color, ..Curve::default() };
     Plot {
         title: format!("Nyquist curve of {name}"),
         x_label: "real part".into(),
         y_label: "imaginary part".into(),
         curves: vec![
-            curve("unit circle", circle.map(|(sin, cos)| (cos, sin)).collect(), CurveStyle::Line, Ink::Grid),
-            curve("negative frequencies", shown(-1.0), CurveStyle::Dashed, Ink::Start),
-            curve("positive frequencies", shown(1.0), CurveStyle::Line, Ink::Result),
-            curve("-1", vec![(-1.0, 0.0)], CurveStyle::Crosses, Ink::Demand),
+            curve("unit circle", circle.map(|(sin, cos)| (cos, sin)).collect(), CurveStyle::Line, Color::Grid),
+            curve("negative frequencies", shown(-1.0), CurveStyle::Dashed, Color::Start),
+            curve("positive frequencies", shown(1.0), CurveStyle::Line, Color::Result),
+            curve("-1", vec![(-1.0, 0.0)], CurveStyle::Crosses, Color::Demand),
         ],
         equal: true,
         ..Plot::default()
@@ -91,7 +92,7 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
     let beside = if poles.iter().chain(&zeros).any(|z| complex::norm(*z) > size) { 3.0 * limit } else { limit };
     let point =
         |z: &Complex| if z.re.abs() <= beside && z.im.abs() <= limit { (z.re, z.im) } else { (f64::NAN, f64::NAN) };
-    let marks = |name: &str, of: &[Complex], style, ink| Curve {
+    let marks = |name: &str, of: &[Complex], style, color| Curve {
         name: match of.iter().filter(|z| !point(z).0.is_finite()).count() {
             _ if of.is_empty() => String::new(),
             0 => name.into(),
@@ -99,7 +100,7 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
         },
         points: of.iter().map(point).collect(),
         style,
-        ink,
+        color,
         ..Curve::default()
     };
     let lines = branches.iter().enumerate().map(|(i, branch)| Curve {
@@ -113,8 +114,8 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
         y_label: "imaginary part (1/s)".into(),
         curves: lines
             .chain([
-                marks("poles", &poles, CurveStyle::Crosses, Ink::Demand),
-                marks("zeros", &zeros, CurveStyle::Dots, Ink::Measured),
+                marks("poles", &poles, CurveStyle::Crosses, Color::Demand),
+                marks("zeros", &zeros, CurveStyle::Dots, Color::Measured),
             ])
             .collect(),
         equal: true,

@@ -12,7 +12,7 @@ use super::study::{StudyArguments, open};
 use super::tables::criteria;
 use crate::files;
 use crate::numbers::FileNames;
-use crate::report::{Curve, Ink, Plot, points};
+use crate::report::{Color, Curve, Plot, points};
 use crate::terminal::{CommandError, Limit, number, print, table, within};
 
 /// What is simulated.
@@ -200,7 +200,7 @@ impl Simulated<'_> {
             let curve = |(i, place): (usize, usize)| Curve {
                 name: signals[place].to_owned(),
                 points: points(&response.traces[place].1),
-                ink: if first == last { Ink::Result } else { Ink::Series(i) },
+                color: if first == last { Color::Result } else { Color::Series(i) },
                 ..Curve::default()
             };
             let plot = Plot {

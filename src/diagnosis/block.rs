@@ -1,9 +1,9 @@
-//! The block `diagnosis` of `result.json`. Numbers are in the units of the study; those that are not finite are null.
+//! Block `diagnosis` of `result.json`. Numbers are in the units of the study; non-finite numbers are null.
 
 use mops_discrepancy::{Diagnosis, ExperimentError, Found, Noticeable, Ranked, StrengthValue};
 use serde_json::{Map, Value, json};
 
-/// The block.
+/// Returns the block of a diagnosis.
 pub(crate) fn block(diagnosis: &Diagnosis) -> Value {
     let moved = diagnosis.parameters.iter().map(
         |p| json!({ "name": p.name, "unit": p.unit, "before": p.before, "after": p.after, "std_error": p.std_error }),
@@ -82,12 +82,12 @@ fn noticeable(noticeable: &Noticeable) -> Value {
     json!({ "effect": noticeable.effect, "place": noticeable.place, "strength": name, "value": value, "unit": unit })
 }
 
-/// Values by name.
+/// Returns the values of an effect's parameters by name.
 fn strengths(strengths: &[StrengthValue]) -> Value {
     strengths.iter().map(|s| (s.name.clone(), json!(s.value))).collect::<Map<_, _>>().into()
 }
 
-/// Errors by experiment, and in each by channel.
+/// Returns the errors by experiment, and by channel within each.
 fn errors(errors: &[ExperimentError]) -> Value {
     let by_channel = |channels: &[(String, f64)]| -> Map<String, Value> {
         channels.iter().map(|(name, rms)| (name.clone(), json!(rms))).collect()
@@ -105,7 +105,7 @@ fn errors(errors: &[ExperimentError]) -> Value {
     errors.iter().map(error).collect::<Map<_, _>>().into()
 }
 
-/// Standard deviation of the noise by experiment, and in each by channel.
+/// Returns the standard deviation of the noise by experiment, and by channel within each.
 fn noise(diagnosis: &Diagnosis) -> Value {
     let mut noise = json!({});
     for prediction in &diagnosis.predictions {
@@ -119,9 +119,9 @@ mod tests {
     use super::super::made_up;
     use super::*;
 
-    /// The names that others read, as they were agreed.
+    /// Guards the names of keys, which other programs read.
     #[test]
-    fn the_block_has_the_agreed_names_and_meanings() {
+    fn the_block_has_the_documented_keys_and_values() {
         let block = block(&made_up::coulomb());
         assert_eq!((&block["verdict"], &block["probability"]), (&json!("effect"), &json!(0.9997)));
         let found = &block["found"][0];

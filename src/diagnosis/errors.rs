@@ -1,31 +1,31 @@
-//! Errors before and after, line by line, as the terminal and the report show them.
+//! Errors of the nominal and the recalibrated model, one line per channel, for the terminal and the report.
 
 use mops_discrepancy::{Diagnosis, ExperimentError, WindowErrors};
 
 use crate::numbers::significant;
 
-/// Error of one channel, or of a whole experiment, before and after.
+/// Error of a channel or of a whole experiment: of the nominal model, then of the recalibrated one.
 pub(crate) struct Line<'a> {
-    /// The experiment.
+    /// Experiment, with the errors of the nominal model.
     pub experiment: &'a ExperimentError,
-    /// `None`: all channels together.
+    /// Name of the channel; `None` for all channels together.
     pub channel: Option<&'a str>,
-    /// Where the record is cut into windows, how.
+    /// Windows of the error; `None` for the whole record.
     pub windows: Option<&'a WindowErrors>,
-    /// In units of the noise.
+    /// Errors in units of the noise level.
     pub scaled: [f64; 2],
-    /// In the unit of the channel.
+    /// Errors in the unit of the channel.
     pub raw: [f64; 2],
     /// Standard deviation of the noise.
     pub noise: f64,
-    /// The unit of the channel.
+    /// Unit of the channel.
     pub unit: &'a str,
 }
 
 impl Line<'_> {
-    /// `theta`, `theta in 3 windows of 3.05 s`, `together`.
+    /// Returns the label: `theta`, `theta in 3 windows of 3.05 s`, `all channels`.
     pub fn label(&self) -> String {
-        let channel = self.channel.unwrap_or("together");
+        let channel = self.channel.unwrap_or("all channels");
         match self.windows {
             Some(w) => format!("{channel} in {} windows of {} s", w.count, significant(w.length, 3)),
             None => channel.to_owned(),
@@ -33,7 +33,7 @@ impl Line<'_> {
     }
 }
 
-/// Of every experiment its channels, then these together, over the whole record and in windows.
+/// Returns the lines of every experiment: each channel, then all together; over the whole record, then in windows.
 pub(crate) fn lines(diagnosis: &Diagnosis) -> Vec<Line<'_>> {
     let mut lines = Vec::new();
     for before in &diagnosis.before {

@@ -1,4 +1,4 @@
-//! Diagnoses by hand, for tests of what is made of them.
+//! Made-up diagnoses for tests of the output.
 
 use mops_core::Role;
 use mops_core::math;
@@ -7,7 +7,7 @@ use mops_discrepancy::{
     Stability, Step, StrengthValue, Unexplained, Verdict,
 };
 
-/// A value between -1 and 1 that looks like chance.
+/// Returns a pseudorandom value between -1 and 1.
 fn chance(i: usize) -> f64 {
     let x = math::sin(i as f64 * 12.9898) * 43_758.547;
     2.0 * (x - x.floor()) - 1.0
@@ -23,7 +23,7 @@ fn strength(name: &str, value: f64, unit: &str) -> StrengthValue {
     }
 }
 
-/// A channel whose model swings too long before, and rightly after.
+/// Returns a channel: the nominal model is underdamped, the recalibrated one correct.
 fn prediction(experiment: &str, role: Role, signal: &str, phase: f64) -> Prediction {
     let times: Vec<f64> = (0..300).map(|i| 0.01 * i as f64).collect();
     let swing = |t: f64, decay: f64| math::exp(-decay * t) * math::cos(7.0 * t + phase);
@@ -51,7 +51,7 @@ fn error(name: &str, role: Role, [phi, theta, normalised]: [f64; 3]) -> Experime
     }
 }
 
-/// A force over time, over the speed and over the position, that is Coulomb friction of 0.0124 N m where `true_place`.
+/// Returns a torque over time, speed and position; Coulomb friction of 0.0124 N m if `true_place`, else noise.
 fn evidence(place: &str, evidence: f64, share: f64, true_place: bool) -> Evidence {
     let times: Vec<f64> = (0..300).map(|i| 0.01 * i as f64).collect();
     let speed: Vec<f64> = times.iter().map(|&t| -7.0 * math::exp(-0.5 * t) * math::sin(7.0 * t)).collect();
@@ -92,7 +92,7 @@ fn moved(name: &str, before: f64, after: f64) -> ParameterMove {
     ParameterMove { name: name.into(), unit: "kg m2".into(), before, after, std_error: Some(0.01 * after.abs()) }
 }
 
-/// Coulomb friction at `joint:phi`, in two experiments with two channels.
+/// Returns a diagnosis of Coulomb friction at `joint:phi`, from two experiments with two channels each.
 pub(crate) fn coulomb() -> Diagnosis {
     let rival = |effect: &str, bic_behind: f64| Rival {
         effect: effect.into(),
@@ -170,7 +170,7 @@ pub(crate) fn coulomb() -> Diagnosis {
     }
 }
 
-/// Nothing missing.
+/// Returns a diagnosis with the verdict `none`.
 pub(crate) fn nothing() -> Diagnosis {
     let mut diagnosis = coulomb();
     for prediction in &mut diagnosis.predictions {
@@ -193,7 +193,7 @@ pub(crate) fn nothing() -> Diagnosis {
     }
 }
 
-/// Something in a process that no effect explains.
+/// Returns a diagnosis with the verdict `unexplained`, with a table for `process:x`.
 pub(crate) fn unexplained() -> Diagnosis {
     let diagnosis = coulomb();
     let table = (0..9).map(|i| [f64::from(i), math::sin(0.7 * f64::from(i))]).collect();

@@ -1,4 +1,4 @@
-//! What a diagnosis leaves behind beside its report: its block of `result.json`, predictions, the repaired model.
+//! Output files of a diagnosis besides its report: block of `result.json`, predictions, recalibrated study.
 
 mod block;
 pub(crate) mod errors;

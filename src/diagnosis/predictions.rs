@@ -1,11 +1,12 @@
-//! What the repaired model predicts, as tables of numbers: one per experiment.
+//! Outputs predicted by the recalibrated model, one table per experiment.
 
 use mops_discrepancy::{Diagnosis, Prediction};
 
 use crate::numbers::{FileNames, significant};
 
-/// The content of `predictions/NAME.csv` for every experiment, with its NAME: the time, then a column per measured output.
-/// The rows are the samples of the first channel; where another channel has no sample at that time, its cell is empty.
+/// Returns NAME and content of `predictions/NAME.csv` for every experiment: the time, then a column per measured output.
+///
+/// The rows are the samples of the first channel. A cell is empty if its channel has no sample at that time.
 pub(crate) fn predictions(diagnosis: &Diagnosis) -> Vec<(String, String)> {
     let mut names = FileNames::default();
     let of_experiments = diagnosis.predictions.chunk_by(|a, b| a.experiment == b.experiment);
@@ -17,20 +18,20 @@ fn table(channels: &[Prediction]) -> String {
     let header = channels.iter().map(|c| format!("{}[{}]", c.signal, if c.unit.is_empty() { "1" } else { &c.unit }));
     let mut write = |row: Vec<String>| writer.write_record(row).expect("memory can be written to");
     write(std::iter::once("t[s]".to_owned()).chain(header).collect());
-    // N.B.: times of one file are the same numbers in all of its channels.
+    // N.B.: channels from one file have bitwise equal times.
     let mut next = vec![0; channels.len()];
     for &time in &channels[0].times {
         let cells = channels.iter().zip(&mut next).map(|(channel, next)| {
             while channel.times.get(*next).is_some_and(|&t| t < time) {
                 *next += 1;
             }
-            let there = channel.times.get(*next).is_some_and(|&t| t == time);
-            let value = channel.after.get(*next).filter(|value| there && value.is_finite());
+            let sampled = channel.times.get(*next).is_some_and(|&t| t == time);
+            let value = channel.after.get(*next).filter(|value| sampled && value.is_finite());
             value.map_or_else(String::new, |value| significant(*value, 12))
         });
         write(std::iter::once(significant(time, 12)).chain(cells).collect());
     }
-    String::from_utf8(writer.into_inner().expect("memory can be written to")).expect("it was made of texts")
+    String::from_utf8(writer.into_inner().expect("memory can be written to")).expect("CSV of strings is UTF-8")
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The repaired model as a study file that runs by itself: the user's file, with the effects found.
+//! Recalibrated study: the user's study file with the effects found, as a calibration that runs by itself.
 
 use std::fmt::Write;
 use std::sync::Arc;
@@ -10,30 +10,31 @@ use mops_discrepancy::{Diagnosis, Found, StrengthValue};
 use super::words;
 use crate::toml_text::{TomlText, key, number, quoted, settled};
 
-/// The study that was diagnosed.
+/// Study that was diagnosed.
 pub(crate) struct Original<'a> {
     /// Text of its file.
     pub(crate) text: &'a str,
-    /// `key=value` pairs that went over it.
+    /// Settings of the command line, as `key=value`.
     pub(crate) settings: &'a [String],
-    /// The study.
+    /// Study built from the file.
     pub(crate) study: &'a Study,
-    /// The effects that were tried.
+    /// Effects of the catalogue.
     pub(crate) effects: &'a [Arc<dyn Effect>],
 }
 
-/// A strength's range reaches so many times its value where physics does not bound it.
-const REACH: f64 = 10.0;
+/// Bound of an effect's parameter relative to its value, if physics sets none.
+const BOUND_RATIO: f64 = 10.0;
 
-/// The text of the repaired study: a calibration that starts at the values found. `locate` leads from the path of a data file
-/// to the path as it counts from where the repaired study will stand.
+/// Returns the text of the recalibrated study, a calibration whose initial guess is the values found.
+///
+/// `locate` maps the path of a data file to its path relative to the new study file.
 pub(crate) fn repaired(original: &Original<'_>, diagnosis: &Diagnosis, locate: &dyn Fn(&str) -> String) -> String {
     let mut text = settled(original.text, original.settings, locate);
     text.set(&["study", "name"], &quoted(&format!("{}-repaired", original.study.name())));
     text.set(&["study", "task"], "\"calibration\"");
     noise_and_criteria(&mut text, diagnosis);
     parameters(&mut text, original.study, diagnosis);
-    start_values(&mut text, original, diagnosis);
+    initial_states(&mut text, original, diagnosis);
     for found in &diagnosis.found {
         effect(&mut text, original, diagnosis, found);
     }
@@ -41,7 +42,7 @@ pub(crate) fn repaired(original: &Original<'_>, diagnosis: &Diagnosis, locate: &
     text.into_text()
 }
 
-/// Every channel needs its noise, and a calibration something to minimise; what the user gave stays.
+/// Adds the missing noise of channels, and criteria if there are none. Entries of the user are kept.
 fn noise_and_criteria(text: &mut TomlText, diagnosis: &Diagnosis) {
     let without = text.keys(&["criteria"]).is_empty();
     for p in diagnosis.predictions.iter().filter(|p| p.noise.is_finite() && p.noise > 0.0) {
@@ -65,7 +66,7 @@ fn noise_and_criteria(text: &mut TomlText, diagnosis: &Diagnosis) {
     }
 }
 
-/// Tuners start at the values found; those of terms that are not needed are taken away.
+/// Sets the initial guess of the tuners to the values found, and comments out the tuners of dropped terms.
 fn parameters(text: &mut TomlText, study: &Study, diagnosis: &Diagnosis) {
     for moved in diagnosis.parameters.iter().filter(|p| p.after.is_finite()) {
         let tuner = ["tuners", &moved.name];
@@ -73,11 +74,11 @@ fn parameters(text: &mut TomlText, study: &Study, diagnosis: &Diagnosis) {
             text.set(&["tuners", &moved.name, "start"], &number(moved.after));
         }
     }
-    for removed in &diagnosis.removed {
-        let term = &removed.term;
+    for dropped in &diagnosis.removed {
+        let term = &dropped.term;
         text.remove(&["tuners", term], &format!("The data show that {term} is not needed."));
-        let takes = |model: &&(String, _)| has_parameter(study, &model.0, term);
-        if let Some((model, _)) = study.models().iter().find(takes) {
+        let has_term = |model: &&(String, _)| has_parameter(study, &model.0, term);
+        if let Some((model, _)) = study.models().iter().find(has_term) {
             text.set(&["models", model, "parameters", term], "0.0");
         }
     }
@@ -89,8 +90,8 @@ fn has_parameter(study: &Study, model: &str, parameter: &str) -> bool {
     parameters.into_iter().any(|p| p.variable.name == parameter)
 }
 
-/// Free start values begin where they were found; those of effects are new.
-fn start_values(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diagnosis) {
+/// Sets the initial guess of free initial states to the values found, and adds the states of effects.
+fn initial_states(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diagnosis) {
     for experiment in text.keys(&["experiments"]) {
         let place = ["experiments", &experiment, "free"];
         let starts = diagnosis.starts.iter().filter(|(name, _, value)| *name == experiment && value.is_finite());
@@ -115,16 +116,16 @@ fn start_values(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diagno
     }
 }
 
-/// A state, with what its entry in `free` says.
+/// State, with the keys and values of its entry in `free`.
 type FreeStart = (String, Vec<(&'static str, f64)>);
 
-/// The state that a parameter is the start value of, where it starts, and for one of an effect where it may.
+/// Returns the state whose initial value is `parameter`, with its initial guess; for a state of an effect also with bounds.
 fn free_start(original: &Original<'_>, diagnosis: &Diagnosis, parameter: &str, value: f64) -> Option<FreeStart> {
     let states = original.study.models().iter().flat_map(|(_, model)| &model.interface().states);
     if let Some(state) = states.into_iter().find(|state| state.start == parameter) {
         return Some((state.name.clone(), vec![("start", value)]));
     }
-    // States of effects are numbered from 1: `name.start1` is the start value of `name.1`.
+    // States of effects are numbered from 1: `name.start1` is the initial value of `name.1`.
     let (name, start) = parameter.rsplit_once('.')?;
     let index = start.strip_prefix("start")?;
     diagnosis.found.iter().find(|found| found.name == name)?;
@@ -132,7 +133,7 @@ fn free_start(original: &Original<'_>, diagnosis: &Diagnosis, parameter: &str, v
     Some((format!("{name}.{index}"), vec![("start", value), ("min", low), ("max", high)]))
 }
 
-/// Adds an effect to its model, and its strengths to the tuners.
+/// Adds an effect to its model, and its parameters to the tuners.
 fn effect(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diagnosis, found: &Found) {
     let model = model_of(original.study, &found.place);
     let name = found.name.as_str();
@@ -142,14 +143,14 @@ fn effect(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diagnosis, f
     text.set(&["models", model, "effects", name], &value);
     let known = original.effects.iter().find(|effect| effect.name() == found.effect);
     for strength in &found.strengths {
-        let is = |known: &&EffectParameter| known.name == strength.name;
-        let known = known.and_then(|effect| effect.strengths().iter().find(is));
+        let same_name = |known: &&EffectParameter| known.name == strength.name;
+        let known = known.and_then(|effect| effect.strengths().iter().find(same_name));
         let tuner_name = format!("{name}.{}", strength.name);
         let own = diagnosis.starts.iter().filter(|(_, parameter, value)| *parameter == tuner_name && value.is_finite());
         let own: Vec<(String, f64)> = own.map(|(experiment, _, value)| (experiment.clone(), *value)).collect();
         text.set(&["tuners", &tuner_name], &tuner(strength, known, &own));
     }
-    // What happened once is neutral in all other experiments.
+    // An effect of one experiment has its null value in all others.
     if let (Some(only), Some(first)) = (&found.only, known.and_then(|effect| effect.strengths().first())) {
         let parameter = format!("{name}.{}", first.name);
         for experiment in text.keys(&["experiments"]).iter().filter(|experiment| *experiment != only) {
@@ -158,7 +159,7 @@ fn effect(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diagnosis, f
     }
 }
 
-/// The model that has the place.
+/// Returns the name of the model that has the place.
 pub(super) fn model_of<'a>(study: &'a Study, place: &str) -> &'a str {
     let simulated = || study.models().iter().filter(|(_, model)| model.interface().analysis == AnalysisKind::Time);
     let has = |(_, model): &&(String, _)| ports(model).any(|port| port == place);
@@ -170,7 +171,8 @@ fn ports(model: &Arc<dyn mops_core::Model>) -> impl Iterator<Item = String> {
     model.interface().ports.iter().map(ToString::to_string)
 }
 
-/// The tuner of a strength: from its value, or where every experiment has its own from these, within what physics allows.
+/// Returns the tuner of an effect's parameter, within its physical bounds. `own` lists the values by experiment, if the
+/// parameter differs between experiments.
 fn tuner(strength: &StrengthValue, known: Option<&EffectParameter>, own: &[(String, f64)]) -> String {
     let bounds = known.map_or([f64::NEG_INFINITY, f64::INFINITY], |known| known.bounds);
     let largest =
@@ -185,19 +187,20 @@ fn tuner(strength: &StrengthValue, known: Option<&EffectParameter>, own: &[(Stri
         tuner += ", per-case = true";
         let own: Vec<String> = own.iter().map(|(case, value)| format!("{} = {}", key(case), at(*value))).collect();
         if !own.is_empty() {
-            write!(tuner, ", starts = {{ {} }}", own.join(", ")).expect("text takes everything");
+            write!(tuner, ", starts = {{ {} }}", own.join(", ")).expect("writing to a string succeeds");
         }
     }
     tuner + " }"
 }
 
-/// The range of a strength around its value; bounds that are infinite are drawn in.
+/// Returns the bounds of a parameter. An infinite bound becomes plus or minus ten times the value, rounded up to one digit;
+/// plus or minus 1 if the value is 0.
 fn range(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
-    let size = if value.is_finite() && value != 0.0 { REACH * value.abs() } else { 1.0 };
+    let size = if value.is_finite() && value != 0.0 { BOUND_RATIO * value.abs() } else { 1.0 };
     // Up to the next round number.
     let decade = math::powf(10.0, math::log10(size).floor());
     let reach = (size / decade - 1e-9).ceil() * decade;
-    // By way of a text: 3 * 0.1 is not 0.3.
+    // Via decimal text, as 3 * 0.1 is not 0.3.
     let reach: f64 = format!("{reach:.0e}").parse().unwrap_or(reach);
     let [low, high] = [low, high].map(|bound| if bound.is_finite() { bound } else { bound.signum() * reach });
     if low < high { [low, high] } else { [low - reach, high + reach] }
@@ -254,7 +257,7 @@ free     = [\"phi\", \"theta\"]
             .unwrap_or_else(|e| panic!("{e}\n{text}"))
     }
 
-    /// The repaired text, and the same without what the effects add.
+    /// Returns the text of the recalibrated study.
     fn made(diagnosis: &Diagnosis, settings: &[String]) -> String {
         let study = read(&STUDY.replace("swing.csv", "../data/swing.csv")).study;
         let original = Original { text: STUDY, settings, study: &study, effects: &crate::catalogue().effects };
@@ -270,7 +273,7 @@ free     = [\"phi\", \"theta\"]
 
     #[test]
     fn the_repaired_study_is_read_as_a_calibration_without_criteria_of_the_user() {
-        // Without the effect, which needs nothing that is tested here.
+        // Without the effect, which this test does not need.
         let diagnosis = Diagnosis { found: Vec::new(), ..made_up::coulomb() };
         let study = read(&made(&diagnosis, &[])).study;
         assert_eq!((study.name(), study.task()), ("swing-repaired", mops_core::Task::Calibration));
@@ -283,7 +286,7 @@ free     = [\"phi\", \"theta\"]
     }
 
     #[test]
-    fn what_happened_once_is_neutral_in_all_other_experiments() {
+    fn an_effect_of_one_experiment_has_its_null_value_in_all_others() {
         let mut diagnosis = made_up::coulomb();
         diagnosis.found[0].only = Some("another".into());
         diagnosis.found[0].effect = "wind-gust".into();
@@ -303,7 +306,7 @@ free     = [\"phi\", \"theta\"]
     }
 
     #[test]
-    fn a_tuner_of_every_case_starts_where_its_case_says() {
+    fn a_tuner_per_case_has_the_initial_guess_of_its_case() {
         let one = "c  = { start = 4e-4, min = 1e-4, max = 1e-3 }";
         let own = "c  = { start = 4e-4, min = 1e-4, max = 1e-3, per-case = true, starts = { swing = 6e-4 } }";
         let study = read(&STUDY.replace("swing.csv", "../data/swing.csv").replace(one, own)).study;
@@ -312,7 +315,7 @@ free     = [\"phi\", \"theta\"]
     }
 
     #[test]
-    fn a_phase_starts_in_each_experiment_where_it_was_found() {
+    fn a_phase_has_the_value_found_as_initial_guess_in_each_experiment() {
         let phase =
             StrengthValue { name: "phase".into(), value: 0.4, unit: "rad".into(), std_error: None, interval95: None };
         let catalogue = crate::catalogue();
@@ -327,7 +330,7 @@ free     = [\"phi\", \"theta\"]
     }
 
     #[test]
-    fn ranges_of_strengths_end_at_round_numbers_and_hold_the_value() {
+    fn ranges_of_parameters_end_at_round_numbers_and_contain_the_value() {
         assert_eq!(range(0.0124, [0.0, f64::INFINITY]), [0.0, 0.2]);
         assert_eq!(range(-3.0, [f64::NEG_INFINITY, f64::INFINITY]), [-30.0, 30.0]);
         let rounded = range(0.03, [f64::NEG_INFINITY, f64::INFINITY]).map(number);

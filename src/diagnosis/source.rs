@@ -1,4 +1,4 @@
-//! The repaired study as a Rust program: tuners as values, models, experiments and criteria by their tables.
+//! Recalibrated study as a Rust program: tuners as values; models, experiments and criteria as TOML tables.
 
 use std::collections::HashSet;
 
@@ -8,10 +8,10 @@ use toml::{Table, Value};
 use super::words;
 use crate::plain::{acts, line};
 
-/// The program that does what the study file `text` says; its data are found from `folder`.
+/// Returns the program that builds and solves the study of the file `text`. Paths of data are relative to `folder`.
 pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String {
-    let study: Table = text.parse().expect("the repaired study is right TOML");
-    // N.B.: names come from a study of whoever wrote it. In comments they are one line, elsewhere literals.
+    let study: Table = text.parse().expect("the recalibrated study is valid TOML");
+    // N.B.: names in a study are untrusted text. In comments they are kept on one line, elsewhere they are literals.
     let about = line(&words::verdict(diagnosis).replace('`', ""));
     let name = study.get("study").and_then(|s| s.get("name")).and_then(Value::as_str).unwrap_or_default();
     let mut imports = vec!["StudyBuilder", "Study", "Task", "TunerBuilder"];
@@ -42,7 +42,7 @@ pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String 
     format!(
         "//! {about}
 //!
-//! Written by `mops diagnose --export rust`. It needs the crate `mops`, and the data that its experiments name.
+//! Written by `mops diagnose --export rust`. Requires the crate `mops` and the data files of the experiments.
 
 use std::error::Error;
 use std::path::Path;
@@ -50,10 +50,10 @@ use std::path::Path;
 use mops::file::{{self, Files}};
 use mops::{{{imports}}};
 
-/// The folder that the paths of data count from.
+/// Folder that data paths are relative to.
 const FOLDER: &str = {folder:?};
 {constants}
-/// Data files in the folder.
+/// Data files in [`FOLDER`].
 struct Data;
 
 impl Files for Data {{
@@ -66,7 +66,7 @@ impl Files for Data {{
     }}
 }}
 
-/// The repaired study.
+/// Builds the recalibrated study.
 pub fn study() -> Result<Study, Box<dyn Error>> {{
     let catalogue = mops::catalogue();
     let models = {models};
@@ -100,17 +100,17 @@ fn main() -> Result<(), Box<dyn Error>> {{
     )
 }
 
-/// The tables of a section, in their order.
+/// Returns the tables of a section, in their order.
 fn entries<'t>(study: &'t Table, section: &str) -> impl Iterator<Item = (&'t str, &'t Value)> {
     study.get(section).and_then(Value::as_table).into_iter().flatten().map(|(name, value)| (name.as_str(), value))
 }
 
-/// A named item of a list.
+/// Returns the code of a named item of a list.
 fn entry(name: &str, value: &str) -> String {
     format!("({name:?}.into(), {value})")
 }
 
-/// A list, on one line if it is short.
+/// Returns the code of a list, on one line if it is short.
 fn items(items: Vec<String>, indent: usize) -> String {
     let short = format!("vec![{}]", items.join(", "));
     if short.len() <= 90 {
@@ -120,22 +120,24 @@ fn items(items: Vec<String>, indent: usize) -> String {
     format!("vec![\n{}{outer}]", items.iter().map(|item| format!("{inner}{item},\n")).collect::<String>())
 }
 
-/// A table as TOML.
+/// Returns a table as TOML.
 fn written(table: &Value) -> String {
-    table.as_table().map(|table| toml::to_string(table).expect("it was TOML")).unwrap_or_default()
+    table.as_table().map(|table| toml::to_string(table).expect("a parsed table is valid TOML")).unwrap_or_default()
 }
 
-/// A text as a raw literal of Rust; with escapes, where it has characters that act.
+/// Returns a text as a raw string literal, or with escapes if it contains control characters.
 fn raw(text: &str) -> String {
     if text.contains(acts) {
         return format!("{:?}", text.trim_start());
     }
-    let hashes =
-        (1..).map(|n| "#".repeat(n)).find(|hashes| !text.contains(&format!("\"{hashes}"))).expect("one is enough");
+    let hashes = (1..)
+        .map(|n| "#".repeat(n))
+        .find(|hashes| !text.contains(&format!("\"{hashes}")))
+        .expect("some number of hashes is enough");
     format!("r{hashes}\"\n{}{}{hashes}", text.trim_start(), '"')
 }
 
-/// The name of a constant: `MODEL_RIG`.
+/// Returns the name of a constant: `MODEL_RIG`.
 fn constant(section: &str, name: &str) -> String {
     let kind = match section {
         "criteria" => "criterion",
@@ -145,13 +147,13 @@ fn constant(section: &str, name: &str) -> String {
     format!("{}_{}", kind.to_uppercase(), name.chars().map(letter).collect::<String>())
 }
 
-/// A name that is not taken yet: others may differ from it in what a constant cannot show.
+/// Returns a unique name: names of a study may map to the same identifier.
 fn unique(name: String, taken: &mut HashSet<String>) -> String {
     let names = std::iter::once(name.clone()).chain((2..).map(|i| format!("{name}_{i}")));
     names.into_iter().find(|name| taken.insert(name.clone())).expect("some number is free")
 }
 
-/// A tuner as a value of Rust.
+/// Returns the code of a tuner.
 fn tuner(tuner: &Value) -> String {
     let Some(table) = tuner.as_table() else { return "TunerBuilder::default()".to_owned() };
     let number = |key: &str| match table.get(key) {
@@ -207,15 +209,17 @@ mod tests {
     use super::super::repaired::{Original, repaired};
     use super::*;
 
-    /// N.B.: the example is compiled with the others, and run by `tests/examples.rs`.
+    /// N.B.: `examples/repaired.rs` is compiled with the other examples, and run by `tests/examples.rs`.
     #[test]
-    fn the_example_is_what_is_written_for_the_swinging_pendulum() {
+    fn the_example_is_the_program_for_the_swinging_pendulum() {
         let catalogue = crate::catalogue();
-        let Some(CatalogueStudy::Shipped(shipped)) = catalogue.study("furuta-swing") else { panic!("it is shipped") };
+        let Some(CatalogueStudy::Shipped(shipped)) = catalogue.study("furuta-swing") else {
+            panic!("`furuta-swing` is a shipped study")
+        };
         let text = std::str::from_utf8(shipped.file("study.toml").unwrap()).unwrap();
         let settings = ["tuners.ca.max=6e-3".to_owned()];
         let study = mops_core::file::read(&catalogue, "study.toml", text, &settings, shipped).unwrap().study;
-        // The pendulum has the effect already, as a term of its own.
+        // Without the effect: the model of the pendulum contains it as a term.
         let removed = vec![Removed { term: "bp".into(), place: "joint:theta".into() }];
         let diagnosis = Diagnosis { found: Vec::new(), removed, ..made_up::coulomb() };
         let original = Original { text, settings: &settings, study: &study, effects: &catalogue.effects };
@@ -227,7 +231,7 @@ mod tests {
         assert_eq!(std::fs::read_to_string(path).unwrap(), program);
     }
 
-    /// The program without what stands in literals: raw ones, and those with escapes.
+    /// Returns the program without the content of its string literals, raw or with escapes.
     fn without_literals(program: &str) -> String {
         let (mut rest, mut code) = (program, String::new());
         while let Some(start) = rest.find('"') {
@@ -280,13 +284,13 @@ mod tests {
                 .filter(|line| line.contains("evil"))
                 .collect();
             assert!(code.is_empty(), "{name:?}: {code:?}");
-            // Nothing of it acts in an editor or a compiler either.
+            // No control character reaches an editor or a compiler.
             assert!(!program.contains(acts) && !program.contains('\r'), "{name:?}");
         }
     }
 
     #[test]
-    fn names_that_a_constant_cannot_tell_apart_have_constants_of_their_own() {
+    fn names_with_the_same_identifier_have_separate_constants() {
         let text = "[cases.\"a-b\"]\nx = 1\n[cases.\"a.b\"]\nx = 2\n[cases.a_b]\nx = 3\n[cases.A_B]\nx = 4\n";
         let program = source(text, &made_up::coulomb(), ".");
         let names: Vec<&str> =
@@ -295,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn every_key_of_a_tuner_has_its_place_in_the_program() {
+    fn every_key_of_a_tuner_is_in_the_program() {
         let of = |text: &str| tuner(&Value::Table(text.parse().unwrap()));
         assert_eq!(of("start = 1\nmin = 0.5\nmax = 2.0\nscale = \"log\""), "TunerBuilder::new(1.0, 0.5, 2.0).log()");
         assert_eq!(

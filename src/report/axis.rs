@@ -1,22 +1,22 @@
-//! Axes: round ticks within a range, and their labels.
+//! Axes: ticks at round values, and their labels.
 
 use super::range::drawable;
 use mops_core::math;
 
-/// An axis that is ready to be drawn.
+/// Axis of a plot, with its ticks.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
-    /// Shown range; of a logarithmic axis, in decades.
+    /// Range; for a logarithmic axis, of the decimal logarithms.
     range: [f64; 2],
     log: bool,
-    /// Positions between 0 and 1, and what stands there.
+    /// Positions from 0 to 1, with labels.
     pub(super) ticks: Vec<(f64, String)>,
-    /// Factor that all labels leave out, such as `x 10^-6`.
+    /// Common factor of all labels, such as `x 10^-6`.
     pub(super) factor: Option<String>,
 }
 
 impl Axis {
-    /// An axis over `range`, of which `log` says whether it is the range of the logarithms; about `count` ticks.
+    /// Creates an axis with about `count` ticks. If `log`, `range` is the range of the decimal logarithms.
     pub(super) fn new(range: [f64; 2], log: bool, count: f64) -> Self {
         if log {
             return Self { range, log, ticks: decades(range), factor: None };
@@ -24,7 +24,7 @@ impl Axis {
         Self::linear(range, round_step((range[1] - range[0]) / count), count)
     }
 
-    /// An axis of angles in degrees: ticks at multiples of 45, where that gives enough of them.
+    /// Creates an axis of angles in degrees, with ticks at multiples of 45 for ranges of 90 or more.
     pub(super) fn degrees(range: [f64; 2], count: f64) -> Self {
         let room = range[1] - range[0];
         let multiples = [45.0, 90.0, 180.0, 360.0, 720.0, 1440.0, 3600.0];
@@ -37,7 +37,7 @@ impl Axis {
     fn linear(range: [f64; 2], step: f64, count: f64) -> Self {
         let [low, high] = range;
         let power = math::log10(low.abs().max(high.abs())).floor();
-        // Powers that engineers have a prefix for, and only where the plain number is hard to read.
+        // Powers with an SI prefix, and only if the plain number is hard to read.
         let power = if (-3.0..5.0).contains(&power) { 0.0 } else { (power / 3.0).floor() * 3.0 };
         let factor = math::powf(10.0, power);
         let decimals = (-math::log10(step / factor).floor()).clamp(0.0, 12.0) as usize;
@@ -51,21 +51,21 @@ impl Axis {
         Self { range, log: false, ticks, factor }
     }
 
-    /// Where a value stands: 0 at the start of the axis, 1 at its end; `None` where it cannot be drawn.
+    /// Returns the position of a value, 0 at the start and 1 at the end of the axis; `None` if it cannot be drawn.
     pub(super) fn position(&self, value: f64) -> Option<f64> {
         let value = drawable(value, self.log)?;
         Some((value - self.range[0]) / (self.range[1] - self.range[0]))
     }
 }
 
-/// The next of 1, 2, 5 times a power of ten.
+/// Rounds up to 1, 2 or 5 times a power of ten.
 fn round_step(step: f64) -> f64 {
     let power = math::powf(10.0, math::log10(step).floor());
     let factor = [1.0, 2.0, 5.0].into_iter().find(|f| step <= f * power * (1.0 + 1e-9)).unwrap_or(10.0);
     factor * power
 }
 
-/// Ticks of a logarithmic axis: powers of ten, and 2 and 5 between them where there are few.
+/// Returns the ticks of a logarithmic axis: powers of ten, with 2 and 5 between them for at most 2.5 decades.
 fn decades([low, high]: [f64; 2]) -> Vec<(f64, String)> {
     let every = ((high - low) / 7.0).ceil().max(1.0) as i32;
     let steps: &[f64] = if high - low <= 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
@@ -92,7 +92,7 @@ fn decades([low, high]: [f64; 2]) -> Vec<(f64, String)> {
     ticks
 }
 
-/// Ticks where no power of ten may lie in the range: round values.
+/// Returns the ticks of a logarithmic axis of less than 0.7 decades: round values.
 fn close(low: f64, high: f64) -> Vec<(f64, String)> {
     let [from, to] = [low, high].map(|end| math::powf(10.0, end));
     let step = round_step((to - from) / 5.0);

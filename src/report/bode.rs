@@ -1,25 +1,26 @@
-//! Frequency responses of linear systems: magnitude and phase over the logarithm of the frequency.
+//! Bode plots of linear systems.
 
 use mops_core::linear::{Complex, zeros};
 use mops_core::math::{self, complex};
 use mops_core::{Analysis, Failure, StateSpace};
 
-use super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::plot::{Color, Curve, CurveStyle, Plot};
 
-/// One response at the frequencies of a plot.
+/// Frequency response at the frequencies of a plot.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Sweep<'a> {
+pub(crate) struct FrequencyCurve<'a> {
     /// Name in the legend.
     pub(crate) name: String,
-    /// The response.
+    /// Complex values of the response.
     pub(crate) values: &'a [Complex],
-    /// How its curves are drawn.
+    /// Style of its curves.
     pub(crate) style: CurveStyle,
-    /// What they stand for.
-    pub(crate) ink: Ink,
+    /// Color of its curves.
+    pub(crate) color: Color,
 }
 
-/// Angular frequencies around everything that happens, two decades to both sides; dense around sharp resonances.
+/// Returns angular frequencies, rad/s, from two decades below the lowest corner frequency to two decades above the highest.
+/// They are dense around sharp resonances. A delay limits the highest frequency.
 pub(crate) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
     let corners = [system.poles()?, zeros(system)?].concat();
     let largest = corners.iter().map(|z| complex::norm(*z)).fold(0.0, f64::max);
@@ -28,7 +29,7 @@ pub(crate) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
     let (low, high) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
     let (low, mut high) = if low.is_finite() { (1e-2 * low, 1e2 * high) } else { (1e-2, 1e2) };
     if system.delay > 0.0 {
-        // Later the phase only turns and turns.
+        // Beyond that, the phase of the delay only wraps around.
         high = high.min((3.0 * corners.iter().map(|z| complex::norm(*z)).fold(0.0, f64::max)).max(6.0 / system.delay));
     }
     const COUNT: usize = 1200;
@@ -43,20 +44,20 @@ pub(crate) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
     Ok(omegas)
 }
 
-/// Magnitude and phase of responses at the same frequencies.
-pub(crate) fn bode(omegas: &[f64], sweeps: &[Sweep<'_>], name: &str) -> [Plot; 2] {
+/// Returns the plots of magnitude and phase of responses at the same frequencies.
+pub(crate) fn bode(omegas: &[f64], responses: &[FrequencyCurve<'_>], name: &str) -> [Plot; 2] {
     let of = |title: &str, y_label: &str, y: &dyn Fn(&[Complex]) -> Vec<f64>| Plot {
         title: format!("{title} of {name}"),
         x_label: "frequency (rad/s)".into(),
         y_label: y_label.into(),
-        curves: sweeps
+        curves: responses
             .iter()
-            .map(|sweep| Curve {
-                name: sweep.name.clone(),
-                points: omegas.iter().copied().zip(y(sweep.values)).collect(),
-                style: sweep.style,
-                ink: sweep.ink,
-                may_leave: sweep.ink == Ink::Start,
+            .map(|response| Curve {
+                name: response.name.clone(),
+                points: omegas.iter().copied().zip(y(response.values)).collect(),
+                style: response.style,
+                color: response.color,
+                may_leave: response.color == Color::Start,
                 ..Curve::default()
             })
             .collect(),
@@ -65,11 +66,11 @@ pub(crate) fn bode(omegas: &[f64], sweeps: &[Sweep<'_>], name: &str) -> [Plot; 2
         ..Plot::default()
     };
     let decibel = |values: &[Complex]| values.iter().map(|g| 20.0 * math::log10(complex::norm(*g))).collect();
-    [of("magnitude", "magnitude (dB)", &decibel), of("phase", "phase (deg)", &followed)]
+    [of("magnitude", "magnitude (dB)", &decibel), of("phase", "phase (deg)", &unwrapped)]
 }
 
-/// The phase, deg, followed from frequency to frequency: it does not jump by a turn.
-fn followed(values: &[Complex]) -> Vec<f64> {
+/// Returns the unwrapped phase, deg.
+fn unwrapped(values: &[Complex]) -> Vec<f64> {
     let mut last = values.first().map_or(0.0, |g| complex::arg(*g));
     let mut phase = Vec::with_capacity(values.len());
     for (i, value) in values.iter().enumerate() {
@@ -79,7 +80,7 @@ fn followed(values: &[Complex]) -> Vec<f64> {
     phase
 }
 
-/// The responses of every input at one output, at the start and at the reported point.
+/// Returns the Bode plots from every input to one output, at the initial guess and at the reported point.
 pub(super) fn compared(
     start: &Result<Analysis, Failure>,
     best: (&Result<Analysis, Failure>, &str),
@@ -98,11 +99,17 @@ pub(super) fn compared(
             response.map_or_else(Vec::new, |response| omegas.iter().map(|&omega| response.scalar(omega)).collect())
         };
         let (first, last) = (values(&start), values(&found));
-        let sweeps = [
-            Sweep { name: "start".into(), values: &first, style: CurveStyle::Dashed, ink: Ink::Start },
-            Sweep { name: best.1.into(), values: &last, style: CurveStyle::Line, ink: Ink::Result },
+        let responses = [
+            FrequencyCurve {
+                name: "initial guess".into(),
+                values: &first,
+                style: CurveStyle::Dashed,
+                color: Color::Start,
+            },
+            FrequencyCurve { name: best.1.into(), values: &last, style: CurveStyle::Line, color: Color::Result },
         ];
-        let drawn: Vec<Sweep<'_>> = sweeps.into_iter().filter(|sweep| !sweep.values.is_empty()).collect();
+        let drawn: Vec<FrequencyCurve<'_>> =
+            responses.into_iter().filter(|response| !response.values.is_empty()).collect();
         let [magnitude, phase] = bode(&omegas, &drawn, &format!("{output}/{name} in case {case}"));
         plots.extend([(format!("magnitude-{output}-{name}"), magnitude), (format!("phase-{output}-{name}"), phase)]);
     }
@@ -116,12 +123,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_phase_of_a_delay_is_a_straight_line_that_does_not_jump() {
+    fn the_unwrapped_phase_of_a_delay_is_a_straight_line() {
         let late = TransferFunction { delay: 2.0, ..TransferFunction::new(vec![1.0], vec![1.0]) };
         let response = late.state_space().unwrap().response().unwrap();
         let omegas: Vec<f64> = (0..200).map(|i| 0.1 * f64::from(i)).collect();
         let values: Vec<Complex> = omegas.iter().map(|&omega| response.scalar(omega)).collect();
-        for (phase, omega) in followed(&values).iter().zip(&omegas) {
+        for (phase, omega) in unwrapped(&values).iter().zip(&omegas) {
             assert!((phase + (2.0 * omega).to_degrees()).abs() < 1e-9);
         }
     }

@@ -1,4 +1,4 @@
-//! The tables of a calibration: estimates with their errors, and how well every channel is met.
+//! Tables of a calibration: estimates with their errors, and the fit of every channel.
 
 use maud::{Markup, html};
 use mops_core::{CalibrationReport, ChannelReport, FailureReport, ParameterReport};
@@ -7,23 +7,22 @@ use super::page::scrolling;
 use super::sensitivity;
 use crate::numbers::{number, percent, significant};
 
-/// Parameters, then experiments.
+/// Returns the tables of parameters and of experiments.
 pub(super) fn section(calibration: &CalibrationReport) -> Markup {
     html! {
         @if !calibration.parameters.is_empty() {
             h3 { "Parameters" }
             p {
-                "Standard errors are to first order, by the sandwich: they hold whatever the weights and the numbers of samples. "
-                "Intervals are by Student's t. Where residuals are correlated, or the model is wrong, intervals hold the truth less "
-                "often than 95 %."
+                "Standard errors are first-order sandwich estimates, valid for any weights and numbers of samples. Intervals use "
+                "Student's t distribution. If residuals are correlated or the model is wrong, their coverage is below 95 %."
             }
             (scrolling("Parameters", parameters(calibration)))
         }
         @if !calibration.experiments.is_empty() {
             h3 { "Experiments" }
             p {
-                "RMSE is the root mean square of measured - simulated; beside the noise it tells what the model leaves "
-                "unexplained (1 is all that can be had). A fit of 100 % is exact, 0 % no better than the mean."
+                "RMSE is the root mean square of measured - simulated. RMSE / noise = 1 is the noise level, the best achievable. "
+                "A fit of 100 % is exact, a fit of 0 % is no better than the mean."
             }
             (scrolling("Experiments", experiments(calibration)))
         }
@@ -31,8 +30,9 @@ pub(super) fn section(calibration: &CalibrationReport) -> Markup {
 }
 
 fn parameters(calibration: &CalibrationReport) -> Markup {
-    let told = calibration.sensitivity.iter().flat_map(|found| &found.tuners);
-    let relative = |parameter: &ParameterReport| match told.clone().find(|tuner| tuner.name == parameter.name) {
+    let sensitivities = calibration.sensitivity.iter().flat_map(|found| &found.tuners);
+    let of_parameter = |parameter: &ParameterReport| sensitivities.clone().find(|tuner| tuner.name == parameter.name);
+    let relative = |parameter: &ParameterReport| match of_parameter(parameter) {
         Some(tuner) => sensitivity::relative(tuner),
         None => html! { (percent((parameter.std_error / parameter.value).abs())) },
     };
@@ -43,7 +43,7 @@ fn parameters(calibration: &CalibrationReport) -> Markup {
                     th scope="col" { "parameter" }
                     th scope="col" class="number" { "estimate" }
                     th scope="col" class="number" { "standard error" }
-                    th scope="col" class="number" { "relative" }
+                    th scope="col" class="number" { "relative error" }
                     th scope="col" class="number" { "95 % from" }
                     th scope="col" class="number" { "to" }
                     th scope="col" { "unit" }
@@ -61,7 +61,7 @@ fn parameters(calibration: &CalibrationReport) -> Markup {
                             td class="number" { (number(parameter.interval95[0])) }
                             td class="number" { (number(parameter.interval95[1])) }
                         } @else {
-                            td colspan="4" class="missed" { "the data do not determine it" }
+                            td colspan="4" class="missed" { "not identifiable from the data" }
                         }
                         td { (parameter.unit) }
                     }
@@ -112,7 +112,7 @@ fn channel_cells(channel: &ChannelReport) -> Markup {
     }
 }
 
-/// Simulations that failed on the way.
+/// Returns the table of failed simulations.
 pub(super) fn failures(failures: &[FailureReport]) -> Markup {
     let table = html! {
         table {
@@ -121,7 +121,7 @@ pub(super) fn failures(failures: &[FailureReport]) -> Markup {
                     th scope="col" { "case" }
                     th scope="col" { "model" }
                     th scope="col" { "failure" }
-                    th scope="col" class="number" { "how often" }
+                    th scope="col" class="number" { "count" }
                 }
             }
             tbody {

@@ -1,11 +1,11 @@
-//! Curves on paper: cut at the frame, without the points that nobody can see.
+//! Curves on the drawing: clipped at the frame and simplified.
 
 use mops_core::math;
 
-/// A point of the drawing: x to the right, y down.
+/// Point of the drawing: x to the right, y down.
 pub(super) type Point = [f64; 2];
 
-/// A rectangle of the drawing: its upper left and lower right corner.
+/// Rectangle of the drawing, by its upper left and lower right corner.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Frame {
     pub(super) from: Point,
@@ -17,7 +17,7 @@ impl Frame {
         (0..2).all(|i| p[i] >= self.from[i] - 1e-6 && p[i] <= self.to[i] + 1e-6)
     }
 
-    /// The part of a segment inside the frame, as two numbers between 0 and 1.
+    /// Returns the part of a segment inside the frame, as two numbers from 0 at `a` to 1 at `b`.
     /// Source: Y.-D. Liang, B. A. Barsky, ACM Transactions on Graphics 3 (1984) 1-22.
     fn inside(&self, a: Point, b: Point) -> Option<[f64; 2]> {
         let [mut enter, mut leave] = [0.0f64, 1.0f64];
@@ -37,8 +37,7 @@ impl Frame {
     }
 }
 
-/// The parts of a curve inside the frame, each without points closer than `tolerance` to the line without them. A gap
-/// (`None`) parts the curve.
+/// Returns the parts of a curve inside the frame, simplified to within `tolerance`. A gap (`None`) splits the curve.
 pub(super) fn visible(points: &[Option<Point>], frame: Frame, tolerance: f64) -> Vec<Vec<Point>> {
     let mut parts: Vec<Vec<Point>> = Vec::new();
     let mut joined = false;
@@ -61,7 +60,7 @@ pub(super) fn visible(points: &[Option<Point>], frame: Frame, tolerance: f64) ->
     parts.iter().map(|part| simplified(part, tolerance)).collect()
 }
 
-/// Source: D. H. Douglas, T. K. Peucker, Cartographica 10 (1973) 112-122.
+/// Simplifies a line to within `tolerance`. Source: D. H. Douglas, T. K. Peucker, Cartographica 10 (1973) 112-122.
 fn simplified(points: &[Point], tolerance: f64) -> Vec<Point> {
     let mut keep = vec![false; points.len()];
     let mut spans = vec![(0, points.len() - 1)];
@@ -79,7 +78,7 @@ fn simplified(points: &[Point], tolerance: f64) -> Vec<Point> {
     points.iter().zip(keep).filter(|(_, keep)| *keep).map(|(p, _)| *p).collect()
 }
 
-/// Distance of `p` from the segment from `a` to `b`.
+/// Returns the distance of `p` from the segment `a` to `b`.
 pub(super) fn distance(p: Point, a: Point, b: Point) -> f64 {
     let (d, e) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
     let length = d[0] * d[0] + d[1] * d[1];
@@ -94,7 +93,7 @@ mod tests {
     const FRAME: Frame = Frame { from: [0.0, 0.0], to: [10.0, 10.0] };
 
     #[test]
-    fn a_curve_is_cut_at_the_frame_and_comes_back() {
+    fn a_curve_is_clipped_where_it_leaves_and_enters_the_frame() {
         let curve = [[0.0, 5.0], [2.0, 5.0], [4.0, 25.0], [6.0, 5.0], [8.0, 5.0]].map(Some);
         assert_eq!(
             visible(&curve, FRAME, 0.1),
@@ -104,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_parts_a_curve_and_straight_lines_keep_their_ends_alone() {
+    fn a_gap_splits_a_curve_and_straight_lines_keep_only_their_ends() {
         let line = |i: u32| Some([f64::from(i), 1.0]);
         let curve: Vec<_> = (0..=10).map(|i| if i == 5 { None } else { line(i) }).collect();
         assert_eq!(visible(&curve, FRAME, 0.1), [[[0.0, 1.0], [4.0, 1.0]], [[6.0, 1.0], [10.0, 1.0]]]);

@@ -1,40 +1,51 @@
-//! Start and reported point beside each other: a signal in both, and measurements with them.
+//! Plots of a signal at the initial guess and at the reported point, with measurements if there are any.
 
 use mops_core::{Analysis, Channel, Failure, Row, Trace, Variable};
 
-use super::plot::{Band, Curve, CurveStyle, Ink, Level, Plot};
+use super::plot::{Band, Color, Curve, CurveStyle, Level, Plot};
 use super::sampling;
 use crate::numbers::{labelled, with_unit};
 
-/// The two analyses that are compared.
-pub(super) struct Both {
+/// Analyses at the initial guess and at the reported point.
+pub(super) struct Comparison {
     pub(super) start: Result<Analysis, Failure>,
     pub(super) best: Result<Analysis, Failure>,
     pub(super) best_name: &'static str,
 }
 
-impl Both {
-    /// Sentences for the simulations that failed.
+impl Comparison {
+    /// Returns a sentence for each failed simulation.
     pub(super) fn failures(&self) -> Vec<String> {
-        let told = |at: &str, analysis: &Result<Analysis, Failure>| {
+        let sentence = |at: &str, analysis: &Result<Analysis, Failure>| {
             analysis
                 .as_ref()
                 .err()
                 .map(|failure| format!("No response at the {at}: the simulation failed ({failure})."))
         };
-        told("start values", &self.start).into_iter().chain(told(self.best_name, &self.best)).collect()
+        let start = sentence("initial guess", &self.start);
+        let mut all: Vec<String> = start.into_iter().chain(sentence(self.best_name, &self.best)).collect();
+        // Without a solver, both points are the initial guess.
+        all.dedup();
+        all
     }
 
     fn curves(&self, signal: &str) -> Vec<Curve> {
-        let curve = |name: &str, analysis: &Result<Analysis, Failure>, style, ink| {
+        let curve = |name: &str, analysis: &Result<Analysis, Failure>, style, color| {
             let points = sampling::points(trace(analysis, signal)?);
-            Some(Curve { name: name.to_owned(), points, style, ink, may_leave: ink == Ink::Start, ..Curve::default() })
+            Some(Curve {
+                name: name.to_owned(),
+                points,
+                style,
+                color,
+                may_leave: color == Color::Start,
+                ..Curve::default()
+            })
         };
-        let start = curve("start", &self.start, CurveStyle::Dashed, Ink::Start);
-        start.into_iter().chain(curve(self.best_name, &self.best, CurveStyle::Line, Ink::Result)).collect()
+        let start = curve("initial guess", &self.start, CurveStyle::Dashed, Color::Start);
+        start.into_iter().chain(curve(self.best_name, &self.best, CurveStyle::Line, Color::Result)).collect()
     }
 
-    /// A signal at both points.
+    /// Returns the plot of a signal at both points.
     pub(super) fn response(&self, signal: &Variable, case: &str, rows: &[&Row]) -> Plot {
         Plot {
             title: format!("{} in case {case}", signal.name),
@@ -44,7 +55,7 @@ impl Both {
         }
     }
 
-    /// The levels that criteria look at: limits of demands, edges of bands.
+    /// Returns the levels of criteria on a signal: limits of demands, edges of bands.
     fn levels(&self, signal: &str, rows: &[&Row]) -> Vec<Level> {
         let Ok(analysis) = &self.best else { return Vec::new() };
         let marks = rows.iter().flat_map(|row| row.criterion.marks(row.demand.limit(), analysis));
@@ -52,21 +63,21 @@ impl Both {
         of_signal.map(|mark| Level { name: mark.label, value: mark.level }).collect()
     }
 
-    /// A measured signal at both points, and the measurement.
+    /// Returns the plot of a measured signal: the measurement, and the simulation at both points.
     pub(super) fn fit(&self, channel: &Channel, signal: &Variable, case: &str) -> Plot {
         let points = channel.times.iter().copied().zip(channel.values.iter().copied()).collect();
         let mut curves = vec![Curve {
             name: "measured".to_owned(),
             points,
             style: CurveStyle::Dots,
-            ink: Ink::Measured,
+            color: Color::Measured,
             ..Curve::default()
         }];
         curves.extend(self.curves(&signal.name));
         Plot { title: format!("{} in experiment {case}", signal.name), curves, ..over_time(signal) }
     }
 
-    /// Measured - simulated at the reported point; `None` where that failed.
+    /// Returns the plot of measured - simulated at the reported point; `None` if the simulation failed.
     pub(super) fn residual(&self, channel: &Channel, signal: &Variable, case: &str) -> Option<Plot> {
         let trace = trace(&self.best, &signal.name)?;
         let simulated = trace.sample(&channel.times);
@@ -78,7 +89,7 @@ impl Both {
             ..Curve::default()
         };
         let ends = [trace.start(), trace.end()];
-        let zero = Curve { points: ends.map(|t| (t, 0.0)).to_vec(), ink: Ink::Faint, ..Curve::default() };
+        let zero = Curve { points: ends.map(|t| (t, 0.0)).to_vec(), color: Color::Faint, ..Curve::default() };
         let band = |noise: f64| Band {
             name: format!("\u{b1}2 noise, {}", with_unit(2.0 * noise, &signal.unit.to_string())),
             range: [-2.0 * noise, 2.0 * noise],
@@ -86,7 +97,7 @@ impl Both {
         Some(Plot {
             title: format!("residual of {} in experiment {case}", signal.name),
             curves: vec![zero, curve],
-            // Over the whole simulation, as the plot above.
+            // The range of the plot above.
             x_range: Some(ends),
             bands: channel.noise.map(band).into_iter().collect(),
             ..over_time(signal)

@@ -1,10 +1,10 @@
-//! Lines of equal height on a grid.
+//! Contour lines on a grid.
 
-/// Segments of the line at `level` through a grid of heights, in grid coordinates: column `c` and row `r` are at `(c, r)`.
-/// Squares with a height that is not finite are left out.
+/// Returns the segments of the contour line at `level`, in grid coordinates: column `c` and row `r` are at `(c, r)`.
+/// Squares with a non-finite height are omitted.
 ///
-/// Source: W. E. Lorensen, H. E. Cline, ACM SIGGRAPH Computer Graphics 21 (1987) 163-169, in two dimensions; a saddle is
-/// cut by the mean of its corners.
+/// Source: W. E. Lorensen, H. E. Cline, ACM SIGGRAPH Computer Graphics 21 (1987) 163-169, in two dimensions. The mean of the
+/// corners resolves a saddle.
 pub(super) fn contour(heights: &[Vec<f64>], level: f64) -> Vec<[[f64; 2]; 2]> {
     let mut segments = Vec::new();
     for (r, pair) in heights.windows(2).enumerate() {
@@ -32,7 +32,7 @@ fn cut(corners: [f64; 4], [x, y]: [f64; 2], level: f64, segments: &mut Vec<[[f64
         [i, j] => segments.push([crossing(i), crossing(j)]),
         [a, b, c, d] => {
             let middle = corners.iter().sum::<f64>() / 4.0 > level;
-            // The corner between sides d and a is the first: it is cut off where the middle lies on the other side.
+            // Corner 0 lies between sides d and a. It is cut off if the middle lies on the other side of the level.
             let pairs = if middle == above[0] { [[a, b], [c, d]] } else { [[d, a], [b, c]] };
             segments.extend(pairs.map(|[i, j]| [crossing(i), crossing(j)]));
         }
@@ -56,9 +56,9 @@ mod tests {
     }
 
     #[test]
-    fn a_saddle_is_cut_in_two_and_gaps_are_left_out() {
+    fn a_saddle_has_two_segments_and_gaps_are_omitted() {
         assert_eq!(contour(&[vec![1.0, 0.0], vec![0.0, 1.0]], 0.6).len(), 2);
-        // The mean lies below: each high corner is cut off by itself.
+        // The mean lies below the level: each high corner is cut off by itself.
         let cuts = contour(&[vec![1.0, 0.0], vec![0.0, 1.0]], 0.6);
         assert!(cuts.iter().any(|s| s.iter().all(|p| p[0] + p[1] < 1.0)), "{cuts:?}");
         assert!(contour(&[vec![1.0, 0.0], vec![f64::NAN, 1.0]], 0.6).is_empty());

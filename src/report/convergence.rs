@@ -1,18 +1,18 @@
-//! How the best point improved from evaluation to evaluation.
+//! Convergence: objective and constraint violation of the best point over the evaluations.
 
 use mops_core::{FEASIBLE, Merit, Objective, Record, Study, Task, Usage};
 
 use super::figures::{Figure, Group};
-use super::plot::{Curve, CurveStyle, Ink, Level, Plot};
+use super::plot::{Color, Curve, CurveStyle, Level, Plot};
 use crate::numbers::counted;
 
-/// The plots of objective and violation over evaluations.
+/// Returns the plots of objective and violation over the evaluations.
 pub(super) fn group(study: &Study, archive: &[Record]) -> Group {
     let failed = archive.iter().filter(|r| r.merit.objective.is_infinite()).count();
     let mut about = Vec::new();
     if failed > 0 {
         about.push(format!(
-            "{} of {} had no value, because a simulation or a criterion failed.",
+            "{} of {} have no value, because a simulation or a criterion failed.",
             failed,
             counted(archive.len(), "point")
         ));
@@ -23,9 +23,9 @@ pub(super) fn group(study: &Study, archive: &[Record]) -> Group {
     let constrained = study.rows().iter().any(|row| matches!(row.usage, Usage::Inequality | Usage::Equality));
     if constrained {
         about.push(match first_feasible {
-            Some((1, _)) => "The start already satisfies every constraint.".to_owned(),
-            Some((at, _)) => format!("The first point that satisfies every constraint is number {at}."),
-            None => "No point satisfies every constraint.".to_owned(),
+            Some((1, _)) => "The initial guess satisfies all constraints.".to_owned(),
+            Some((at, _)) => format!("The first feasible point is number {at}."),
+            None => "No point is feasible.".to_owned(),
         });
     }
     let mut plots = vec![("convergence".to_owned(), objective(study, archive, &best))];
@@ -36,7 +36,7 @@ pub(super) fn group(study: &Study, archive: &[Record]) -> Group {
     Group { title: String::new(), about, figures }
 }
 
-/// The evaluations, counted from 1, at which the best point changed, and what it was worth from then on.
+/// Returns the evaluations, counted from 1, at which the best point improved, with its merit from then on.
 fn improvements(archive: &[Record]) -> Vec<(usize, Merit)> {
     let mut best: Vec<(usize, Merit)> = Vec::new();
     for (i, record) in archive.iter().enumerate() {
@@ -52,7 +52,7 @@ fn objective(study: &Study, archive: &[Record], best: &[(usize, Merit)]) -> Plot
         Objective::Max | Objective::Each => "worst scaled criterion",
         Objective::Sum => "sum of weighted scaled criteria",
     };
-    // The objective of an infeasible point can be low for the wrong reason: it is drawn in another colour.
+    // The objective of an infeasible point may be low because constraints are violated, so its colour differs.
     let split = best.iter().position(|(_, merit)| merit.is_feasible()).unwrap_or(best.len());
     let end = best.get(split).map_or(archive.len(), |(at, _)| *at);
     let before = steps(&best[..split], end, |m| m.objective);
@@ -60,27 +60,22 @@ fn objective(study: &Study, archive: &[Record], best: &[(usize, Merit)]) -> Plot
     let all = archive.iter().enumerate().map(|(i, r)| ((i + 1) as f64, r.merit.objective)).collect();
     let curves = vec![
         Curve {
-            name: "every point".into(),
+            name: "all points".into(),
             points: all,
             style: CurveStyle::Dots,
-            ink: Ink::Start,
+            color: Color::Start,
             may_leave: true,
             ..Curve::default()
         },
-        Curve {
-            name: "best so far, a constraint violated".into(),
-            points: before,
-            ink: Ink::Measured,
-            ..Curve::default()
-        },
+        Curve { name: "best so far, infeasible".into(), points: before, color: Color::Measured, ..Curve::default() },
         Curve { name: "best so far".into(), points: after, ..Curve::default() },
     ];
-    // Only without weights is a worst scaled value of 1 the demand itself.
+    // A worst scaled value of 1 is the demand only without weights.
     let weighted = study.rows().iter().any(|row| row.usage == Usage::Minimise && row.weight != 1.0);
     let demanded = study.task() == Task::Design && study.objective() == Objective::Max && !weighted;
     let levels = if demanded { vec![Level { name: "demand".into(), value: 1.0 }] } else { Vec::new() };
     Plot {
-        title: "Objective of the best point".into(),
+        title: "Objective at the best point".into(),
         x_label: "evaluations".into(),
         x_range: Some([1.0, archive.len() as f64]),
         y_label: name.into(),
@@ -92,29 +87,29 @@ fn objective(study: &Study, archive: &[Record], best: &[(usize, Merit)]) -> Plot
 }
 
 fn violation(best: &[(usize, Merit)], evaluations: usize) -> Plot {
-    // Where the constraints hold the violation is zero, which a logarithmic axis cannot show: the line ends there.
+    // A feasible point has no violation, and a logarithmic axis cannot show zero: the line ends there.
     let split = best.iter().position(|(_, merit)| merit.is_feasible());
     let end = split.map_or(evaluations, |at| best[at].0);
     let infeasible = &best[..split.unwrap_or(best.len())];
     let points = steps(infeasible, end, |m| m.violation);
     let values = infeasible.iter().map(|(_, merit)| merit.violation).filter(|v| *v > FEASIBLE);
     Plot {
-        title: "Largest violation of a constraint at the best point".into(),
+        title: "Largest constraint violation at the best point".into(),
         x_label: "evaluations".into(),
         x_range: Some([1.0, evaluations as f64]),
         y_label: "scaled violation".into(),
         log_y: spans_decades(values),
         curves: vec![Curve {
-            name: "best so far, a constraint violated".into(),
+            name: "best so far, infeasible".into(),
             points,
-            ink: Ink::Measured,
+            color: Color::Measured,
             ..Curve::default()
         }],
         ..Plot::default()
     }
 }
 
-/// A line that keeps each value until the next improvement.
+/// Returns a staircase: each value until the next improvement.
 fn steps(best: &[(usize, Merit)], end: usize, value: impl Fn(&Merit) -> f64) -> Vec<(f64, f64)> {
     let mut points = Vec::new();
     for (i, (at, merit)) in best.iter().enumerate() {
@@ -124,7 +119,7 @@ fn steps(best: &[(usize, Merit)], end: usize, value: impl Fn(&Merit) -> f64) -> 
     points
 }
 
-/// Whether the finite values are positive and their largest is more than a hundred times their smallest.
+/// Returns true if the finite values are positive and span more than two decades.
 fn spans_decades(values: impl Iterator<Item = f64>) -> bool {
     let range = values.filter(|v| v.is_finite()).map(|v| [v, v]).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
     range.is_some_and(|[low, high]| low > 0.0 && high > 100.0 * low)
@@ -135,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_best_point_is_kept_until_a_better_one_comes() {
+    fn the_best_point_is_kept_until_a_better_one_is_found() {
         let record = |violation, objective| Record {
             tuners: vec![],
             values: vec![],

@@ -1,4 +1,4 @@
-//! The table of criteria, with bars on which the demand is marked.
+//! Table of criteria, with bars that mark the demand.
 
 use maud::{Markup, html};
 use mops_core::{CriterionReport, Task, Usage};
@@ -7,7 +7,7 @@ use super::Report;
 use super::page::scrolling;
 use crate::numbers::{apart, number, significant, with_unit};
 
-/// What a criterion is asked for, with its unit; `None` where it is only watched and nothing was asked.
+/// Returns the demand of a criterion, with its unit; `None` without a demand.
 pub(super) fn demand(criterion: &CriterionReport) -> Option<String> {
     match (criterion.demand, criterion.good, criterion.bad) {
         (Some(demand), _, _) if criterion.at_least => Some(format!("at least {}", with_unit(demand, &criterion.unit))),
@@ -20,12 +20,12 @@ pub(super) fn demand(criterion: &CriterionReport) -> Option<String> {
     }
 }
 
-/// All criteria in all cases, at the start and at the reported point.
+/// Returns the table of all criteria in all cases, at the initial guess and at the reported point.
 pub(super) fn table(report: &Report<'_>) -> Markup {
     let (outcome, best) = (report.outcome, report.best_name());
     let models = report.problem.study().models().len() > 1;
     let cases = report.problem.study().cases().len() > 1;
-    // Where nothing was solved there is but one point; a sum has no demand to meet.
+    // Without a solver there is only one point. The sum of a calibration has no demand.
     let (two, demands) = (outcome.solver != "none", outcome.task != Task::Calibration);
     let shape = report.problem.shape();
     let rows = outcome.criteria.iter().zip(&outcome.start.criteria).zip(&shape.rows);
@@ -38,29 +38,29 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
                     @if models { th scope="col" { "model" } }
                     th scope="col" { "usage" }
                     th scope="col" class="number" { "demand" }
-                    @if two { th scope="col" class="number" { "at start" } }
+                    @if two { th scope="col" class="number" { "at initial guess" } }
                     th scope="col" class="number" { "at " (best) }
                     th scope="col" { "unit" }
-                    @if two { th scope="col" class="number" { "scaled at start" } }
+                    @if two { th scope="col" class="number" { "scaled at initial guess" } }
                     th scope="col" { "scaled at " (best) }
                     @if demands { th scope="col" { "met" } }
                 }
             }
             tbody {
                 @for ((now, start), (usage, weight)) in rows {
-                    @let asked = demand(now);
+                    @let demanded = demand(now).is_some();
                     tr {
                         th scope="row" { (now.name) @if let Some(note) = now.note { small { (note) } } }
                         @if cases { td { (now.case) } }
                         @if models { td { (now.model) } }
                         td { (usage_name(now.usage, *usage)) @if *weight != 1.0 { small { "weight " (number(*weight)) } } }
-                        td class="number" { @if asked.is_some() { (limit(now)) } @else { "none" } }
-                        @if two { td class="number" { (beside_its_demand(start)) } }
-                        td class="number" { strong { (beside_its_demand(now)) } }
+                        td class="number" { @if demanded { (limit(now)) } @else { "none" } }
+                        @if two { td class="number" { (distinct_from_demand(start)) } }
+                        td class="number" { strong { (distinct_from_demand(now)) } }
                         td { (now.unit) }
-                        @if two { td class="number" { @if asked.is_some() { (scaled_number(start.scaled)) } } }
-                        td { @if asked.is_some() { (scaled(now)) } }
-                        @if demands { td { @if asked.is_some() { (met(now)) } } }
+                        @if two { td class="number" { @if demanded { (scaled_number(start.scaled)) } } }
+                        td { @if demanded { (scaled(now)) } }
+                        @if demands { td { @if demanded { (met(now)) } } }
                     }
                 }
             }
@@ -70,23 +70,26 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
         p {
             @if outcome.task == Task::Calibration {
                 "The objective is the sum of the scaled values (value / demand) of the calibration data: "
-                strong { (number(outcome.objective)) } @if two { ", at the start " (number(outcome.start.objective)) } ". "
+                strong { (number(outcome.objective)) }
+                @if two { ", at the initial guess " (number(outcome.start.objective)) } ". "
             } @else {
                 "Scaled value = value / demand: 0 is ideal, at most 1 means the demand is met. "
             }
-            @if outcome.task == Task::Design { "The design lowers the largest scaled value of the criteria that are minimised." }
+            @if outcome.task == Task::Design {
+                "The objective is the largest weighted scaled value among the minimised criteria."
+            }
         }
         (scrolling("Criteria", rows_and_head))
     }
 }
 
-/// The value of a criterion, with as many digits as it takes to tell it from a demand that it misses.
-fn beside_its_demand(criterion: &CriterionReport) -> String {
+/// Returns the value of a criterion, with enough digits to distinguish it from a missed demand.
+fn distinct_from_demand(criterion: &CriterionReport) -> String {
     let limit = criterion.demand.or(criterion.bad).filter(|_| !criterion.met);
     apart(criterion.value, limit, 5)
 }
 
-/// What is asked for, without the unit: it has a column of its own.
+/// Returns the demand without its unit, which has a separate column.
 fn limit(criterion: &CriterionReport) -> Markup {
     match (criterion.demand, criterion.good, criterion.bad) {
         (None, Some(good), Some(bad)) => html! { (number(bad)) small { "good: " (number(good)) } },
@@ -97,18 +100,18 @@ fn limit(criterion: &CriterionReport) -> Markup {
     }
 }
 
-/// What the study does with a criterion; data that move no parameter only report.
-fn usage_name(asked: Usage, effective: Usage) -> &'static str {
-    match (asked, effective) {
+/// Returns the usage of a criterion in words. Criteria of data that are not calibration data are only reported.
+fn usage_name(declared: Usage, effective: Usage) -> &'static str {
+    match (declared, effective) {
         (Usage::Monitor, _) => "report only",
-        (_, Usage::Monitor) => "report only: no calibration data",
+        (_, Usage::Monitor) => "report only: not calibration data",
         (Usage::Minimise, _) => "minimise",
         (Usage::Inequality, _) => "constraint",
         (Usage::Equality, _) => "equality",
     }
 }
 
-/// The scaled value beside a bar from 0 to 2 on which the demand is marked.
+/// Returns the scaled value, with a bar from 0 to 2 that marks the demand.
 fn scaled(criterion: &CriterionReport) -> Markup {
     let share = if criterion.scaled.is_nan() { 0.0 } else { 50.0 * criterion.scaled.clamp(0.0, 2.0) };
     html! {
@@ -126,12 +129,12 @@ fn met(criterion: &CriterionReport) -> Markup {
     }
 }
 
-/// A scaled value to four digits; rounding errors around 0 are none.
+/// Formats a scaled value to four digits; rounding errors around 0 become 0.
 fn scaled_number(scaled: f64) -> String {
     if scaled.abs() < 1e-9 { "0".to_owned() } else { significant(scaled, 4) }
 }
 
-/// Class of a criterion: what is not met decides only if it is a constraint.
+/// Returns the CSS class of a criterion: a missed demand is an error only for a constraint.
 fn tone(criterion: &CriterionReport) -> &'static str {
     match (criterion.met, criterion.usage) {
         (true, _) => "met",

@@ -1,4 +1,4 @@
-//! How rich the inputs are: sentences, a table, the eigenvalues over the order; and regressions.
+//! Persistent excitation of the inputs: sentences, a table, eigenvalues over the order; and regressions.
 
 use maud::{Markup, html};
 use mops_core::ExcitationFindings;
@@ -10,7 +10,7 @@ use super::plot::{Curve, CurveStyle, Level, Plot};
 use super::sensitivity::sentences;
 use crate::numbers::{number, percent, significant};
 
-/// The findings of the task.
+/// Returns the findings of the task `excitation`.
 pub(super) fn section(found: &ExcitationFindings) -> Markup {
     html! {
         (inputs(&found.inputs))
@@ -22,17 +22,16 @@ pub(super) fn section(found: &ExcitationFindings) -> Markup {
     }
 }
 
-/// The inputs, in sentences and numbers.
+/// Returns the findings on inputs: sentences and a table.
 pub(super) fn inputs(inputs: &[ExcitationReport]) -> Markup {
     html! {
         (sentences(inputs.iter().map(|input| &input.words)))
         p {
-            "Order n says that n parameters of a linear model (impulse response, transfer function) can be estimated "
-            "consistently: the covariances of n neighbouring samples are positive definite in the long run. It is a theorem "
-            "on linear models; whether the tuners of this one are determined is told by the sensitivities. Start values are "
-            "not counted among the parameters: no input excites them. A finite record leaves traces of what happened only "
-            "once; they are not counted. Yet a transient may well do for a short experiment: what it is worth is told by "
-            "the standard errors."
+            "An input that is persistently exciting of order n permits consistent estimates of n parameters of a linear model "
+            "(impulse response, transfer function): the covariance matrix of n neighbouring samples is positive definite in the "
+            "limit. For this model, the sensitivities show which tuners are determined. Initial states are not counted as "
+            "parameters, as no input excites them. Transients are not counted as excitation. They may suffice in a short "
+            "experiment; the standard errors show it."
         }
         (scrolling("Inputs", html! {
             table {
@@ -42,12 +41,12 @@ pub(super) fn inputs(inputs: &[ExcitationReport]) -> Markup {
                         th scope="col" { "input" }
                         th scope="col" class="number" { "order" }
                         th scope="col" class="number" { "parameters" }
-                        th scope="col" { "suffices, if linear" }
-                        th scope="col" class="number" { "weakest direction" }
+                        th scope="col" { "sufficient for a linear model" }
+                        th scope="col" class="number" { "smallest eigenvalue" }
                         th scope="col" class="number" { "next order" }
-                        th scope="col" class="number" { "with transients" }
+                        th scope="col" class="number" { "next order with transients" }
                         th scope="col" class="number" { "samples" }
-                        th scope="col" class="number" { "every" }
+                        th scope="col" class="number" { "sample time" }
                     }
                 }
                 tbody {
@@ -57,7 +56,7 @@ pub(super) fn inputs(inputs: &[ExcitationReport]) -> Markup {
                             td { (input.input) }
                             td class="number" { @if input.at_least { "at least " } strong { (input.order) } }
                             td class="number" { @if let Some(parameters) = input.parameters { (parameters) } }
-                            td { @if input.suffices { span class="met" { "yes" } } @else { span class="above" { "in the long run, no" } } }
+                            td { @if input.suffices { span class="met" { "yes" } } @else { span class="above" { "no" } } }
                             td class="number" { (percent(input.eigenvalue)) }
                             td class="number" { @if let Some(next) = input.next_eigenvalue { (percent(next)) } }
                             td class="number" { @if let Some(share) = input.transient { (percent(share)) } }
@@ -97,7 +96,7 @@ fn parameters(regression: &RegressionReport) -> Markup {
     }
 }
 
-/// The eigenvalues over the order, a plot for every input.
+/// Returns a plot for every input: smallest eigenvalue over the order.
 pub(super) fn group(inputs: &[ExcitationReport]) -> Group {
     let figure = |input: &ExcitationReport| {
         let points = input.spectrum.iter().map(|&(n, share)| (n as f64, share.max(1e-16))).collect();
@@ -106,8 +105,8 @@ pub(super) fn group(inputs: &[ExcitationReport]) -> Group {
             x_label: "order".into(),
             y_label: "smallest eigenvalue / power".into(),
             log_y: true,
-            curves: vec![Curve { name: "persisting".into(), points, style: CurveStyle::Dots, ..Curve::default() }],
-            levels: vec![Level { name: "zero".into(), value: input.zero }],
+            curves: vec![Curve { name: "persistent".into(), points, style: CurveStyle::Dots, ..Curve::default() }],
+            levels: vec![Level { name: "counts as zero".into(), value: input.zero }],
             ..Plot::default()
         };
         Figure { plots: vec![(format!("excitation-{}-{}", input.case, input.input), plot)], caption: Vec::new() }

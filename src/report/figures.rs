@@ -1,35 +1,35 @@
-//! The pictures of a run: every job's signals at the start and at the reported point, and measurements beside them.
+//! Plots of the responses: the signals of every simulation at the initial guess and at the reported point, with measurements.
 
 use mops_core::{AnalysisKind, Row, Variable};
 
 use super::Report;
 use super::bode;
-use super::comparison::Both;
+use super::comparison::Comparison;
 use super::front;
 use super::plot::Plot;
 use super::uncertainty::{self, Around};
 use crate::numbers::{counted, with_unit};
 
-/// More jobs than this are not shown, but only those that come closest to their demands or miss them most.
+/// Largest number of simulations with plots; beyond it, those with the largest scaled values are shown.
 const MOST_JOBS: usize = 30;
 
-/// Plots that belong together, with a heading.
+/// Group of plots with a heading.
 #[derive(Debug, Default)]
 pub(super) struct Group {
     pub(super) title: String,
-    /// Sentences to know before the plots.
+    /// Sentences above the plots.
     pub(super) about: Vec<String>,
     pub(super) figures: Vec<Figure>,
 }
 
-/// Plots one above the other, each with its file name, and lines to stand below them.
+/// Column of plots, each with its file name, and the lines of the caption.
 #[derive(Debug)]
 pub(super) struct Figure {
     pub(super) plots: Vec<(String, Plot)>,
     pub(super) caption: Vec<String>,
 }
 
-/// A group for every job, or for the most interesting ones where there are many; and a sentence if some are left out.
+/// Returns a group for every simulation, at most [`MOST_JOBS`], and a sentence if some are omitted.
 pub(super) fn responses(report: &Report<'_>) -> (Vec<Group>, Option<String>) {
     let study = report.problem.study();
     let mut jobs: Vec<usize> = (0..study.jobs().len()).collect();
@@ -43,10 +43,10 @@ pub(super) fn responses(report: &Report<'_>) -> (Vec<Group>, Option<String>) {
         jobs.truncate(MOST_JOBS);
         jobs.sort_unstable();
     }
-    let left_out = (all > MOST_JOBS).then(|| {
-        format!("Of {}, the {MOST_JOBS} with the largest scaled values are shown.", counted(all, "simulation"))
+    let omitted = (all > MOST_JOBS).then(|| {
+        format!("The {MOST_JOBS} of {} with the largest scaled values are shown.", counted(all, "simulation"))
     });
-    (jobs.into_iter().map(|job| of_job(report, job)).collect(), left_out)
+    (jobs.into_iter().map(|job| of_job(report, job)).collect(), omitted)
 }
 
 fn of_job(report: &Report<'_>, job: usize) -> Group {
@@ -57,14 +57,14 @@ fn of_job(report: &Report<'_>, job: usize) -> Group {
         Some(experiment) => format!("Experiment `{}` ({})", case.name, experiment.role.name()),
         None => format!("Case `{}`", case.name),
     };
-    // Names of models are told apart only where there is more than one.
+    // The model is named only if there are several.
     let place = if study.models().len() > 1 {
         title.push_str(&format!(", model `{model_name}`"));
         format!("{}-{model_name}", case.name)
     } else {
         case.name.clone()
     };
-    let both = Both {
+    let both = Comparison {
         start: report.problem.analyse_all(job, &study.start(), None),
         best: report.problem.analyse_all(job, &report.best.tuners, None),
         best_name: report.best_name(),
@@ -87,8 +87,8 @@ fn of_job(report: &Report<'_>, job: usize) -> Group {
         if let Some(signal) = signals.iter().find(|s| s.name == channel.signal) {
             let mut fit = both.fit(channel, signal, &case.name);
             let bands = |around: Around| {
-                let told = report.outcome.found.uncertainty.as_ref();
-                told.map_or_else(Vec::new, |found| uncertainty::bands(found, &case.name, &signal.name, around))
+                let found = report.outcome.found.uncertainty.as_ref();
+                found.map_or_else(Vec::new, |found| uncertainty::bands(found, &case.name, &signal.name, around))
             };
             fit.curves.extend(bands(Around::Prediction));
             let mut plots = vec![(format!("fit-{place}-{}", signal.name), fit)];
@@ -116,7 +116,7 @@ fn of_job(report: &Report<'_>, job: usize) -> Group {
     group
 }
 
-/// What a criterion says of the signal that is shown.
+/// Returns the caption of a criterion: value and demand.
 fn caption(report: &Report<'_>, index: usize, row: &Row) -> String {
     let criterion = &report.outcome.criteria[index];
     let mut text = format!("`{}`: {}", row.name, with_unit(criterion.value, &criterion.unit));

@@ -1,15 +1,14 @@
-// Selects a point of the front in all pictures and in the table at once. Everything that belongs to a point carries its
-// number as data-point.
+// Selects a point of the front in all plots and in the table. Elements of a point have its number as data-point.
 (() => {
   "use strict";
   const table = document.querySelector("table.front");
   if (!table) return;
   const body = table.tBodies[0];
-  const pictures = [...document.querySelectorAll("svg.plot")].filter((svg) => svg.querySelector("[data-point]"));
-  let kept = null; // the point that a click keeps
+  const plots = [...document.querySelectorAll("svg.plot")].filter((svg) => svg.querySelector("[data-point]"));
+  let kept = null; // point selected by a click
   let shown = null;
 
-  // Where the dots of a picture are, in its own units.
+  // Positions of the dots of a plot, in its own units.
   const dots = (svg) => [...svg.querySelectorAll("g.dot[data-point]")].map((g) => {
     const [x, y] = g.querySelector("path").getAttribute("d").slice(1).split(/[ h]/).map(Number);
     return { point: g.dataset.point, x, y };
@@ -22,7 +21,7 @@
     if (point === null) return;
     for (const element of document.querySelectorAll(`[data-point="${point}"]`)) {
       element.classList.add("chosen");
-      // What is chosen lies on top.
+      // The selected element is drawn on top.
       if (element.tagName === "g") element.parentNode.append(element);
     }
   }
@@ -33,7 +32,7 @@
     show(kept ?? point);
   }
 
-  // The dot nearest to the pointer, within reach of it.
+  // Dot nearest to the pointer, within 24 units.
   function nearest(svg, event) {
     const box = svg.getBoundingClientRect();
     const scale = svg.viewBox.baseVal.width / box.width;
@@ -43,11 +42,11 @@
       const distance = Math.hypot(dot.x - x, dot.y - y);
       if (distance < 24 && (!best || distance < best.distance)) best = { distance, point: dot.point };
     }
-    // A line, such as a response, is chosen by touching it.
+    // Lines, such as responses, are selected by hovering.
     return best ? best.point : event.target.closest?.("[data-point]")?.dataset.point ?? null;
   }
 
-  // Right and down: the next row of the table as it is sorted now; left and up: the one before.
+  // Selects the next (right, down) or previous (left, up) row of the table in its present order.
   function step(by) {
     const rows = [...body.rows];
     const at = rows.findIndex((row) => row.dataset.point === shown);
@@ -73,7 +72,7 @@
     }
   }
 
-  for (const svg of pictures) {
+  for (const svg of plots) {
     svg.setAttribute("tabindex", "0");
     svg.addEventListener("pointermove", (event) => { const point = nearest(svg, event); if (point !== null) show(point); });
     svg.addEventListener("pointerleave", () => show(kept));

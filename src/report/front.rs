@@ -1,4 +1,4 @@
-//! The front: its points over every pair of criteria, the tuners along it, and a table of all of them.
+//! Pareto front: plots over pairs of criteria and of the tuners, and a table of all points.
 
 use maud::{Markup, html};
 use mops_core::math;
@@ -7,16 +7,16 @@ use mops_core::{Analysis, Pareto, TradeOffs, Tuner};
 use super::Report;
 use super::figures::{Figure, Group};
 use super::page::scrolling;
-use super::plot::{Curve, CurveStyle, Ink, Level, Plot, Third, Upright};
+use super::plot::{Color, Curve, CurveStyle, Level, ParallelAxis, Plot, ZAxis};
 use super::sampling::{points, within_columns};
 use crate::numbers::{labelled, number, significant};
 
-/// More criteria than this are not drawn in pairs.
+/// Largest number of criteria plotted in pairs.
 const MOST_PAIRED: usize = 4;
-/// More tuners than this are not drawn.
+/// Largest number of tuners with plots.
 const MOST_TUNERS: usize = 8;
 
-/// A quantity that every point of the front has.
+/// Quantity with a value at every point of the front.
 struct Quantity {
     name: String,
     unit: String,
@@ -26,17 +26,17 @@ struct Quantity {
 }
 
 impl Quantity {
-    /// The least and the largest of its values.
+    /// Returns the smallest and the largest finite value.
     fn ends(&self) -> [f64; 2] {
         let finite = self.values.iter().copied().filter(|value| value.is_finite());
         finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
     }
 }
 
-/// The scripts that turn a front over three criteria, and that select a point in all pictures and in the table.
+/// Scripts that rotate a front over three criteria, and that select a point in all plots and in the table.
 pub(super) const SCRIPTS: [&str; 2] = [include_str!("space.js"), include_str!("front.js")];
 
-/// The plots of a front; `None` where none was found.
+/// Returns the plots of the front; `None` without a front.
 pub(super) fn group(report: &Report<'_>) -> Option<Group> {
     let found = report.outcome.found.trade_offs.as_ref()?;
     let (criteria, tuners) = (criteria(report, found), tuners(report));
@@ -96,7 +96,7 @@ fn tuners(report: &Report<'_>) -> Vec<Quantity> {
     study.tuners().iter().enumerate().filter(|(_, tuner)| tuner.active).map(quantity).collect()
 }
 
-/// A dot for every point, and dots of other colours on those worth a look.
+/// Returns the plot of two quantities: a dot for every point, in other colours at the knee and nearest to the demands.
 fn pair(found: &TradeOffs, x: &Quantity, y: &Quantity) -> Plot {
     Plot {
         title: format!("{} over {}", y.name, x.name),
@@ -111,35 +111,45 @@ fn pair(found: &TradeOffs, x: &Quantity, y: &Quantity) -> Plot {
     }
 }
 
-/// The dots of a picture, each with the point that it stands for.
+/// Returns the dots of a plot, each with the index of its point.
 fn dots(found: &TradeOffs, x: &Quantity, y: &Quantity) -> Vec<(usize, Curve)> {
-    let one = |i: usize, name: &str, ink| {
+    let one = |i: usize, name: &str, color| {
         let points = vec![(x.values[i], y.values[i])];
-        (i, Curve { name: name.to_owned(), points, style: CurveStyle::Dots, ink, of: Some(i), ..Curve::default() })
+        (
+            i,
+            Curve {
+                name: name.to_owned(),
+                points,
+                style: CurveStyle::Dots,
+                color,
+                front_point: Some(i),
+                ..Curve::default()
+            },
+        )
     };
-    let name = |i| if i == 0 { "points of the front" } else { "" };
-    let mut all: Vec<(usize, Curve)> = (0..x.values.len()).map(|i| one(i, name(i), Ink::Result)).collect();
-    all.extend(found.knee.map(|i| one(i, "knee", Ink::Measured)));
-    all.push(one(found.nearest, "nearest to the demands", Ink::Demand));
+    let name = |i| if i == 0 { "Pareto front" } else { "" };
+    let mut all: Vec<(usize, Curve)> = (0..x.values.len()).map(|i| one(i, name(i), Color::Result)).collect();
+    all.extend(found.knee.map(|i| one(i, "knee", Color::Measured)));
+    all.push(one(found.nearest, "nearest to the demands", Color::Demand));
     all
 }
 
-/// The same over three criteria.
+/// Returns the plot of three criteria.
 fn space(found: &TradeOffs, [x, y, z]: [&Quantity; 3]) -> Plot {
     let dots = dots(found, x, y);
-    let third =
-        Third { label: labelled(&z.name, &z.unit), values: dots.iter().map(|(i, _)| vec![z.values[*i]]).collect() };
+    let z_axis =
+        ZAxis { label: labelled(&z.name, &z.unit), values: dots.iter().map(|(i, _)| vec![z.values[*i]]).collect() };
     Plot {
         title: format!("{}, {} and {}", x.name, y.name, z.name),
         x_label: labelled(&x.name, &x.unit),
         y_label: labelled(&y.name, &y.unit),
         curves: dots.into_iter().map(|(_, curve)| curve).collect(),
-        third: Some(third),
+        z_axis: Some(z_axis),
         ..Plot::default()
     }
 }
 
-/// A line for every point across all quantities, each from its least to its largest value.
+/// Returns the plot of parallel coordinates: one line per point, each axis from the smallest to the largest value.
 fn parallel(found: &TradeOffs, criteria: &[Quantity], tuners: &[Quantity]) -> Plot {
     let all: Vec<&Quantity> = criteria.iter().chain(tuners.iter().take(MOST_TUNERS)).collect();
     let ends: Vec<[f64; 2]> = all.iter().map(|quantity| quantity.ends()).collect();
@@ -149,36 +159,38 @@ fn parallel(found: &TradeOffs, criteria: &[Quantity], tuners: &[Quantity]) -> Pl
         if high > low { (drawn(quantity.values[i]) - low) / (high - low) } else { 0.5 }
     };
     #[allow(clippy::cast_precision_loss)]
-    let line = |i: usize, ink| Curve {
+    let line = |i: usize, color| Curve {
         points: all.iter().zip(&ends).enumerate().map(|(at, (q, ends))| (at as f64, height(q, *ends, i))).collect(),
-        ink,
-        of: Some(i),
+        color,
+        front_point: Some(i),
         ..Curve::default()
     };
-    let mut curves: Vec<Curve> = (0..criteria[0].values.len()).map(|i| line(i, Ink::Result)).collect();
-    let worth = [(found.knee, "knee", Ink::Measured), (Some(found.nearest), "nearest to the demands", Ink::Demand)];
-    curves
-        .extend(worth.into_iter().filter_map(|(i, name, ink)| Some(Curve { name: name.to_owned(), ..line(i?, ink) })));
-    let upright = |(quantity, ends): (&&Quantity, &[f64; 2])| Upright {
+    let mut curves: Vec<Curve> = (0..criteria[0].values.len()).map(|i| line(i, Color::Result)).collect();
+    let notable =
+        [(found.knee, "knee", Color::Measured), (Some(found.nearest), "nearest to the demands", Color::Demand)];
+    curves.extend(
+        notable.into_iter().filter_map(|(i, name, color)| Some(Curve { name: name.to_owned(), ..line(i?, color) })),
+    );
+    let axis = |(quantity, ends): (&&Quantity, &[f64; 2])| ParallelAxis {
         name: labelled(&quantity.name, &quantity.unit),
         ends: ends.map(|end| significant(end, 3)),
     };
     Plot {
         title: "Parallel coordinates".to_owned(),
         x_label: "quantity".to_owned(),
-        y_label: "From least to largest".to_owned(),
-        uprights: all.iter().zip(&ends).map(upright).collect(),
+        y_label: "from smallest to largest".to_owned(),
+        parallel_axes: all.iter().zip(&ends).map(axis).collect(),
         curves,
         ..Plot::default()
     }
 }
 
-/// More responses than this of all points are not drawn.
+/// Largest number of responses, over all points and simulations.
 const MOST_RESPONSES: usize = 400;
-/// Columns of a thin curve.
+/// Number of columns to which a thin curve is reduced.
 const COLUMNS: f64 = 150.0;
 
-/// What a job gives at every point of the front; nothing where there is none, or where there are too many.
+/// Returns the analysis of a job at every point of the front; empty beyond [`MOST_RESPONSES`].
 pub(super) fn analyses(report: &Report<'_>, job: usize) -> Vec<Option<Analysis>> {
     if report.front.len() * report.problem.study().jobs().len() > MOST_RESPONSES {
         return Vec::new();
@@ -186,22 +198,22 @@ pub(super) fn analyses(report: &Report<'_>, job: usize) -> Vec<Option<Analysis>>
     report.front.iter().map(|at| report.problem.analyse_all(job, &at.tuners, None).ok()).collect()
 }
 
-/// A signal at every point of the front, as thin curves.
+/// Returns a signal at every point of the front, as thin curves.
 pub(super) fn responses(analyses: &[Option<Analysis>], signal: &str) -> Vec<Curve> {
     let curve = |(i, analysis): (usize, &Option<Analysis>)| {
         let Some(Analysis::Time(response)) = analysis else { return None };
         let (_, trace) = response.traces.iter().find(|(name, _)| name == signal)?;
         let points = within_columns(points(trace), COLUMNS);
-        Some(Curve { points, ink: Ink::Start, of: Some(i), may_leave: true, ..Curve::default() })
+        Some(Curve { points, color: Color::Start, front_point: Some(i), may_leave: true, ..Curve::default() })
     };
     let mut curves: Vec<Curve> = analyses.iter().enumerate().filter_map(curve).collect();
     if let Some(first) = curves.first_mut() {
-        "other points of the front".clone_into(&mut first.name);
+        "other Pareto points".clone_into(&mut first.name);
     }
     curves
 }
 
-/// All points; the script makes its columns sortable and its rows selectable.
+/// Returns the table of all points; a script makes its columns sortable and its rows selectable.
 pub(super) fn table(report: &Report<'_>, found: &TradeOffs) -> Markup {
     let quantities: Vec<Quantity> = criteria(report, found).into_iter().chain(tuners(report)).collect();
     let rows = html! {
@@ -210,7 +222,7 @@ pub(super) fn table(report: &Report<'_>, found: &TradeOffs) -> Markup {
                 tr {
                     th scope="col" class="number" { "point" }
                     @for quantity in &quantities { th scope="col" class="number" { (labelled(&quantity.name, &quantity.unit)) } }
-                    th scope="col" class="number" { "worst scaled" }
+                    th scope="col" class="number" { "worst scaled value" }
                     th scope="col" { "Pareto-optimal" }
                     th scope="col" { "" }
                 }
@@ -235,8 +247,9 @@ pub(super) fn table(report: &Report<'_>, found: &TradeOffs) -> Markup {
     };
     html! {
         p class="hint" hidden {
-            "Hover over a point, or move with the arrow keys; a click or Enter keeps it, Escape lets go of it. Click a column to sort."
-            @if found.criteria.len() == 3 { " The box turns as it is dragged, or by Shift and the arrow keys." }
+            "Hover over a point or use the arrow keys; click or press Enter to select it, Escape to deselect. Click a column header "
+            "to sort."
+            @if found.criteria.len() == 3 { " Drag the box, or press Shift and an arrow key, to rotate it." }
         }
         (scrolling("Points of the front", rows))
     }
@@ -245,7 +258,7 @@ pub(super) fn table(report: &Report<'_>, found: &TradeOffs) -> Markup {
 fn pareto(pareto: Pareto) -> &'static str {
     match pareto {
         Pareto::CertifiedLocal => "to first order",
-        Pareto::NotShown => "not shown",
+        Pareto::NotShown => "not certified",
         Pareto::No => "no",
     }
 }

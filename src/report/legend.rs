@@ -1,54 +1,56 @@
-//! The legend of a plot, and dots without those that cover each other.
+//! Legend and markers of a plot.
 
 use std::collections::HashSet;
 
 use super::clip::{Frame, Point};
-use super::plot::{CurveStyle, Ink, Plot};
+use super::plot::{Color, CurveStyle, Plot};
 use super::scene::{ADVANCE, Anchor, Mark, SIZE, Scene};
 
 impl Scene {
-    /// Dots, of those that cover each other only one.
-    pub(super) fn dots(&mut self, points: impl Iterator<Item = Point>, ink: Ink) {
+    /// Draws dots; of coinciding dots only one.
+    pub(super) fn dots(&mut self, points: impl Iterator<Item = Point>, color: Color) {
         let mut seen = HashSet::new();
         let centres: Vec<Point> = points.filter(|p| seen.insert(p.map(|v| v.round() as i64))).collect();
-        // Few dots are drawn larger than many.
+        // Dots are larger if there are few.
         let radius = if centres.len() < 60 { 2.4 } else { 1.5 };
-        self.marks.push(Mark::Dots { centres, ink, radius });
+        self.marks.push(Mark::Dots { centres, color, radius });
     }
 
-    /// A cross.
-    pub(super) fn cross(&mut self, at: Point, ink: Ink) {
+    /// Draws a cross.
+    pub(super) fn cross(&mut self, at: Point, color: Color) {
         for turn in [-1.0, 1.0] {
             let points = vec![[at[0] - 4.0, at[1] - 4.0 * turn], [at[0] + 4.0, at[1] + 4.0 * turn]];
-            self.marks.push(Mark::Line { points, ink, width: 1.8, dashed: false });
+            self.marks.push(Mark::Line { points, color, width: 1.8, dashed: false });
         }
     }
 
-    /// The legend, in rows; returns where it ends.
+    /// Draws the legend in rows, the first at `row`. Returns the position of its end.
     pub(super) fn legend(&mut self, plot: &Plot, mut row: f64) -> f64 {
-        let bands = plot.bands.iter().map(|band| (band.name.as_str(), Ink::Band, CurveStyle::Line));
-        let curves = plot.curves.iter().filter(|c| !c.points.is_empty()).map(|c| (c.name.as_str(), c.ink, c.style));
+        let bands = plot.bands.iter().map(|band| (band.name.as_str(), Color::Band, CurveStyle::Line));
+        let curves = plot.curves.iter().filter(|c| !c.points.is_empty()).map(|c| (c.name.as_str(), c.color, c.style));
         let mut at = 10.0;
-        for (name, ink, style) in curves.chain(bands).filter(|(name, _, _)| !name.is_empty()) {
+        for (name, color, style) in curves.chain(bands).filter(|(name, _, _)| !name.is_empty()) {
             let width = 46.0 + ADVANCE * name.chars().count() as f64;
             if at + width > SIZE[0] && at > 10.0 {
                 (at, row) = (10.0, row + 17.0);
             }
             let (a, b) = ([at, row], [at + 24.0, row]);
-            self.marks.push(match (ink, style) {
-                (Ink::Band, _) => Mark::Box { frame: Frame { from: [at, row - 5.0], to: [at + 24.0, row + 5.0] }, ink },
+            self.marks.push(match (color, style) {
+                (Color::Band, _) => {
+                    Mark::Box { frame: Frame { from: [at, row - 5.0], to: [at + 24.0, row + 5.0] }, color }
+                }
                 (_, CurveStyle::Dots) => {
-                    Mark::Dots { centres: [4.0, 12.0, 20.0].map(|d| [at + d, row]).to_vec(), ink, radius: 2.0 }
+                    Mark::Dots { centres: [4.0, 12.0, 20.0].map(|d| [at + d, row]).to_vec(), color, radius: 2.0 }
                 }
                 (_, CurveStyle::Crosses) => {
-                    [5.0, 19.0].into_iter().for_each(|d| self.cross([at + d, row], ink));
-                    self.text(name, [at + 30.0, row], Anchor::Start, Ink::Faint);
+                    [5.0, 19.0].into_iter().for_each(|d| self.cross([at + d, row], color));
+                    self.text(name, [at + 30.0, row], Anchor::Start, Color::Faint);
                     at += width;
                     continue;
                 }
-                (_, style) => Mark::Line { points: vec![a, b], ink, width: 1.8, dashed: style == CurveStyle::Dashed },
+                (_, style) => Mark::Line { points: vec![a, b], color, width: 1.8, dashed: style == CurveStyle::Dashed },
             });
-            self.text(name, [at + 30.0, row], Anchor::Start, Ink::Faint);
+            self.text(name, [at + 30.0, row], Anchor::Start, Color::Faint);
             at += width;
         }
         if at > 10.0 { row + 8.0 } else { row - 16.0 }

@@ -1,4 +1,4 @@
-//! Criteria by cases: a table of scaled values, shaded by how far each is from its demand.
+//! Criteria by case: a table of scaled values, shaded by the distance from the demand.
 
 use maud::{Markup, html};
 use mops_core::{CriterionReport, Outcome, Usage};
@@ -6,8 +6,8 @@ use mops_core::{CriterionReport, Outcome, Usage};
 use super::page::scrolling;
 use crate::numbers::{significant, with_unit};
 
-/// A row for every case, a column for every criterion, and the worst of both; `None` of a single case, or where nothing is
-/// demanded.
+/// Returns the table: a row for every case, a column for every criterion, and the worst of each. `None` for fewer than two
+/// cases with demands.
 pub(super) fn section(outcome: &Outcome) -> Option<Markup> {
     let counts = |c: &&CriterionReport| c.demand.is_some() || (c.good.is_some() && c.bad.is_some());
     let all: Vec<&CriterionReport> = outcome.criteria.iter().filter(counts).collect();
@@ -48,14 +48,13 @@ pub(super) fn section(outcome: &Outcome) -> Option<Markup> {
     };
     Some(html! {
         p {
-            "Scaled values: up to 1 the demand is met, and the deeper the shade the farther the value is from 1. What is not met is set in "
-            "bold."
+            "Scaled values: at most 1 means the demand is met. Darker shades are farther from 1; missed demands are bold."
         }
         (scrolling("Criteria by case", rows))
     })
 }
 
-/// How bad a criterion is: an equality as far as it is from 1; without a value it is worst.
+/// Returns the severity: the scaled value; for an equality, 1 plus its distance from 1; infinite without a value.
 fn severity(criterion: &CriterionReport) -> f64 {
     match (criterion.scaled, criterion.usage) {
         (scaled, _) if scaled.is_nan() => f64::INFINITY,
@@ -85,7 +84,7 @@ fn cell(criterion: Option<&CriterionReport>) -> Markup {
     }
 }
 
-/// Names in the order of their first appearance.
+/// Returns the distinct names, in the order of their first appearance.
 fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut found: Vec<&str> = Vec::new();
     for name in names {

@@ -1,4 +1,4 @@
-//! The report of a run: one HTML page, and its plots as SVG and PNG.
+//! Report of a run: one HTML page, and its plots as SVG and PNG.
 
 mod axis;
 mod bode;
@@ -15,8 +15,9 @@ mod front;
 mod legend;
 mod matrix;
 mod page;
-mod pictures;
+mod parallel_axes;
 mod plot;
+mod plot_files;
 mod png;
 mod range;
 mod robustness;
@@ -33,7 +34,6 @@ mod sweep;
 mod tests;
 mod tuners;
 mod uncertainty;
-mod uprights;
 mod verdict;
 
 use std::fs;
@@ -46,44 +46,44 @@ use mops_discrepancy::Diagnosis;
 use crate::files;
 use crate::numbers::FileNames;
 
-pub(crate) use bode::{Sweep, bode, frequencies};
+pub(crate) use bode::{FrequencyCurve, bode, frequencies};
 pub use page::page;
-use pictures::Pictures;
-pub use plot::{Band, Curve, CurveStyle, Ink, Level, Plot, Surface, Third, Upright};
+pub use plot::{Band, Color, Curve, CurveStyle, Level, ParallelAxis, Plot, Surface, ZAxis};
+use plot_files::PlotFiles;
 pub(crate) use sampling::points;
 pub(crate) use sensitivity::combination;
 pub(crate) use side_by_side::{Responses, Rows, comparison_page};
 
-/// The style sheet of all pages.
+/// Style sheet of all pages.
 pub(crate) const STYLE: &str = include_str!("style.css");
 
-/// Everything a report shows.
+/// Content of a report.
 pub struct Report<'a> {
-    /// The result.
+    /// Result of the run.
     pub outcome: &'a Outcome,
-    /// The problem that was solved.
+    /// Solved problem.
     pub problem: &'a Problem,
-    /// The evaluation that the outcome reports.
+    /// Evaluation at the reported point.
     pub best: &'a Evaluation,
-    /// All points, in the order of their evaluation; the first is the start.
+    /// All points in the order of evaluation; the first is the initial guess.
     pub archive: &'a [Record],
-    /// Points of the front, in the order of the result; empty where none was looked for.
+    /// Points of the Pareto front, in the order of the result; empty for other tasks.
     pub front: &'a [Evaluation],
-    /// What the model lacks, where that was searched.
+    /// Diagnosis, for the task `diagnosis`.
     pub diagnosis: Option<&'a Diagnosis>,
-    /// The study file with its settings.
+    /// Text of the study file, with its settings.
     pub text: &'a str,
 }
 
 impl Report<'_> {
-    /// Writes `report.html`, `plots/*.svg` and `plots/*.png` into the folder, which is made if it is not there.
+    /// Writes `report.html`, `plots/*.svg` and `plots/*.png` into the folder, which is created if necessary.
     ///
     /// # Errors
-    /// A file cannot be written.
+    /// If a file cannot be written.
     pub fn write(&self, folder: &Path) -> io::Result<()> {
         let plots = folder.join("plots");
         fs::create_dir_all(&plots)?;
-        let (responses, left_out) = figures::responses(self);
+        let (responses, omitted) = figures::responses(self);
         let convergence = self.searched().then(|| convergence::group(self.problem.study(), self.archive));
         let front = front::group(self);
         let sweep = self.outcome.found.sweep.as_ref().map(|sweep| sweep::group(sweep, self.best_name()));
@@ -92,12 +92,12 @@ impl Report<'_> {
             None => self.outcome.calibration.as_ref().map(|calibration| &calibration.excitation),
         };
         let excitation = inputs.filter(|inputs| !inputs.is_empty()).map(|inputs| excitation::group(inputs));
-        let diagnosis = self.diagnosis.map(diagnosis::Pictures::of);
+        let diagnosis = self.diagnosis.map(diagnosis::Plots::of);
         let robustness = robustness::sections(self);
         let uncertainty = self.outcome.found.uncertainty.as_ref().map(uncertainty::group);
-        let pictures = page::Pictures {
+        let sections = page::Plots {
             responses,
-            left_out,
+            omitted,
             convergence,
             front,
             sweep,
@@ -107,27 +107,27 @@ impl Report<'_> {
             uncertainty,
         };
         let findings =
-            [&pictures.convergence, &pictures.front, &pictures.sweep, &pictures.excitation, &pictures.uncertainty];
-        let groups = pictures.responses.iter().chain(findings.into_iter().flatten());
-        let groups = groups.chain(pictures.robustness.iter().map(|section| &section.group));
-        let groups = groups.chain(pictures.diagnosis.iter().flat_map(diagnosis::Pictures::groups));
+            [&sections.convergence, &sections.front, &sections.sweep, &sections.excitation, &sections.uncertainty];
+        let groups = sections.responses.iter().chain(findings.into_iter().flatten());
+        let groups = groups.chain(sections.robustness.iter().map(|section| &section.group));
+        let groups = groups.chain(sections.diagnosis.iter().flat_map(diagnosis::Plots::groups));
         let mut names = FileNames::default();
-        let pictures_of_all = groups.flat_map(|group| &group.figures).flat_map(|figure| &figure.plots);
-        let all: Vec<(String, &Plot)> = pictures_of_all.map(|(name, plot)| (names.unique(name), plot)).collect();
-        let earlier = Pictures::of(&plots);
+        let figures = groups.flat_map(|group| &group.figures).flat_map(|figure| &figure.plots);
+        let all: Vec<(String, &Plot)> = figures.map(|(name, plot)| (names.unique(name), plot)).collect();
+        let earlier = PlotFiles::of(&plots);
         earlier.note(all.iter().map(|(name, _)| name.as_str()))?;
         for (name, plot) in &all {
             files::write(&plots.join(format!("{name}.svg")), plot.svg())?;
             plot.write_png(&plots.join(format!("{name}.png")))?;
         }
         earlier.remove_others(all.iter().map(|(name, _)| name.as_str()))?;
-        files::write(&folder.join("report.html"), page::of(self, &pictures).into_string())
+        files::write(&folder.join("report.html"), page::of(self, &sections).into_string())
     }
 
-    /// Whether a search stands behind the result, and nothing but it.
+    /// Returns true if the result is that of a single search, so that its convergence can be plotted.
     fn searched(&self) -> bool {
         match self.outcome.task {
-            // The rounds of a design against worst cases have objectives of their own.
+            // Each round of a design against worst cases has its own objective.
             Task::Design | Task::Calibration | Task::Pareto => self.outcome.found.robust.is_none(),
             Task::Sensitivity => self.archive.len() > 1,
             Task::Excitation | Task::Sweep | Task::Diagnosis => false,
@@ -135,10 +135,10 @@ impl Report<'_> {
         }
     }
 
-    /// What the reported point is called: an optimum only if the solver showed one.
+    /// Returns the name of the reported point: `optimum` only if the solver converged to a feasible point.
     fn best_name(&self) -> &'static str {
         if self.outcome.solver == "none" {
-            "start"
+            "initial guess"
         } else if self.outcome.stop == Stop::Converged && self.outcome.feasible {
             "optimum"
         } else {

@@ -1,4 +1,4 @@
-//! The page: one HTML file that needs no network. Scripts sort its tables and move about in a front; it reads well without.
+//! Page of the report: one HTML file without external resources. Scripts only sort tables and select points of a front.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use mops_core::{CalibrationReport, Task};
@@ -11,30 +11,30 @@ use super::{
 };
 use crate::numbers::significant;
 
-/// What the page shows beside the tables.
-pub(super) struct Pictures {
+/// Plots of the page, by section.
+pub(super) struct Plots {
     pub(super) responses: Vec<Group>,
-    /// A sentence where responses are left out.
-    pub(super) left_out: Option<String>,
+    /// Sentence on omitted responses.
+    pub(super) omitted: Option<String>,
     pub(super) convergence: Option<Group>,
     pub(super) front: Option<Group>,
     pub(super) sweep: Option<Group>,
     pub(super) excitation: Option<Group>,
-    pub(super) diagnosis: Option<diagnosis::Pictures>,
+    pub(super) diagnosis: Option<diagnosis::Plots>,
     pub(super) robustness: Vec<robustness::Section>,
     pub(super) uncertainty: Option<Group>,
 }
 
-/// The script that makes tables sortable.
+/// Script that makes tables sortable.
 const TABLES: &str = include_str!("tables.js");
 
-/// Wraps HTML as a page of its own in the style of the reports: one file, light and dark, its tables sortable.
+/// Wraps HTML into a page in the style of the reports: one file, light and dark scheme, sortable tables.
 #[must_use]
 pub fn page(title: &str, body: &str) -> String {
     document(title, PreEscaped(body.to_owned())).into_string()
 }
 
-/// The frame that all pages have: one file, light and dark, its tables sortable.
+/// Returns a page with the common head: one file, light and dark scheme, sortable tables.
 pub(super) fn document(title: &str, body: Markup) -> Markup {
     html! {
         (DOCTYPE)
@@ -52,8 +52,8 @@ pub(super) fn document(title: &str, body: Markup) -> Markup {
     }
 }
 
-/// The whole page.
-pub(super) fn of(report: &Report<'_>, pictures: &Pictures) -> Markup {
+/// Returns the page of a report.
+pub(super) fn of(report: &Report<'_>, plots: &Plots) -> Markup {
     let outcome = report.outcome;
     let warnings = verdict::warnings(report);
     let body = html! {
@@ -62,23 +62,23 @@ pub(super) fn of(report: &Report<'_>, pictures: &Pictures) -> Markup {
             @if !warnings.is_empty() {
                 (section("Warnings", html! { ul class="warnings" { @for text in &warnings { li { (rich(text)) } } } }))
             }
-            @if let (Some(found), Some(pictures)) = (report.diagnosis, &pictures.diagnosis) {
-                (diagnosis::sections(found, pictures))
+            @if let (Some(found), Some(plots)) = (report.diagnosis, &plots.diagnosis) {
+                (diagnosis::sections(found, plots))
             }
-            @for one in &pictures.robustness {
+            @for one in &plots.robustness {
                 (section(one.title, html! { (one.content) (figures(&one.group)) }))
             }
-            @if let (Some(found), Some(group)) = (&outcome.found.trade_offs, &pictures.front) {
+            @if let (Some(found), Some(group)) = (&outcome.found.trade_offs, &plots.front) {
                 (section("Front", html! { (figures(group)) (front::table(report, found)) }))
             }
-            @if let Some(group) = &pictures.sweep { (section("Sweep", figures(group))) }
+            @if let Some(group) = &plots.sweep { (section("Sweep", figures(group))) }
             @if let Some(found) = &outcome.found.sensitivity {
                 (section(sensitivity::title(found), sensitivity::section(found)))
             }
             @if let Some(found) = &outcome.found.excitation {
                 (section("Excitation", html! {
                     (excitation::section(found))
-                    @if let Some(group) = &pictures.excitation { (figures(group)) }
+                    @if let Some(group) = &plots.excitation { (figures(group)) }
                 }))
             }
             @if let Some(table) = matrix::section(outcome) { (section("Criteria by case", table)) }
@@ -88,54 +88,54 @@ pub(super) fn of(report: &Report<'_>, pictures: &Pictures) -> Markup {
                 @let one_case = report.problem.study().cases().len() == 1;
                 (section("Sensitivities", slopes::section(found, report.best_name(), one_case)))
             }
-            @if !pictures.responses.is_empty() {
+            @if !plots.responses.is_empty() {
                 (section("Responses", html! {
-                    @if let Some(text) = &pictures.left_out { p { (text) } }
-                    @for group in &pictures.responses { (figures(group)) }
+                    @if let Some(text) = &plots.omitted { p { (text) } }
+                    @for group in &plots.responses { (figures(group)) }
                 }))
             }
-            @if let Some(group) = &pictures.convergence { (section("Convergence", figures(group))) }
+            @if let Some(group) = &plots.convergence { (section("Convergence", figures(group))) }
             @if let Some(results) = &outcome.calibration {
                 (section("Calibration", calibration::section(results)))
                 @if let Some(found) = &outcome.found.uncertainty {
                     (section(uncertainty::TITLE, html! {
                         (uncertainty::section(found))
-                        @if let Some(group) = &pictures.uncertainty { (figures(group)) }
+                        @if let Some(group) = &plots.uncertainty { (figures(group)) }
                     }))
                 }
                 @if results.sensitivity.is_some() || !results.excitation.is_empty() {
-                    (section("What the data can tell", told(results, pictures)))
+                    (section(sensitivity::IDENTIFIABILITY, identifiability(results, plots)))
                 }
             }
             @if !outcome.failures.is_empty() { (section("Failures", calibration::failures(&outcome.failures))) }
             (section("Study", html! {
                 details {
-                    summary { "The study file this page belongs to" }
+                    summary { "Study file with its settings" }
                     pre tabindex="0" { code { (report.text) } }
                 }
             }))
         }
-        footer { "Written by mops " (outcome.mops) ". The numbers of this page are in result.json, its plots in the folder plots." }
-        @if pictures.front.is_some() { @for text in front::SCRIPTS { script { (PreEscaped(text)) } } }
+        footer { "Written by mops " (outcome.mops) ". All numbers are in result.json, the plots in the folder plots." }
+        @if plots.front.is_some() { @for text in front::SCRIPTS { script { (PreEscaped(text)) } } }
     };
     document(&format!("{}: {}", outcome.study, task(outcome.task)), body)
 }
 
-/// What the data of a calibration tell of its tuners, and how rich its inputs are.
-fn told(results: &CalibrationReport, pictures: &Pictures) -> Markup {
+/// Returns the identifiability of the tuners of a calibration, and the excitation of its inputs.
+fn identifiability(results: &CalibrationReport, plots: &Plots) -> Markup {
     html! {
         @if let Some(found) = &results.sensitivity { (sensitivity::section(found)) }
         h3 { "Inputs" }
         @if results.excitation.is_empty() {
-            p { "No experiment is driven by an input: what there is to learn comes from the start values." }
+            p { "No experiment is driven by an input: all information comes from the initial states." }
         } @else {
             (excitation::inputs(&results.excitation))
-            @if let Some(group) = &pictures.excitation { (figures(group)) }
+            @if let Some(group) = &plots.excitation { (figures(group)) }
         }
     }
 }
 
-/// A table that can be scrolled sideways where the screen is narrow.
+/// Wraps a table for horizontal scrolling on narrow screens.
 pub(super) fn scrolling(name: &str, table: Markup) -> Markup {
     html! { div class="wide" role="region" tabindex="0" aria-label=(name) { (table) } }
 }
@@ -164,7 +164,7 @@ fn header(report: &Report<'_>) -> Markup {
                 } @else {
                     (fact("Solver", &verdict::solver(outcome)))
                     (fact("Evaluations", &outcome.evaluations.to_string()))
-                    @if let Some(reused) = outcome.reused { (fact("Known before", &reused.to_string())) }
+                    @if let Some(reused) = outcome.reused { (fact("Reused evaluations", &reused.to_string())) }
                 }
                 (fact("Simulations", &outcome.simulations.to_string()))
                 (fact("Time", &format!("{} s", significant(outcome.seconds, 3))))
@@ -185,7 +185,7 @@ fn fact(name: &str, value: &str) -> Markup {
 fn task(task: Task) -> &'static str {
     match task {
         Task::Design => "Design",
-        Task::Pareto => "Front",
+        Task::Pareto => "Pareto front",
         Task::Calibration => "Calibration",
         Task::Excitation => "Excitation",
         Task::Sensitivity => "Sensitivity",
@@ -215,7 +215,7 @@ fn figure(figure: &Figure) -> Markup {
     }
 }
 
-/// A text in which names stand between backticks.
+/// Returns a text as markup; names between backticks become code.
 pub(super) fn rich(text: &str) -> Markup {
     let parts: Vec<&str> = text.split('`').collect();
     if parts.len().is_multiple_of(2) {

@@ -1,4 +1,4 @@
-//! A plot over one axis: curves, levels and bands, drawn as SVG for pages and as PNG for everything else.
+//! Plots: curves, levels, bands and surfaces, drawn as SVG and as PNG.
 
 use std::io;
 use std::path::Path;
@@ -6,72 +6,72 @@ use std::path::Path;
 use super::scene::Scene;
 use super::{png, svg};
 
-/// What a mark stands for; this gives it its colour, on white paper and on a dark page.
+/// Colour of a mark, by its meaning. The page and the style sheet map it to light and dark schemes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Ink {
+pub enum Color {
     /// Titles and labels.
     Text,
-    /// Numbers at the axes.
+    /// Axes and their numbers.
     Faint,
     /// Grid and frame.
     Grid,
-    /// What the study found.
+    /// Result of the study.
     #[default]
     Result,
-    /// What it started from.
+    /// Initial guess.
     Start,
-    /// What was measured.
+    /// Measurements.
     Measured,
-    /// What is asked for.
+    /// Demands.
     Demand,
-    /// The range that is expected.
+    /// Expected range.
     Band,
-    /// One of several curves of equal rank, counted from 0.
+    /// Index of one of several curves of equal rank, from 0.
     Series(usize),
 }
 
-/// How a curve is drawn.
+/// Style of a curve.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum CurveStyle {
-    /// A solid line.
+    /// Solid line.
     #[default]
     Line,
-    /// A dashed line.
+    /// Dashed line.
     Dashed,
-    /// A dot for every point.
+    /// Dot at every point.
     Dots,
-    /// A cross for every point.
+    /// Cross at every point.
     Crosses,
 }
 
-/// Points with a name. Points that are not finite are left out; a line has a gap there.
+/// Curve of a plot. Non-finite points are omitted; a line has a gap there.
 #[derive(Debug, Clone, Default)]
 pub struct Curve {
-    /// Name in the legend; without one it does not appear there.
+    /// Name in the legend; not listed if empty.
     pub name: String,
-    /// The points.
+    /// Points `(x, y)`.
     pub points: Vec<(f64, f64)>,
-    /// How they are drawn.
+    /// Style of the points.
     pub style: CurveStyle,
-    /// What they stand for.
-    pub ink: Ink,
-    /// The point of a front that it belongs to, by index: a page marks it where that point is chosen.
-    pub of: Option<usize>,
-    /// Whether the curve may leave the picture: it widens the shown range to three times that of the others at most.
+    /// Colour of the points.
+    pub color: Color,
+    /// Index of the front point of the curve; a page highlights the curve if the point is selected.
+    pub front_point: Option<usize>,
+    /// True if the curve may leave the frame: it widens the range at most to three times that of the other curves.
     pub may_leave: bool,
 }
 
-/// A horizontal line, such as a demand. It widens the shown range to three times that of the curves at most; farther
-/// away it is not shown.
+/// Horizontal line, such as a demand. It widens the range at most to three times that of the curves; beyond that it is not
+/// shown.
 #[derive(Debug, Clone, Default)]
 pub struct Level {
     /// Label at its right end; may be empty.
     pub name: String,
-    /// Where it lies.
+    /// Value along y.
     pub value: f64,
 }
 
-/// A range of values behind the curves, such as that of noise.
+/// Range of values behind the curves, such as the noise level.
 #[derive(Debug, Clone, Default)]
 pub struct Band {
     /// Name in the legend.
@@ -80,91 +80,90 @@ pub struct Band {
     pub range: [f64; 2],
 }
 
-/// Heights over a grid, drawn as colours behind the curves.
+/// Surface over a grid, drawn as colours behind the curves.
 #[derive(Debug, Clone, Default)]
 pub struct Surface {
-    /// Name of the height, with its unit.
+    /// Name of the values, with their unit.
     pub label: String,
-    /// Places along x, increasing; at least two.
+    /// Grid points along x, increasing; at least two.
     pub x: Vec<f64>,
-    /// Places along y, increasing; at least two.
+    /// Grid points along y, increasing; at least two.
     pub y: Vec<f64>,
-    /// Heights: a row for every place along y, with a number for every place along x. Those that are not finite are left
-    /// blank.
+    /// Values, `y.len()` rows of `x.len()` numbers. Non-finite values are left blank.
     pub values: Vec<Vec<f64>>,
-    /// Whether heights are told apart by their logarithms; those that are not positive are then left blank.
+    /// True for a logarithmic colour scale; values that are not positive are then left blank.
     pub log: bool,
 }
 
-/// A third axis, upwards, for points in space.
+/// Vertical axis of a three-dimensional plot.
 #[derive(Debug, Clone, Default)]
-pub struct Third {
-    /// Quantity and unit along it.
+pub struct ZAxis {
+    /// Quantity and unit along the axis.
     pub label: String,
-    /// For every curve the values that belong to its points.
+    /// Values along the axis: for every curve, one per point.
     pub values: Vec<Vec<f64>>,
 }
 
-/// An upright axis of parallel coordinates, on which curves run from 0 at its foot to 1 at its head.
+/// Vertical axis of parallel coordinates. Curves have values from 0 at the lower to 1 at the upper end.
 #[derive(Debug, Clone, Default)]
-pub struct Upright {
-    /// The quantity.
+pub struct ParallelAxis {
+    /// Quantity and unit along the axis.
     pub name: String,
-    /// What stands at its foot and at its head.
+    /// Labels of the lower and the upper end.
     pub ends: [String; 2],
 }
 
-/// A plot. Curves are drawn in their order, the last on top.
+/// Plot. Curves are drawn in their order, the last on top.
 #[derive(Debug, Clone, Default)]
 pub struct Plot {
-    /// What is shown.
+    /// Title.
     pub title: String,
     /// Quantity and unit along x, such as `time (s)`.
     pub x_label: String,
     /// Quantity and unit along y.
     pub y_label: String,
-    /// The curves.
+    /// Curves.
     pub curves: Vec<Curve>,
     /// Horizontal lines.
     pub levels: Vec<Level>,
     /// Ranges behind the curves.
     pub bands: Vec<Band>,
-    /// Shown range of x; that of the curves where absent.
+    /// Range of x to be included; the range of the curves if `None`.
     pub x_range: Option<[f64; 2]>,
-    /// Whether x is logarithmic; values that are not positive are then left out.
+    /// True if x is logarithmic; values that are not positive are then omitted.
     pub log_x: bool,
-    /// Whether y is logarithmic; values that are not positive are then left out.
+    /// True if y is logarithmic; values that are not positive are then omitted.
     pub log_y: bool,
-    /// Where a faint line runs from top to bottom.
+    /// Value of x at which a vertical line is drawn.
     pub vertical: Option<f64>,
-    /// Whether a unit is as long along x as along y, so that a circle is round.
+    /// True for equal scales along x and y, so that a circle is round.
     pub equal: bool,
-    /// Whether y is an angle in degrees: ticks stand at multiples of 45.
+    /// True if y is an angle in degrees, with ticks at multiples of 45.
     pub degrees: bool,
-    /// A surface behind the curves; its grid is then what is shown of x and y.
+    /// Surface behind the curves; its grid determines the ranges of x and y.
     pub surface: Option<Surface>,
-    /// A third axis: the points of all curves are then dots in a box.
-    pub third: Option<Third>,
-    /// Axes of parallel coordinates, at x = 0, 1, 2, ..., instead of the others.
-    pub uprights: Vec<Upright>,
+    /// Vertical axis of a three-dimensional plot, in which all curves are dots.
+    pub z_axis: Option<ZAxis>,
+    /// Axes of parallel coordinates at x = 0, 1, 2, ..., in place of the x and y axes.
+    pub parallel_axes: Vec<ParallelAxis>,
 }
 
 impl Plot {
-    /// The plot as an SVG document, which may stand in a page as it is. Every element also carries a class (`result`,
+    /// Returns the plot as an SVG document, which can be embedded in a page. Every element also has a class (`result`,
     /// `start`, ...), so that the style sheet of a page can change its colours.
     pub fn svg(&self) -> String {
         svg::document(&Scene::of(self), &self.title, &self.description())
     }
 
-    /// Writes the plot as a PNG of two pixels per unit of the SVG.
+    /// Writes the plot as a PNG, with two pixels per unit of the SVG.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// If the file cannot be written.
     pub fn write_png(&self, path: &Path) -> io::Result<()> {
         png::write(&Scene::of(self), path)
     }
 
-    /// What a reader who cannot see the plot is told: the range of every curve.
+    /// Returns a description for screen readers: the range of every curve.
     fn description(&self) -> String {
         let mut text = format!("{} over {}.", self.y_label, self.x_label);
         for curve in &self.curves {

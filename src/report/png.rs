@@ -1,4 +1,4 @@
-//! A scene as a PNG: strokes by their distance from every pixel, letters by the bundled font, so that it needs no system font.
+//! Scene as a PNG: strokes with anti-aliasing by distance, letters in the bundled font, so that no system font is needed.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -7,10 +7,10 @@ use std::sync::Once;
 
 use plotters::backend::{BitMapBackend, DrawingBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{Color, FontStyle, FontTransform, IntoFont, RGBColor, TextStyle, WHITE, register_font};
+use plotters::style::{Color as _, FontStyle, FontTransform, IntoFont, RGBColor, TextStyle, WHITE, register_font};
 
 use super::clip::{Point, distance};
-use super::plot::Ink;
+use super::plot::Color;
 use super::scene::{Anchor, Mark, SIZE, Scene};
 use super::svg::rgb;
 use crate::files;
@@ -19,14 +19,14 @@ use mops_core::math;
 /// Pixels per unit of the scene.
 const SCALE: f64 = 2.0;
 const FONT: &str = "DejaVu Sans";
-/// Height of a line of DejaVu Sans (ascender to descender), which plotters calls the size of a font, by its em.
+/// Line height of DejaVu Sans (ascender to descender), which plotters calls the size of a font, in units of the em.
 const LINE: f64 = 1.164;
 
-/// Draws the scene into a file.
+/// Writes the scene into a file.
 pub(super) fn write(scene: &Scene, path: &Path) -> io::Result<()> {
     static FONT_ONCE: Once = Once::new();
     FONT_ONCE.call_once(|| {
-        // Fails only for bytes that are no font.
+        // Fails only if the bytes are not a font.
         let _ = register_font(FONT, FontStyle::Normal, include_bytes!("../../assets/DejaVuSans.ttf"));
     });
     let [width, height] = SIZE.map(|length| (SCALE * length) as u32);
@@ -54,27 +54,27 @@ fn failed(error: impl std::error::Error) -> io::Error {
 
 fn draw(paper: &mut BitMapBackend<'_>, mark: &Mark) -> io::Result<()> {
     match mark {
-        Mark::Of { marks, .. } => marks.iter().try_for_each(|mark| draw(paper, mark)),
+        Mark::FrontPoint { marks, .. } => marks.iter().try_for_each(|mark| draw(paper, mark)),
         Mark::InSpace { mark, .. } => draw(paper, mark),
-        Mark::Line { points, ink, width, dashed } => {
+        Mark::Line { points, color, width, dashed } => {
             let parts = if *dashed { dashes(points, 6.0, 4.0) } else { vec![points.clone()] };
             let segments: Vec<[Point; 2]> =
                 parts.iter().flat_map(|part| part.windows(2).map(|w| [w[0], w[1]])).collect();
-            stroke(paper, &segments, 0.5 * width, *ink)
+            stroke(paper, &segments, 0.5 * width, *color)
         }
-        Mark::Dots { centres, ink, radius } => {
+        Mark::Dots { centres, color, radius } => {
             let segments: Vec<[Point; 2]> = centres.iter().map(|&c| [c, c]).collect();
-            stroke(paper, &segments, *radius, *ink)
+            stroke(paper, &segments, *radius, *color)
         }
-        Mark::Box { frame, ink } => {
+        Mark::Box { frame, color } => {
             let pixel = |p: Point| ((SCALE * p[0]).round() as i32, (SCALE * p[1]).round() as i32);
-            paper.draw_rect(pixel(frame.from), pixel(frame.to), &colour(*ink), true).map_err(failed)
+            paper.draw_rect(pixel(frame.from), pixel(frame.to), &rgb_color(*color), true).map_err(failed)
         }
         Mark::Cell { frame, rgb: [r, g, b] } => {
             let pixel = |p: Point| ((SCALE * p[0]).round() as i32, (SCALE * p[1]).round() as i32);
             paper.draw_rect(pixel(frame.from), pixel(frame.to), &RGBColor(*r, *g, *b), true).map_err(failed)
         }
-        Mark::Text { text, at, anchor, size, ink, upwards } => {
+        Mark::Text { text, at, anchor, size, color, upwards } => {
             let h_pos = match anchor {
                 Anchor::Start => HPos::Left,
                 Anchor::Middle => HPos::Center,
@@ -82,9 +82,9 @@ fn draw(paper: &mut BitMapBackend<'_>, mark: &Mark) -> io::Result<()> {
             };
             let font = (FONT, LINE * SCALE * size).into_font();
             let font = if *upwards { font.transform(FontTransform::Rotate270) } else { font };
-            let colour = colour(*ink);
-            let style = TextStyle::from(font).color(&colour).pos(Pos::new(h_pos, VPos::Top));
-            // plotters puts the line on which letters stand half a font size below the top; ours lies 0.35 em below the middle.
+            let rgb = rgb_color(*color);
+            let style = TextStyle::from(font).color(&rgb).pos(Pos::new(h_pos, VPos::Top));
+            // plotters places the baseline half a font size below the top; ours is 0.35 em below the middle.
             let lift = SCALE * size * (0.35 - 0.5 * LINE);
             let [x, y] = at.map(|v| SCALE * v);
             let [x, y] = if *upwards { [x + lift, y] } else { [x, y + lift] };
@@ -93,15 +93,15 @@ fn draw(paper: &mut BitMapBackend<'_>, mark: &Mark) -> io::Result<()> {
     }
 }
 
-fn colour(ink: Ink) -> RGBColor {
-    let [r, g, b] = rgb(ink);
+fn rgb_color(color: Color) -> RGBColor {
+    let [r, g, b] = rgb(color);
     RGBColor(r, g, b)
 }
 
-/// Paints every pixel within `half` of one of the segments, those at the edge in part.
-fn stroke(paper: &mut BitMapBackend<'_>, segments: &[[Point; 2]], half: f64, ink: Ink) -> io::Result<()> {
+/// Paints the pixels within `half` of the segments, with anti-aliasing at the edge.
+fn stroke(paper: &mut BitMapBackend<'_>, segments: &[[Point; 2]], half: f64, color: Color) -> io::Result<()> {
     let half = SCALE * half;
-    // Corners of pixels to their middles.
+    // From pixel corners to pixel centres.
     let segments: Vec<[Point; 2]> = segments.iter().map(|s| s.map(|p| p.map(|v| SCALE * v - 0.5))).collect();
     let reach = |points: &[Point], i: usize| {
         let (low, high) = points.iter().fold((f64::MAX, 0.0f64), |(low, high), p| (low.min(p[i]), high.max(p[i])));
@@ -123,12 +123,12 @@ fn stroke(paper: &mut BitMapBackend<'_>, segments: &[[Point; 2]], half: f64, ink
     }
     for (i, &part) in cover.iter().enumerate().filter(|(_, part)| **part > 0.0) {
         let at = ((columns.start + i % columns.len()) as i32, (rows.start + i / columns.len()) as i32);
-        paper.draw_pixel(at, colour(ink).mix(part).to_backend_color()).map_err(failed)?;
+        paper.draw_pixel(at, rgb_color(color).mix(part).to_backend_color()).map_err(failed)?;
     }
     Ok(())
 }
 
-/// The parts of a line that a dashed pen draws.
+/// Returns the parts of a dashed line.
 fn dashes(points: &[Point], on: f64, off: f64) -> Vec<Vec<Point>> {
     let mut parts: Vec<Vec<Point>> = points.first().map(|p| vec![*p]).into_iter().collect();
     let (mut drawing, mut left) = (true, on);
@@ -140,7 +140,7 @@ fn dashes(points: &[Point], on: f64, off: f64) -> Vec<Vec<Point>> {
             at += left;
             let p = [a[0] + at / length * (b[0] - a[0]), a[1] + at / length * (b[1] - a[1])];
             if drawing {
-                parts.last_mut().expect("a line that is drawn has a part").push(p);
+                parts.last_mut().expect("a drawn line has a part").push(p);
             } else {
                 parts.push(vec![p]);
             }
@@ -149,7 +149,7 @@ fn dashes(points: &[Point], on: f64, off: f64) -> Vec<Vec<Point>> {
         }
         left -= length - at;
         if drawing {
-            parts.last_mut().expect("a line that is drawn has a part").push(b);
+            parts.last_mut().expect("a drawn line has a part").push(b);
         }
     }
     parts

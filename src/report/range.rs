@@ -1,16 +1,16 @@
-//! Ranges of values: what of a plot is shown.
+//! Ranges of the axes.
 
 use super::plot::Plot;
 use mops_core::math;
 
-/// A value, or its logarithm, if it is one that can be drawn.
+/// Returns a value, or its decimal logarithm if `log`; `None` if it cannot be drawn.
 pub(super) fn drawable(value: f64, log: bool) -> Option<f64> {
     let value = if log { math::log10(value) } else { value };
-    // Beyond this, differences of two values would overflow.
+    // Differences of larger values may overflow.
     (value.abs() < 1e150).then_some(value)
 }
 
-/// The smallest range that holds all values, widened where they are as good as equal; `None` without a value.
+/// Returns the smallest range that contains all values, widened if they are nearly equal; `None` without values.
 pub(super) fn range_of(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     let [low, high] = values.map(|v| [v, v]).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])?;
     let size = low.abs().max(high.abs());
@@ -21,7 +21,8 @@ pub(super) fn range_of(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     Some([low - margin, high + margin])
 }
 
-/// The shown range of y: all of the curves that must be seen, the others and the levels as far as there is room.
+/// Returns the range of y. It contains the curves that may not leave the frame; other curves and levels widen it at most to
+/// three times that range.
 pub(super) fn y_range(plot: &Plot) -> Option<[f64; 2]> {
     let values = |may_leave: bool| {
         let curves = plot.curves.iter().filter(move |c| c.may_leave == may_leave).flat_map(|c| &c.points);
@@ -43,7 +44,7 @@ pub(super) fn y_range(plot: &Plot) -> Option<[f64; 2]> {
     Some([range[0] - margin, range[1] + margin])
 }
 
-/// Ranges of x and y in which a unit is equally long on paper of this width over height, with a margin.
+/// Returns ranges of x and y with equal scales and a margin, for a frame with the aspect ratio `shape` (width / height).
 pub(super) fn equal(x: [f64; 2], y: [f64; 2], shape: f64) -> [[f64; 2]; 2] {
     let about = |[low, high]: [f64; 2], room: f64| [0.5 * (low + high - room), 0.5 * (low + high + room)];
     let height = (1.05 * (y[1] - y[0])).max(1.05 * (x[1] - x[0]) / shape);
@@ -56,13 +57,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equal_axes_hold_both_ranges() {
+    fn equal_axes_contain_both_ranges() {
         let [x, y] = equal([-1.0, 3.0], [0.0, 1.0], 2.0);
         assert!((x[1] - x[0] - 2.0 * (y[1] - y[0])).abs() < 1e-12 && x[0] < -1.0 && y[0] < 0.0 && y[1] > 1.0);
     }
 
     #[test]
-    fn a_curve_that_may_leave_and_a_far_level_do_not_crush_the_others() {
+    fn a_curve_that_may_leave_and_a_far_level_do_not_compress_the_others() {
         let curve = |values: [f64; 2], may_leave| Curve {
             points: values.map(|v| (v, v)).to_vec(),
             may_leave,

@@ -1,13 +1,13 @@
-//! Traces as points to draw: every extremum and every jump, and enough between them to look smooth.
+//! Traces as points of a plot: every extremum and every jump, and enough points between them for a smooth curve.
 
 use mops_core::Trace;
 
-/// Points per trace between its extrema.
+/// Number of points per trace in addition to the ends of its pieces.
 const GRID: usize = 1500;
-/// Columns of a plot within which only the first, lowest, highest and last point can be seen.
+/// Number of columns of a plot; within a column only the first, lowest, highest and last point are visible.
 const COLUMNS: f64 = 1000.0;
 
-/// Points of a trace to draw.
+/// Returns the points of a trace for a plot.
 pub(crate) fn points(trace: &Trace) -> Vec<(f64, f64)> {
     let (start, step) = (trace.start(), (trace.end() - trace.start()) / GRID as f64);
     let mut points = Vec::new();
@@ -26,13 +26,12 @@ pub(crate) fn points(trace: &Trace) -> Vec<(f64, f64)> {
     thinned(points)
 }
 
-/// Of points with increasing x, those that can be seen.
+/// Reduces points with increasing x to the visible ones.
 pub(super) fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     within_columns(points, COLUMNS)
 }
 
-/// Of points with increasing x, at most four in each of so many columns. Source (M4): U. Jugel et al., PVLDB 7 (2014)
-/// 797-808.
+/// Reduces points with increasing x to at most four per column (M4). Source: U. Jugel et al., PVLDB 7 (2014) 797-808.
 pub(super) fn within_columns(points: Vec<(f64, f64)>, columns: f64) -> Vec<(f64, f64)> {
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return points };
     let (start, width) = (first.0, (last.0 - first.0) / columns);

@@ -1,63 +1,64 @@
-//! A plot laid out on paper: lines, dots, rectangles and texts at their places, the same for SVG and PNG.
+//! Layout of a plot: lines, dots, rectangles and texts with their coordinates, for SVG and PNG alike.
 
 use super::axis::Axis;
 use super::clip::{Frame, Point, visible};
-use super::plot::{CurveStyle, Ink, Plot, Surface};
+use super::plot::{Color, CurveStyle, Plot, Surface};
 use super::range::{drawable, equal, range_of, y_range};
-use super::space::{Place, View};
+use super::space::{Point3, View};
 use super::surface::SCALE_WIDTH;
 
-/// Size of every plot; one unit is a pixel of a page at its natural size.
+/// Width and height of every plot; one unit is a CSS pixel.
 pub(super) const SIZE: Point = [560.0, 300.0];
-/// Size of the letters, and how wide one is on average.
+/// Font size.
 const LETTER: f64 = 12.0;
+/// Mean width of a letter.
 pub(super) const ADVANCE: f64 = 0.6 * LETTER;
 
-/// Something drawn.
+/// Element of a drawing.
 #[derive(Debug, Clone)]
 pub(super) enum Mark {
     Line {
         points: Vec<Point>,
-        ink: Ink,
+        color: Color,
         width: f64,
         dashed: bool,
     },
     Dots {
         centres: Vec<Point>,
-        ink: Ink,
+        color: Color,
         radius: f64,
     },
     Box {
         frame: Frame,
-        ink: Ink,
+        color: Color,
     },
-    /// A box of a colour of its own, the same on every page.
+    /// Box of a fixed colour, independent of the colour scheme.
     Cell {
         frame: Frame,
         rgb: [u8; 3],
     },
-    /// `at` is the middle of the height, and the left end, the middle or the right end by `anchor`.
+    /// Text. `at` is at mid-height; horizontally at the left end, middle or right end, according to `anchor`.
     Text {
         text: String,
         at: Point,
         anchor: Anchor,
         size: f64,
-        ink: Ink,
+        color: Color,
         upwards: bool,
     },
-    /// What belongs to a point of a front: a line, or a dot.
-    Of {
+    /// Marks of a point of a front: a line or a dot.
+    FrontPoint {
         point: usize,
         marks: Vec<Self>,
     },
-    /// What has its places in a box that can be turned, as it is seen at first.
+    /// Mark in the box of a three-dimensional plot: its points in the box, and the mark in the initial view.
     InSpace {
-        places: Vec<Place>,
+        points: Vec<Point3>,
         mark: Box<Self>,
     },
 }
 
-/// Which end of a text stands at its place.
+/// Part of a text that its position refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -65,18 +66,18 @@ pub(super) enum Anchor {
     End,
 }
 
-/// All that is drawn, from back to front.
+/// Drawing: all marks, from back to front.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scene {
     pub(super) marks: Vec<Mark>,
-    /// From where the box of [`Mark::InSpace`] is seen.
+    /// View of the box of [`Mark::InSpace`].
     pub(super) view: Option<View>,
 }
 
 impl Scene {
     /// Lays out a plot.
     pub(super) fn of(plot: &Plot) -> Self {
-        if plot.third.is_some() {
+        if plot.z_axis.is_some() {
             return Self::space(plot);
         }
         let mut scene = Self::default();
@@ -91,7 +92,7 @@ impl Scene {
         };
         let shown = [x_range.unwrap_or([0.0, 1.0]), y_range.unwrap_or([0.0, 1.0])];
         let top = scene.legend(plot, 38.0) + 12.0;
-        // Wide enough for numbers of five letters.
+        // With margins for numbers of five letters.
         let room = [SIZE[0] - 54.0 - 5.0 * ADVANCE, SIZE[1] - 46.0 - top];
         let [x_shown, y_shown] = if plot.equal { equal(shown[0], shown[1], room[0] / room[1]) } else { shown };
         let x = x_axis(x_shown, plot.log_x);
@@ -103,7 +104,7 @@ impl Scene {
             .filter(|(at, _)| (0.0..=1.0).contains(at))
             .collect();
 
-        scene.text(&plot.title, [10.0, 16.0], Anchor::Start, Ink::Text);
+        scene.text(&plot.title, [10.0, 16.0], Anchor::Start, Color::Text);
         let labels = longest(y.ticks.iter().map(|(_, label)| label.as_str()));
         let left = 38.0 + ADVANCE * if plot.equal { labels.max(5.0) } else { labels };
         let beside = if plot.surface.is_some() { SCALE_WIDTH } else { 0.0 };
@@ -118,18 +119,18 @@ impl Scene {
         for band in &plot.bands {
             if let [Some(low), Some(high)] = band.range.map(|v| y.position(v)) {
                 let (from, to) = ([left, height(low.max(high))], [frame.to[0], height(low.min(high))]);
-                scene.marks.push(Mark::Box { frame: Frame { from, to }, ink: Ink::Band });
+                scene.marks.push(Mark::Box { frame: Frame { from, to }, color: Color::Band });
             }
         }
-        if plot.uprights.is_empty() {
+        if plot.parallel_axes.is_empty() {
             scene.axes(plot, &x, &y, frame);
         } else {
-            scene.uprights(&plot.uprights, [&x, &y], frame);
+            scene.parallel_axes(&plot.parallel_axes, [&x, &y], frame);
         }
         if let Some(at) = plot.vertical.and_then(|value| x.position(value)).filter(|at| (0.0..=1.0).contains(at)) {
             let px = left + at * (frame.to[0] - left);
             let points = vec![[px, top], [px, frame.to[1]]];
-            scene.marks.push(Mark::Line { points, ink: Ink::Start, width: 0.8, dashed: false });
+            scene.marks.push(Mark::Line { points, color: Color::Start, width: 0.8, dashed: false });
         }
         if let Some(surface) = &plot.surface {
             scene.surface(surface, &x, &y, frame);
@@ -139,62 +140,63 @@ impl Scene {
             let points: Vec<Option<Point>> = curve.points.iter().map(place).collect();
             let inside = points.iter().copied().flatten().filter(|p| frame.contains(*p));
             match curve.style {
-                CurveStyle::Dots => scene.dots(inside, curve.ink),
-                CurveStyle::Crosses => inside.for_each(|p| scene.cross(p, curve.ink)),
+                CurveStyle::Dots => scene.dots(inside, curve.color),
+                CurveStyle::Crosses => inside.for_each(|p| scene.cross(p, curve.color)),
                 CurveStyle::Line | CurveStyle::Dashed => {
                     let dashed = curve.style == CurveStyle::Dashed;
-                    let width = match (curve.of, curve.ink) {
+                    let width = match (curve.front_point, curve.color) {
                         (Some(_), _) => 0.8,
-                        (None, Ink::Start) => 1.3,
+                        (None, Color::Start) => 1.3,
                         _ => 1.8,
                     };
                     for points in visible(&points, frame, 0.1) {
-                        scene.marks.push(Mark::Line { points, ink: curve.ink, width, dashed });
+                        scene.marks.push(Mark::Line { points, color: curve.color, width, dashed });
                     }
                 }
             }
-            if let Some(point) = curve.of {
+            if let Some(point) = curve.front_point {
                 let marks = scene.marks.split_off(before);
-                scene.marks.push(Mark::Of { point, marks });
+                scene.marks.push(Mark::FrontPoint { point, marks });
             }
         }
         let mut lowest = f64::INFINITY;
         for (at, name) in descending(levels) {
             let line = vec![[left, height(at)], [frame.to[0], height(at)]];
-            scene.marks.push(Mark::Line { points: line, ink: Ink::Demand, width: 1.2, dashed: true });
-            // Labels of neighbouring levels are pushed apart.
+            scene.marks.push(Mark::Line { points: line, color: Color::Demand, width: 1.2, dashed: true });
+            // Labels of neighbouring levels must not overlap.
             lowest = if lowest.is_finite() { height(at).max(lowest + 14.0) } else { height(at) };
-            scene.text(name, [frame.to[0] + 6.0, lowest], Anchor::Start, Ink::Demand);
+            scene.text(name, [frame.to[0] + 6.0, lowest], Anchor::Start, Color::Demand);
         }
         if y_range.is_none() {
             let middle = [0.5 * (left + frame.to[0]), 0.5 * (top + frame.to[1])];
-            scene.text("nothing to show", middle, Anchor::Middle, Ink::Faint);
+            scene.text("no data", middle, Anchor::Middle, Color::Faint);
         }
         scene
     }
 
-    pub(super) fn text(&mut self, text: &str, at: Point, anchor: Anchor, ink: Ink) {
+    pub(super) fn text(&mut self, text: &str, at: Point, anchor: Anchor, color: Color) {
         if !text.is_empty() {
-            let size = if ink == Ink::Text { LETTER + 1.0 } else { LETTER };
-            self.marks.push(Mark::Text { text: text.to_owned(), at, anchor, size, ink, upwards: false });
+            let size = if color == Color::Text { LETTER + 1.0 } else { LETTER };
+            self.marks.push(Mark::Text { text: text.to_owned(), at, anchor, size, color, upwards: false });
         }
     }
 
-    /// Grid, frame, ticks and labels of both axes.
+    /// Draws grid, frame, ticks and labels of both axes.
     fn axes(&mut self, plot: &Plot, x: &Axis, y: &Axis, Frame { from, to }: Frame) {
-        let line = |a: Point, b: Point, width| Mark::Line { points: vec![a, b], ink: Ink::Grid, width, dashed: false };
+        let line =
+            |a: Point, b: Point, width| Mark::Line { points: vec![a, b], color: Color::Grid, width, dashed: false };
         for (at, label) in &x.ticks {
             let px = from[0] + at * (to[0] - from[0]);
             self.marks.push(line([px, from[1]], [px, to[1]], 0.7));
-            self.text(label, [px, to[1] + 13.0], Anchor::Middle, Ink::Faint);
+            self.text(label, [px, to[1] + 13.0], Anchor::Middle, Color::Faint);
         }
         for (at, label) in &y.ticks {
             let py = to[1] - at * (to[1] - from[1]);
             self.marks.push(line([from[0], py], [to[0], py], 0.7));
-            self.text(label, [from[0] - 6.0, py], Anchor::End, Ink::Faint);
+            self.text(label, [from[0] - 6.0, py], Anchor::End, Color::Faint);
         }
         let corners = vec![from, [from[0], to[1]], to];
-        self.marks.push(Mark::Line { points: corners, ink: Ink::Faint, width: 1.0, dashed: false });
+        self.marks.push(Mark::Line { points: corners, color: Color::Faint, width: 1.0, dashed: false });
         let with_factor = |label: &str, axis: &Axis| match &axis.factor {
             Some(factor) => format!("{label} {factor}"),
             None => label.to_owned(),
@@ -203,15 +205,22 @@ impl Scene {
             &with_factor(&plot.x_label, x),
             [0.5 * (from[0] + to[0]), SIZE[1] - 12.0],
             Anchor::Middle,
-            Ink::Faint,
+            Color::Faint,
         );
         let at = [12.0, 0.5 * (from[1] + to[1])];
         let text = with_factor(&plot.y_label, y);
-        self.marks.push(Mark::Text { text, at, anchor: Anchor::Middle, size: LETTER, ink: Ink::Faint, upwards: true });
+        self.marks.push(Mark::Text {
+            text,
+            at,
+            anchor: Anchor::Middle,
+            size: LETTER,
+            color: Color::Faint,
+            upwards: true,
+        });
     }
 }
 
-/// The axis along x: fewer ticks where their labels would touch.
+/// Returns the axis along x, with fewer ticks if their labels would touch.
 fn x_axis(range: [f64; 2], log: bool) -> Axis {
     let labels = |axis: &Axis| {
         ADVANCE * (longest(axis.ticks.iter().map(|(_, label)| label.as_str())) + 1.5) * axis.ticks.len() as f64

@@ -1,4 +1,4 @@
-//! What the data, or the criteria, tell of the tuners: sentences, trust, correlations, eigenvectors.
+//! Identifiability of the tuners, or sensitivity of the criteria: sentences, standard errors, correlations, eigenvectors.
 
 use maud::{Markup, html};
 use mops_core::identification::{SensitivityReport, TunerSensitivity};
@@ -6,48 +6,51 @@ use mops_core::identification::{SensitivityReport, TunerSensitivity};
 use super::page::{rich, scrolling};
 use crate::numbers::{number, percent, significant};
 
-/// More tuners than this make tables that nobody reads.
+/// Largest number of tuners with tables of correlations and directions.
 const MOST_TUNERS: usize = 24;
 
-/// The title of the section.
+/// Title of the section on the tuners of a calibration.
+pub(super) const IDENTIFIABILITY: &str = "Identifiability";
+
+/// Returns the title of the section.
 pub(super) fn title(found: &SensitivityReport) -> &'static str {
-    if found.of == "residuals" { "What the data can tell" } else { "What the criteria can tell" }
+    if found.of == "residuals" { IDENTIFIABILITY } else { "Sensitivity of the criteria" }
 }
 
-/// Sentences in their order.
+/// Returns sentences as a list, in their order.
 pub(super) fn sentences<'a>(words: impl IntoIterator<Item = &'a String>) -> Markup {
     html! { ul class="findings" { @for text in words { li { (rich(text)) } } } }
 }
 
-/// All that was found.
+/// Returns sentences and tables.
 pub(super) fn section(found: &SensitivityReport) -> Markup {
     let measured = found.of == "residuals";
     html! {
         (sentences(&found.words))
-        h3 { "Which tuners can be trusted" }
+        h3 { "Sensitivity to each tuner" }
         p {
-            "The effect is the change of the " (if measured { "weighted residuals" } else { "scaled criteria" })
-            ", root of their sum of squares, for a change of the tuner by its own value. "
+            "Effect: root of the sum of squared derivatives of the "
+            (if measured { "weighted residuals" } else { "scaled criteria" }) ", per relative change of the tuner. "
             @if measured {
-                "Alone is the standard error if all other tuners were known; the factor is what not knowing them costs. Relative "
-                "errors are shares of the value; of start values, which may well be near zero, shares of the range."
+                "Alone: standard error if all other tuners were known. Factor: increase of the standard error because they are "
+                "not known. Relative error: share of the value; for initial states, which may be near zero, share of the range."
             } @else {
-                "The factor is how much of that effect the other tuners can undo: 1 is none."
+                "Factor: effect divided by its part that the other tuners cannot compensate; 1 if they compensate nothing."
             }
         }
-        (scrolling("Which tuners can be trusted", trust(found, measured)))
+        (scrolling("Sensitivity to each tuner", accuracy(found, measured)))
         @if (2..=MOST_TUNERS).contains(&found.tuners.len()) {
             h3 { "Correlation of the estimates" }
             (scrolling("Correlation of the estimates", correlations(found)))
             h3 { "Directions" }
             p {
-                "Eigenvectors of the sensitivity matrix, strongest first, in shares of the tuners' values (of the "
-                "range, where a value is 0). Along a direction with "
-                "a small eigenvalue the tuners may move together and hardly change anything. Slopes are "
-                (if found.slopes == "tangents" { "exact (tangents of the simulation)" } else { "central differences" })
-                "; they do not resolve singular values below " (number(found.zero)) " of the largest."
+                "Eigenvectors of the sensitivity matrix by decreasing eigenvalue, for relative changes of the tuners (relative "
+                "to the range for a value of 0). A joint change of the tuners along a direction with a small eigenvalue has "
+                "little effect. Derivatives are "
+                (if found.slopes == "tangents" { "exact (automatic differentiation)" } else { "central differences" })
+                "; they resolve singular values down to " (number(found.zero)) " of the largest."
                 @if measured {
-                    " A direction along which one standard error moves a tuner through its whole range is not determined."
+                    " A direction is not determined if one standard error along it spans the whole range of a tuner."
                 }
             }
             (scrolling("Directions", directions(found)))
@@ -55,7 +58,7 @@ pub(super) fn section(found: &SensitivityReport) -> Markup {
     }
 }
 
-fn trust(found: &SensitivityReport, measured: bool) -> Markup {
+fn accuracy(found: &SensitivityReport, measured: bool) -> Markup {
     html! {
         table {
             thead {
@@ -67,7 +70,7 @@ fn trust(found: &SensitivityReport, measured: bool) -> Markup {
                     @if measured {
                         th scope="col" class="number" { "standard error" }
                         th scope="col" class="number" { "alone" }
-                        th scope="col" class="number" { "relative" }
+                        th scope="col" class="number" { "relative error" }
                     }
                     th scope="col" class="number" { "factor" }
                     th scope="col" { "" }
@@ -94,11 +97,11 @@ fn trust(found: &SensitivityReport, measured: bool) -> Markup {
     }
 }
 
-/// The standard error as a share, with what it is a share of where that is not the value.
+/// Returns the relative standard error, with its reference if that is the range.
 pub(super) fn relative(tuner: &TunerSensitivity) -> Markup {
     html! {
         (known(tuner.relative_error, percent))
-        @if tuner.relative_to == "range" && tuner.relative_error.is_finite() { small { "of its range" } }
+        @if tuner.relative_to == "range" && tuner.relative_error.is_finite() { small { "of the range" } }
     }
 }
 
@@ -147,10 +150,10 @@ fn directions(found: &SensitivityReport) -> Markup {
             thead {
                 tr {
                     th scope="col" class="number" { "eigenvalue" }
-                    th scope="col" class="number" { "of the largest" }
-                    th scope="col" { "direction, relative" }
-                    th scope="col" class="number" { "in own units" }
-                    th scope="col" class="number" { "of the largest" }
+                    th scope="col" class="number" { "/ largest" }
+                    th scope="col" { "direction, relative changes" }
+                    th scope="col" class="number" { "eigenvalue, own units" }
+                    th scope="col" class="number" { "/ largest" }
                     th scope="col" { "direction, own units" }
                 }
             }
@@ -170,7 +173,7 @@ fn directions(found: &SensitivityReport) -> Markup {
     }
 }
 
-/// An eigenvector as a sum; parts below `least` are left out.
+/// Returns an eigenvector as a sum over the tuners; parts below `least` are omitted.
 pub(crate) fn combination(found: &SensitivityReport, vector: &[f64], least: f64) -> String {
     let mut text = String::new();
     for (tuner, part) in found.tuners.iter().zip(vector).filter(|(_, part)| part.abs() >= least) {

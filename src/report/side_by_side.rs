@@ -1,39 +1,39 @@
-//! The page of a comparison: the responses of several runs over each other.
+//! Page of a comparison: tables and responses of several runs.
 
 use maud::{Markup, PreEscaped, html};
 use mops_core::{Analysis, Problem};
 
 use super::page::{document, scrolling, section};
-use super::plot::{Curve, Ink, Plot};
+use super::plot::{Color, Curve, Plot};
 use super::sampling;
 use crate::numbers::labelled;
 
-/// A run whose responses are drawn.
+/// Run with responses to plot.
 pub(crate) struct Responses {
     /// Name in the legends.
     pub(crate) name: String,
-    /// The problem.
+    /// Problem of the run.
     pub(crate) problem: Problem,
-    /// Values of all its tuners.
+    /// Values of all tuners.
     pub(crate) tuners: Vec<f64>,
 }
 
-/// A table of a comparison: names, units, then numbers.
+/// Table of a comparison: names, units, then numbers.
 pub(crate) struct Rows {
-    /// What it is of.
+    /// Title.
     pub(crate) title: &'static str,
-    /// What stands above each column.
+    /// Header of each column.
     pub(crate) header: Vec<String>,
-    /// The lines, as long as the header.
+    /// Lines, each with one cell per column.
     pub(crate) lines: Vec<Vec<String>>,
 }
 
-/// The page: which letter stands for which folder, tables, responses as pictures, sentences on what is not shown.
+/// Returns the page: folder of each letter, tables, responses as plots, and sentences on omitted responses.
 pub(crate) fn comparison_page(
     names: &[(String, String)],
     tables: &[Rows],
     runs: &[Responses],
-    silent: &[String],
+    omitted: &[String],
 ) -> String {
     let plots = plots(runs);
     let body = html! {
@@ -47,8 +47,8 @@ pub(crate) fn comparison_page(
                 (section(rows.title, scrolling(rows.title, table(rows))))
             }
             (section("Responses", html! {
-                @for sentence in silent { p { (sentence) } }
-                @if plots.is_empty() { p { "There is no signal over time to draw." } }
+                @for sentence in omitted { p { (sentence) } }
+                @if plots.is_empty() { p { "No signals over time." } }
                 div class="figures" { @for plot in &plots { figure { div class="wide" { (PreEscaped(plot.svg())) } } } }
             }))
         }
@@ -75,35 +75,35 @@ fn table(rows: &Rows) -> Markup {
     }
 }
 
-/// A curve, with the plot it belongs to: case, model, signal, and its label.
-type Drawn = ([String; 3], String, Curve);
+/// Curve with its plot (case, model, signal) and the label of the y axis.
+type PlottedCurve = ([String; 3], String, Curve);
 
-/// A plot for every signal that criteria read, with a curve for every run that has it.
+/// Returns a plot for every signal that criteria read, with a curve for every run that has the signal.
 fn plots(runs: &[Responses]) -> Vec<Plot> {
-    let drawn: Vec<Drawn> = runs.iter().enumerate().flat_map(|(i, run)| curves(i, run)).collect();
-    let mut places: Vec<(&[String; 3], &String)> = Vec::new();
-    for (place, label, _) in &drawn {
-        if places.iter().all(|(known, _)| *known != place) {
-            places.push((place, label));
+    let drawn: Vec<PlottedCurve> = runs.iter().enumerate().flat_map(|(i, run)| curves(i, run)).collect();
+    let mut keys: Vec<(&[String; 3], &String)> = Vec::new();
+    for (key, label, _) in &drawn {
+        if keys.iter().all(|(known, _)| *known != key) {
+            keys.push((key, label));
         }
     }
-    let several = places.iter().any(|(place, _)| place[1] != places[0].0[1]);
-    let plot = |(place, label): (&[String; 3], &String)| {
-        let [case, model, signal] = place;
+    let several = keys.iter().any(|(key, _)| key[1] != keys[0].0[1]);
+    let plot = |(key, label): (&[String; 3], &String)| {
+        let [case, model, signal] = key;
         let of = if several { format!(" of {model}") } else { String::new() };
         Plot {
             title: format!("{signal}{of} in case {case}"),
             x_label: "time (s)".into(),
             y_label: label.clone(),
-            curves: drawn.iter().filter(|(at, ..)| at == place).map(|(_, _, curve)| curve.clone()).collect(),
+            curves: drawn.iter().filter(|(at, ..)| at == key).map(|(_, _, curve)| curve.clone()).collect(),
             ..Plot::default()
         }
     };
-    places.into_iter().map(plot).collect()
+    keys.into_iter().map(plot).collect()
 }
 
-/// The responses of a run; a simulation that fails has none.
-fn curves(index: usize, run: &Responses) -> Vec<Drawn> {
+/// Returns the responses of a run; a failed simulation has none.
+fn curves(index: usize, run: &Responses) -> Vec<PlottedCurve> {
     let study = run.problem.study();
     let mut drawn = Vec::new();
     for (job, plan) in study.jobs().iter().enumerate() {
@@ -111,10 +111,10 @@ fn curves(index: usize, run: &Responses) -> Vec<Drawn> {
         let Ok(Analysis::Time(response)) = run.problem.analyse_all(job, &run.tuners, None) else { continue };
         for signal in plan.signals.iter().map(|&i| &model.interface().signals[i]) {
             let Some(trace) = response.trace(&signal.name) else { continue };
-            let place = [study.cases()[plan.case].name.clone(), model_name.clone(), signal.name.clone()];
-            let ink = Ink::Series(index % 6);
-            let curve = Curve { name: run.name.clone(), points: sampling::points(trace), ink, ..Curve::default() };
-            drawn.push((place, labelled(&signal.name, &signal.unit.to_string()), curve));
+            let key = [study.cases()[plan.case].name.clone(), model_name.clone(), signal.name.clone()];
+            let color = Color::Series(index % 6);
+            let curve = Curve { name: run.name.clone(), points: sampling::points(trace), color, ..Curve::default() };
+            drawn.push((key, labelled(&signal.name, &signal.unit.to_string()), curve));
         }
     }
     drawn

@@ -1,4 +1,4 @@
-//! The slopes of a design's criteria at the reported point, as a table of shades.
+//! Sensitivities of a design's criteria to its tuners at the reported point, as a shaded table.
 
 use maud::{Markup, html};
 use mops_core::SlopesReport;
@@ -6,7 +6,7 @@ use mops_core::SlopesReport;
 use super::page::scrolling;
 use crate::numbers::significant;
 
-/// A row for every criterion in its case, a column for every tuner.
+/// Returns the table: a row for every criterion in its case, a column for every tuner.
 pub(super) fn section(found: &SlopesReport, best: &str, one_case: bool) -> Markup {
     let steepest = |slopes: &[f64]| slopes.iter().filter(|s| s.is_finite()).fold(0.0_f64, |most, s| most.max(s.abs()));
     let name = |key: &str| {
@@ -36,10 +36,10 @@ pub(super) fn section(found: &SlopesReport, best: &str, one_case: bool) -> Marku
     };
     html! {
         p {
-            "What a tuner that is raised by 1 % of its range (of its decades, where it is logarithmic) adds to a scaled value at the "
-            (best) ", to first order: below 0 is better. The shade tells which tuner moves a criterion most. Where a criterion has a "
-            "kink, the number holds for one side of it; a very large one tells of a jump, such as that of a settling time where the "
-            "response just touches the band."
+            "First-order change of each scaled value at the " (best) " when a tuner is increased by 1 % of its range (1 % of its "
+            "log range for logarithmic tuners). Negative means better. Darker shades mark the tuners with the largest influence "
+            "on a criterion. At a non-differentiable point the value is one-sided; very large values indicate a discontinuity, "
+            "such as that of a settling time if the response just touches the band."
         }
         (scrolling("Sensitivities", table))
     }

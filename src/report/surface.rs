@@ -1,25 +1,28 @@
-//! A surface seen from above: coloured by height, with lines of equal height and a scale.
+//! Surface plots: values as colours, with contour lines and a colour scale.
 
 use super::axis::Axis;
 use super::clip::{Frame, Point};
 use super::contour::contour;
-use super::plot::{Ink, Surface};
+use super::plot::{Color, Surface};
 use super::range::{drawable, range_of};
 use super::scene::{Anchor, Mark, Scene};
 
-/// Room to the right of the picture for the scale.
+/// Width of the colour scale to the right of the frame.
 pub(super) const SCALE_WIDTH: f64 = 84.0;
 
-/// Number of colours, and of the lines between some of them.
-const COLOURS: usize = 32;
+/// Number of colours.
+const COLORS: usize = 32;
+/// Number of intervals between contour lines.
 const LINES: usize = 8;
 
-/// Heights above this share of all others, or so many decades above the lowest, are drawn as if they were there: what
-/// blows up next to a failure would flatten the rest.
+/// Quantile of the values at which the colour scale ends. Values above it have the same colour, as large values next to a
+/// failure would compress the scale.
 const HIGHEST: f64 = 0.9;
+/// Largest number of decades of a logarithmic colour scale.
 const DECADES: f64 = 4.0;
 
-/// Red, green and blue from low to high; their lightness grows evenly, also for readers who see fewer colours.
+/// Red, green and blue of the colour scale, from low to high values. Lightness increases evenly, also for colour-blind
+/// readers.
 /// Source: S. van der Walt, N. Smith, viridis, Matplotlib 1.5 (2015), every 32nd colour.
 const VIRIDIS: [[f64; 3]; 9] = [
     [68.0, 1.0, 84.0],
@@ -33,8 +36,8 @@ const VIRIDIS: [[f64; 3]; 9] = [
     [253.0, 231.0, 37.0],
 ];
 
-/// The colour of a height between 0 and 1.
-fn colour(height: f64) -> [u8; 3] {
+/// Returns the colour of a height from 0 to 1.
+fn viridis(height: f64) -> [u8; 3] {
     let at = height.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
     let i = (at as usize).min(VIRIDIS.len() - 2);
     let s = at - i as f64;
@@ -42,12 +45,12 @@ fn colour(height: f64) -> [u8; 3] {
 }
 
 impl Surface {
-    /// Range of a coordinate, or of its logarithm.
+    /// Returns the range of a coordinate, or of its logarithm.
     pub(super) fn range(values: &[f64], log: bool) -> Option<[f64; 2]> {
         range_of(values.iter().filter_map(|&v| drawable(v, log)))
     }
 
-    /// Range of the heights that are told apart, or of their logarithms.
+    /// Returns the range of the colour scale: of the values, or of their logarithms.
     fn heights(&self) -> Option<[f64; 2]> {
         let mut all: Vec<f64> = self.values.iter().flatten().filter_map(|&v| drawable(v, self.log)).collect();
         all.sort_by(f64::total_cmp);
@@ -58,12 +61,12 @@ impl Surface {
 }
 
 impl Scene {
-    /// Draws the surface into the frame, and its scale beside it.
+    /// Draws the surface into the frame, and its colour scale to the right.
     pub(super) fn surface(&mut self, surface: &Surface, x: &Axis, y: &Axis, frame: Frame) {
         let Some([low, high]) = surface.heights() else { return };
         let Frame { from: [left, top], to: [right, bottom] } = frame;
         let height = |value: f64| drawable(value, surface.log).map(|v| ((v - low) / (high - low)).clamp(0.0, 1.0));
-        let band = |value: f64| height(value).map(|h| ((h * COLOURS as f64) as usize).min(COLOURS - 1));
+        let band = |value: f64| height(value).map(|h| ((h * COLORS as f64) as usize).min(COLORS - 1));
         let xs: Vec<f64> = surface.x.iter().map(|&v| left + x.position(v).unwrap_or(0.0) * (right - left)).collect();
         let ys: Vec<f64> = surface.y.iter().map(|&v| bottom - y.position(v).unwrap_or(0.0) * (bottom - top)).collect();
         let edges = |at: &[f64], i: usize| {
@@ -76,12 +79,12 @@ impl Scene {
             let [upper, lower] = edges(&ys, r);
             let mut c = 0;
             while c < row.len() {
-                // Neighbours of one colour are one box.
+                // Neighbours of equal colour are merged into one box.
                 let of = band(row[c]);
                 let end = (c..row.len()).find(|&k| band(row[k]) != of).unwrap_or(row.len());
                 if let Some(of) = of {
                     let box_ = Frame { from: [edges(&xs, c)[0], upper], to: [edges(&xs, end - 1)[1], lower] };
-                    self.marks.push(Mark::Cell { frame: box_, rgb: colour((of as f64 + 0.5) / COLOURS as f64) });
+                    self.marks.push(Mark::Cell { frame: box_, rgb: viridis((of as f64 + 0.5) / COLORS as f64) });
                 }
                 c = end;
             }
@@ -91,7 +94,7 @@ impl Scene {
         for line in 1..LINES {
             for segment in contour(&raised, line as f64 / LINES as f64) {
                 let points = segment.map(|p| [along(&xs, p[0]), along(&ys, p[1])]).to_vec();
-                self.marks.push(Mark::Line { points, ink: Ink::Faint, width: 0.7, dashed: false });
+                self.marks.push(Mark::Line { points, color: Color::Faint, width: 0.7, dashed: false });
             }
         }
         self.scale(surface, [low, high], frame);
@@ -100,28 +103,28 @@ impl Scene {
     fn scale(&mut self, surface: &Surface, range: [f64; 2], Frame { from: [_, top], to: [right, bottom] }: Frame) {
         let at = |share: f64| bottom - share * (bottom - top);
         let [left, end] = [right + 14.0, right + 26.0];
-        for i in 0..COLOURS {
-            let [from, to] = [i, i + 1].map(|i| at(i as f64 / COLOURS as f64));
+        for i in 0..COLORS {
+            let [from, to] = [i, i + 1].map(|i| at(i as f64 / COLORS as f64));
             let frame = Frame { from: [left, to], to: [end, from] };
-            self.marks.push(Mark::Cell { frame, rgb: colour((i as f64 + 0.5) / COLOURS as f64) });
+            self.marks.push(Mark::Cell { frame, rgb: viridis((i as f64 + 0.5) / COLORS as f64) });
         }
         let axis = Axis::new(range, surface.log, 6.0);
         for (share, label) in &axis.ticks {
-            self.text(label, [end + 5.0, at(*share)], Anchor::Start, Ink::Faint);
+            self.text(label, [end + 5.0, at(*share)], Anchor::Start, Color::Faint);
         }
         let factor = axis.factor.as_deref().map_or_else(String::new, |factor| format!(" {factor}"));
         let label = format!("{}{factor}", surface.label);
-        self.text(&label, [right + SCALE_WIDTH - 4.0, top - 14.0], Anchor::End, Ink::Faint);
+        self.text(&label, [right + SCALE_WIDTH - 4.0, top - 14.0], Anchor::End, Color::Faint);
     }
 }
 
-/// The place between grid points.
+/// Interpolates between grid points, at a fractional index.
 fn along(places: &[f64], index: f64) -> f64 {
     let i = (index as usize).min(places.len().saturating_sub(2));
     places[i] + (index - i as f64) * (places[i + 1] - places[i])
 }
 
-/// The line where heights cross a level, as points over x and y with gaps between its segments.
+/// Returns the contour line at a level, as points over x and y with gaps between the segments.
 pub(super) fn border(surface: &Surface, heights: &[Vec<f64>], level: f64) -> Vec<(f64, f64)> {
     let gap = (f64::NAN, f64::NAN);
     let place = |p: Point| (along(&surface.x, p[0]), along(&surface.y, p[1]));
@@ -140,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn failed_points_are_left_blank_and_one_high_point_does_not_flatten_the_rest() {
+    fn failed_points_are_left_blank_and_one_high_point_does_not_compress_the_scale() {
         let mut values: Vec<Vec<f64>> = (0..10).map(|r| (0..10).map(|c| f64::from(r * c)).collect()).collect();
         values[9][9] = 1e9;
         values[0][0] = f64::NAN;

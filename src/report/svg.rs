@@ -1,15 +1,15 @@
-//! A scene as an SVG document: light colours as attributes, so that it stands alone, and classes for the page's colours.
+//! Scene as an SVG document: light colours as attributes for standalone use, and classes for the colours of a page.
 
 use std::fmt::Write as _;
 
 use maud::{Markup, html};
 
 use super::clip::Point;
-use super::plot::Ink;
+use super::plot::Color;
 use super::scene::{Anchor, Mark, SIZE, Scene};
 use super::space::View;
 
-/// The document, with a title and a description for readers that cannot see it.
+/// Returns the document, with a title and a description for screen readers.
 pub(super) fn document(scene: &Scene, title: &str, description: &str) -> String {
     let [width, height] = SIZE;
     let markup = html! {
@@ -25,23 +25,23 @@ pub(super) fn document(scene: &Scene, title: &str, description: &str) -> String 
     markup.into_string()
 }
 
-/// From where a box is seen, as the page that turns it reads it: turn, height, scale, middle.
+/// Returns the view of a three-dimensional plot for the script of the page: azimuth, elevation, scale, centre.
 fn view(scene: &Scene) -> Option<String> {
-    let View { turn, height, scale, middle: [x, y] } = scene.view?;
-    Some(format!("{turn} {height} {scale} {x} {y}"))
+    let View { azimuth, elevation, scale, centre: [x, y] } = scene.view?;
+    Some(format!("{azimuth} {elevation} {scale} {x} {y}"))
 }
 
 fn element(mark: &Mark) -> Markup {
     match mark {
-        Mark::InSpace { places, mark } => {
-            let places: Vec<String> = places.as_flattened().iter().map(|v| format!("{v:.4}")).collect();
-            html! { g data-space=(places.join(" ")) { (element(mark)) } }
+        Mark::InSpace { points, mark } => {
+            let points: Vec<String> = points.as_flattened().iter().map(|v| format!("{v:.4}")).collect();
+            html! { g data-space=(points.join(" ")) { (element(mark)) } }
         }
-        Mark::Line { points, ink, width, dashed } => html! {
-            path class=(class(*ink)) d=(line(points)) fill="none" stroke=(colour(*ink)) stroke-width=(width)
+        Mark::Line { points, color, width, dashed } => html! {
+            path class=(class(*color)) d=(line(points)) fill="none" stroke=(hex(*color)) stroke-width=(width)
                 stroke-dasharray=[dashed.then_some("6 4")] {}
         },
-        Mark::Of { point, marks } => {
+        Mark::FrontPoint { point, marks } => {
             let is_dot = |mark: &Mark| matches!(mark, Mark::Dots { .. });
             let kind = match marks.as_slice() {
                 [Mark::InSpace { mark, .. }] if is_dot(mark) => "dot",
@@ -50,21 +50,21 @@ fn element(mark: &Mark) -> Markup {
             };
             html! { g class=(kind) data-point=(point) { @for mark in marks { (element(mark)) } } }
         }
-        // A line of no length with round ends is a dot, and the shortest way to write one.
-        Mark::Dots { centres, ink, radius } => html! {
-            path class=(class(*ink)) d=(dots(centres)) fill="none" stroke=(colour(*ink)) stroke-width=(2.0 * radius) {}
+        // A zero-length line with round ends is the shortest dot.
+        Mark::Dots { centres, color, radius } => html! {
+            path class=(class(*color)) d=(dots(centres)) fill="none" stroke=(hex(*color)) stroke-width=(2.0 * radius) {}
         },
-        Mark::Box { frame, ink } => html! {
-            rect class=(class(*ink)) x=(short(frame.from[0])) y=(short(frame.from[1]))
-                width=(short(frame.to[0] - frame.from[0])) height=(short(frame.to[1] - frame.from[1])) fill=(colour(*ink)) {}
+        Mark::Box { frame, color } => html! {
+            rect class=(class(*color)) x=(short(frame.from[0])) y=(short(frame.from[1]))
+                width=(short(frame.to[0] - frame.from[0])) height=(short(frame.to[1] - frame.from[1])) fill=(hex(*color)) {}
         },
         Mark::Cell { frame, rgb: [r, g, b] } => html! {
             rect x=(short(frame.from[0])) y=(short(frame.from[1])) width=(short(frame.to[0] - frame.from[0]))
                 height=(short(frame.to[1] - frame.from[1])) fill=(format!("#{r:02x}{g:02x}{b:02x}"))
                 shape-rendering="crispEdges" {}
         },
-        Mark::Text { text, at: [x, y], anchor, size, ink, upwards } => {
-            // The middle of the letters lies about a third of their size above the line they stand on.
+        Mark::Text { text, at: [x, y], anchor, size, color, upwards } => {
+            // The middle of the letters is about a third of the font size above the baseline.
             let place = if *upwards {
                 format!("translate({} {}) rotate(-90)", short(x + 0.35 * size), short(*y))
             } else {
@@ -76,7 +76,7 @@ fn element(mark: &Mark) -> Markup {
                 Anchor::End => "end",
             };
             html! {
-                text class=(class(*ink)) transform=(place) text-anchor=(anchor) font-size=(size) fill=(colour(*ink)) { (text) }
+                text class=(class(*color)) transform=(place) text-anchor=(anchor) font-size=(size) fill=(hex(*color)) { (text) }
             }
         }
     }
@@ -98,46 +98,46 @@ fn dots(centres: &[Point]) -> String {
     path
 }
 
-/// A coordinate to a tenth of a unit.
+/// Rounds a coordinate to a tenth of a unit.
 fn short(value: f64) -> f64 {
     (value * 10.0).round() / 10.0
 }
 
-/// Class of an ink in the page's style sheet.
-fn class(ink: Ink) -> String {
-    match ink {
-        Ink::Text => "text".to_owned(),
-        Ink::Faint => "faint".to_owned(),
-        Ink::Grid => "grid".to_owned(),
-        Ink::Result => "result".to_owned(),
-        Ink::Start => "start".to_owned(),
-        Ink::Measured => "measured".to_owned(),
-        Ink::Demand => "demand".to_owned(),
-        Ink::Band => "band".to_owned(),
-        Ink::Series(i) => format!("series{}", i % SERIES.len()),
+/// Returns the class of a colour in the style sheet of a page.
+fn class(color: Color) -> String {
+    match color {
+        Color::Text => "text".to_owned(),
+        Color::Faint => "faint".to_owned(),
+        Color::Grid => "grid".to_owned(),
+        Color::Result => "result".to_owned(),
+        Color::Start => "start".to_owned(),
+        Color::Measured => "measured".to_owned(),
+        Color::Demand => "demand".to_owned(),
+        Color::Band => "band".to_owned(),
+        Color::Series(i) => format!("series{}", i % SERIES.len()),
     }
 }
 
-/// Colours of curves of equal rank, told apart by readers with any colour vision.
+/// Colours of curves of equal rank, distinguishable with any colour vision.
 /// Source: M. Okabe, K. Ito, Color Universal Design (2008), darkened for lines on white.
 const SERIES: [[u8; 3]; 6] = [[0, 92, 170], [200, 80, 0], [0, 125, 90], [165, 70, 130], [60, 140, 190], [140, 110, 0]];
 
-/// Red, green and blue of an ink on white paper.
-pub(super) fn rgb(ink: Ink) -> [u8; 3] {
-    match ink {
-        Ink::Text => [27, 31, 36],
-        Ink::Faint => [80, 88, 98],
-        Ink::Grid => [222, 226, 231],
-        Ink::Result => SERIES[0],
-        Ink::Start => [130, 136, 144],
-        Ink::Measured => [200, 90, 20],
-        Ink::Demand => [170, 25, 45],
-        Ink::Band => [226, 236, 246],
-        Ink::Series(i) => SERIES[i % SERIES.len()],
+/// Returns red, green and blue of a colour on a white background.
+pub(super) fn rgb(color: Color) -> [u8; 3] {
+    match color {
+        Color::Text => [27, 31, 36],
+        Color::Faint => [80, 88, 98],
+        Color::Grid => [222, 226, 231],
+        Color::Result => SERIES[0],
+        Color::Start => [130, 136, 144],
+        Color::Measured => [200, 90, 20],
+        Color::Demand => [170, 25, 45],
+        Color::Band => [226, 236, 246],
+        Color::Series(i) => SERIES[i % SERIES.len()],
     }
 }
 
-fn colour(ink: Ink) -> String {
-    let [r, g, b] = rgb(ink);
+fn hex(color: Color) -> String {
+    let [r, g, b] = rgb(color);
     format!("#{r:02x}{g:02x}{b:02x}")
 }

@@ -1,4 +1,4 @@
-// Makes tables sortable by a click on the head of a column: numbers by size, all else by name.
+// Makes tables sortable by a click on a column header: numbers by value, text alphabetically.
 (() => {
   "use strict";
   const number = (text) => (/^\s*[-+]?\.?\d/.test(text) ? parseFloat(text) : null);
@@ -6,16 +6,16 @@
 
   function order(a, b) {
     const [x, y] = [number(a), number(b)];
-    if ((x === null) !== (y === null)) return x === null ? 1 : -1; // what has no value comes last
+    if ((x === null) !== (y === null)) return x === null ? 1 : -1; // cells without a number come last
     return x === null || x === y ? a.localeCompare(b) : x - y;
   }
 
-  function sortBy(table, column, head) {
-    const down = head.getAttribute("aria-sort") === "ascending";
+  function sortBy(table, column, header) {
+    const descending = header.getAttribute("aria-sort") === "ascending";
     for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
-    head.setAttribute("aria-sort", down ? "descending" : "ascending");
+    header.setAttribute("aria-sort", descending ? "descending" : "ascending");
     const rows = [...table.tBodies[0].rows].sort((a, b) => order(value(a, column), value(b, column)));
-    table.tBodies[0].append(...(down ? rows.reverse() : rows));
+    table.tBodies[0].append(...(descending ? rows.reverse() : rows));
   }
 
   for (const table of document.querySelectorAll("table")) {

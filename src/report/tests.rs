@@ -1,4 +1,4 @@
-//! The whole report of a tiny study: a first-order lag with a step and an experiment.
+//! Tests of the whole report of a small study: a first-order lag with a step and an experiment.
 
 use std::sync::Arc;
 
@@ -10,11 +10,11 @@ use mops_core::{
     TunerBuilder, TunerReport, Unit, Usage, Value, Variable,
 };
 
-use super::plot::{Curve, CurveStyle, Plot, Third};
+use super::plot::{Curve, CurveStyle, Plot, ZAxis};
 use super::{Level, Report};
 use crate::numbers;
 
-/// `T y' + y = 1`, `y(0) = 0`; not defined for `T` above 10 s.
+/// First-order lag `T y' + y = 1`, `y(0) = 0`; not defined for `T` above 10 s.
 pub(super) struct Lag(Interface);
 
 impl Lag {
@@ -47,7 +47,7 @@ impl Model for Lag {
     }
 }
 
-/// The value at the end; with a measurement, the sum of squared differences.
+/// Criterion: value of `y` at the end.
 #[derive(Clone, Copy)]
 struct End;
 
@@ -71,7 +71,7 @@ impl Criterion for End {
     }
 }
 
-/// A study with a case and an experiment, and the outcome that a run would write.
+/// Returns a study with a case and an experiment, and the outcome that a run would write.
 fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome, Vec<Record>) {
     let times: Vec<f64> = (0..100).map(|i| 0.05 * f64::from(i)).collect();
     let values = times.iter().map(|t| 1.0 - math::exp(-t / 1.3f64) + 0.01 * math::sin(40.0 * t)).collect();
@@ -172,13 +172,13 @@ fn criteria(problem: &Problem, at: &Evaluation) -> Vec<CriterionReport> {
     study.rows().iter().zip(&at.readings).map(report).collect()
 }
 
-/// Writes the report into a folder that lives as long as the answer.
+/// Writes the report of a study; returns its temporary folder and the page.
 fn written(name: &str, start: f64, usage: Usage) -> (tempfile::TempDir, String) {
     let (problem, best, outcome, archive) = study(name, start, usage);
     page_of(&problem, &best, &outcome, &archive, "a < b")
 }
 
-/// The folder of a report, and its page.
+/// Writes a report; returns its temporary folder and the page.
 fn page_of(
     problem: &Problem,
     best: &Evaluation,
@@ -214,13 +214,13 @@ fn the_page_shows_every_criterion_and_escapes_what_users_write() {
 }
 
 #[test]
-fn an_infeasible_result_names_the_constraint_and_a_failed_start_is_told() {
+fn an_infeasible_result_names_the_constraint_and_a_failed_initial_guess_is_reported() {
     let (_folder, page) = written("lag", 15.0, Usage::Inequality);
-    assert!(page.contains("No feasible point was found: <code>end</code> in case <code>"));
-    // What a solver by itself has run is said; whether a point that misses a constraint is Pareto-optimal is no question.
+    assert!(page.contains("No feasible point found: <code>end</code> in case <code>"));
+    // The methods of a composite solver are listed; an infeasible point has no Pareto status.
     assert!(page.contains("by-hand: sqp, pattern-search") && !page.contains("<dt>Pareto"));
-    assert!(page.contains("No response at the start values: the simulation failed (diverged at 0.1000 s)."));
-    assert!(page.contains("1 of 2 points had no value"));
+    assert!(page.contains("No response at the initial guess: the simulation failed (diverged at 0.1000 s)."));
+    assert!(page.contains("1 of 2 points have no value"));
 }
 
 #[test]
@@ -231,7 +231,7 @@ fn a_run_without_a_single_value_still_has_a_page() {
     (outcome.objective, outcome.violation, outcome.feasible) = (f64::INFINITY, f64::INFINITY, false);
     outcome.criteria = criteria(&problem, &best);
     let (_folder, page) = page_of(&problem, &best, &outcome, &archive, "");
-    assert!(page.contains("Failed. No point could be evaluated") && page.contains("nothing to show"));
+    assert!(page.contains("Failed: no point could be evaluated") && page.contains(">no data<"));
 }
 
 #[test]
@@ -248,7 +248,7 @@ fn every_plot_is_written_twice_under_a_safe_name() {
 }
 
 #[test]
-fn a_plot_escapes_names_and_skips_what_is_not_finite() {
+fn a_plot_escapes_names_and_skips_non_finite_points() {
     let points = vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, f64::INFINITY), (3.0, 2.0), (f64::NAN, 0.0), (4.0, 1e300)];
     let curve = |style| Curve { name: "a<b & \"c\"".into(), points: points.clone(), style, ..Curve::default() };
     let curves = [CurveStyle::Line, CurveStyle::Dashed, CurveStyle::Dots].map(curve).to_vec();
@@ -278,7 +278,7 @@ fn empty_and_constant_plots_are_drawn() {
 }
 
 #[test]
-fn cases_and_slopes_are_shown_as_tables_of_shades() {
+fn cases_and_sensitivities_are_shown_as_shaded_tables() {
     let (problem, best, mut outcome, archive) = study("lag", 5.0, Usage::Minimise);
     let slope = |key: &str, slope| CriterionSlopes { key: key.into(), slopes: vec![slope] };
     let criteria = vec![slope("nominal & more/end", 25.0), slope("step/1/end", f64::NAN)];
@@ -287,15 +287,16 @@ fn cases_and_slopes_are_shown_as_tables_of_shades() {
     // Both cases at 1 - exp(-5/2) = 0.9179 for a demand of 0.5.
     assert_eq!(page.matches("data-value=\"1.83").count(), 2 + 2 + 2, "two cells, their worsts, and the worst of all");
     assert!(page.contains("Criteria by case") && page.contains("number shade mixed above"));
-    assert!(page.contains(">+0.25</td>") && page.contains("--share:45%"), "a quarter for a step of a hundredth");
-    assert!(page.contains(">n/a</td>"), "a slope that is not known is told as such");
+    assert!(page.contains(">+0.25</td>") && page.contains("--share:45%"), "a hundredth of the derivative");
+    assert!(page.contains(">n/a</td>"), "an unknown derivative is shown as n/a");
 }
 
 #[test]
-fn a_third_axis_keeps_the_places_that_a_page_turns() {
-    let dot = |x| Curve { points: vec![(x, 2.0 * x)], style: CurveStyle::Dots, of: Some(0), ..Curve::default() };
-    let third = Third { label: "z (s)".into(), values: vec![vec![0.0], vec![4.0]] };
-    let plot = Plot { curves: vec![dot(0.0), dot(1.0)], third: Some(third), ..Plot::default() };
+fn a_z_axis_keeps_the_points_that_a_page_rotates() {
+    let dot =
+        |x| Curve { points: vec![(x, 2.0 * x)], style: CurveStyle::Dots, front_point: Some(0), ..Curve::default() };
+    let z_axis = ZAxis { label: "z (s)".into(), values: vec![vec![0.0], vec![4.0]] };
+    let plot = Plot { curves: vec![dot(0.0), dot(1.0)], z_axis: Some(z_axis), ..Plot::default() };
     let svg = plot.svg();
     assert!(svg.contains("data-view=") && svg.contains(">z (s)</text>") && !svg.contains("NaN"));
     assert_eq!(svg.matches("class=\"dot\" data-point=\"0\"").count(), 2);

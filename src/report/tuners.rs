@@ -1,4 +1,4 @@
-//! The table of tuners, with bars that show where each stands within its bounds.
+//! Table of tuners, with their positions within the bounds.
 
 use maud::{Markup, html};
 use mops_core::{Scale, Tuner};
@@ -7,7 +7,7 @@ use super::Report;
 use super::page::scrolling;
 use crate::numbers::number;
 
-/// All tuners, and where they stand within their bounds.
+/// Returns the table of all tuners, with their positions within the bounds.
 pub(super) fn table(report: &Report<'_>) -> Markup {
     let study = report.problem.study();
     let two = report.outcome.solver != "none";
@@ -17,12 +17,12 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
             thead {
                 tr {
                     th scope="col" { "tuner" }
-                    @if two { th scope="col" class="number" { "at start" } }
+                    @if two { th scope="col" class="number" { "at initial guess" } }
                     th scope="col" class="number" { "at " (report.best_name()) }
                     th scope="col" { "unit" }
-                    th scope="col" class="number" { "from" }
+                    th scope="col" class="number" { "min" }
                     th scope="col" { "position" }
-                    th scope="col" class="number" { "to" }
+                    th scope="col" class="number" { "max" }
                     th scope="col" { "remark" }
                 }
             }
@@ -43,7 +43,12 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
         }
     };
     html! {
-        p { "The filled mark is the value" @if two { ", the hollow one the start" } @if log { "; logarithmic ranges are drawn as such" } "." }
+        p {
+            "Filled mark: value"
+            @if two { "; hollow mark: initial guess" }
+            @if log { "; positions of logarithmic tuners are on a logarithmic scale" }
+            "."
+        }
         (scrolling("Tuners", rows_and_head))
     }
 }
@@ -61,11 +66,11 @@ fn position(tuner: &Tuner, start: f64, value: f64) -> Markup {
 fn remark<'a>(tuner: &Tuner, at_bound: Option<&str>, name: impl Fn(usize) -> &'a String) -> Markup {
     html! {
         @if let Some((_, of)) = &tuner.tie {
-            "follows " (of.iter().map(|&i| name(i).as_str()).collect::<Vec<_>>().join(", "))
+            "tied to " (of.iter().map(|&i| name(i).as_str()).collect::<Vec<_>>().join(", "))
         } @else if !tuner.active {
-            "kept"
+            "fixed"
         } @else if let Some(side) = at_bound {
-            span class="missed" { "at its " (side) " bound" }
+            span class="missed" { "at " (side) " bound" }
             @if tuner.scale == Scale::Log { span class="quiet" { ", logarithmic" } }
         } @else if tuner.scale == Scale::Log {
             span class="quiet" { "logarithmic" }

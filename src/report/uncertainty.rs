@@ -1,43 +1,43 @@
-//! What a calibration tells of the uncertainty of its estimates besides standard errors: profiles, bootstrap, bands.
+//! Uncertainty of the estimates in addition to standard errors: profiles, bootstrap, bands.
 
 use maud::{Markup, html};
 use mops_core::{BandReport, BootstrapReport, ProfileReport, UncertaintyReport};
 
 use super::figures::{Figure, Group};
 use super::page::scrolling;
-use super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::plot::{Color, Curve, CurveStyle, Plot};
 use super::sensitivity::sentences;
 use crate::numbers::{labelled, number, significant};
 
 /// Title of the section.
 pub(super) const TITLE: &str = "Uncertainty of the estimates";
 
-/// What is said.
+/// Returns sentences and tables.
 pub(super) fn section(found: &UncertaintyReport) -> Markup {
     html! {
         (sentences(&found.words))
         @if !found.profiles.is_empty() {
-            h3 { "Profiles of the likelihood" }
+            h3 { "Likelihood profiles" }
             p {
-                "One parameter is held, all others are estimated again. The root of the likelihood ratio, in standard errors, is a "
-                "straight line where the model is linear; where it is bent, the interval to first order is wrong. The interval ends "
-                "where the root meets the t quantile. A parameter that the data do not determine has no interval to first order."
+                "One parameter is fixed at a time, and all others are re-estimated. The signed root of the likelihood ratio is a "
+                "straight line if the model is linear; if it is curved, the first-order interval is inaccurate. The interval "
+                "ends where the root reaches the t quantile. A parameter that is not identifiable has no first-order interval."
             }
             (scrolling("Profiles", profiles(&found.profiles)))
         }
         @if let Some(bootstrap) = &found.bootstrap {
             h3 { "Bootstrap" }
             p {
-                "Residuals, scaled to the noise that the standard errors rest on, are resampled in blocks of " (blocks(bootstrap))
-                " samples, and everything is estimated again: this holds where residuals are correlated over less than a block. "
-                "Intervals are percentiles of the replicates."
+                "Residuals, scaled to the noise level of the standard errors, are resampled in blocks of " (blocks(bootstrap))
+                " samples, and all estimates are repeated. This is valid if the correlation time of the residuals is shorter "
+                "than a block. Intervals are percentiles of the replicates."
             }
             (scrolling("Bootstrap", replicates(bootstrap)))
         }
         @if !found.bands.is_empty() {
             p {
-                "Bands are drawn beside the responses: of the response, as far as the parameters are uncertain, and of a new "
-                "measurement, noise included; both point by point and to first order."
+                "The plots of the responses show pointwise first-order bands: for the response, from the uncertainty of the "
+                "parameters, and for a new measurement, with noise."
             }
         }
     }
@@ -66,7 +66,7 @@ fn profiles(list: &[ProfileReport]) -> Markup {
                     th scope="col" class="number" { "estimate" }
                     th scope="col" class="number" { "from" }
                     th scope="col" class="number" { "to" }
-                    th scope="col" class="number" { "to first order from" }
+                    th scope="col" class="number" { "first-order from" }
                     th scope="col" class="number" { "to" }
                     th scope="col" { "unit" }
                 }
@@ -120,7 +120,7 @@ fn replicates(found: &BootstrapReport) -> Markup {
     }
 }
 
-/// Profiles, and distributions of the bootstrap.
+/// Returns the plots of profiles and of bootstrap distributions.
 pub(super) fn group(found: &UncertaintyReport) -> Group {
     let figures = found.profiles.iter().map(profile);
     let replicates = found.bootstrap.iter().flat_map(|b| &b.parameters).map(|one| {
@@ -129,17 +129,18 @@ pub(super) fn group(found: &UncertaintyReport) -> Group {
         let n = sorted.len() as f64;
         let steps =
             sorted.iter().enumerate().flat_map(|(i, &v)| [(v, i as f64 / n), (v, (i + 1) as f64 / n)]).collect();
-        let upright = |name: &str, x: f64, ink, style| Curve {
+        let vertical = |name: &str, x: f64, color, style| Curve {
             name: name.into(),
             points: vec![(x, 0.0), (x, 1.0)],
-            ink,
+            color,
             style,
             ..Curve::default()
         };
-        let mut curves = vec![Curve { name: "share of replicates up to".into(), points: steps, ..Curve::default() }];
-        curves.push(upright("estimate", one.value, Ink::Start, CurveStyle::Dashed));
-        curves.push(upright("interval", one.interval[0], Ink::Demand, CurveStyle::Line));
-        curves.push(upright("", one.interval[1], Ink::Demand, CurveStyle::Line));
+        let mut curves =
+            vec![Curve { name: "empirical distribution function".into(), points: steps, ..Curve::default() }];
+        curves.push(vertical("estimate", one.value, Color::Start, CurveStyle::Dashed));
+        curves.push(vertical("interval", one.interval[0], Color::Demand, CurveStyle::Line));
+        curves.push(vertical("", one.interval[1], Color::Demand, CurveStyle::Line));
         let plot = Plot {
             title: format!("Bootstrap of {}", one.parameter),
             x_label: labelled(&one.parameter, &one.unit),
@@ -153,63 +154,63 @@ pub(super) fn group(found: &UncertaintyReport) -> Group {
 }
 
 fn profile(one: &ProfileReport) -> Figure {
-    let line = |name: &str, points: Vec<(f64, f64)>, ink, style| Curve {
+    let line = |name: &str, points: Vec<(f64, f64)>, color, style| Curve {
         name: name.into(),
         points,
-        ink,
+        color,
         style,
         ..Curve::default()
     };
     let half = (one.linear_interval[1] - one.value) / one.limit;
     let ends = [one.points.first(), one.points.last()].map(|p| p.map_or(one.value, |p| p.0));
     let first_order = ends.map(|x| (x, (x - one.value) / half)).to_vec();
-    let first_order = line("to first order", first_order, Ink::Start, CurveStyle::Dashed);
+    let first_order = line("first order", first_order, Color::Start, CurveStyle::Dashed);
     let ends = |y: f64| ends.map(|x| (x, y)).to_vec();
     let mut curves: Vec<Curve> = half.is_finite().then_some(first_order).into_iter().collect();
     curves.extend([
-        line("root of the likelihood ratio", one.points.clone(), Ink::Result, CurveStyle::Line),
-        line("", one.points.clone(), Ink::Result, CurveStyle::Dots),
-        line("t quantile", ends(one.limit), Ink::Demand, CurveStyle::Line),
-        line("", ends(-one.limit), Ink::Demand, CurveStyle::Line),
+        line("signed root of the likelihood ratio", one.points.clone(), Color::Result, CurveStyle::Line),
+        line("", one.points.clone(), Color::Result, CurveStyle::Dots),
+        line("t quantile", ends(one.limit), Color::Demand, CurveStyle::Line),
+        line("", ends(-one.limit), Color::Demand, CurveStyle::Line),
     ]);
     let plot = Plot {
         title: format!("Profile of {}", one.parameter),
         x_label: labelled(&one.parameter, &one.unit),
-        y_label: "root of the likelihood ratio".into(),
+        y_label: "signed root of the likelihood ratio".into(),
         curves,
         ..Plot::default()
     };
     Figure { plots: vec![(format!("profile-{}", one.parameter), plot)], caption: Vec::new() }
 }
 
-/// What bands lie around.
+/// Centre of a band.
 #[derive(Clone, Copy)]
 pub(super) enum Around {
-    /// The prediction.
+    /// Prediction.
     Prediction,
-    /// Zero, as residuals do.
+    /// Zero, for residuals.
     Zero,
 }
 
-/// The curves of the bands of a channel, to lie over its plot.
+/// Returns the curves of the bands of a channel, for its plot.
 pub(super) fn bands(found: &UncertaintyReport, experiment: &str, channel: &str, around: Around) -> Vec<Curve> {
     let Some(band) = found.bands.iter().find(|b| b.experiment == experiment && b.channel == channel) else {
         return Vec::new();
     };
     let percent = significant(100.0 * found.level, 4);
-    let curve = |name: String, half: &[f64], sign: f64, ink: Ink| Curve {
+    let curve = |name: String, half: &[f64], sign: f64, color: Color| Curve {
         name,
         points: points(band, half, sign, around),
-        ink,
+        color,
         style: CurveStyle::Dashed,
         may_leave: true,
-        of: None,
+        front_point: None,
     };
-    let (response, measurement) = (Ink::Series(2), Ink::Series(3));
+    let (response, measurement) = (Color::Series(2), Color::Series(3));
     vec![
-        curve(format!("{percent} % of responses"), &band.response, 1.0, response),
+        curve(format!("{percent} % band of the response"), &band.response, 1.0, response),
         curve(String::new(), &band.response, -1.0, response),
-        curve(format!("{percent} % of measurements"), &band.measurement, 1.0, measurement),
+        curve(format!("{percent} % band of measurements"), &band.measurement, 1.0, measurement),
         curve(String::new(), &band.measurement, -1.0, measurement),
     ]
 }

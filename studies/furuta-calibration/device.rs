@@ -1,10 +1,11 @@
-//! A simulated Furuta pendulum that shares nothing with mops' models and method: the device of the shipped measurements.
+//! Simulated Furuta pendulum, the device of the shipped measurements. It shares no model and no method with mops.
 //!
-//! The pendulum is a point at its centre of mass that carries a direction: with `p` the point and `n` the unit vector
-//! along the rod, d'Alembert's principle over `m p''` and `J n''` gives mass matrix and forces from the axes of the joints
-//! (a rod without inertia about its own axis has kinetic energy `m |p'|^2/2 + J |n'|^2/2`). Friction is Moreau's time
-//! stepping: an impulse within its limit, found by projected Gauss-Seidel sweeps, in steps of 20 microseconds with
-//! midpoint forces.
+//! The pendulum is a point at its centre of mass with a direction. Let `p` be the point and `n` the unit vector along the
+//! rod. D'Alembert's principle for `m p''` and `J n''` gives mass matrix and forces from the joint axes. (A rod without
+//! inertia about its own axis has the kinetic energy `m |p'|^2/2 + J |n'|^2/2`.)
+//!
+//! Moreau's time stepping with steps of 20 microseconds and midpoint forces: friction is an impulse within its limit, found
+//! by projected Gauss-Seidel sweeps.
 //!
 //! Source of the method: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM 302 (1988).
 
@@ -14,19 +15,19 @@ use mops_core::math;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// A pendulum on an arm.
+/// Pendulum on an arm.
 pub struct Device {
     /// Inertia of the pendulum about its centre of mass, and of the arm about its axis, kg m2.
     pub inertia: [f64; 2],
     /// Mass of the pendulum, kg.
     pub mass: f64,
-    /// Distance of its centre of mass from the arm, and length of the arm, m.
+    /// Distance of the pendulum's centre of mass from the arm, and length of the arm, m.
     pub length: [f64; 2],
     /// Friction torque (N m) over speed (rad/s) of arm and pendulum.
     pub friction: [&'static [[f64; 2]]; 2],
     /// Break-away torque over friction at rest.
     pub peak: [f64; 2],
-    /// Spring (N m/rad) and damper (N m s/rad) against the tilt; a pendulum that does not tilt where absent.
+    /// Spring (N m/rad) and damper (N m s/rad) against the tilt; `None` for a pendulum that does not tilt.
     pub tilt: Option<[f64; 2]>,
     /// Torque on the arm over time, N m.
     pub torque: fn(f64) -> f64,
@@ -38,7 +39,7 @@ pub type State = [[f64; 3]; 2];
 const STEP: f64 = 2e-5;
 const GRAVITY: f64 = 9.81;
 
-/// Three seconds at 100 Hz, both angles with white noise, as a CSV text; the torque is a column where `torque` says so.
+/// Returns a recording as CSV: 3 s at 100 Hz, both angles with white noise; with `torque`, also the torque.
 pub fn recording(device: &Device, start: State, noise: f64, seed: u64, torque: bool) -> String {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut text =
@@ -53,8 +54,8 @@ pub fn recording(device: &Device, start: State, noise: f64, seed: u64, torque: b
         } else {
             writeln!(text, "{time:.2},{phi:.6},{theta:.6}")
         };
-        line.expect("a text takes everything");
-        // A sampled torque stays until the next sample.
+        line.expect("writing to a string succeeds");
+        // Zero-order hold of the torque.
         for _ in 0..500 {
             state = device.advance(time, state);
         }
@@ -63,12 +64,12 @@ pub fn recording(device: &Device, start: State, noise: f64, seed: u64, torque: b
 }
 
 impl Device {
-    /// One step: positions by the mean speed, speeds by forces at mid-step and by the impulses of friction.
+    /// Performs one step: positions by the mean speed, speeds by the forces at mid-step and the friction impulses.
     fn advance(&self, t: f64, [q, w]: State) -> State {
         let middle = plus(q, times(0.5 * STEP, w));
         let mut mean = w;
         let mut next = w;
-        // The speeds at mid-step are known after a first pass.
+        // The first pass estimates the speeds at mid-step.
         for _ in 0..2 {
             let (matrix, mut force) = self.mass_and_force(middle, mean);
             force[0] += (self.torque)(t);
@@ -80,7 +81,7 @@ impl Device {
         [plus(q, times(0.5 * STEP, plus(w, next))), next]
     }
 
-    /// The speeds after friction: its impulses try to stop their joints, each within its limit.
+    /// Returns the speeds after friction: each impulse tends to stop its joint, within its limit.
     fn slowed(&self, inverse: [Vector; 3], free: Vector, before: Vector, mean: Vector) -> Vector {
         let torque = |i: usize| interpolated(self.friction[i], mean[i].abs());
         let limit = |i: usize| STEP * if before[i] == 0.0 { self.peak[i] * self.friction[i][0][1] } else { torque(i) };
@@ -90,7 +91,7 @@ impl Device {
             for i in 0..2 {
                 let speed = free[i] + dot(inverse[i], impulse);
                 impulse[i] = if limits[i] < 0.0 {
-                    // A table that fell below zero drives.
+                    // Negative friction accelerates the joint.
                     -limits[i] * mean[i].signum()
                 } else {
                     (impulse[i] - speed / inverse[i][i]).clamp(-limits[i], limits[i])
@@ -103,18 +104,18 @@ impl Device {
         })
     }
 
-    /// Mass matrix and torques without friction.
+    /// Returns the mass matrix and the torques without friction.
     fn mass_and_force(&self, q: Vector, w: Vector) -> ([Vector; 3], Vector) {
         let [[sf, cf], [st, ct], [sp, cp]] = q.map(|angle| [math::sin(angle), math::cos(angle)]);
         let about_vertical = |[x, y, z]: Vector| [x * cf + z * sf, y, z * cf - x * sf];
         let axes = [[0.0, 1.0, 0.0], [cf, 0.0, -sf], about_vertical([0.0, -st, ct])];
         let rod = about_vertical([-sp, cp * ct, cp * st]);
         let end = times(-self.length[1], axes[1]);
-        // How the end of the arm and the direction of the rod move with each joint.
+        // Derivatives of the end of the arm and of the direction of the rod with respect to each joint.
         let end_by = [cross(axes[0], end), [0.0; 3], [0.0; 3]];
         let rod_by = axes.map(|axis| cross(axis, rod));
         let point_by: [Vector; 3] = std::array::from_fn(|i| plus(end_by[i], times(self.length[0], rod_by[i])));
-        // Their accelerations at constant joint speeds.
+        // Accelerations at constant joint speeds.
         let turning = [times(w[0], axes[0]), times(w[1], axes[1]), times(w[2], axes[2])];
         let arm_and_swing = plus(turning[0], turning[1]);
         let spin = plus(arm_and_swing, turning[2]);
@@ -144,7 +145,7 @@ impl Device {
     }
 }
 
-/// Straight lines between the entries of a table and beyond its last two.
+/// Interpolates a table linearly, and extrapolates from its last two entries.
 fn interpolated(table: &[[f64; 2]], x: f64) -> f64 {
     let last = table.len() - 2;
     let k = (0..last).find(|&k| x < table[k + 1][0]).unwrap_or(last);
@@ -170,7 +171,7 @@ fn times(factor: f64, a: Vector) -> Vector {
     a.map(|x| factor * x)
 }
 
-/// The inverse of a symmetric matrix, by its adjugate.
+/// Returns the inverse of a symmetric matrix, by its adjugate.
 fn inverse([a, b, c]: [Vector; 3]) -> [Vector; 3] {
     let rows = [cross(b, c), cross(c, a), cross(a, b)];
     let determinant = dot(a, rows[0]);

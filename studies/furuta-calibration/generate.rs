@@ -5,7 +5,7 @@ mod device;
 
 use device::{Device, State};
 
-/// Table 4.6 of the thesis.
+/// Parameters of table 4.6 of the thesis.
 const DEVICE: Device = Device {
     inertia: [0.001082, 0.001656],
     mass: 0.040414,
@@ -19,13 +19,13 @@ const DEVICE: Device = Device {
     torque: |_| 0.0,
 };
 
-/// Name of the file, seed of its noise, and where the device is released.
+/// Name of the file, seed of its noise, initial state.
 pub const RECORDINGS: [(&str, u64, State); 2] = [
     ("horizontal.csv", 1, [[-0.002626, 1.677478, 0.0], [-0.0362232, 1.640014, 0.0]]),
     ("upright.csv", 2, [[-0.106993, -1.785922, 0.0], [-1.340885, -10.443861, 0.0]]),
 ];
 
-/// The recording as a CSV text: noise of 0.003 rad.
+/// Returns a recording as CSV, with a noise level of 0.003 rad.
 pub fn recording(seed: u64, start: State) -> String {
     device::recording(&DEVICE, start, 0.003, seed, false)
 }

@@ -1,8 +1,10 @@
 //! Generates the measurements of the study `furuta-swing`.
 //!
-//! The device is simulated by a method that shares nothing with mops' own: Moreau's time stepping, in which dry friction
-//! is an impulse found by projected Gauss-Seidel sweeps, with steps of 10 microseconds. Then the sensors: white noise on
-//! both angles, an encoder with 2048 lines on the arm, a 12-bit converter over one turn on the pendulum.
+//! The device is simulated by a method that shares nothing with mops: Moreau's time stepping with steps of 10
+//! microseconds. Dry friction is an impulse found by projected Gauss-Seidel sweeps.
+//!
+//! Sensors: white noise on both angles, an encoder with 2048 lines on the arm, a 12-bit converter over one turn on the
+//! pendulum.
 //!
 //! Source of the method: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM 302 (1988).
 
@@ -19,7 +21,7 @@ pub const VISCOUS: [f64; 2] = [1.2e-4, 2.5e-5];
 /// Coulomb friction of arm and pendulum, N m.
 pub const COULOMB: [f64; 2] = [9.0e-4, 1.8e-4];
 
-/// Name of the file, seed of its noise, and where the device is released: arm and pendulum, angle and speed.
+/// Name of the file, seed of its noise, initial state: arm and pendulum, angle and speed.
 pub const RECORDINGS: [(&str, u64, [f64; 4]); 2] = [
     ("horizontal.csv", 1, [-0.0122, -0.0635, 1.6803, 1.7812]),
     ("upright.csv", 2, [-0.0851, -2.1246, -2.0698, -8.7596]),
@@ -30,7 +32,7 @@ const SAMPLE: f64 = 0.01;
 const DURATION: f64 = 3.0;
 const NOISE: f64 = 0.003;
 
-/// The recording as a CSV text.
+/// Returns a recording as CSV.
 pub fn recording(seed: u64, start: [f64; 4]) -> String {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut measure = |angle: f64, lines: f64| {
@@ -47,18 +49,19 @@ pub fn recording(seed: u64, start: [f64; 4]) -> String {
             }
         }
         let (phi, theta) = (measure(state[0], 8192.0), measure(state[2], 4096.0));
-        writeln!(text, "{:.2},{phi:.6},{theta:.6}", sample as f64 * SAMPLE).expect("a text takes everything");
+        writeln!(text, "{:.2},{phi:.6},{theta:.6}", sample as f64 * SAMPLE).expect("writing to a string succeeds");
     }
     text
 }
 
-/// One step of length [`STEP`]: positions by the mean speed, speeds by the forces at mid-step and the friction impulses.
+/// Performs a step of length [`STEP`]: positions by the mean speed, speeds by the forces at mid-step and the friction
+/// impulses.
 fn advance([phi, v, theta, w]: [f64; 4]) -> [f64; 4] {
     let [a, b, c, d] = LUMPED;
     let half = 0.5 * STEP;
     let angle = theta + half * w;
     let (sin, cos) = math::sin_cos(angle);
-    // Mass matrix in the order arm, pendulum, and its inverse.
+    // Mass matrix in the order (arm, pendulum), and its inverse.
     let (m11, m12, m22) = (b + a * sin * sin, c * cos, a);
     let determinant = m11 * m22 - m12 * m12;
     let inverse = [[m22 / determinant, -m12 / determinant], [-m12 / determinant, m11 / determinant]];
@@ -70,7 +73,7 @@ fn advance([phi, v, theta, w]: [f64; 4]) -> [f64; 4] {
         v + STEP * (inverse[0][0] * force[0] + inverse[0][1] * force[1]),
         w + STEP * (inverse[1][0] * force[0] + inverse[1][1] * force[1]),
     ];
-    // Friction impulses: each tries to stop its joint, within its limit.
+    // Friction impulses: each tends to stop its joint, within its limit.
     let mut impulse = [0.0_f64; 2];
     for _ in 0..50 {
         for i in 0..2 {

@@ -1,8 +1,8 @@
-//! The studies that mops ships.
+//! Shipped studies.
 
 use mops_core::Shipped;
 
-/// The files of a study, by their names in its folder under `studies/`.
+/// Embeds the files of a study, by their names in its folder under `studies/`.
 macro_rules! study {
     ($name:literal $(, $file:literal)*) => {
         Shipped {
@@ -16,7 +16,7 @@ macro_rules! study {
     };
 }
 
-/// Every shipped study. A new one is a folder, and a line here.
+/// Returns all shipped studies. A new study is a folder and a line here.
 pub fn shipped() -> Vec<Shipped> {
     vec![
         study!("pid-design"),

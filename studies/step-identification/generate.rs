@@ -6,7 +6,7 @@ mod device;
 use device::Device;
 use mops_core::math;
 
-/// A pendulum that does not tilt, with viscous friction; its inertias are what the study looks for.
+/// Pendulum without tilt, with viscous friction; the study estimates its inertias.
 const DEVICE: Device = Device {
     inertia: [0.0008, 0.02],
     mass: 0.035,
@@ -17,13 +17,13 @@ const DEVICE: Device = Device {
     torque: |_| 0.0,
 };
 
-/// A torque over time, N m.
+/// Torque over time, N m.
 type Torque = fn(f64) -> f64;
 
 /// Name of the file, seed of its noise, torque on the arm (N m).
 pub const RECORDINGS: [(&str, u64, Torque); 2] = [("step.csv", 1, |_| 0.02), ("sine.csv", 2, |t| 0.02 * math::sin(t))];
 
-/// The recording as a CSV text: from hanging at rest, noise of 0.01 rad.
+/// Returns a recording as CSV, hanging at rest initially, with a noise level of 0.01 rad.
 pub fn recording(seed: u64, torque: Torque) -> String {
     let hanging = [[0.0, std::f64::consts::PI, 0.0], [0.0; 3]];
     device::recording(&Device { torque, ..DEVICE }, hanging, 0.01, seed, true)

@@ -1,7 +1,7 @@
 //! The page of a benchmark: what the terminal says, and the reliability of stated probabilities as a picture.
 
 use super::statistics::{Bin, reliability};
-use mops::report::{Curve, CurveStyle, Ink, Plot};
+use mops::report::{Color, Curve, CurveStyle, Plot};
 
 /// The page, from the tables as text, and stated probabilities beside what came true, by what they are of.
 pub(crate) fn page(tables: &str, stated: &[(&str, Vec<(f64, bool)>)]) -> String {
@@ -14,12 +14,16 @@ pub(crate) fn page(tables: &str, stated: &[(&str, Vec<(f64, bool)>)]) -> String 
 fn plot(of: &str, bins: &[Bin]) -> Plot {
     let points: Vec<(f64, f64)> = bins.iter().map(|bin| (bin.stated, bin.observed.share())).collect();
     let dots =
-        Curve { name: "observed".into(), points, style: CurveStyle::Dots, ink: Ink::Measured, ..Curve::default() };
-    let diagonal =
-        Curve { name: "calibrated".into(), points: vec![(0.0, 0.0), (1.0, 1.0)], ink: Ink::Demand, ..Curve::default() };
+        Curve { name: "observed".into(), points, style: CurveStyle::Dots, color: Color::Measured, ..Curve::default() };
+    let diagonal = Curve {
+        name: "calibrated".into(),
+        points: vec![(0.0, 0.0), (1.0, 1.0)],
+        color: Color::Demand,
+        ..Curve::default()
+    };
     let interval = |bin: &Bin| {
         let points = bin.observed.interval95().map(|share| (bin.stated, share)).to_vec();
-        Curve { name: String::new(), points, ink: Ink::Measured, ..Curve::default() }
+        Curve { name: String::new(), points, color: Color::Measured, ..Curve::default() }
     };
     Plot {
         title: format!("Reliability of {of}"),

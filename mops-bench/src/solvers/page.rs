@@ -2,10 +2,10 @@
 
 use super::results::{Results, Row};
 use super::{ROUGH, Score, data_profile, performance_profile};
-use mops::report::{Curve, CurveStyle, Ink, Plot, Upright};
+use mops::report::{Color, Curve, CurveStyle, ParallelAxis, Plot};
 
 /// Inks that differ.
-const INKS: usize = 6;
+const COLORS: usize = 6;
 
 /// The page, from the tables as text, and from the results with their names.
 pub(crate) fn page(tables: &str, all: &[(String, &Results)]) -> String {
@@ -64,18 +64,18 @@ fn volumes(all: &[(String, &Results)]) -> Option<Plot> {
             name: named(solver, name),
             points: results.of(solver).filter_map(point).collect(),
             style: CurveStyle::Dots,
-            ink: Ink::Series(index),
+            color: Color::Series(index),
             ..Curve::default()
         }
     };
     let ends = [-0.3, problems.len() as f64 - 0.7];
-    let rule = |y: f64| Curve { points: ends.map(|x| (x, y)).to_vec(), ink: Ink::Grid, ..Curve::default() };
-    let upright = |name: &&str| Upright { name: (*name).to_owned(), ends: [from.to_string(), "1".to_owned()] };
+    let rule = |y: f64| Curve { points: ends.map(|x| (x, y)).to_vec(), color: Color::Grid, ..Curve::default() };
+    let upright = |name: &&str| ParallelAxis { name: (*name).to_owned(), ends: [from.to_string(), "1".to_owned()] };
     (!shares.is_empty()).then(|| Plot {
         title: "Hypervolume in parts of that of the true front".into(),
         x_label: "problem".into(),
         y_label: "one dot for every seed".into(),
-        uprights: problems.iter().map(upright).collect(),
+        parallel_axes: problems.iter().map(upright).collect(),
         curves: [0.0, 1.0].map(rule).into_iter().chain(names.iter().enumerate().map(curve)).collect(),
         ..Plot::default()
     })
@@ -105,8 +105,8 @@ fn curves(profiles: Vec<(String, Vec<(f64, f64)>)>) -> Option<Vec<Curve>> {
         let share = points.last().map_or(0.0, |&(_, share)| share);
         points.push((last, share));
         // Where the inks begin anew, lines are dashed.
-        let style = if (index / INKS).is_multiple_of(2) { CurveStyle::Line } else { CurveStyle::Dashed };
-        Curve { name, points, style, ink: Ink::Series(index), ..Curve::default() }
+        let style = if (index / COLORS).is_multiple_of(2) { CurveStyle::Line } else { CurveStyle::Dashed };
+        Curve { name, points, style, color: Color::Series(index), ..Curve::default() }
     };
     (last > 0.0).then(|| profiles.into_iter().enumerate().map(curve).collect())
 }

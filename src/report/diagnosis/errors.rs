@@ -1,4 +1,4 @@
-//! The table of errors before and after, with bars in units of the noise.
+//! Table of errors before and after, with bars in units of the noise level.
 
 use maud::{Markup, html};
 use mops_discrepancy::Diagnosis;
@@ -8,7 +8,7 @@ use crate::diagnosis::errors::lines;
 use crate::diagnosis::words::times;
 use crate::numbers::{number, significant};
 
-/// All experiments and channels.
+/// Returns the table over all experiments and channels.
 pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
     let lines = lines(diagnosis);
     let same = lines.iter().all(|line| line.scaled[0].to_bits() == line.scaled[1].to_bits());
@@ -57,17 +57,17 @@ pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
     };
     html! {
         p {
-            "Root mean square of measured - predicted in units of the noise"
-            @if same { "; " } @else {
-                ": the " span class="swatch before" {} " declared model, the " span class="swatch after" {} " repaired one; "
+            "Root mean square of measured - predicted, in units of the noise level"
+            @if !same {
+                ": " span class="swatch before" {} " nominal model, " span class="swatch after" {} " recalibrated model"
             }
-            "the line marks the noise, 1, which is all that can be had."
+            ". The line at 1 is the noise level, the best achievable."
         }
-        (scrolling("Before and after", rows))
+        (scrolling("Errors before and after", rows))
     }
 }
 
-/// Two bars, before above after, or one for both where they are the same; and a mark at the noise.
+/// Returns the bars of the errors before and after, one bar if they are equal, and a mark at the noise level.
 fn bars(scaled: [f64; 2], largest: f64, same: bool) -> Markup {
     let width =
         |value: f64| format!("width:{:.1}%", if value.is_finite() { 100.0 * (value / largest).min(1.0) } else { 0.0 });

@@ -1,21 +1,21 @@
-//! Where the residual comes from: evidence per place, and the unknown signal there that would explain it.
+//! Evidence by place, and the unknown input at a place that would explain the residuals.
 
 use maud::{Markup, html};
 use mops_discrepancy::{Curve as Points, Diagnosis, Evidence};
 
 use super::super::figures::{Figure, Group};
 use super::super::page::{rich, scrolling};
-use super::super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::super::plot::{Color, Curve, CurveStyle, Plot};
 use super::super::sampling::thinned;
 use crate::diagnosis::words;
 use crate::numbers::{labelled, significant};
 
-/// Signals of more places than this are not drawn.
+/// Largest number of places with plots.
 const MOST_PLACES: usize = 3;
-/// Experiments whose signal is drawn over time.
+/// Largest number of experiments plotted over time.
 const MOST_EXPERIMENTS: usize = 2;
 
-/// The evidence of every place, with bars.
+/// Returns the table of evidence by place, with bars.
 pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
     let largest = diagnosis.evidence.iter().map(|e| e.evidence).filter(|e| e.is_finite()).fold(1e-9, f64::max);
     let rows = html! {
@@ -24,15 +24,15 @@ pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
                 tr {
                     th scope="col" { "place" }
                     th scope="col" { "evidence" }
-                    th scope="col" class="number" { "ln likelihood gained" }
-                    th scope="col" class="number" { "explains" }
+                    th scope="col" class="number" { "ln Bayes factor" }
+                    th scope="col" class="number" { "explained share" }
                     th scope="col" class="number" { "degrees of freedom" }
                 }
             }
             tbody {
                 @for place in &diagnosis.evidence {
                     tr {
-                        th scope="row" { (place.place) @if acted(diagnosis, &place.place) { small { "an effect was added here" } } }
+                        th scope="row" { (place.place) @if has_effect(diagnosis, &place.place) { small { "effect added" } } }
                         td { (bar(place.evidence / largest)) }
                         td class="number" { (significant(place.evidence, 3)) }
                         td class="number" { (words::share(place.share)) }
@@ -44,44 +44,44 @@ pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
     };
     html! {
         p {
-            "A free signal was let in at one place at a time and estimated by smoothing, the model staying the constraint. The "
-            "place that explains the residual best, with the fewest degrees of freedom, is where something acts. The signal is a "
-            "picture for people: the verdict does not rest on it."
+            "At each place in turn an unknown input was added and estimated by a smoother subject to the model equations. A "
+            "missing effect most likely acts where the evidence is largest: the input explains most of the residual with few "
+            "degrees of freedom. The input is an illustration only; the verdict does not use it."
         }
         (scrolling("Evidence by place", rows))
     }
 }
 
-/// A bar of this share of its room.
+/// Returns a bar of a share from 0 to 1.
 pub(super) fn bar(share: f64) -> Markup {
     let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
     html! { span class="share" aria-hidden="true" { span style=(format!("width:{:.1}%", 100.0 * share)) {} } }
 }
 
-fn acted(diagnosis: &Diagnosis, place: &str) -> bool {
+/// Returns true if an effect was added at the place.
+fn has_effect(diagnosis: &Diagnosis, place: &str) -> bool {
     diagnosis.found.iter().any(|found| found.place == place)
 }
 
-/// The places that are drawn: where effects were added, then the best ones.
+/// Returns the plots of places: those with added effects; without any, the place with the largest evidence.
 pub(super) fn groups(diagnosis: &Diagnosis) -> Vec<Group> {
     let (at_effects, others): (Vec<&Evidence>, Vec<&Evidence>) =
-        diagnosis.evidence.iter().partition(|e| acted(diagnosis, &e.place));
-    // Where effects explain it all, other places are of no interest.
+        diagnosis.evidence.iter().partition(|e| has_effect(diagnosis, &e.place));
     let most = if at_effects.is_empty() { 1 } else { at_effects.len() };
     at_effects.into_iter().chain(others).take(most.min(MOST_PLACES)).map(|e| group(diagnosis, e)).collect()
 }
 
 fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
-    let sketched = diagnosis.unexplained.as_ref().filter(|u| u.place == evidence.place);
+    let unexplained = diagnosis.unexplained.as_ref().filter(|u| u.place == evidence.place);
     let effects: Vec<&str> =
         diagnosis.found.iter().filter(|f| f.place == evidence.place).map(|f| f.effect.as_str()).collect();
     let effects = effects.join(" and ");
-    let y_label = labelled("missing signal", &evidence.unit);
-    // The estimate, and what the effects make of it.
-    let both = |points: &Points, drawn: fn(&str, &[f64], &[f64], Ink) -> Curve| {
-        let mut curves = vec![drawn("estimated, without any formula", &points.x, &points.estimated, Ink::Measured)];
+    let y_label = labelled("unknown input", &evidence.unit);
+    // The estimate, and the formulas of the effects found.
+    let curves_of = |points: &Points, curve: fn(&str, &[f64], &[f64], Color) -> Curve| {
+        let mut curves = vec![curve("estimate without a formula", &points.x, &points.estimated, Color::Measured)];
         if !points.found.is_empty() {
-            curves.push(drawn(&effects, &points.x, &points.found, Ink::Result));
+            curves.push(curve(&effects, &points.x, &points.found, Color::Result));
         }
         curves
     };
@@ -91,24 +91,24 @@ fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
     };
     let mut figures = Vec::new();
     for (over, unit, points) in &evidence.over {
-        let mut curves = both(points, dots);
-        if let Some(unexplained) = sketched.filter(|u| u.over == *over) {
+        let mut curves = curves_of(points, dots);
+        if let Some(unexplained) = unexplained.filter(|u| u.over == *over) {
             let [x, y] = [0, 1].map(|k| unexplained.table.iter().map(|point| point[k]).collect::<Vec<f64>>());
-            curves.push(line("table, linear between its points", &x, &y, Ink::Demand));
+            curves.push(line("lookup table, linear interpolation", &x, &y, Color::Demand));
         }
-        let title = format!("missing signal at {} over {over}", evidence.place);
+        let title = format!("unknown input at {} over {over}", evidence.place);
         figures.push(figure(over, title, labelled(over, unit), curves));
     }
     for (experiment, points) in evidence.over_time.iter().take(MOST_EXPERIMENTS) {
-        let title = format!("missing signal at {} in {experiment}", evidence.place);
-        figures.push(figure(&format!("time-{experiment}"), title, "time (s)".into(), both(points, line)));
+        let title = format!("unknown input at {} in {experiment}", evidence.place);
+        figures.push(figure(&format!("time-{experiment}"), title, "time (s)".into(), curves_of(points, line)));
     }
-    let title = format!("The missing signal {}", words::at(&evidence.place));
-    let drawn = evidence.over.iter().any(|(_, _, points)| !points.found.is_empty());
-    let about = if drawn {
+    let title = format!("Unknown input {}", words::at(&evidence.place));
+    let with_formula = evidence.over.iter().any(|(_, _, points)| !points.found.is_empty());
+    let about = if with_formula {
         vec![format!(
-            "Estimated about the repaired model with {effects} taken away and everything else held; where the formula is the \
-             right one, the estimate follows it."
+            "Component-plus-residual plot: the input is estimated for the recalibrated model without {effects}, with all \
+             other parameters fixed. If the formula is correct, the estimate follows it."
         )]
     } else {
         Vec::new()
@@ -116,17 +116,17 @@ fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
     Group { title, about, figures }
 }
 
-fn dots(name: &str, x: &[f64], y: &[f64], ink: Ink) -> Curve {
+fn dots(name: &str, x: &[f64], y: &[f64], color: Color) -> Curve {
     let points = x.iter().copied().zip(y.iter().copied()).collect();
-    Curve { name: name.into(), points, ink, style: CurveStyle::Dots, ..Curve::default() }
+    Curve { name: name.into(), points, color, style: CurveStyle::Dots, ..Curve::default() }
 }
 
-fn line(name: &str, x: &[f64], y: &[f64], ink: Ink) -> Curve {
-    let dots = dots(name, x, y, ink);
+fn line(name: &str, x: &[f64], y: &[f64], color: Color) -> Curve {
+    let dots = dots(name, x, y, color);
     Curve { points: thinned(dots.points), style: CurveStyle::Line, ..dots }
 }
 
-/// A place as it stands in tables.
-pub(super) fn named(place: &str) -> Markup {
+/// Returns a place in words, as markup.
+pub(super) fn located(place: &str) -> Markup {
     rich(&words::at(place))
 }

@@ -1,30 +1,30 @@
-//! What it could be: every effect that was tried; what the data cannot tell apart; parameters; what would have been noticed.
+//! Tables of candidate effects, steps of the search, parameter shifts and detection limits.
 
 use maud::{Markup, html};
 use mops_discrepancy::{Diagnosis, Ranked};
 
 use super::super::page::scrolling;
-use super::places::{bar, named};
+use super::places::{bar, located};
 use crate::diagnosis::words;
 use crate::numbers::{number, percent, significant, with_unit};
 
-/// Effects in the table; the others stand below it, to be opened.
+/// Number of effects in the first table; a collapsed second table has the others.
 const SHOWN: usize = 10;
 
-/// The ranking, with what cannot be told apart marked.
+/// Returns the ranking, with marks on indistinguishable effects.
 pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
     let (first, others) = diagnosis.ranked.split_at(SHOWN.min(diagnosis.ranked.len()));
     html! {
         p {
-            "The effects that were fitted at places of the model, each beside those that were in by then. Absorbed is the share of "
-            "its trace in the outputs that parameters and start values can take over. Strengths here are from all data that choose "
-            "between effects; those of what was found, above, from calibration data alone."
+            "Candidate effects fitted at each place, together with those already accepted. Absorbed: the part of the effect's "
+            "output signature that parameters and initial states can mimic. Parameters in this table are from calibration and "
+            "selection data; those of the effects found, above, are from calibration data alone."
         }
         (scrolling("Ranking", rows(diagnosis, first)))
         @if !others.is_empty() {
             details {
-                summary { (others.len()) " more that were tried" }
-                (scrolling("Ranking, the others", rows(diagnosis, others)))
+                summary { (others.len()) " more candidates" }
+                (scrolling("Ranking, continued", rows(diagnosis, others)))
             }
         }
     }
@@ -40,7 +40,7 @@ fn rows(diagnosis: &Diagnosis, ranked: &[Ranked]) -> Markup {
                     th scope="col" { "probability" }
                     th scope="col" {}
                     th scope="col" class="number" { "BIC gain" }
-                    th scope="col" { "strengths" }
+                    th scope="col" { "parameters" }
                     th scope="col" class="number" { "error / noise" }
                     th scope="col" class="number" { "absorbed" }
                 }
@@ -63,7 +63,7 @@ fn rows(diagnosis: &Diagnosis, ranked: &[Ranked]) -> Markup {
     }
 }
 
-/// How an effect stands to those found.
+/// Returns the relation of a candidate to the effects found.
 fn mark(diagnosis: &Diagnosis, effect: &Ranked) -> Option<&'static str> {
     let is = |name: &str, place: &str| name == effect.effect && place == effect.place;
     if diagnosis.found.iter().any(|found| is(&found.effect, &found.place)) {
@@ -72,22 +72,25 @@ fn mark(diagnosis: &Diagnosis, effect: &Ranked) -> Option<&'static str> {
     let mut rivals = diagnosis.found.iter().flat_map(|found| &found.indistinguishable);
     let rival = rivals.find(|rival| is(&rival.effect, &rival.place))?;
     Some(match rival.bic_behind {
-        behind if behind <= -words::BARE_MENTION => "likelier",
-        behind if behind < words::BARE_MENTION => "cannot be told apart",
+        behind if behind <= -words::BARE_MENTION => "more likely",
+        behind if behind < words::BARE_MENTION => "indistinguishable",
         _ => "not excluded",
     })
 }
 
-/// The models that the search passed through.
+/// Returns the table of the models along the search.
 pub(super) fn steps(diagnosis: &Diagnosis) -> Markup {
     let mut windows: Vec<usize> = diagnosis.steps.iter().map(|step| step.windows).collect();
     windows.dedup();
     html! {
         @if windows.len() > 1 {
-            p class="quiet" { "Windows have start values of their own: errors in more of them are smaller, and not to be compared with those of whole records." }
+            p class="quiet" {
+                "Each window has its own initial states. Errors over more windows are therefore smaller, and not comparable with "
+                "errors over whole records."
+            }
         }
         table {
-            thead { tr { th scope="col" { "step" } th scope="col" { "effects in the model" } th scope="col" class="number" { "error, times the noise" } } }
+            thead { tr { th scope="col" { "step" } th scope="col" { "effects in the model" } th scope="col" class="number" { "error / noise" } } }
             tbody {
                 @for step in &diagnosis.steps {
                     tr {
@@ -101,19 +104,19 @@ pub(super) fn steps(diagnosis: &Diagnosis) -> Markup {
     }
 }
 
-/// What the parameters had absorbed.
+/// Returns the table of parameter shifts.
 pub(super) fn parameters(diagnosis: &Diagnosis) -> Markup {
     let rows = html! {
         table {
             thead {
                 tr {
                     th scope="col" { "parameter" }
-                    th scope="col" class="number" { "declared model" }
-                    th scope="col" class="number" { "repaired model" }
+                    th scope="col" class="number" { "nominal model" }
+                    th scope="col" class="number" { "recalibrated model" }
                     th scope="col" class="number" { "standard error" }
                     th scope="col" { "unit" }
                     th scope="col" class="number" { "change" }
-                    th scope="col" class="number" { "in standard errors" }
+                    th scope="col" class="number" { "change / standard error" }
                 }
             }
             tbody {
@@ -132,12 +135,12 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> Markup {
         }
     };
     html! {
-        p { "What a parameter moved by is what it had taken over of the missing effect." }
+        p { "The shift is the bias that the missing effect had caused." }
         (scrolling("Parameters", rows))
     }
 }
 
-/// The smallest strengths that would have been noticed.
+/// Returns the table of detection limits.
 pub(super) fn noticeable(diagnosis: &Diagnosis) -> Markup {
     let rows = html! {
         table {
@@ -145,14 +148,14 @@ pub(super) fn noticeable(diagnosis: &Diagnosis) -> Markup {
                 tr {
                     th scope="col" { "effect" }
                     th scope="col" { "place" }
-                    th scope="col" class="number" { "noticed from" }
+                    th scope="col" class="number" { "detection limit" }
                 }
             }
             tbody {
                 @for effect in &diagnosis.noticeable {
                     tr {
                         th scope="row" { (effect.effect) }
-                        td { (named(&effect.place)) }
+                        td { (located(&effect.place)) }
                         td class="number" { (effect.strength.name) " = " (with_unit(effect.strength.value, &effect.strength.unit)) }
                     }
                 }
@@ -160,7 +163,7 @@ pub(super) fn noticeable(diagnosis: &Diagnosis) -> Markup {
         }
     };
     html! {
-        p { "A verdict of nothing is worth what it would have taken to change it: a weaker effect may be there." }
-        (scrolling("Noticeable strengths", rows))
+        p { "Smallest parameter of each effect that would have been detected. A smaller effect may be present." }
+        (scrolling("Detection limits", rows))
     }
 }

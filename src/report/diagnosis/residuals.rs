@@ -1,22 +1,23 @@
-//! Residuals of the declared model and of the repaired one: over time, as spectrum, as autocorrelation.
+//! Residuals of the nominal and the recalibrated model: time series, spectrum, autocorrelation.
 
 use mops_core::Role;
 use mops_discrepancy::{Diagnosis, Prediction};
 
 use super::super::figures::{Figure, Group};
-use super::super::plot::{Band, Curve, CurveStyle, Ink, Level, Plot};
+use super::super::plot::{Band, Color, Curve, CurveStyle, Level, Plot};
 use super::super::sampling::thinned;
 use super::spectrum::{autocorrelation, band, even, spectrum};
 use crate::numbers::{labelled, with_unit};
 
-/// More experiments than this are not drawn.
+/// Largest number of experiments with plots.
 const MOST: usize = 4;
 
-pub(super) const EXPLAINED: &str = "Where nothing is missing, a residual stays within twice the noise, has as much power at \
-    every frequency, and its autocorrelation lies inside the band (95 % of it for white residuals).";
+/// Properties of the residuals of a correct model.
+pub(super) const WHITE_RESIDUALS: &str = "If nothing is missing, the residuals are white: 95 % of them lie within twice the \
+    noise level, their spectrum is flat, and 95 % of their autocorrelation lies within the band.";
 
-/// The experiments that are drawn: at least one of each role, the first ones of the others.
-fn drawn(diagnosis: &Diagnosis) -> Vec<&[Prediction]> {
+/// Returns the experiments with plots: the first of each role, then the first of the others.
+fn shown(diagnosis: &Diagnosis) -> Vec<&[Prediction]> {
     let all: Vec<&[Prediction]> = diagnosis.predictions.chunk_by(|a, b| a.experiment == b.experiment).collect();
     let first = |role| all.iter().position(|channels| channels[0].role == role);
     let mut chosen: Vec<usize> =
@@ -31,15 +32,16 @@ fn title(channels: &[Prediction]) -> String {
     format!("Experiment `{}` ({})", channels[0].experiment, channels[0].role.name())
 }
 
-/// A group for every experiment: a column of plots for every channel, with spectrum and autocorrelation in the first.
+/// Returns a group for every experiment, with a column of plots for every channel. The first group includes spectrum and
+/// autocorrelation.
 pub(super) fn groups(diagnosis: &Diagnosis) -> Vec<Group> {
     let all = diagnosis.predictions.chunk_by(|a, b| a.experiment == b.experiment).count();
-    let shown = drawn(diagnosis);
-    let left_out = (all > shown.len()).then(|| format!("Of {all} experiments {} are drawn.", shown.len()));
+    let shown = shown(diagnosis);
+    let omitted = (all > shown.len()).then(|| format!("{} of {all} experiments are shown.", shown.len()));
     let group = |(i, channels): (usize, &&[Prediction])| Group {
         title: title(channels),
-        about: left_out.iter().filter(|_| i == 0).cloned().collect(),
-        // Once is enough: spectra and autocorrelations of other experiments say the same.
+        about: omitted.iter().filter(|_| i == 0).cloned().collect(),
+        // Spectra and autocorrelations of other experiments are similar.
         figures: channels.iter().map(|channel| figure(channel, i == 0)).collect(),
     };
     shown.iter().enumerate().map(group).collect()
@@ -49,16 +51,16 @@ fn difference(prediction: &Prediction, model: &[f64]) -> Vec<f64> {
     prediction.measured.iter().zip(model).map(|(measured, model)| measured - model).collect()
 }
 
-/// Two curves of one kind, the declared model below the repaired one; only one where they are the same.
-fn both(before: Vec<(f64, f64)>, after: Vec<(f64, f64)>, style: CurveStyle) -> Vec<Curve> {
-    let curve = |name: &str, points, ink| Curve { name: name.into(), points, style, ink, ..Curve::default() };
+/// Returns the curves of the nominal model and, on top, of the recalibrated model; one curve if they are equal.
+fn of_models(before: Vec<(f64, f64)>, after: Vec<(f64, f64)>, style: CurveStyle) -> Vec<Curve> {
+    let curve = |name: &str, points, color| Curve { name: name.into(), points, style, color, ..Curve::default() };
     if before == after {
-        return vec![curve("declared model", before, Ink::Result)];
+        return vec![curve("nominal model", before, Color::Result)];
     }
-    vec![curve("declared model", before, Ink::Measured), curve("repaired model", after, Ink::Result)]
+    vec![curve("nominal model", before, Color::Measured), curve("recalibrated model", after, Color::Result)]
 }
 
-fn figure(prediction: &Prediction, whole: bool) -> Figure {
+fn figure(prediction: &Prediction, with_spectrum: bool) -> Figure {
     let Prediction { experiment, signal, times, unit, noise, .. } = prediction;
     let place = format!("{experiment}-{signal}");
     let [before, after] = [&prediction.before, &prediction.after].map(|model| difference(prediction, model));
@@ -69,7 +71,7 @@ fn figure(prediction: &Prediction, whole: bool) -> Figure {
             title: format!("residual of {signal}"),
             x_label: "time (s)".into(),
             y_label: labelled(signal, unit),
-            curves: both(over_time(&before), over_time(&after), CurveStyle::Dots),
+            curves: of_models(over_time(&before), over_time(&after), CurveStyle::Dots),
             bands: vec![Band {
                 name: format!("\u{b1}2 noise, {}", with_unit(2.0 * noise, unit)),
                 range: [-2.0 * noise, 2.0 * noise],
@@ -77,17 +79,17 @@ fn figure(prediction: &Prediction, whole: bool) -> Figure {
             ..Plot::default()
         },
     )];
-    let evenly = |values: &[f64]| even(times, values).filter(|_| whole);
+    let evenly = |values: &[f64]| even(times, values).filter(|_| with_spectrum);
     if let (Some((step, before)), Some((_, after))) = (evenly(&before), evenly(&after)) {
         plots.push((
             format!("spectrum-{place}"),
             Plot {
                 title: format!("spectrum of the residual of {signal}"),
                 x_label: "frequency (Hz)".into(),
-                y_label: "power / that of the noise".into(),
+                y_label: "power / noise power".into(),
                 log_x: true,
                 log_y: true,
-                curves: both(spectrum(step, &before, *noise), spectrum(step, &after, *noise), CurveStyle::Line),
+                curves: of_models(spectrum(step, &before, *noise), spectrum(step, &after, *noise), CurveStyle::Line),
                 levels: vec![Level { name: "noise".into(), value: 1.0 }],
                 ..Plot::default()
             },
@@ -99,7 +101,7 @@ fn figure(prediction: &Prediction, whole: bool) -> Figure {
                 title: format!("autocorrelation of the residual of {signal}"),
                 x_label: "lag (s)".into(),
                 y_label: "autocorrelation".into(),
-                curves: both(autocorrelation(step, &before), autocorrelation(step, &after), CurveStyle::Line),
+                curves: of_models(autocorrelation(step, &before), autocorrelation(step, &after), CurveStyle::Line),
                 bands: vec![Band { name: "95 % of white residuals".into(), range: [-width, width] }],
                 ..Plot::default()
             },
@@ -108,7 +110,7 @@ fn figure(prediction: &Prediction, whole: bool) -> Figure {
     Figure { plots, caption: Vec::new() }
 }
 
-/// A group for every experiment that is drawn: measurement and both models.
+/// Returns a group for every experiment with plots: the measurement and the predictions of both models.
 pub(super) fn predictions(diagnosis: &Diagnosis) -> Vec<Group> {
     let plot = |p: &Prediction| {
         let points = |values: &[f64]| thinned(p.times.iter().copied().zip(values.iter().copied()).collect());
@@ -116,10 +118,10 @@ pub(super) fn predictions(diagnosis: &Diagnosis) -> Vec<Group> {
             name: "measured".into(),
             points: points(&p.measured),
             style: CurveStyle::Dots,
-            ink: Ink::Start,
+            color: Color::Start,
             ..Curve::default()
         }];
-        curves.extend(both(points(&p.before), points(&p.after), CurveStyle::Line));
+        curves.extend(of_models(points(&p.before), points(&p.after), CurveStyle::Line));
         let plot = Plot {
             title: format!("{} in experiment {}", p.signal, p.experiment),
             x_label: "time (s)".into(),
@@ -134,5 +136,5 @@ pub(super) fn predictions(diagnosis: &Diagnosis) -> Vec<Group> {
         about: Vec::new(),
         figures: channels.iter().map(plot).collect(),
     };
-    drawn(diagnosis).into_iter().map(group).collect()
+    shown(diagnosis).into_iter().map(group).collect()
 }

@@ -2,12 +2,13 @@
 
 use mops_core::math;
 
-/// Lags that are shown: at most so many, and a quarter of the samples.
+/// Largest number of lags; also limited to a quarter of the samples.
 const MOST_LAGS: usize = 100;
-/// Samples of a segment of the spectrum: a third of all, within these bounds.
+/// Bounds of the segment length, in samples; the length is a third of the record within these bounds.
 const SEGMENT: [usize; 2] = [32, 512];
 
-/// A residual at evenly spaced times: the step, s, and the values; between samples that are not, on straight lines.
+/// Returns a residual at evenly spaced times: the sample time, s, and the values. Uneven samples are interpolated linearly.
+/// `None` for records shorter than a segment.
 pub(super) fn even(times: &[f64], values: &[f64]) -> Option<(f64, Vec<f64>)> {
     let known: Vec<(f64, f64)> =
         times.iter().copied().zip(values.iter().copied()).filter(|p| p.1.is_finite()).collect();
@@ -35,10 +36,10 @@ pub(super) fn even(times: &[f64], values: &[f64]) -> Option<(f64, Vec<f64>)> {
     (step > 0.0 && count < 10_000_000).then(|| (step, (0..count).map(at).collect()))
 }
 
-/// Power over the frequency, Hz, in units of that of white noise of standard deviation `noise`.
+/// Returns frequencies, Hz, with the power spectrum relative to white noise of standard deviation `noise`.
 ///
-/// Averaged over segments that overlap by half and are weighted by a Hann window. Source: P. D. Welch, The use of fast
-/// Fourier transform for the estimation of power spectra, IEEE Transactions on Audio and Electroacoustics 15 (1967), 70-73.
+/// Average over segments with a Hann window and 50 % overlap. Source: P. D. Welch, The use of fast Fourier transform for the
+/// estimation of power spectra, IEEE Transactions on Audio and Electroacoustics 15 (1967), 70-73.
 pub(super) fn spectrum(step: f64, values: &[f64], noise: f64) -> Vec<(f64, f64)> {
     let length = (values.len() / 3).clamp(SEGMENT[0], SEGMENT[1]).min(values.len());
     let window: Vec<f64> = (0..length)
@@ -63,17 +64,17 @@ pub(super) fn spectrum(step: f64, values: &[f64], noise: f64) -> Vec<(f64, f64)>
     (1..=length / 2).map(|k| (k as f64 / (length as f64 * step), power(k) / (noise * noise))).collect()
 }
 
-/// Autocorrelation about the mean over the lag, s, from one sample up.
+/// Returns lags, s, from one sample on, with the autocorrelation about the mean.
 pub(super) fn autocorrelation(step: f64, values: &[f64]) -> Vec<(f64, f64)> {
     let n = values.len();
     let mean = values.iter().sum::<f64>() / n as f64;
-    let about: Vec<f64> = values.iter().map(|v| v - mean).collect();
-    let product = |lag: usize| about.iter().zip(&about[lag..]).map(|(a, b)| a * b).sum::<f64>();
+    let centred: Vec<f64> = values.iter().map(|v| v - mean).collect();
+    let product = |lag: usize| centred.iter().zip(&centred[lag..]).map(|(a, b)| a * b).sum::<f64>();
     let power = product(0);
     (1..=MOST_LAGS.min(n / 4)).map(|lag| (lag as f64 * step, product(lag) / power)).collect()
 }
 
-/// Half-width of the band in which the autocorrelation of white residuals lies with probability 0.95.
+/// Returns the half-width of the band that contains the autocorrelation of white residuals with probability 0.95.
 /// Source: G. E. P. Box, G. M. Jenkins, Time Series Analysis, Forecasting and Control (1976), section 2.1.6.
 pub(super) fn band(count: usize) -> f64 {
     1.96 / (count as f64).sqrt()
@@ -94,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn the_spectrum_of_white_noise_is_flat_at_one_and_a_sine_stands_out_at_its_frequency() {
+    fn the_spectrum_of_white_noise_is_flat_at_one_and_a_sine_has_a_peak_at_its_frequency() {
         let noise = white(4096);
         let flat = spectrum(0.01, &noise, 1.0);
         let mean = flat.iter().map(|p| p.1).sum::<f64>() / flat.len() as f64;
@@ -110,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn the_autocorrelation_of_an_autoregression_is_its_power_and_white_noise_stays_in_the_band() {
+    fn the_autocorrelation_of_an_autoregression_is_geometric_and_white_noise_stays_in_the_band() {
         let noise = white(8000);
         let mut slow = vec![0.0];
         for v in &noise {
@@ -126,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_are_bridged_and_short_records_have_no_spectrum() {
+    fn gaps_are_interpolated_and_short_records_have_no_spectrum() {
         let times: Vec<f64> = (0..100).filter(|i| !(40..45).contains(i)).map(f64::from).collect();
         let (step, values) = even(&times, &times).unwrap();
         assert_eq!((step, values.len()), (1.0, 100));

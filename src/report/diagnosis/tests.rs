@@ -1,4 +1,4 @@
-//! The whole report of diagnoses by hand.
+//! Tests of the whole report, with made-up diagnoses.
 
 use mops_core::{CaseBuilder, ChannelBuilder, Measured, StudyBuilder, Task, TunerBuilder};
 use mops_discrepancy::Diagnosis;
@@ -9,7 +9,7 @@ use crate::diagnosis::made_up;
 use crate::search::Options;
 use crate::tasks::diagnosis::of;
 
-/// Writes the report into a folder that lives as long as the answer.
+/// Writes the report; returns its temporary folder and the page.
 fn written(diagnosis: Diagnosis) -> (tempfile::TempDir, String) {
     let times: Vec<f64> = (0..100).map(|i| 0.05 * f64::from(i)).collect();
     let channel = ChannelBuilder { signal: "y".into(), values: times.clone(), times, ..ChannelBuilder::default() };
@@ -38,25 +38,25 @@ fn written(diagnosis: Diagnosis) -> (tempfile::TempDir, String) {
     (folder, page)
 }
 
-/// The titles of the sections, in their order.
+/// Returns the titles of the sections, in their order.
 fn titles(page: &str) -> Vec<&str> {
     page.split("<h2").skip(1).map(|after| after.split(['>', '<']).nth(1).unwrap()).collect()
 }
 
 #[test]
-fn a_found_effect_is_told_from_the_verdict_to_the_next_experiment() {
+fn an_effect_found_is_reported_from_the_verdict_to_the_next_experiment() {
     let (folder, page) = written(made_up::coulomb());
     assert_eq!(
         titles(&page),
         [
-            "What is missing",
-            "Before and after",
-            "What the declared model leaves",
-            "Where it comes from",
-            "What it could be",
-            "How it was found",
-            "How the parameters moved",
-            "What to measure next",
+            "Missing effects",
+            "Errors before and after",
+            "Residuals of the nominal model",
+            "Evidence by place",
+            "Candidate effects",
+            "Steps of the search",
+            "Parameter shifts",
+            "Next experiment",
             "Measured and predicted",
             "Notes",
             "Study"
@@ -65,7 +65,7 @@ fn a_found_effect_is_told_from_the_verdict_to_the_next_experiment() {
     for text in [
         "The model lacks <code>coulomb-friction</code> in the joint <code>phi</code>",
         "c = 0.0124 (0.0118 to 0.013) N m",
-        "cannot be told apart",
+        "indistinguishable",
         "not excluded",
         "15.40",
     ] {
@@ -83,18 +83,16 @@ fn a_found_effect_is_told_from_the_verdict_to_the_next_experiment() {
     }
     assert!(
         !folder.path().join("plots/missing-sensor-phi-speed.svg").exists(),
-        "where no effect acts, nothing is drawn"
+        "places without an effect have no plot"
     );
 }
 
 #[test]
-fn nothing_missing_is_told_with_what_would_have_been_noticed() {
+fn the_verdict_none_is_reported_with_detection_limits() {
     let (_folder, page) = written(made_up::nothing());
-    assert!(page.contains("Nothing is missing that these data could show"));
-    assert!(
-        titles(&page).contains(&"What would have been noticed") && !titles(&page).contains(&"How the parameters moved")
-    );
-    assert!(!page.contains("repaired model</text>") && !page.contains("RMS before"), "there is but one model");
+    assert!(page.contains("No missing effect detected."));
+    assert!(titles(&page).contains(&"Detection limits") && !titles(&page).contains(&"Parameter shifts"));
+    assert!(!page.contains("recalibrated model</text>") && !page.contains("RMS before"), "there is only one model");
 }
 
 #[test]
@@ -104,22 +102,23 @@ fn what_no_effect_explains_has_a_place_and_a_table() {
     diagnosis.next_experiment = None;
     let (folder, page) = written(diagnosis);
     assert!(
-        page.contains("Something is missing in the equation of <code>x</code> that none of the effects tried explains")
+        page.contains("The model lacks something in the equation of <code>x</code> that no tested effect explains")
     );
-    assert!(!titles(&page).contains(&"What is missing") && !titles(&page).contains(&"What to measure next"));
+    assert!(!titles(&page).contains(&"Missing effects") && !titles(&page).contains(&"Next experiment"));
     let plot = std::fs::read_to_string(folder.path().join("plots/missing-process-x-position.svg")).unwrap();
-    assert!(plot.contains("table, linear between its points"));
+    assert!(plot.contains("lookup table, linear interpolation"));
 }
 
 #[test]
-fn what_is_left_beside_an_effect_is_told_apart_from_where_the_declared_model_fails() {
+fn an_unexplained_residual_with_an_effect_refers_to_the_place_in_the_nominal_model() {
     let diagnosis = Diagnosis { found: made_up::coulomb().found, ..made_up::unexplained() };
     let (_, page) = written(diagnosis);
     assert!(page.contains(
-        "Even with <code>coulomb-friction</code> something is missing that none of the effects tried explains: "
+        "Even with <code>coulomb-friction</code>, the model lacks something that no tested effect explains: "
     ));
     assert!(page.contains(
-        ". Without them a free signal in the equation of <code>x</code> takes 80 % of what is above the noise."
+        ". In the nominal model, an unknown input in the equation of <code>x</code> explains 80 % of the residual above the \
+         noise."
     ));
 }
 

@@ -1,4 +1,4 @@
-//! Distributions of the criteria: shares that meet demands, quantiles, histograms, and samples over parameters.
+//! Distributions of the criteria: shares that meet the demands, quantiles, histograms, samples over parameters.
 
 use maud::{Markup, html};
 use mops_core::math;
@@ -6,15 +6,15 @@ use mops_core::{DistributionReport, MonteCarloReport, ShareReport};
 
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;
-use super::super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::super::plot::{Color, Curve, CurveStyle, Plot};
 use super::super::sensitivity::sentences;
 use super::{Section, parameters};
 use crate::numbers::{labelled, number, significant};
 
-/// Points of an empirical distribution function that are drawn.
-const DRAWN: usize = 400;
+/// Largest number of plotted points of an empirical distribution function.
+const MOST_POINTS: usize = 400;
 
-/// Bins of a histogram, at most.
+/// Largest number of bins of a histogram.
 const BINS: usize = 60;
 
 pub(super) fn section(found: &MonteCarloReport) -> Section {
@@ -23,8 +23,8 @@ pub(super) fn section(found: &MonteCarloReport) -> Section {
         (parameters(&found.parameters))
         (table(found))
         p {
-            "Intervals stand behind the numbers, with a confidence of " (percent(found.level)) ": those of quantiles suppose no "
-            "distribution, those of shares are by Clopper and Pearson. All samples are in samples.csv."
+            "Brackets contain " (percent(found.level)) " confidence intervals: of quantiles without assumption on the "
+            "distribution, of shares by Clopper and Pearson. All samples are in samples.csv."
         }
     };
     let figures = found.criteria.iter().enumerate().flat_map(|(i, criterion)| figures(found, criterion, i));
@@ -49,8 +49,8 @@ fn table(found: &MonteCarloReport) -> Markup {
                         th scope="col" { "case" }
                         th scope="col" class="number" { "nominal" }
                         th scope="col" class="number" { "mean" }
-                        th scope="col" class="number" { "deviation" }
-                        @for share in &shares { th scope="col" class="number" { (percent(*share)) " below" } }
+                        th scope="col" class="number" { "standard deviation" }
+                        @for share in &shares { th scope="col" class="number" { (percent(*share)) " quantile" } }
                         th scope="col" { "unit" }
                         th scope="col" class="number" { "demand met" }
                         @if found.failed > 0 { th scope="col" class="number" { "failed" } }
@@ -82,7 +82,7 @@ fn share(share: &ShareReport) -> Markup {
     html! { strong { (percent(share.share)) } small { "[" (percent(share.interval[0])) ", " (percent(share.interval[1])) "]" } }
 }
 
-/// Histogram, distribution function, and the samples over every parameter.
+/// Returns the histogram, the distribution function, and the samples over every parameter.
 fn figures(found: &MonteCarloReport, criterion: &DistributionReport, index: usize) -> Vec<Figure> {
     let mut values: Vec<f64> = found.table.iter().map(|(_, row)| row[index]).filter(|v| v.is_finite()).collect();
     values.sort_by(f64::total_cmp);
@@ -98,7 +98,7 @@ fn figures(found: &MonteCarloReport, criterion: &DistributionReport, index: usiz
     let one = |plot| Figure { plots: vec![plot], caption: Vec::new() };
     let mut figures: Vec<Figure> = plots.into_iter().map(one).collect();
     for (j, parameter) in found.parameters.iter().enumerate() {
-        let points = found.table.iter().take(4 * DRAWN).map(|(x, y)| (x[j], y[index])).collect();
+        let points = found.table.iter().take(4 * MOST_POINTS).map(|(x, y)| (x[j], y[index])).collect();
         let mut curves = vec![Curve { name: "samples".into(), points, style: CurveStyle::Dots, ..Curve::default() }];
         let ends = Some([
             found.table.iter().map(|(x, _)| x[j]).fold(f64::INFINITY, f64::min),
@@ -108,7 +108,7 @@ fn figures(found: &MonteCarloReport, criterion: &DistributionReport, index: usiz
             ends.map(|ends| Curve {
                 name: "demand".into(),
                 points: ends.map(|x| (x, demand)).to_vec(),
-                ink: Ink::Demand,
+                color: Color::Demand,
                 may_leave: true,
                 ..Curve::default()
             })
@@ -126,8 +126,8 @@ fn figures(found: &MonteCarloReport, criterion: &DistributionReport, index: usiz
     figures
 }
 
-/// Number of values in equal bins, as many as the cube root rule gives, drawn as steps.
-/// Source: D. Freedman, P. Diaconis, Zeitschrift fuer Wahrscheinlichkeitstheorie 57 (1981) 453-476 (width of a bin).
+/// Returns the histogram, with bins of the width by Freedman and Diaconis.
+/// Source: D. Freedman, P. Diaconis, Zeitschrift fuer Wahrscheinlichkeitstheorie 57 (1981) 453-476.
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn histogram(criterion: &DistributionReport, sorted: &[f64]) -> Plot {
     let [low, high] = [sorted[0], sorted[sorted.len() - 1]];
@@ -144,7 +144,7 @@ fn histogram(criterion: &DistributionReport, sorted: &[f64]) -> Plot {
     points.push((high, 0.0));
     let highest = bins.iter().copied().max().unwrap_or(1) as f64;
     let mut curves = vec![Curve { name: "samples per bin".into(), points, ..Curve::default() }];
-    curves.extend(uprights(criterion, highest));
+    curves.extend(vertical_lines(criterion, highest));
     Plot {
         title: format!("Histogram of {} in case {}", criterion.of.criterion, criterion.of.case),
         x_label: labelled(&criterion.of.criterion, &criterion.of.unit),
@@ -154,32 +154,32 @@ fn histogram(criterion: &DistributionReport, sorted: &[f64]) -> Plot {
     }
 }
 
-/// The demand and the value without uncertainty, as lines from bottom to top.
-fn uprights(criterion: &DistributionReport, top: f64) -> Vec<Curve> {
-    let line = |name: &str, x: f64, ink: Ink, style: CurveStyle| Curve {
+/// Returns vertical lines at the demand and at the nominal value.
+fn vertical_lines(criterion: &DistributionReport, top: f64) -> Vec<Curve> {
+    let line = |name: &str, x: f64, color: Color, style: CurveStyle| Curve {
         name: name.into(),
         points: vec![(x, 0.0), (x, top)],
-        ink,
+        color,
         style,
         may_leave: true,
-        of: None,
+        front_point: None,
     };
-    let demand = criterion.of.demand.map(|x| line("demand", x, Ink::Demand, CurveStyle::Line));
+    let demand = criterion.of.demand.map(|x| line("demand", x, Color::Demand, CurveStyle::Line));
     let nominal = Some(criterion.of.nominal)
         .filter(|x| x.is_finite())
-        .map(|x| line("without uncertainty", x, Ink::Start, CurveStyle::Dashed));
+        .map(|x| line("nominal value", x, Color::Start, CurveStyle::Dashed));
     demand.into_iter().chain(nominal).collect()
 }
 
 #[allow(clippy::cast_precision_loss)]
 fn ecdf(criterion: &DistributionReport, sorted: &[f64]) -> Plot {
     let n = sorted.len();
-    let every = n.div_ceil(DRAWN);
+    let every = n.div_ceil(MOST_POINTS);
     let kept = (0..n).filter(|i| i % every == 0 || *i + 1 == n);
     let points =
         kept.flat_map(|i| [(sorted[i], i as f64 / n as f64), (sorted[i], (i + 1) as f64 / n as f64)]).collect();
-    let mut curves = vec![Curve { name: "share of samples up to".into(), points, ..Curve::default() }];
-    curves.extend(uprights(criterion, 1.0));
+    let mut curves = vec![Curve { name: "empirical distribution function".into(), points, ..Curve::default() }];
+    curves.extend(vertical_lines(criterion, 1.0));
     Plot {
         title: format!("Distribution of {} in case {}", criterion.of.criterion, criterion.of.case),
         x_label: labelled(&criterion.of.criterion, &criterion.of.unit),

@@ -1,11 +1,11 @@
-//! Effects of uncertain parameters over their whole ranges: by Morris and by Sobol.
+//! Global sensitivity to the uncertain parameters: Morris and Sobol.
 
 use maud::{Markup, html};
 use mops_core::{EffectReport, EffectsReport, Estimated, GlobalSensitivityReport, SensitivityMethod};
 
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;
-use super::super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::super::plot::{Color, Curve, CurveStyle, Plot};
 use super::super::sensitivity::sentences;
 use super::{Section, parameters};
 use crate::numbers::{labelled, significant};
@@ -17,13 +17,13 @@ pub(super) fn section(found: &GlobalSensitivityReport) -> Section {
         (parameters(&found.parameters))
         p {
             @if morris {
-                "Each of " (found.samples) " trajectories moves every parameter once, by two thirds of its range. The magnitude "
-                "is the mean size of what that does to the criterion, per range; in the mean, what goes both ways cancels; a "
-                "deviation as large as the magnitude tells of nonlinearity, or of parameters that act together. "
+                "Elementary effects over " (found.samples) " trajectories, each of which moves every parameter once by two "
+                "thirds of its range. The magnitude is the mean absolute effect per range; in the mean, effects of opposite "
+                "sign cancel. A standard deviation as large as the magnitude indicates nonlinearity or interactions. "
             } @else {
-                "Shares of the variance: by the parameter alone, and by it alone and together with others. Intervals are by "
-                "bootstrap over " (found.samples) " samples, with a confidence of " (significant(100.0 * found.level, 3)) " %; "
-                "an estimate may be a little below 0. "
+                "Sobol indices: first-order share of the variance, and total share with interactions. Brackets contain "
+                (significant(100.0 * found.level, 3)) " % bootstrap intervals over " (found.samples) " samples. Estimates may be "
+                "slightly negative. "
             }
         }
         @for criterion in found.criteria.iter().filter(|c| !c.effects.is_empty()) {
@@ -38,7 +38,7 @@ pub(super) fn section(found: &GlobalSensitivityReport) -> Section {
 
 fn table(criterion: &EffectsReport, morris: bool) -> Markup {
     let bare = |value: Option<f64>| value.map_or_else(String::new, |v| significant(v, 4));
-    let told = |share: Option<Estimated>| {
+    let with_interval = |share: Option<Estimated>| {
         html! {
             @if let Some(Estimated { value, interval: [low, high] }) = share {
                 (significant(value, 3)) small { "[" (significant(low, 3)) ", " (significant(high, 3)) "]" }
@@ -53,10 +53,10 @@ fn table(criterion: &EffectsReport, morris: bool) -> Markup {
                     @if morris {
                         th scope="col" class="number" { (labelled("magnitude", &criterion.of.unit)) }
                         th scope="col" class="number" { (labelled("mean", &criterion.of.unit)) }
-                        th scope="col" class="number" { (labelled("deviation", &criterion.of.unit)) }
+                        th scope="col" class="number" { (labelled("standard deviation", &criterion.of.unit)) }
                     } @else {
-                        th scope="col" class="number" { "alone" }
-                        th scope="col" class="number" { "alone and with others" }
+                        th scope="col" class="number" { "first-order" }
+                        th scope="col" class="number" { "total" }
                     }
                 }
             }
@@ -69,8 +69,8 @@ fn table(criterion: &EffectsReport, morris: bool) -> Markup {
                             td class="number" { (bare(effect.mean)) }
                             td class="number" { (bare(effect.deviation)) }
                         } @else {
-                            td class="number" { (told(effect.first)) }
-                            td class="number" { (told(effect.total)) }
+                            td class="number" { (with_interval(effect.first)) }
+                            td class="number" { (with_interval(effect.total)) }
                         }
                     }
                 }
@@ -79,27 +79,27 @@ fn table(criterion: &EffectsReport, morris: bool) -> Markup {
     }
 }
 
-/// Deviation over magnitude, a dot for every parameter.
+/// Returns the plot of standard deviation over magnitude, with a dot for every parameter.
 fn plane(criterion: &EffectsReport) -> Figure {
     let dot = |(i, effect): (usize, &EffectReport)| Curve {
         name: effect.parameter.clone(),
         points: vec![(effect.magnitude.unwrap_or(f64::NAN), effect.deviation.unwrap_or(f64::NAN))],
         style: CurveStyle::Dots,
-        ink: Ink::Series(i),
+        color: Color::Series(i),
         ..Curve::default()
     };
     let longest = criterion.effects.iter().filter_map(|e| e.magnitude).fold(0.0, f64::max);
     let equal = Curve {
-        name: "as large as the magnitude".into(),
+        name: "deviation = magnitude".into(),
         points: vec![(0.0, 0.0), (longest, longest)],
         style: CurveStyle::Dashed,
-        ink: Ink::Faint,
+        color: Color::Faint,
         ..Curve::default()
     };
     let plot = Plot {
         title: format!("Elementary effects on {}", criterion.of.criterion),
         x_label: labelled("magnitude", &criterion.of.unit),
-        y_label: labelled("deviation", &criterion.of.unit),
+        y_label: labelled("standard deviation", &criterion.of.unit),
         curves: std::iter::once(equal).chain(criterion.effects.iter().enumerate().map(dot)).collect(),
         ..Plot::default()
     };
@@ -109,10 +109,10 @@ fn plane(criterion: &EffectsReport) -> Figure {
     }
 }
 
-/// Shares with their intervals, side by side; the parameters are counted along x.
+/// Returns the plot of Sobol indices with their intervals, parameters numbered along x.
 #[allow(clippy::cast_precision_loss)]
 fn shares(criterion: &EffectsReport) -> Figure {
-    let of = |name: &str, ink: Ink, aside: f64, pick: fn(&EffectReport) -> Option<Estimated>| {
+    let of = |name: &str, color: Color, aside: f64, pick: fn(&EffectReport) -> Option<Estimated>| {
         let known: Vec<(f64, Estimated)> = criterion
             .effects
             .iter()
@@ -123,19 +123,19 @@ fn shares(criterion: &EffectsReport) -> Figure {
         let bars = known.iter().flat_map(bar).collect();
         let dots = known.iter().map(|(x, share)| (*x, share.value)).collect();
         [
-            Curve { points: bars, ink, ..Curve::default() },
-            Curve { name: name.into(), points: dots, style: CurveStyle::Dots, ink, ..Curve::default() },
+            Curve { points: bars, color, ..Curve::default() },
+            Curve { name: name.into(), points: dots, style: CurveStyle::Dots, color, ..Curve::default() },
         ]
     };
     let mut curves = Vec::new();
-    curves.extend(of("alone", Ink::Result, -0.08, |e| e.first));
-    curves.extend(of("alone and with others", Ink::Measured, 0.08, |e| e.total));
+    curves.extend(of("first-order", Color::Result, -0.08, |e| e.first));
+    curves.extend(of("total", Color::Measured, 0.08, |e| e.total));
     let names: Vec<String> =
         criterion.effects.iter().enumerate().map(|(i, e)| format!("{} {}", i + 1, e.parameter)).collect();
     let plot = Plot {
-        title: format!("Shares of the variance of {}", criterion.of.criterion),
+        title: format!("Sobol indices of {}", criterion.of.criterion),
         x_label: format!("parameter: {}", names.join(", ")),
-        y_label: "share".into(),
+        y_label: "share of the variance".into(),
         curves,
         x_range: Some([0.5, criterion.effects.len() as f64 + 0.5]),
         ..Plot::default()

@@ -1,4 +1,4 @@
-//! What is found where parameters are uncertain: sentences, tables, plots.
+//! Results for uncertain parameters: sentences, tables, plots.
 
 mod distributions;
 mod effects;
@@ -14,14 +14,14 @@ use super::page::scrolling;
 use super::verdict::Tone;
 use crate::numbers::{number, significant};
 
-/// A section of the page: its title, what is said, and its plots.
+/// Section of the page: title, content and plots.
 pub(super) struct Section {
     pub(super) title: &'static str,
     pub(super) content: Markup,
     pub(super) group: Group,
 }
 
-/// The sections of what was found.
+/// Returns the sections of all results for uncertain parameters.
 pub(super) fn sections(report: &Report<'_>) -> Vec<Section> {
     let found = &report.outcome.found;
     let robust = found.robust.as_ref().map(rounds::section);
@@ -31,7 +31,7 @@ pub(super) fn sections(report: &Report<'_>) -> Vec<Section> {
     [robust, worst, drawn, effects].into_iter().flatten().collect()
 }
 
-/// The verdict, and how good it is; `None` where parameters are taken as known.
+/// Returns the verdict in words, with its tone; `None` without results for uncertain parameters.
 pub(super) fn verdict(outcome: &Outcome) -> Option<(Tone, String)> {
     let found = &outcome.found;
     if let Some(found) = &found.robust {
@@ -45,21 +45,21 @@ pub(super) fn verdict(outcome: &Outcome) -> Option<(Tone, String)> {
         return Some((tone, found.words.iter().take(2).cloned().collect::<Vec<_>>().join(" ")));
     }
     if let Some(found) = &found.worst_case {
-        let asked = found.criteria.iter().filter(|c| c.of.demand.is_some());
-        let tone = if asked.clone().all(|c| c.met) && found.criteria.iter().all(|c| c.failed == 0) {
+        let demanded = found.criteria.iter().filter(|c| c.of.demand.is_some());
+        let tone = if demanded.clone().all(|c| c.met) && found.criteria.iter().all(|c| c.failed == 0) {
             Tone::Good
         } else {
             Tone::Mixed
         };
-        let worst = asked.filter(|c| !c.met).max_by(|a, b| a.scaled.total_cmp(&b.scaled));
+        let worst = demanded.filter(|c| !c.met).max_by(|a, b| a.scaled.total_cmp(&b.scaled));
         let words = worst.map(|worst| {
             let missed = significant(worst.scaled, 4);
             format!(
-                "Not met everywhere in the box: `{}` in case `{}` comes to {missed} times its demand at worst.",
+                "Demand missed in the box: `{}` in case `{}` has the worst scaled value {missed}.",
                 worst.of.criterion, worst.of.case
             )
         });
-        let met = "Every demand is met at every point of the box that was looked at.";
+        let met = "All demands are met at every evaluated point of the box.";
         return Some((tone, words.unwrap_or_else(|| met.to_owned())));
     }
     if let Some(found) = &found.monte_carlo {
@@ -73,7 +73,7 @@ pub(super) fn verdict(outcome: &Outcome) -> Option<(Tone, String)> {
     Some((Tone::Good, found.words.first().cloned()?))
 }
 
-/// What is uncertain, as a table.
+/// Returns the table of uncertain parameters.
 fn parameters(list: &[UncertainReport]) -> Markup {
     let bound = |value: f64| if value.is_finite() { number(value) } else { String::new() };
     scrolling(
@@ -82,7 +82,7 @@ fn parameters(list: &[UncertainReport]) -> Markup {
             table {
                 thead {
                     tr {
-                        th scope="col" { "uncertain" }
+                        th scope="col" { "uncertain parameter" }
                         th scope="col" class="number" { "nominal" }
                         th scope="col" class="number" { "from" }
                         th scope="col" class="number" { "to" }

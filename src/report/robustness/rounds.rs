@@ -1,11 +1,11 @@
-//! How a design against worst cases came about: rounds, bounds, cases that were added.
+//! Robust design against worst cases: rounds, bounds, added cases.
 
 use maud::{Markup, html};
 use mops_core::RobustReport;
 
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;
-use super::super::plot::{Curve, CurveStyle, Ink, Plot};
+use super::super::plot::{Color, Curve, CurveStyle, Plot};
 use super::super::sensitivity::sentences;
 use super::{Section, parameters, worst};
 use crate::numbers::{number, significant};
@@ -16,8 +16,9 @@ pub(super) fn section(found: &RobustReport) -> Section {
         (parameters(&found.parameters))
         h3 { "Rounds" }
         p {
-            "Each round makes the best design for the cases at hand, and searches the box for worse ones. The worst over the "
-            "cases at hand can only rise; the worst that is found in the box is what the design of the round would do."
+            "Each round solves the design for the present cases, then searches the box for worse ones. The worst scaled value "
+            "over the present cases is a lower bound on the worst case of any design, if the solution is optimal. It increases as "
+            "cases are added. The worst value found in the box is that of the design of the round."
         }
         (rounds(found))
         h3 { "Worst cases of the design" }
@@ -39,9 +40,9 @@ fn rounds(found: &RobustReport) -> Markup {
                     tr {
                         th scope="col" class="number" { "round" }
                         th scope="col" class="number" { "cases" }
-                        th scope="col" class="number" { "worst of these" }
-                        th scope="col" class="number" { "worst found" }
-                        th scope="col" class="number" { "violation found" }
+                        th scope="col" class="number" { "worst over the cases" }
+                        th scope="col" class="number" { "worst found in the box" }
+                        th scope="col" class="number" { "violation in the box" }
                         th scope="col" class="number" { "evaluations" }
                         th scope="col" { "added" }
                     }
@@ -72,28 +73,28 @@ fn rounds(found: &RobustReport) -> Markup {
 
 #[allow(clippy::cast_precision_loss)]
 fn bounds(found: &RobustReport) -> Figure {
-    let curve = |name: &str, ink: Ink, style: CurveStyle, of: &dyn Fn(&mops_core::RoundReport) -> f64| Curve {
+    let curve = |name: &str, color: Color, style: CurveStyle, of: &dyn Fn(&mops_core::RoundReport) -> f64| Curve {
         name: name.into(),
         points: found.rounds.iter().enumerate().map(|(i, round)| ((i + 1) as f64, of(round))).collect(),
-        ink,
+        color,
         style,
         ..Curve::default()
     };
     let mut curves = vec![
-        curve("worst found in the box", Ink::Measured, CurveStyle::Line, &|round| round.found),
-        curve("", Ink::Measured, CurveStyle::Dots, &|round| round.found),
-        curve("worst over the cases at hand", Ink::Result, CurveStyle::Line, &|round| round.for_cases),
-        curve("", Ink::Result, CurveStyle::Dots, &|round| round.for_cases),
+        curve("worst found in the box", Color::Measured, CurveStyle::Line, &|round| round.found),
+        curve("", Color::Measured, CurveStyle::Dots, &|round| round.found),
+        curve("worst over the present cases", Color::Result, CurveStyle::Line, &|round| round.for_cases),
+        curve("", Color::Result, CurveStyle::Dots, &|round| round.for_cases),
     ];
     if found.rounds.iter().any(|round| round.violation_found > 0.0) {
-        curves.push(curve("violation found in the box", Ink::Demand, CurveStyle::Dashed, &|round| {
+        curves.push(curve("violation found in the box", Color::Demand, CurveStyle::Dashed, &|round| {
             round.violation_found.max(0.0)
         }));
     }
     let plot = Plot {
-        title: "Worst scaled value by rounds".into(),
+        title: "Worst scaled value by round".into(),
         x_label: "round".into(),
-        y_label: "scaled value".into(),
+        y_label: "worst scaled value".into(),
         curves,
         ..Plot::default()
     };

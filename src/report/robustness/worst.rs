@@ -1,4 +1,4 @@
-//! Worst cases: a table, the responses there, and every criterion along every parameter.
+//! Worst cases: a table, their responses, and every criterion along every parameter.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use mops_core::{CoordinateReport, Problem, UncertainReport, WorstCaseReport, Wor
 use super::super::Report;
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;
-use super::super::plot::{Curve, CurveStyle, Ink, Level, Plot};
+use super::super::plot::{Color, Curve, CurveStyle, Level, Plot};
 use super::super::sampling;
 use super::super::sensitivity::sentences;
 use super::{Section, parameters};
@@ -26,7 +26,7 @@ pub(super) fn section(report: &Report<'_>, found: &WorstCaseReport) -> Section {
     Section { title: "Worst cases", content, group }
 }
 
-/// The worst of every criterion, and where it is.
+/// Returns the table of the worst case of every criterion.
 pub(super) fn table(list: &[WorstReport], names: &[UncertainReport]) -> Markup {
     let failed = list.iter().any(|worst| worst.failed > 0);
     scrolling(
@@ -44,7 +44,7 @@ pub(super) fn table(list: &[WorstReport], names: &[UncertainReport]) -> Markup {
                         th scope="col" class="number" { "scaled" }
                         th scope="col" { "met" }
                         @for name in names { th scope="col" class="number" { "at " (labelled(&name.name, &name.unit)) } }
-                        th scope="col" class="number" { "searches" }
+                        th scope="col" class="number" { "searches ending here" }
                         @if failed { th scope="col" class="number" { "failed" } }
                     }
                 }
@@ -76,7 +76,7 @@ fn coordinate(at: &CoordinateReport) -> Markup {
     html! { (number(at.value)) @if let Some(side) = at.at_bound { small { (side) " end" } } }
 }
 
-/// The signals that a criterion reads, without uncertainty and at its worst.
+/// Returns plots of the signals that a criterion reads, for nominal parameters and in the worst case.
 fn responses(report: &Report<'_>, found: &WorstCaseReport) -> Vec<Figure> {
     let study = report.problem.study().over_uncertain(&report.best.tuners);
     let first = study.tuners().len() - study.tasks().uncertain.len();
@@ -88,24 +88,24 @@ fn responses(report: &Report<'_>, found: &WorstCaseReport) -> Vec<Figure> {
         let Some(row) = study.rows().iter().find(here) else { continue };
         let mut tuners = study.start();
         let analyses = [
-            ("without uncertainty", CurveStyle::Dashed, Ink::Start, false),
-            ("at worst", CurveStyle::Line, Ink::Result, true),
+            ("nominal", CurveStyle::Dashed, Color::Start, false),
+            ("worst case", CurveStyle::Line, Color::Result, true),
         ]
-        .map(|(name, style, ink, moved)| {
+        .map(|(name, style, color, moved)| {
             if moved {
                 tuners[first..].iter_mut().zip(&worst.at).for_each(|(value, at)| *value = at.value);
             }
-            (name, style, ink, problem.analyse_all(row.job, &tuners, None).ok())
+            (name, style, color, problem.analyse_all(row.job, &tuners, None).ok())
         });
         let signals = &study.models()[study.jobs()[row.job].model].1.interface().signals;
         for signal in row.criterion.signals() {
-            let curve = |(name, style, ink, analysis): &(&str, CurveStyle, Ink, Option<mops_core::Analysis>)| {
+            let curve = |(name, style, color, analysis): &(&str, CurveStyle, Color, Option<mops_core::Analysis>)| {
                 let trace = analysis.as_ref()?.response()?.trace(&signal)?;
                 Some(Curve {
                     name: (*name).into(),
                     points: sampling::points(trace),
                     style: *style,
-                    ink: *ink,
+                    color: *color,
                     ..Curve::default()
                 })
             };
@@ -116,7 +116,7 @@ fn responses(report: &Report<'_>, found: &WorstCaseReport) -> Vec<Figure> {
             let marks = analyses[1].3.iter().flat_map(|analysis| row.criterion.marks(row.demand.limit(), analysis));
             let levels = marks.filter(|m| m.signal == signal && m.level.is_finite());
             let plot = Plot {
-                title: format!("{signal} where {} is worst", of.criterion),
+                title: format!("{signal} in the worst case of {}", of.criterion),
                 x_label: "time (s)".into(),
                 y_label: labelled(&signal, &variable.unit.to_string()),
                 curves,
@@ -130,16 +130,16 @@ fn responses(report: &Report<'_>, found: &WorstCaseReport) -> Vec<Figure> {
     figures
 }
 
-/// A criterion along every parameter through its worst case, which is marked.
+/// Returns plots of a criterion along every parameter through its worst case, which is marked.
 fn slices(worst: &WorstReport) -> Vec<Figure> {
     let of = &worst.of;
     let one = |(slice, at): (&mops_core::Slice, &CoordinateReport)| {
         let points = slice.x.iter().copied().zip(slice.y.iter().copied()).collect();
         let mark = Curve {
-            name: "worst".into(),
+            name: "worst case".into(),
             points: vec![(at.value, worst.value)],
             style: CurveStyle::Dots,
-            ink: Ink::Demand,
+            color: Color::Demand,
             ..Curve::default()
         };
         let plot = Plot {

@@ -1,26 +1,25 @@
-//! The two tiers of the tests: the quick one runs a tenth of the cases of a property, the full one all of them.
+//! Tiers of property tests: the quick tier runs a tenth of the cases of a property, the full tier all of them.
 //!
-//! `cargo test --workspace` is the quick tier, `cargo test --workspace --features full-tests` the full one. A property test
-//! states its number of cases once, for the full tier.
+//! `cargo test --workspace` runs the quick tier, `cargo test --workspace --features full-tests` the full tier. A property
+//! test states the number of cases of the full tier.
 
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::RngSeed;
 
-/// The number of cases to run of a property that has `full` of them in the full tier: all there, a tenth (rounded up) in
-/// the quick tier.
+/// Returns the number of cases of a property: `full` in the full tier, a tenth of it, rounded up, in the quick tier.
 #[must_use]
 pub const fn cases(full: u32) -> u32 {
     if is_full() { full } else { full.div_ceil(10) }
 }
 
-/// Whether the tests run in the full tier.
+/// Returns true if the tests run in the full tier.
 #[must_use]
 pub const fn is_full() -> bool {
     cfg!(feature = "full-tests")
 }
 
-/// The configuration of a property with `full` cases in the full tier: the same cases in every run, and no files of
-/// failures.
+/// Returns the configuration of a property with `full` cases in the full tier. Every run has the same cases, and failures are
+/// not written to files.
 #[must_use]
 pub fn property(full: u32) -> ProptestConfig {
     ProptestConfig {

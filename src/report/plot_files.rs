@@ -1,5 +1,5 @@
-//! Which pictures are those of a report: what an earlier one drew in the folder, and this one does not, goes. What others put
-//! there stays.
+//! Plot files of a report: files of an earlier report that the present one does not write are removed. Other files in the
+//! folder stay.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,37 +9,37 @@ use std::path::{Path, PathBuf};
 use crate::files;
 use crate::numbers::file_name;
 
-/// The file that lists the pictures of a folder, a name without ending in each line.
+/// File that lists the plots of a folder, one name without extension per line.
 const LIST: &str = ".pictures";
 
-/// Pictures that an earlier report left in its folder.
-pub(super) struct Pictures {
+/// Plot files of an earlier report.
+pub(super) struct PlotFiles {
     folder: PathBuf,
     names: BTreeSet<String>,
 }
 
-impl Pictures {
-    /// Those of a folder; none where nothing was noted.
+impl PlotFiles {
+    /// Reads the list of a folder; empty without a list.
     pub(super) fn of(folder: &Path) -> Self {
         let list = files::read(&folder.join(LIST)).unwrap_or_default();
         let list = String::from_utf8_lossy(&list);
-        // A list that leads out of the folder is none of ours.
+        // A name that leads out of the folder is not ours.
         let names = list.lines().filter(|name| file_name(name) == **name).map(str::to_owned).collect();
         Self { folder: folder.to_owned(), names }
     }
 
-    /// Notes these beside the earlier ones, before they are drawn: whatever happens then, all of them are known.
+    /// Adds names to the list before the files are written, so that an interruption leaves no unlisted file.
     ///
     /// # Errors
-    /// The list cannot be written.
+    /// If the list cannot be written.
     pub(super) fn note<'n>(&'n self, names: impl Iterator<Item = &'n str>) -> io::Result<()> {
         self.write(names.chain(self.names.iter().map(String::as_str)).collect())
     }
 
-    /// Removes the earlier ones that are none of these.
+    /// Removes the earlier files that are not among `names`.
     ///
     /// # Errors
-    /// A picture cannot be removed, or the list not be written.
+    /// If a file cannot be removed, or the list cannot be written.
     pub(super) fn remove_others<'n>(&self, names: impl Iterator<Item = &'n str>) -> io::Result<()> {
         let names: BTreeSet<&str> = names.collect();
         for name in self.names.iter().filter(|name| !names.contains(name.as_str())) {
@@ -64,13 +64,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pictures_of_an_earlier_report_go_and_all_else_stays() {
+    fn plots_of_an_earlier_report_are_removed_and_other_files_stay() {
         let folder = tempfile::tempdir().unwrap();
         let (plots, at) = (folder.path().join("plots"), |name: &str| folder.path().join("plots").join(name));
         fs::create_dir(&plots).unwrap();
         fs::write(folder.path().join("outside.svg"), "").unwrap();
         let draw = |names: &[&str]| {
-            let earlier = Pictures::of(&plots);
+            let earlier = PlotFiles::of(&plots);
             earlier.note(names.iter().copied()).unwrap();
             for name in names {
                 ["svg", "png"].iter().for_each(|end| fs::write(at(&format!("{name}.{end}")), "").unwrap());
@@ -81,7 +81,7 @@ mod tests {
         fs::write(at("notes.md"), "").unwrap();
         draw(&["a", "b"]);
         draw(&["b", "c"]);
-        for (name, there) in [
+        for (name, exists) in [
             ("a.svg", false),
             ("a.png", false),
             ("b.svg", true),
@@ -89,10 +89,10 @@ mod tests {
             ("mine.svg", true),
             ("notes.md", true),
         ] {
-            assert_eq!(at(name).exists(), there, "{name}");
+            assert_eq!(at(name).exists(), exists, "{name}");
         }
-        // Of one that was killed while it drew, the next one knows all.
-        Pictures::of(&plots).note(["d"].into_iter()).unwrap();
+        // The next report removes the files of one that was killed.
+        PlotFiles::of(&plots).note(["d"].into_iter()).unwrap();
         fs::write(at("d.svg"), "").unwrap();
         fs::write(at(LIST), fs::read_to_string(at(LIST)).unwrap() + "../outside\n/etc/passwd\n").unwrap();
         draw(&["c"]);
