@@ -5,7 +5,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use mops::core::file::{self, Files};
+use mops::file::{self, Files};
 use mops::{Study, StudyBuilder, Task, TunerBuilder};
 
 /// Folder that data paths are relative to.

@@ -1,0 +1,160 @@
+//! Prose outside of `discrepancy` uses the field's words: the forbidden words and phrases below stand in no page, message or
+//! comment.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Places whose prose is checked.
+const PLACES: [&str; 19] = [
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "README.md",
+    "SECURITY.md",
+    "benches",
+    "criteria",
+    "docs",
+    "effects",
+    "examples",
+    "math",
+    "models",
+    "mops-bench",
+    "mops-core",
+    "solvers",
+    "src",
+    "studies",
+    "tests/problems",
+    "tests/testbed",
+    "tests/tiers",
+];
+
+/// Pages that are not checked: histories, and the page of the diagnosis until its search is rebuilt.
+const LEFT_OUT: [&str; 2] = ["docs/adr", "docs/explanation/diagnosis.md"];
+
+/// Words that are not used, whole words in any case; the field's word stands behind each.
+const WORDS: [(&str, &str); 10] = [
+    ("afresh", "again, from a new start"),
+    ("begun", "started"),
+    ("held", "fixed, kept; held-out data are held-out"),
+    ("led", "taken, mapped"),
+    ("likeness", "cosine similarity"),
+    ("said", "reported, stated, given"),
+    ("tell", "report, distinguish"),
+    ("telling", "reporting"),
+    ("tells", "reports, shows"),
+    ("told", "reported"),
+];
+
+/// Phrases that are not used.
+const PHRASES: [(&str, &str); 6] = [
+    ("all that can be had", "the best achievable"),
+    ("stand there", "are present"),
+    ("stands there", "is present"),
+    ("to and fro", "back and forth"),
+    ("what chance does", "what chance explains (p-value)"),
+    ("what the model leaves", "the residual"),
+];
+
+/// First words that no doc comment has: they need the item above, which rustdoc does not show.
+const OPENINGS: [&str; 5] = ["The same", "It ", "That ", "Those ", "Such "];
+
+/// Places where a word has its other meaning: end of the path, part of the line.
+const ALLOWED: [(&str, &str); 2] = [("", "held-out"), ("", "held out")];
+
+#[test]
+fn prose_is_in_the_words_of_the_field() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut found = Vec::new();
+    for place in PLACES {
+        for path in files(&root.join(place)) {
+            let name = path.strip_prefix(root).expect("it is below").display().to_string().replace('\\', "/");
+            if LEFT_OUT.iter().any(|left| name.starts_with(left)) {
+                continue;
+            }
+            let text = fs::read_to_string(&path).expect("it is text");
+            let is_code = name.ends_with(".rs");
+            for (number, line) in text.lines().enumerate() {
+                let allowed = |(end, part): &(&str, &str)| name.ends_with(end) && line.contains(part);
+                if ALLOWED.iter().any(allowed) {
+                    continue;
+                }
+                let prose = if is_code { prose_of(line) } else { line.to_owned() };
+                let at = |what: String| format!("{name}:{}: {what}", number + 1);
+                found.extend(faults(&prose).into_iter().map(at));
+                found.extend(is_code.then(|| opening(line)).flatten().map(at));
+            }
+        }
+    }
+    assert!(found.is_empty(), "{} places:\n{}", found.len(), found.join("\n"));
+}
+
+#[test]
+fn forbidden_words_are_found_as_whole_words_only() {
+    for (text, count) in [
+        ("as told above", 1),
+        ("Told once, and it tells", 2),
+        ("the threshold is held", 1),
+        ("a controlled, labelled, filled vessel", 0),
+        ("what `stands there` is", 1),
+        ("a step is fixed", 0),
+    ] {
+        assert_eq!(faults(text).len(), count, "{text}");
+    }
+    assert_eq!(prose_of("let told = 3; // not told"), " not told");
+    assert_eq!(prose_of("f(\"it is said\", led)"), "it is said ");
+    assert_eq!(prose_of("    /// Returns it."), " Returns it.");
+    assert!(opening("    /// The same for doubles.").is_some() && opening("/// Thesis").is_none());
+}
+
+/// Forbidden words and phrases in a text, each with what to write instead.
+fn faults(text: &str) -> Vec<String> {
+    let lower = text.to_lowercase();
+    let words = lower.split(|c: char| !c.is_alphanumeric());
+    let of_word = |word: &str| WORDS.iter().find(|(forbidden, _)| *forbidden == word);
+    let phrases = PHRASES.iter().filter(|(forbidden, _)| lower.contains(forbidden));
+    words.filter_map(of_word).chain(phrases).map(|(word, instead)| format!("`{word}`: write {instead}")).collect()
+}
+
+/// The comment and the string literals of a line of Rust.
+fn prose_of(line: &str) -> String {
+    let mut prose = String::new();
+    let mut rest = line;
+    let mut in_string = false;
+    while let Some(c) = rest.chars().next() {
+        if !in_string && rest.starts_with("//") {
+            prose.push_str(rest.trim_start_matches(['/', '!']));
+            break;
+        }
+        if in_string && rest.starts_with('\\') {
+            rest = rest.get(2..).unwrap_or("");
+            continue;
+        }
+        if c == '"' {
+            in_string = !in_string;
+            prose.push_str(if in_string { "" } else { " " });
+        } else if in_string {
+            prose.push(c);
+        }
+        rest = &rest[c.len_utf8()..];
+    }
+    prose
+}
+
+/// A doc comment that opens without its noun.
+fn opening(line: &str) -> Option<String> {
+    let text = line.trim_start();
+    let text = text.strip_prefix("///").or_else(|| text.strip_prefix("//!"))?.trim_start();
+    let word = OPENINGS.iter().find(|opening| text.starts_with(**opening))?;
+    Some(format!("a comment opens with `{}`: name the thing", word.trim()))
+}
+
+/// The file, or the files of prose below a folder.
+fn files(place: &Path) -> Vec<PathBuf> {
+    if place.is_file() {
+        return vec![place.to_owned()];
+    }
+    let entries = fs::read_dir(place).unwrap_or_else(|error| panic!("{}: {error}", place.display()));
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("it can be read").path()).collect();
+    paths.sort();
+    let is_prose = |path: &PathBuf| path.extension().is_some_and(|end| end == "rs" || end == "md");
+    paths.into_iter().filter(|path| path.is_dir() || is_prose(path)).flat_map(|path| files(&path)).collect()
+}
