@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 use self::feedback::Wanted;
 use self::text::MANY;
 use super::study::{StudyArguments, open};
-use crate::terminal::{CommandError, Limit, or_end, print};
+use crate::terminal::{CommandError, Limit, exit_after, print};
 
 /// What is linearised, and what is done with it.
 #[derive(Args)]
@@ -62,7 +62,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    or_end(arguments.limit);
+    exit_after(arguments.limit);
     let study = open(catalogue, &arguments.study)?.study;
     let (job, model) = chosen(&study, arguments)?;
     let (name, case) = (&study.models[model].0, &study.cases[study.jobs[job].case]);

@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use super::study::{StudyArguments, open_as};
 use crate::files;
-use crate::terminal::{CommandError, Limit, number, print, table, within};
+use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 use crate::toml_text::{self, TomlText, key, quoted};
 
 /// What can be said to the choice of a point.
@@ -74,7 +74,7 @@ pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     }
     let setting = |(name, value): &(String, String)| format!("criteria.{}.demand={}", key(name), written(value));
     let mut file = open(arguments.demands.iter().map(setting).collect())?;
-    file.study.cancelled_by(&within(arguments.limit));
+    file.study.cancelled_by(&cancel_after(arguments.limit));
     let problem = Problem::new(Arc::new(file.study.clone()));
     let (index, at) = nearest(&problem, &front, &path)?;
     let refined = if arguments.no_refine { None } else { refined(catalogue, &problem, &at) };

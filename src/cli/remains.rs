@@ -13,7 +13,7 @@ use mops_discrepancy::Diagnosis;
 
 use super::study::Home;
 use crate::diagnosis::{Original, predictions, repaired, source};
-use crate::files::{self, Beside};
+use crate::files::{self, AtomicFile};
 use crate::report::Report;
 use crate::search::Solved;
 use crate::terminal::CommandError;
@@ -48,9 +48,9 @@ impl Remains<'_> {
         let until = Instant::now() + patience;
         let is_full = |error: &io::Error| matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded);
         loop {
-            let written = Beside::create(&path).and_then(|mut file| {
+            let written = AtomicFile::create(&path).and_then(|mut file| {
                 file.write_all(json.as_bytes())?;
-                file.settle_on_disk()
+                file.commit_synced()
             });
             match written {
                 Err(error) if is_full(&error) && Instant::now() < until => thread::sleep(Duration::from_millis(100)),

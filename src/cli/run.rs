@@ -14,7 +14,7 @@ use super::{diagnosis, findings, keep, tables};
 use crate::numbers::file_name;
 use crate::search::{DEFAULT_EVALUATIONS, Options, Solved, solves, suits};
 use crate::store::Start;
-use crate::terminal::{CommandError, Limit, Progress, listen, print, print_json, say};
+use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, eprint_line, print, print_json};
 use crate::watch::{Both, Page};
 
 /// What `mops diagnose` sets.
@@ -156,7 +156,10 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
         jobs: arguments.jobs.map(usize::from),
         effects: catalogue.effects.clone(),
         keeping: None,
-        cancellation: listen(arguments.limit, "interrupted: saving the best point; press Ctrl-C again to quit now"),
+        cancellation: cancel_on_signal(
+            arguments.limit,
+            "interrupted: saving the best point; press Ctrl-C again to quit now",
+        ),
     };
     // Before anything of an earlier run is touched.
     suits(&file.study, &options.solver).map_err(|why| refused(&why.0, &file, options.solver.kind))?;
@@ -169,7 +172,7 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     }
     if talks {
         for warning in &file.study.warnings {
-            say(&format!("warning: {warning}"));
+            eprint_line(&format!("warning: {warning}"));
         }
     }
     let mut said = Said::default();
@@ -180,7 +183,7 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     let asked = StudyArguments { study: arguments.study.study.clone(), settings: settings.clone() };
     let keeper = keep::open((&folder, &start), (&file, &asked), &home, &options)?;
     if let Some(note) = keeper.note.as_ref().filter(|_| talks) {
-        say(&format!("note: {note}"));
+        eprint_line(&format!("note: {note}"));
     }
     let (known, id) = (keeper.known(), keeper.id.clone());
     let page = arguments.watch.then(|| watch(&file.study, &options)).transpose()?;
@@ -230,14 +233,14 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
         said.of(print(&(shown(&solved) + &told)));
     }
     if let Ok(Some(note)) = &held {
-        say(&format!("warning: {note}"));
+        eprint_line(&format!("warning: {note}"));
     }
     let written = result.and_then(|()| remains.write_others());
     if let Some(page) = page {
         page.finish(&folder);
     }
     if let Some(trouble) = opened.end(keep::state(solved.outcome.stop), solved.outcome.evaluations) {
-        say(&format!("warning: not all of the run is in the database: {trouble}"));
+        eprint_line(&format!("warning: not all of the run is in the database: {trouble}"));
     }
     if talks && written.is_ok() {
         said.of(print(&format!("\nresult, report and plots are in {}\n", folder.display())));
@@ -295,7 +298,7 @@ fn shown(solved: &Solved) -> String {
 fn watch(study: &Study, options: &Options) -> Result<Page, CommandError> {
     let cannot = |error| CommandError::Failure(format!("no page can be served for --watch: {error}"));
     let page = Page::open(study, options.solver.kind, options.max_evaluations).map_err(cannot)?;
-    say(&format!("watch the run at {}", page.address()));
+    eprint_line(&format!("watch the run at {}", page.address()));
     Ok(page)
 }
 

@@ -13,7 +13,7 @@ use super::tables::criteria;
 use crate::files;
 use crate::numbers::FileNames;
 use crate::report::{Curve, Ink, Plot, points};
-use crate::terminal::{CommandError, Limit, number, print, table, within};
+use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 
 /// What is simulated.
 #[derive(Args)]
@@ -38,7 +38,7 @@ pub(super) struct Arguments {
 
 pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let mut study = open(catalogue, &arguments.study)?.study;
-    study.cancelled_by(&within(arguments.limit));
+    study.cancelled_by(&cancel_after(arguments.limit));
     let tuners = values(&study, &arguments.at)?;
     if let Some(case) = &arguments.case {
         let names = study.cases.iter().map(|c| c.name.as_str());

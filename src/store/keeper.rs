@@ -154,7 +154,7 @@ impl Keeper {
                 let draft = Database::draft(&file(folder), &run).map_err(cannot)?;
                 note = make_room(folder)?.or(note);
                 let cannot = |error| Refusal::Failure(format!("{} cannot be written: {error}", file(folder).display()));
-                draft.settle().map_err(cannot)?
+                draft.commit().map_err(cannot)?
             }
         };
         let taken = database.room_taken().map_err(cannot)?;

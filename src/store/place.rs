@@ -10,11 +10,11 @@ use rusqlite::{Connection, OpenFlags};
 
 use super::database::{Database, WAITS, is_passing, prepare};
 use super::runs::{RunRow, begin};
-use crate::files::{beside, is_at};
+use crate::files::{is_at, temporary_path};
 
 /// A new database that is not yet at its place.
 pub(super) struct Draft {
-    beside: PathBuf,
+    temporary: PathBuf,
     path: PathBuf,
     run: i64,
 }
@@ -31,25 +31,25 @@ pub(super) fn with_companions(path: &Path) -> [PathBuf; 4] {
 impl Database {
     /// Removes what a run left that was killed while it made its database.
     pub(super) fn clear_draft(path: &Path) {
-        for left in with_companions(&beside(path)) {
+        for left in with_companions(&temporary_path(path)) {
             let _ = fs::remove_file(left);
         }
     }
 
     /// Makes a new one that holds this run and nothing else. Nobody sees a half of it: it is made beside its place, in one
-    /// transaction, and moved by [`Draft::settle`].
+    /// transaction, and moved by [`Draft::commit`].
     ///
     /// # Errors
     /// The file cannot be written.
     pub(super) fn draft(path: &Path, run: &RunRow) -> rusqlite::Result<Draft> {
-        let beside = beside(path);
-        let mut connection = Connection::open(&beside)?;
+        let temporary = temporary_path(path);
+        let mut connection = Connection::open(&temporary)?;
         let transaction = connection.transaction()?;
         prepare(&transaction)?;
         let run = begin(&transaction, run)?;
         transaction.commit()?;
         connection.close().map_err(|(_, error)| error)?;
-        Ok(Draft { beside, path: path.to_owned(), run })
+        Ok(Draft { temporary, path: path.to_owned(), run })
     }
 
     /// Whether no run was ever entered there: a run was killed while it began, in a version that made its database in parts.
@@ -78,11 +78,11 @@ impl Database {
             return Ok(false);
         }
         let path = path.clone();
-        let beside = beside(&path);
-        let _ = fs::remove_file(&beside);
-        let copied = beside.to_str().ok_or_else(|| io::Error::other("its path is no text"));
+        let temporary = temporary_path(&path);
+        let _ = fs::remove_file(&temporary);
+        let copied = temporary.to_str().ok_or_else(|| io::Error::other("its path is no text"));
         self.connection.execute("VACUUM INTO ?", [copied?]).map_err(io::Error::other)?;
-        fs::rename(&beside, &path)?;
+        fs::rename(&temporary, &path)?;
         if let Some(again) = Self::open(&path, true).map_err(io::Error::other)? {
             *self = again;
         }
@@ -119,8 +119,8 @@ impl Draft {
     ///
     /// # Errors
     /// It cannot be moved, or opened.
-    pub(super) fn settle(self) -> io::Result<(Database, i64)> {
-        fs::rename(&self.beside, &self.path)?;
+    pub(super) fn commit(self) -> io::Result<(Database, i64)> {
+        fs::rename(&self.temporary, &self.path)?;
         let database = Database::open(&self.path, true).map_err(io::Error::other)?;
         Ok((database.ok_or_else(|| io::Error::other("it was replaced at once"))?, self.run))
     }

@@ -7,7 +7,7 @@ use mops_core::{DiagnosisTask, Effect, Mistake, Study, Watch, suggestion};
 use mops_discrepancy::Diagnosis;
 
 use crate::diagnosis::block;
-use crate::search::{Options, Solved, Unsuitable, look};
+use crate::search::{Options, Solved, Unsuitable, evaluate_start};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     let begun = Instant::now();
@@ -47,7 +47,7 @@ fn effects(task: &DiagnosisTask, all: &[Arc<dyn Effect>]) -> Result<Vec<Arc<dyn 
 fn ended(mut study: Study, options: &Options, watch: &dyn Watch) -> Solved {
     study.rows.clear();
     study.jobs.clear();
-    let mut solved = look(study, options, watch);
+    let mut solved = evaluate_start(study, options, watch);
     let outcome = &mut solved.outcome;
     (outcome.solver, outcome.evaluations, outcome.calibration) = ("discrepancy".to_owned(), 0, None);
     outcome.front.clear();
@@ -60,7 +60,7 @@ pub(crate) fn of(mut study: Study, options: &Options, diagnosis: Diagnosis) -> S
     // Criteria have no say in this: every channel counts with its noise.
     study.rows.clear();
     study.jobs.clear();
-    let mut solved = look(study, options, &());
+    let mut solved = evaluate_start(study, options, &());
     let outcome = &mut solved.outcome;
     let study = solved.problem.study();
     for (report, tuner) in outcome.tuners.iter_mut().zip(&study.tuners) {

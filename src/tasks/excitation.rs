@@ -3,7 +3,7 @@
 use mops_core::identification::{excitations, regressions};
 use mops_core::{ExcitationFindings, Study, Watch};
 
-use crate::search::{Options, Solved, look};
+use crate::search::{Options, Solved, evaluate_start};
 
 pub(super) fn perform(mut study: Study, options: &Options, watch: &dyn Watch) -> Solved {
     let inputs = excitations(&study, &study.tasks.excitation.question);
@@ -11,7 +11,7 @@ pub(super) fn perform(mut study: Study, options: &Options, watch: &dyn Watch) ->
     // Criteria have no say in this: nothing is simulated.
     study.rows.clear();
     study.jobs.clear();
-    let mut solved = look(study, options, watch);
+    let mut solved = evaluate_start(study, options, watch);
     solved.outcome.calibration = None;
     solved.outcome.found.excitation = Some(ExcitationFindings { inputs, regressions });
     solved

@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use mops_core::{Halt, Place, Stop, Study, Task, Watch};
 
-use crate::search::{Options, Solved, Unsuitable, look, search};
+use crate::search::{Options, Solved, Unsuitable, evaluate_start, search};
 
 /// Does the task of the study.
 ///
@@ -52,7 +52,7 @@ pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 /// The point that a task asks for.
 fn at(place: Place, study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
     match place {
-        Place::Start => Ok(look(study, options, watch)),
+        Place::Start => Ok(evaluate_start(study, options, watch)),
         Place::Optimum => search(study, options, watch),
     }
 }
