@@ -55,7 +55,8 @@ pub(super) fn list(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     let wanted = tables.into_iter().filter(|(sort, ..)| arguments.what.is_none_or(|what| what == *sort));
     let text: Vec<String> = wanted.map(|(_, title, rows)| table(&[title, ""], &[], rows)).collect();
     print(&format!(
-        "{}\nFor details: mops describe NAME, also for the tables of a study file: study, models, tuners, cases, experiments,\ncriteria, solver.\n",
+        "{}\nFor details: mops describe NAME, also for the tables of a study file: study, models, tuners, cases,\n\
+         experiments, criteria, solver.\n",
         text.join("\n")
     ))?;
     Ok(ExitCode::SUCCESS)

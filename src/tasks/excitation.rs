@@ -1,4 +1,4 @@
-//! `task = "excitation"`: how rich the inputs are, without a simulation.
+//! `task = "excitation"`: order of persistent excitation of the inputs, without a simulation.
 
 use mops_core::identification::{excitations, regressions};
 use mops_core::{ExcitationFindings, Study, Watch};
@@ -8,7 +8,7 @@ use crate::search::{Options, Solved, evaluate_start};
 pub(super) fn perform(mut study: Study, options: &Options, watch: &dyn Watch) -> Solved {
     let inputs = excitations(&study, &study.tasks.excitation.question);
     let regressions = regressions(&study);
-    // Criteria have no say in this: nothing is simulated.
+    // No criterion is evaluated, as nothing is simulated.
     study.rows.clear();
     study.jobs.clear();
     let mut solved = evaluate_start(study, options, watch);
