@@ -10,7 +10,7 @@ use mops_core::{
 
 use mops_discrepancy::Diagnosis;
 
-/// Options of [`crate::solve`].
+/// Options of [`crate::solve()`].
 #[derive(Clone)]
 pub struct Options {
     /// Solver and its options.
@@ -71,7 +71,7 @@ impl Default for Options {
     }
 }
 
-/// Result of [`crate::solve`].
+/// Result of [`crate::solve()`].
 pub struct Solved {
     /// Content of `result.json`.
     pub outcome: Outcome,

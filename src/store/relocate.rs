@@ -52,8 +52,8 @@ impl Database {
         Ok(Draft { temporary, path: path.to_owned(), run })
     }
 
-    /// Returns true if the database contains no run, as after a kill at the start of a run of a version that created its
-    /// database in several steps.
+    /// Returns true if the database contains no run. Earlier versions created the database in several steps and left such a
+    /// file when killed at the start.
     pub(super) fn is_blank(path: &Path) -> bool {
         let count = |connection: &Connection, sql: &str| connection.query_row(sql, [], |row| row.get::<_, i64>(0));
         let Ok(connection) = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE) else { return false };

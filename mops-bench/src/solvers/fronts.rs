@@ -55,8 +55,8 @@ fn statistics(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     [mean, square.sqrt()]
 }
 
-/// Returns the mean hypervolume of pymoo 0.6.2 under the same conditions, and the inverted generational distance if it was
-/// computed with equally many points of the true front.
+/// Returns the mean hypervolume of pymoo 0.6.2 under the same conditions, and the inverted generational distance. The latter is
+/// `None` if it was not computed with equally many points of the true front.
 ///
 /// Settings: NSGA-II with 100 members and 250 generations for two objectives; NSGA-III with 92 members and 250 (DTLZ1: 400)
 /// generations for three; 7 seeds.

@@ -1,4 +1,4 @@
-//! A linear system as text: operating point, matrices, poles, zeros and transfer functions.
+//! Text of a linear system: operating point, matrices, poles, zeros and transfer functions.
 
 use mops_core::linear::{Complex, TransferFunction, undecided};
 use mops_core::math::{self, complex};

@@ -207,9 +207,9 @@ impl<'a> Search<'a> {
         self.side
     }
 
-    /// Locates the end between the last point within the limit and one beyond, by regula falsi, and by bisection after a step
-    /// that does not halve the bracket. Returns `None` if the end is found or the search is over. Returns the point beyond if a
-    /// refit shows that it is within the limit.
+    /// Locates the end between the last point within the limit and one beyond, by regula falsi. A step that does not halve the
+    /// bracket is followed by a bisection. Returns `None` if the end is found or the search is over. Returns the point beyond
+    /// if a refit shows that it is within the limit.
     fn end_between(
         &mut self,
         start: f64,

@@ -13,7 +13,7 @@ use super::matching::matched;
 /// Version of the format of `case.json`.
 const FORMAT: u32 = 1;
 
-/// A case of a folder, `case.json`: equations of a plant with unknown parameters, and the data files measured on it.
+/// Case of a folder, `case.json`: equations of a plant with unknown parameters, and the data files measured on it.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[schemars(title = "mops-bench case, format 1")]
 pub(crate) struct Declared {
@@ -27,7 +27,7 @@ pub(crate) struct Declared {
     inputs: Vec<Named>,
     /// Measured outputs.
     pub(super) outputs: Vec<Output>,
-    /// One equation for each state, `m*v' = u - b*v`, in any order; a prime marks the time derivative.
+    /// Equations, one for each state, in any order: `m*v' = u - b*v`. A prime marks the time derivative.
     equations: Vec<String>,
     /// Unknown parameters, which the diagnosis calibrates.
     parameters: Vec<Parameter>,
@@ -53,7 +53,7 @@ fn format() -> u32 {
     FORMAT
 }
 
-/// A state or an input.
+/// State or input.
 #[derive(Debug, Deserialize, JsonSchema)]
 struct Named {
     /// Name in the equations.
@@ -65,7 +65,7 @@ struct Named {
     column: Option<String>,
 }
 
-/// A measured output.
+/// Measured output.
 #[derive(Debug, Deserialize, JsonSchema)]
 pub(super) struct Output {
     /// Name.
@@ -86,7 +86,7 @@ pub(super) struct Output {
     noise_std_total: Option<f64>,
 }
 
-/// An unknown parameter.
+/// Unknown parameter.
 #[derive(Debug, Deserialize, JsonSchema)]
 struct Parameter {
     /// Name in the equations.
