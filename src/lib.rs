@@ -4,7 +4,7 @@
 //! problem over the unit box, runs a solver on it and returns the outcome:
 //!
 //! ```
-//! use mops::{CaseDraft, CriterionDraft, Draft, ModelDraft, Options, TunerDraft, criteria::overshoot::Overshoot};
+//! use mops::{CaseBuilder, CriterionBuilder, StudyBuilder, ModelBuilder, Options, TunerBuilder, criteria::overshoot::Overshoot};
 //! # use mops::{Analysis, Failure, Interface, Job, Model, Parameter, Response, Trace, Variable};
 //! # struct Lag(Interface);
 //! # impl Model for Lag {
@@ -21,15 +21,15 @@
 //! #     horizon: Some(1.0),
 //! #     ..Interface::default()
 //! # });
-//! let study = Draft {
+//! let study = StudyBuilder {
 //!     name: "example".into(),
 //!     models: vec![("loop".into(), model.into())],
-//!     tuners: vec![("k".into(), TunerDraft::new(3.0, 0.5, 5.0))],
+//!     tuners: vec![("k".into(), TunerBuilder::new(3.0, 0.5, 5.0))],
 //!     criteria: vec![(
 //!         "overshoot".into(),
-//!         CriterionDraft::minimise(Overshoot { signal: "y".into(), target: Some(1.0.into()), ..Overshoot::default() }, 0.1),
+//!         CriterionBuilder::minimise(Overshoot { signal: "y".into(), target: Some(1.0.into()), ..Overshoot::default() }, 0.1),
 //!     )],
-//!     ..Draft::default()
+//!     ..StudyBuilder::default()
 //! }
 //! .build()?;
 //! let solved = mops::solve(study, &Options::default(), &())?;
@@ -73,7 +73,7 @@ pub use mops_solvers as solvers;
 pub use mops_studies as studies;
 #[cfg(feature = "report")]
 pub use report::{Band, Curve, CurveStyle, Ink, Level, Plot, Report, Surface, Third, Upright};
-pub use search::{DEFAULT_EVALUATIONS, Keeping, Options, Solved, Unsuitable, suits};
+pub use search::{DEFAULT_EVALUATIONS, EvaluationStore, Options, SolveError, Solved, suits};
 pub use solve::solve;
 
 /// Returns the built-in catalogue: models, criteria, solvers, effects and studies.

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Budget, Cancellation, Effect, Ending, Evaluation, Mistake, Objective, Oracle, Outcome, Pareto, Place, Problem,
-    Quiet, Record, Run, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, Task, Watch, conclude,
+    Budget, Cancellation, Effect, Ending, Evaluation, Objective, Oracle, Outcome, Pareto, Place, Problem, Quiet,
+    Record, Run, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task, Watch, conclude,
 };
 
 use mops_discrepancy::Diagnosis;
@@ -22,15 +22,15 @@ pub struct Options {
     /// Candidate effects of a diagnosis.
     pub effects: Vec<Arc<dyn Effect>>,
     /// Store of evaluated points, read and extended by the run. The result does not depend on it, bit for bit, except for
-    /// [`Keeping::begin`].
-    pub keeping: Option<Keeping>,
+    /// [`EvaluationStore::begin`].
+    pub keeping: Option<EvaluationStore>,
     /// Handle that stops the run, also within a simulation.
     pub cancellation: Cancellation,
 }
 
 /// Store of evaluated points, with the study that they belong to.
 #[derive(Clone)]
-pub struct Keeping {
+pub struct EvaluationStore {
     /// Study of the stored points.
     pub study: Study,
     /// Store of the points.
@@ -89,27 +89,27 @@ pub struct Solved {
 
 /// Reason why the solver or the task cannot handle the study, with a remedy and, if known, the key path in the study file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unsuitable(pub Mistake);
+pub struct SolveError(pub StudyError);
 
-impl std::fmt::Display for Unsuitable {
+impl std::fmt::Display for SolveError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.0.message)?;
         self.0.help.as_ref().map_or(Ok(()), |help| write!(f, "; {help}"))
     }
 }
 
-impl std::error::Error for Unsuitable {}
+impl std::error::Error for SolveError {}
 
 /// Checks that a solver can handle the task of a study, as far as possible without a simulation.
 ///
 /// # Errors
 /// If the solver does not accept the problem.
-pub fn suits(study: &Study, solver: &SolverChoice) -> Result<(), Unsuitable> {
+pub fn suits(study: &Study, solver: &SolverChoice) -> Result<(), SolveError> {
     if solves(study) { accepts(solver, solver.make().as_ref(), &Problem::outline(study)) } else { Ok(()) }
 }
 
-fn accepts(choice: &SolverChoice, solver: &dyn Solver, shape: &Shape) -> Result<(), Unsuitable> {
-    solver.accepts(shape).map_err(|why| Unsuitable(Mistake::new(choice.kind, why).within("solver")))
+fn accepts(choice: &SolverChoice, solver: &dyn Solver, shape: &Shape) -> Result<(), SolveError> {
+    solver.accepts(shape).map_err(|why| SolveError(StudyError::new(choice.kind, why).within("solver")))
 }
 
 /// Returns true if the task of a study needs a solver.
@@ -128,7 +128,7 @@ pub(crate) fn solves(study: &Study) -> bool {
 ///
 /// # Errors
 /// If the solver does not accept the problem.
-pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let started = Instant::now();
     let problem = Problem::new(Arc::new(study));
     let mut solver = options.solver.make();

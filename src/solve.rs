@@ -2,7 +2,7 @@
 
 use mops_core::{Cancellation, Evaluation, Halt, RunState, Study, Watch};
 
-use crate::search::{Options, Solved, Unsuitable};
+use crate::search::{Options, SolveError, Solved};
 use crate::tasks;
 
 /// Performs the task of a study; `watch` observes the run and may stop it.
@@ -12,7 +12,7 @@ use crate::tasks;
 ///
 /// # Panics
 /// If the threads cannot be started.
-pub fn solve(mut study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub fn solve(mut study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     study.cancelled_by(&options.cancellation);
     let watch = Cancellable { watch, cancellation: &options.cancellation };
     let threads = rayon::ThreadPoolBuilder::new().num_threads(options.jobs.unwrap_or(0)).build();

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Diagnostic, KnownStudy, ModelKind, suggestion};
+use mops_core::{Catalogue, CatalogueStudy, Diagnostic, ModelKind, suggestion};
 
 use super::effect;
 use super::places::places;
@@ -57,7 +57,7 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         .by_ref()
         .map(|(name, _)| name)
         .chain(catalogue.effects.iter().map(|effect| effect.name()))
-        .chain(catalogue.studies.iter().map(KnownStudy::name))
+        .chain(catalogue.studies.iter().map(CatalogueStudy::name))
         .chain(mops_core::file::tables().into_iter().map(|(table, _)| table))
         .collect();
     Err(Diagnostic::new(format!("no kind, effect, study or table is named `{name}`"))
@@ -66,9 +66,9 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
 }
 
 /// Returns the page of a study: its README and its study.toml, or the description of a study built in Rust.
-fn page_of(study: &KnownStudy) -> String {
+fn page_of(study: &CatalogueStudy) -> String {
     match study {
-        KnownStudy::Built(built) => {
+        CatalogueStudy::Built(built) => {
             format!(
                 "{}: {}\n\nBuilt in Rust; `mops check {0}` shows its tuners and criteria.\n",
                 built.name(),

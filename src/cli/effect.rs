@@ -1,7 +1,7 @@
 //! Manual page of an effect.
 
 use crate::terminal::number;
-use mops_core::{Dimension, Effect, PortKind, Scope, Strength};
+use mops_core::{Dimension, Effect, EffectParameter, PortKind, Scope};
 
 /// Formats the page of an effect: definition, formula, places, parameters and source.
 pub(super) fn page(effect: &dyn Effect) -> String {
@@ -38,7 +38,7 @@ fn place(kind: PortKind) -> &'static str {
     }
 }
 
-fn facts(strength: &Strength) -> String {
+fn facts(strength: &EffectParameter) -> String {
     let mut facts = vec![unit(strength.dimension)];
     match strength.bounds {
         [low, high] if low.is_finite() && high.is_finite() => {

@@ -11,8 +11,8 @@ use std::sync::Arc;
 use clap::Args;
 use mops_core::linear::{Complex, TransferFunction, zeros};
 use mops_core::{
-    Analysis, AnalysisKind, Catalogue, Diagnostic, Failure, Job, Linearise, Linearised, Mistake, Quantity, Resting,
-    StateSpace, Study, suggestion,
+    Analysis, AnalysisKind, Catalogue, Diagnostic, Failure, Job, Linearise, Linearised, Quantity, Resting, StateSpace,
+    Study, StudyError, suggestion,
 };
 use serde_json::{Value, json};
 
@@ -250,7 +250,7 @@ fn found(
     }
     let options =
         Linearise { at, equilibrium: arguments.equilibrium, free: arguments.free.clone(), ..Linearise::default() };
-    let diagnostic = |Mistake { message, help, .. }: Mistake| Diagnostic { help, ..Diagnostic::new(message) };
+    let diagnostic = |StudyError { message, help, .. }: StudyError| Diagnostic { help, ..Diagnostic::new(message) };
     let linearised = Linearised::new(Arc::clone(model), &options).map_err(diagnostic)?;
     let found = linearised.at(case, parameters).map_err(undefined)?;
     match found.rough.iter().find(|rough| rough.is_rate) {

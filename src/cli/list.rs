@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use crate::terminal::{CommandError, print, table};
 use clap::{Args, ValueEnum};
-use mops_core::{Catalogue, KnownStudy};
+use mops_core::{Catalogue, CatalogueStudy};
 
 use super::study::text_of;
 
@@ -33,7 +33,7 @@ pub(super) fn list(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     let row = |name: &str, about: String| vec![format!("  {name}"), about];
     let studies = catalogue.studies.iter().map(|study| {
         let about = match study {
-            KnownStudy::Built(built) => built.about().to_owned(),
+            CatalogueStudy::Built(built) => built.about().to_owned(),
             _ => {
                 let readme = text_of(study, "README.md").unwrap_or_default();
                 readme.lines().next().unwrap_or_default().trim_start_matches('#').trim().to_owned()

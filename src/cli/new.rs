@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Diagnostic, KnownStudy, suggestion};
+use mops_core::{Catalogue, CatalogueStudy, Diagnostic, suggestion};
 
 use super::schema;
 use crate::files;
@@ -34,9 +34,9 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
     let called = called.replace(['"', '\\'], "-");
     let files: Vec<(&str, Vec<u8>)> = match from {
         Some(name) => {
-            let names = catalogue.studies.iter().map(KnownStudy::name);
+            let names = catalogue.studies.iter().map(CatalogueStudy::name);
             let unknown = || Diagnostic::new(format!("no shipped study `{name}`")).with_help(suggestion(name, names));
-            let KnownStudy::Shipped(study) = catalogue.study(name).ok_or_else(unknown)? else {
+            let CatalogueStudy::Shipped(study) = catalogue.study(name).ok_or_else(unknown)? else {
                 return Err(Diagnostic::new(format!("`{name}` is not a shipped study"))
                     .with_help("copy its folder, or for a study built in Rust its source code")
                     .into());

@@ -7,7 +7,7 @@ use mops_core::file::StudyFile;
 use mops_core::{Diagnostic, SensitivityMethod, Stop, Study, Task, Watch};
 
 use super::study::{Home, StudyArguments};
-use crate::search::{Keeping, Options, Solved, Unsuitable, solves};
+use crate::search::{EvaluationStore, Options, SolveError, Solved, solves};
 use crate::solve::solve;
 use crate::store::{FinishedRun, Identity, OpenError, Recorder, RunRow, RunState, Start, row};
 use crate::terminal::CommandError;
@@ -98,7 +98,7 @@ pub(super) fn open(
 }
 
 /// Solved study, and the database of its points.
-pub(super) type RecordedSolution = (Result<Solved, Unsuitable>, FinishedRun);
+pub(super) type RecordedSolution = (Result<Solved, SolveError>, FinishedRun);
 
 /// Solves the study and stores its points.
 pub(super) fn solve_recorded(
@@ -108,7 +108,7 @@ pub(super) fn solve_recorded(
     watch: &dyn Watch,
 ) -> RecordedSolution {
     let start_point = recorder.start_point.clone();
-    let keeping = Some(Keeping { study: study.clone(), store: recorder.store(), begin: start_point });
+    let keeping = Some(EvaluationStore { study: study.clone(), store: recorder.store(), begin: start_point });
     let options = Options { keeping, ..options.clone() };
     recorder.run(watch, |watch| solve(study.clone(), &options, watch))
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, Halt, Mistake, Stop, Study, Task, Watch, suggestion};
+use mops_core::{Catalogue, Diagnostic, Halt, Stop, Study, StudyError, Task, Watch, suggestion};
 
 use super::run_files::{DISK_TIMEOUT, RunFiles};
 use super::study::{StudyArguments, home, open_as, without_settings};
@@ -308,7 +308,7 @@ fn watch(study: &Study, options: &Options) -> Result<Page, CommandError> {
 
 /// Returns the error for a study that the solver or task refuses. The position in the file is given if there is one; a solver
 /// from the command line has none.
-fn refused(why: &Mistake, file: &StudyFile, solver: &str) -> Diagnostic {
+fn refused(why: &StudyError, file: &StudyFile, solver: &str) -> Diagnostic {
     let of_command_line = solver != file.solver.kind && why.path.first().is_some_and(|key| key == "solver");
     if why.path.is_empty() || of_command_line {
         Diagnostic { help: why.help.clone(), ..Diagnostic::new(why.message.clone()) }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use mops_core::file::{Folder, StudyFile};
-use mops_core::{BuiltStudy, Catalogue, Diagnostic, KnownStudy, Shipped, Source, StudyFolder, suggestion};
+use mops_core::{BuiltStudy, Catalogue, CatalogueStudy, Diagnostic, Shipped, Source, StudyFolder, suggestion};
 
 use crate::toml_text::quoted;
 
@@ -42,11 +42,11 @@ pub(super) fn home(catalogue: &Catalogue, arguments: &StudyArguments) -> Home {
 
 impl Home {
     /// Returns the location of a study of the catalogue.
-    fn of(known: &KnownStudy) -> Self {
+    fn of(known: &CatalogueStudy) -> Self {
         match known {
-            KnownStudy::Shipped(shipped) => Self::Shipped(*shipped),
-            KnownStudy::Folder(folder) => Self::File(folder.file()),
-            KnownStudy::Built(built) => Self::Built(built.clone()),
+            CatalogueStudy::Shipped(shipped) => Self::Shipped(*shipped),
+            CatalogueStudy::Folder(folder) => Self::File(folder.file()),
+            CatalogueStudy::Built(built) => Self::Built(built.clone()),
             other => unreachable!("`{}` is an unknown sort of study", other.name()),
         }
     }
@@ -95,10 +95,10 @@ pub(super) fn open_as(
 }
 
 /// Returns the text of a file of a shipped study or of a study folder.
-pub(super) fn text_of(study: &KnownStudy, name: &str) -> Option<String> {
+pub(super) fn text_of(study: &CatalogueStudy, name: &str) -> Option<String> {
     match study {
-        KnownStudy::Shipped(shipped) => shipped.file(name).map(|bytes| String::from_utf8_lossy(bytes).into_owned()),
-        KnownStudy::Folder(folder) => std::fs::read_to_string(folder.path().join(name)).ok(),
+        CatalogueStudy::Shipped(shipped) => shipped.file(name).map(|bytes| String::from_utf8_lossy(bytes).into_owned()),
+        CatalogueStudy::Folder(folder) => std::fs::read_to_string(folder.path().join(name)).ok(),
         _ => None,
     }
 }
@@ -153,10 +153,10 @@ pub(super) fn read_at(
 ) -> Result<StudyFile, Diagnostic> {
     let name = home.display().to_string();
     match catalogue.study(&name) {
-        Some(KnownStudy::Shipped(shipped)) => {
+        Some(CatalogueStudy::Shipped(shipped)) => {
             return mops_core::file::read(catalogue, &format!("{name}/study.toml"), text, settings, shipped);
         }
-        Some(KnownStudy::Built(built)) => return mops_core::file::built(catalogue, built, settings, &program()),
+        Some(CatalogueStudy::Built(built)) => return mops_core::file::built(catalogue, built, settings, &program()),
         _ => {}
     }
     let folder = home.parent().unwrap_or(Path::new("")).to_owned();
@@ -182,6 +182,6 @@ fn no_study(catalogue: &Catalogue, study: &str, error: &std::io::Error) -> Diagn
         return Diagnostic::new(format!("there is no file `{study}`"))
             .with_help("`mops new` writes a template; `mops list` lists the shipped studies");
     }
-    let names = catalogue.studies.iter().map(KnownStudy::name);
+    let names = catalogue.studies.iter().map(CatalogueStudy::name);
     Diagnostic::new(format!("there is no file and no shipped study `{study}`")).with_help(suggestion(study, names))
 }

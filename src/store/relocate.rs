@@ -13,7 +13,7 @@ use super::runs::{RunRow, insert_run};
 use crate::files::{is_at, temporary_path};
 
 /// New database under its temporary name.
-pub(super) struct Draft {
+pub(super) struct StudyBuilder {
     temporary: PathBuf,
     path: PathBuf,
     run: i64,
@@ -36,12 +36,12 @@ impl Database {
         }
     }
 
-    /// Creates a new database that contains only this run, under a temporary name and in one transaction. [`Draft::commit`]
+    /// Creates a new database that contains only this run, under a temporary name and in one transaction. [`StudyBuilder::commit`]
     /// renames it, so that no incomplete database is ever visible.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub(super) fn draft(path: &Path, run: &RunRow) -> rusqlite::Result<Draft> {
+    pub(super) fn draft(path: &Path, run: &RunRow) -> rusqlite::Result<StudyBuilder> {
         let temporary = temporary_path(path);
         let mut connection = Connection::open(&temporary)?;
         let transaction = connection.transaction()?;
@@ -49,7 +49,7 @@ impl Database {
         let run = insert_run(&transaction, run)?;
         transaction.commit()?;
         connection.close().map_err(|(_, error)| error)?;
-        Ok(Draft { temporary, path: path.to_owned(), run })
+        Ok(StudyBuilder { temporary, path: path.to_owned(), run })
     }
 
     /// Returns true if the database contains no run. Earlier versions created the database in several steps and left such a
@@ -109,13 +109,13 @@ impl Database {
     }
 }
 
-impl Drop for Draft {
+impl Drop for StudyBuilder {
     fn drop(&mut self) {
         Database::clear_draft(&self.path);
     }
 }
 
-impl Draft {
+impl StudyBuilder {
     /// Renames the database to its final name and opens it; returns it with the id of its run.
     ///
     /// # Errors

@@ -27,7 +27,7 @@ pub(super) fn make_room(folder: &Path) -> Result<Option<String>, OpenError> {
         return Ok(None);
     }
     let in_use = |what: &str| {
-        OpenError::Mistake(
+        OpenError::StudyError(
             Diagnostic::new(format!("{} is open in another program, and {what}", path.display()))
                 .with_help("close it there, or choose another folder with --out"),
         )

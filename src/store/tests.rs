@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mops_core::file::StudyFile;
-use mops_core::{Failure, Known, KnownStudy, Missed, Problem, RowSlopes, RowValue, Study, Value};
+use mops_core::{CatalogueStudy, Failure, Known, Missed, Problem, RowSlopes, RowValue, Study, Value};
 
 use super::database::{Database, PointRow};
 use super::{FILE, Identity, OpenError, Recorder, RunState, Start, bytes, row};
@@ -12,7 +12,7 @@ use super::{FILE, Identity, OpenError, Recorder, RunState, Start, bytes, row};
 /// Reads a shipped study with settings.
 fn file(name: &str, settings: &[&str]) -> StudyFile {
     let catalogue = crate::catalogue();
-    let Some(KnownStudy::Shipped(shipped)) = catalogue.study(name) else { panic!("{name} is shipped") };
+    let Some(CatalogueStudy::Shipped(shipped)) = catalogue.study(name) else { panic!("{name} is shipped") };
     let text = std::str::from_utf8(shipped.file("study.toml").unwrap()).unwrap();
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     mops_core::file::read(&catalogue, name, text, &settings, shipped).unwrap()

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Cancellation, Evaluation, Halt, Kept, Known, Problem, RowSlopes, Scenario, Store, Study};
+use mops_core::{CachedPoint, Cancellation, Evaluation, Halt, Known, Problem, RowSlopes, Scenario, Store, Study};
 
 use crate::search::Options;
 
@@ -153,13 +153,13 @@ fn evaluate_stored(
     (problem, every): (&Problem, bool),
     tuners: &[f64],
     store: Option<&Copies>,
-    evaluate: impl FnOnce(Option<Known>) -> Kept,
+    evaluate: impl FnOnce(Option<Known>) -> CachedPoint,
 ) -> Evaluation {
     let known = store.and_then(|store| store.known(tuners));
     if let Some(end) = store.and_then(|store| store.closed()).filter(|_| !problem.has_met(known.as_ref(), every)) {
         end.request(Halt::Interrupted);
     }
-    let Kept { evaluation, learned } = evaluate(known);
+    let CachedPoint { evaluation, learned } = evaluate(known);
     if let Some(store) = store {
         store.answered(tuners, learned);
     }

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use mops_core::{DiagnosisTask, Effect, Mistake, Study, Watch, suggestion};
+use mops_core::{DiagnosisTask, Effect, Study, StudyError, Watch, suggestion};
 use mops_discrepancy::Diagnosis;
 
 use crate::diagnosis::block;
-use crate::search::{Options, Solved, Unsuitable, evaluate_start};
+use crate::search::{Options, SolveError, Solved, evaluate_start};
 
-pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let started = Instant::now();
     let mut solved = match search(&study, options, watch) {
         Ok(diagnosis) => of(study, options, diagnosis),
@@ -21,25 +21,27 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 }
 
 /// Runs the diagnosis over the effects selected by the task.
-fn search(study: &Study, options: &Options, watch: &dyn Watch) -> Result<Diagnosis, Unsuitable> {
+fn search(study: &Study, options: &Options, watch: &dyn Watch) -> Result<Diagnosis, SolveError> {
     let task = &study.tasks.diagnosis;
     let effects = effects(task, &options.effects)?;
     let options = mops_discrepancy::Options { max_effects: task.max_effects, level: task.level, seed: study.seed };
-    mops_discrepancy::diagnose(study, &effects, &options, watch).map_err(Unsuitable)
+    mops_discrepancy::diagnose(study, &effects, &options, watch).map_err(SolveError)
 }
 
 /// Returns the effects selected by the task. N.B.: names in a study file are checked when the file is read.
-fn effects(task: &DiagnosisTask, all: &[Arc<dyn Effect>]) -> Result<Vec<Arc<dyn Effect>>, Unsuitable> {
+fn effects(task: &DiagnosisTask, all: &[Arc<dyn Effect>]) -> Result<Vec<Arc<dyn Effect>>, SolveError> {
     let known = |name: &&String| all.iter().any(|effect| effect.name() == **name);
     if let Some(unknown) = task.effects.iter().flatten().chain(&task.without).find(|name| !known(name)) {
         let help = suggestion(unknown, all.iter().map(|effect| effect.name()));
-        return Err(Unsuitable(Mistake::new("diagnosis", format!("there is no effect `{unknown}`")).with_help(help)));
+        return Err(SolveError(
+            StudyError::new("diagnosis", format!("there is no effect `{unknown}`")).with_help(help),
+        ));
     }
     let left: Vec<_> = all.iter().filter(|effect| task.tries(effect.name())).cloned().collect();
     if left.is_empty() {
         let mistake =
-            Mistake::new("without", "no effect is left to try").with_help("exclude fewer effects in `without`");
-        return Err(Unsuitable(mistake.within("diagnosis")));
+            StudyError::new("without", "no effect is left to try").with_help("exclude fewer effects in `without`");
+        return Err(SolveError(mistake.within("diagnosis")));
     }
     Ok(left)
 }

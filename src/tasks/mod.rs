@@ -17,13 +17,13 @@ use std::time::Instant;
 
 use mops_core::{Halt, Place, Stop, Study, Task, Watch};
 
-use crate::search::{Options, Solved, Unsuitable, evaluate_start, search};
+use crate::search::{Options, SolveError, Solved, evaluate_start, search};
 
 /// Performs the task of the study.
 ///
 /// # Errors
 /// If the solver does not accept the problem.
-pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let started = Instant::now();
     let mut solved = match study.task {
         Task::Design if study.tasks.robust.is_some() => robust::perform(study, options, watch)?,
@@ -50,7 +50,7 @@ pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 }
 
 /// Returns the point at which a task is performed: the start values or the optimum.
-fn at(place: Place, study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+fn at(place: Place, study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     match place {
         Place::Start => Ok(evaluate_start(study, options, watch)),
         Place::Optimum => search(study, options, watch),

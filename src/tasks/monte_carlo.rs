@@ -12,9 +12,9 @@ use super::at;
 use super::batches::{Stage, each};
 use super::copies::{Copies, evaluate_at};
 use crate::numbers::significant;
-use crate::search::{Options, Solved, Unsuitable};
+use crate::search::{Options, SolveError, Solved};
 
-pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let task = study.tasks.monte_carlo.clone();
     let mut solved = at(task.at, study, options, watch)?;
     let over = Arc::new(solved.problem.study().over_uncertain(&solved.best.tuners));

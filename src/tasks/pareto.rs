@@ -7,9 +7,9 @@ use mops_core::{Budget, Certified, FrontPoint, Pareto, Problem, Quiet, Run, Stud
 use mops_solvers::certificate;
 
 use crate::numbers::significant;
-use crate::search::{Options, Solved, Unsuitable, search};
+use crate::search::{Options, SolveError, Solved, search};
 
-pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let started = Instant::now();
     let mut solved = search(study, options, watch)?;
     let problem = &solved.problem;

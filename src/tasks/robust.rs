@@ -11,7 +11,7 @@ use super::batches::Stage;
 use super::copies::Copies;
 use super::worst_case::{Effort, NO_GUARANTEE, Region, Worst, sentence};
 use crate::numbers::significant;
-use crate::search::{Keeping, Options, Solved, Unsuitable, search};
+use crate::search::{EvaluationStore, Options, SolveError, Solved, search};
 
 /// Outer approximation: solves for the present cases, searches the box for worse cases, adds them, and repeats.
 ///
@@ -20,7 +20,7 @@ use crate::search::{Keeping, Options, Solved, Unsuitable, search};
 ///
 /// Source: J. W. Blankenship, J. E. Falk, Journal of Optimization Theory and Applications 19 (1976) 261-281 (algorithm 2.1).
 /// N.B.: the paper assumes an exact worst case; here it is the result of a search, so that no guarantee is given.
-pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let task = study.tasks.robust.clone().expect("the study asks for it");
     let mut rounds = Rounds { study, task, scenarios: Vec::new(), done: Vec::new(), worst: Vec::new() };
     let mut left = options.max_evaluations;
@@ -127,12 +127,12 @@ impl Rounds {
 
     /// Returns the store for the points of a round, which is that of the study. The first round starts where the run starts,
     /// later rounds at the design of the previous round.
-    fn keeping(&self, study: &Study, options: &Options) -> Option<Keeping> {
+    fn keeping(&self, study: &Study, options: &Options) -> Option<EvaluationStore> {
         let store: Arc<dyn Store> = Arc::new(Copies::of(options, &self.study, study, &self.scenarios)?);
         let begin = options.keeping.as_ref().and_then(|keeping| keeping.begin.clone());
         let here = || Problem::new(Arc::new(study.clone())).start();
         let begin = begin.map(|begin| if self.done.is_empty() { begin } else { here() });
-        Some(Keeping { study: study.clone(), store, begin })
+        Some(EvaluationStore { study: study.clone(), store, begin })
     }
 
     /// Searches the box around a design and adds the cases that are worse than the present ones. Returns true if a case was

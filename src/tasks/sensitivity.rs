@@ -5,9 +5,9 @@ use mops_core::identification::{Point, sensitivity_at};
 use mops_core::{Place, SensitivityMethod, Study, Watch};
 
 use super::{at, global_sensitivity};
-use crate::search::{Options, Solved, Unsuitable};
+use crate::search::{Options, SolveError, Solved};
 
-pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let task = study.tasks.sensitivity;
     let mut solved = at(task.at, study, options, watch)?;
     if task.method != SensitivityMethod::Local {

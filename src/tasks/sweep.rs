@@ -4,12 +4,12 @@ use mops_core::{Axis, Budget, Merit, Oracle, Problem, Run, Scale, Study, SweepAx
 
 use super::at;
 use crate::numbers::significant;
-use crate::search::{Options, Solved, Unsuitable};
+use crate::search::{Options, SolveError, Solved};
 
 /// Share of the points, those with the lowest objective, that count as the valley.
 const VALLEY: f64 = 0.05;
 
-pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let task = study.tasks.sweep.clone().expect("a study with this task defines the sweep");
     let mut solved = at(task.at, study, options, watch)?;
     let problem = &solved.problem;

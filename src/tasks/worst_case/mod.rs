@@ -12,7 +12,7 @@ pub(super) use search::{Effort, Region, Worst};
 use super::at;
 use super::batches::{Stage, each};
 use crate::numbers::significant;
-use crate::search::{Options, Solved, Unsuitable};
+use crate::search::{Options, SolveError, Solved};
 
 /// Number of values along each parameter through a worst case.
 const SLICE: usize = 61;
@@ -21,7 +21,7 @@ const SLICE: usize = 61;
 pub(super) const NO_GUARANTEE: &str =
     "These are the worst cases that were found, not a guarantee: the box may contain worse ones.";
 
-pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, Unsuitable> {
+pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let task = study.tasks.worst_case.clone();
     let mut solved = at(task.at, study, options, watch)?;
     let study = solved.problem.study();
