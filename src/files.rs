@@ -1,49 +1,49 @@
-//! Files that are whole or not there: each is written beside its place and renamed into it.
+//! Atomic file writes: each file is written under a temporary name in the same folder and then renamed.
 
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// What stands before the name of a file while it is written. The name is always the same, so that what a killed process left
-/// is replaced by the next one; one process at a time writes in the folder of a run.
-const BESIDE: &str = ".new-";
+/// Prefix of a file name during writing. The name is fixed, so that the next process replaces the remains of a killed one;
+/// only one process at a time writes in the folder of a run.
+const TEMPORARY_PREFIX: &str = ".new-";
 
-/// A file that is being written. Dropped before [`Beside::settle`] it leaves the file that was there as it was.
+/// File being written. If dropped before [`AtomicFile::commit`], an existing file remains unchanged.
 ///
-/// N.B.: neither name is followed where it is a symbolic link: the link is replaced.
-pub(crate) struct Beside {
+/// N.B.: a symbolic link at either name is replaced, not followed.
+pub(crate) struct AtomicFile {
     file: Option<BufWriter<File>>,
-    beside: PathBuf,
+    temporary: PathBuf,
     path: PathBuf,
 }
 
-impl Beside {
-    /// Begins to write the file that will be at `path`.
+impl AtomicFile {
+    /// Creates the temporary file for `path`.
     ///
     /// # Errors
-    /// Nothing can be written there.
+    /// If the folder is not writable.
     pub(crate) fn create(path: &Path) -> io::Result<Self> {
-        let beside = free(path)?;
-        let file = OpenOptions::new().write(true).create_new(true).open(&beside)?;
-        Ok(Self { file: Some(BufWriter::new(file)), beside, path: path.to_owned() })
+        let temporary = cleared_temporary_path(path)?;
+        let file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
+        Ok(Self { file: Some(BufWriter::new(file)), temporary, path: path.to_owned() })
     }
 
-    /// Moves what was written to its place.
+    /// Renames the temporary file to its final path.
     ///
     /// # Errors
-    /// It cannot be written, or moved.
-    pub(crate) fn settle(mut self) -> io::Result<()> {
+    /// If the file cannot be written or renamed.
+    pub(crate) fn commit(mut self) -> io::Result<()> {
         self.close()?;
-        fs::rename(&self.beside, &self.path)
+        fs::rename(&self.temporary, &self.path)
     }
 
-    /// The same once all bytes are on the disk, so that the file survives a loss of power too.
+    /// Syncs the bytes to the disk and renames the temporary file, so that the file also survives a loss of power.
     ///
     /// # Errors
-    /// As [`Beside::settle`].
-    pub(crate) fn settle_on_disk(mut self) -> io::Result<()> {
+    /// As [`AtomicFile::commit`].
+    pub(crate) fn commit_synced(mut self) -> io::Result<()> {
         self.close()?.sync_data()?;
-        fs::rename(&self.beside, &self.path)
+        fs::rename(&self.temporary, &self.path)
     }
 
     fn close(&mut self) -> io::Result<File> {
@@ -52,7 +52,7 @@ impl Beside {
     }
 }
 
-impl Write for Beside {
+impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.file.as_mut().expect("it is open").write(bytes)
     }
@@ -62,82 +62,82 @@ impl Write for Beside {
     }
 }
 
-impl Drop for Beside {
+impl Drop for AtomicFile {
     fn drop(&mut self) {
-        // Renamed files have no such name any more.
-        let _ = fs::remove_file(&self.beside);
+        // After a rename the temporary name no longer exists.
+        let _ = fs::remove_file(&self.temporary);
     }
 }
 
-/// Where a file is written before it is renamed.
-pub(crate) fn beside(path: &Path) -> PathBuf {
-    let mut name = std::ffi::OsString::from(BESIDE);
+/// Returns the temporary path of a file during writing.
+pub(crate) fn temporary_path(path: &Path) -> PathBuf {
+    let mut name = std::ffi::OsString::from(TEMPORARY_PREFIX);
     name.push(path.file_name().unwrap_or_default());
     path.with_file_name(name)
 }
 
-/// The same, with nothing there.
-fn free(path: &Path) -> io::Result<PathBuf> {
-    let beside = beside(path);
-    match fs::remove_file(&beside) {
+/// Returns the temporary path of a file, after removing a leftover there.
+fn cleared_temporary_path(path: &Path) -> io::Result<PathBuf> {
+    let temporary = temporary_path(path);
+    match fs::remove_file(&temporary) {
         Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
-        _ => Ok(beside),
+        _ => Ok(temporary),
     }
 }
 
-/// Lets `write` make a file, for those who want a path, and moves it to its place.
+/// Lets `write` create a file at a temporary path and renames it, for writers that need a path.
 ///
 /// # Errors
-/// It cannot be written, or moved.
+/// If the file cannot be written or renamed.
 pub(crate) fn make(path: &Path, write: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
-    let beside = free(path)?;
-    let made = write(&beside).and_then(|()| fs::rename(&beside, path));
+    let temporary = cleared_temporary_path(path)?;
+    let made = write(&temporary).and_then(|()| fs::rename(&temporary, path));
     if made.is_err() {
-        let _ = fs::remove_file(&beside);
+        let _ = fs::remove_file(&temporary);
     }
     made
 }
 
-/// Writes a table as CSV.
+/// Writes a CSV file.
 ///
 /// # Errors
-/// The file cannot be written.
+/// If the file cannot be written.
 pub(crate) fn write_csv(
     path: &Path,
-    fill: impl FnOnce(&mut csv::Writer<Beside>) -> Result<(), csv::Error>,
+    fill: impl FnOnce(&mut csv::Writer<AtomicFile>) -> Result<(), csv::Error>,
 ) -> io::Result<()> {
-    let mut writer = csv::Writer::from_writer(Beside::create(path)?);
+    let mut writer = csv::Writer::from_writer(AtomicFile::create(path)?);
     fill(&mut writer)?;
-    writer.into_inner().map_err(csv::IntoInnerError::into_error)?.settle()
+    writer.into_inner().map_err(csv::IntoInnerError::into_error)?.commit()
 }
 
 /// Writes a whole file.
 ///
 /// # Errors
-/// The file cannot be written; what was there before is as it was.
+/// If the file cannot be written; an existing file then remains unchanged.
 pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
-    let mut file = Beside::create(path)?;
+    let mut file = AtomicFile::create(path)?;
     file.write_all(content.as_ref())?;
-    file.settle()
+    file.commit()
 }
 
-/// Whether the file of this name is this one.
+/// Returns true if `path` names the given file.
 #[cfg(unix)]
 pub(crate) fn is_at(path: &Path, file: &Metadata) -> bool {
     use std::os::unix::fs::MetadataExt;
     fs::metadata(path).is_ok_and(|there| (there.dev(), there.ino()) == (file.dev(), file.ino()))
 }
 
-/// Whether the file of this name is this one: elsewhere a file that is open cannot be replaced.
+/// Returns true if `path` exists: on this platform an open file cannot be replaced.
 #[cfg(not(unix))]
 pub(crate) fn is_at(path: &Path, _: &Metadata) -> bool {
     path.exists()
 }
 
-/// The bytes of a regular file. Devices and pipes, which may have no end, are refused.
+/// Reads a regular file. Devices and pipes are refused, as they may be endless.
 ///
 /// # Errors
-/// The file cannot be read, or is none.
+/// If the file cannot be read or is not a regular file.
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     mops_core::data::read_regular(path)
 }
@@ -151,12 +151,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.json");
         write(&path, "old").unwrap();
-        let mut file = Beside::create(&path).unwrap();
+        let mut file = AtomicFile::create(&path).unwrap();
         file.write_all(b"half").unwrap();
         drop(file);
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
-        // What a killed process left is in nobody's way.
-        fs::write(beside(&path), "left").unwrap();
+        // The leftover of a killed process is replaced.
+        fs::write(temporary_path(&path), "left").unwrap();
         write(&path, "new").unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "new");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
@@ -165,7 +165,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_are_replaced_and_what_they_lead_to_stays() {
+    fn links_are_replaced_and_their_targets_stay() {
         use std::os::unix::fs::symlink;
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);

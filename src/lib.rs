@@ -1,7 +1,7 @@
 //! Multi-objective parameter synthesis: design and identification as weighted min-max problems.
 //!
-//! A study brings models, cases, tuners and criteria together. [`solve`] turns it into a min-max problem over the unit
-//! box, runs a solver on it and reports the outcome:
+//! A study combines models, cases, tuners (the parameters to be chosen) and criteria. [`solve`] turns it into a min-max
+//! problem over the unit box, runs a solver on it and returns the outcome:
 //!
 //! ```
 //! use mops::{CaseBuilder, CriterionBuilder, StudyBuilder, ModelBuilder, Options, TunerBuilder, criteria::overshoot::Overshoot};
@@ -38,7 +38,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))] // Helpers of the command line stay in smaller builds.
+#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))] // Smaller builds keep helpers of the command line.
 
 #[cfg(feature = "cli")]
 mod cli;
@@ -61,7 +61,7 @@ mod toml_text;
 #[cfg(feature = "watch")]
 mod watch;
 
-/// The fragments of the guide in Rust, compiled and run.
+/// Rust examples of the guide, compiled and run as doctests.
 #[cfg(doctest)]
 #[doc = include_str!("../docs/guide/7-in-rust.md")]
 mod guide {}
@@ -83,7 +83,7 @@ pub use mops_studies as studies;
 pub use search::{DEFAULT_EVALUATIONS, EvaluationStore, Options, SolveError, Solved, suits};
 pub use solve::solve;
 
-/// Everything that comes with mops: models, criteria, solvers and studies.
+/// Returns the built-in catalogue: models, criteria, solvers, effects and studies.
 pub fn catalogue() -> Catalogue {
     Catalogue {
         models: mops_models::kinds(),
@@ -96,7 +96,7 @@ pub fn catalogue() -> Catalogue {
 }
 
 #[cfg(feature = "cli")]
-/// The command line over a catalogue; a crate with kinds of its own calls it from its `main`.
+/// Runs the command line with a catalogue; a crate that adds its own kinds calls this function from its `main`.
 pub fn main(catalogue: Catalogue) -> std::process::ExitCode {
     cli::main(catalogue)
 }

@@ -1,13 +1,13 @@
-//! Numbers and names as a reader wants them: significant digits, units, percent, and names that every file system takes.
+//! Formats of numbers and names for a reader: significant digits, units, percent, and portable file names.
 
-/// A number to five significant digits without trailing zeros: `0.86341`, `12`, `1.2e-7`.
+/// Formats a number to five significant digits without trailing zeros: `0.86341`, `12`, `1.2e-7`.
 pub(crate) fn number(value: f64) -> String {
     significant(value, 5)
 }
 
-/// A number to so many significant digits, or to as many more as tell it from the limit that it misses.
+/// Formats a number to `digits` significant digits, or to as many more as distinguish it from the limit that it misses.
 pub(crate) fn apart(value: f64, limit: Option<f64>, digits: usize) -> String {
-    /// Decimal digits that a number has.
+    /// Number of decimal digits that distinguish all `f64`.
     const ALL: usize = 17;
     let differs = |&digits: &usize| limit.is_none_or(|limit| significant(value, digits) != significant(limit, digits));
     let digits =
@@ -15,7 +15,7 @@ pub(crate) fn apart(value: f64, limit: Option<f64>, digits: usize) -> String {
     significant(value, digits)
 }
 
-/// A number to so many significant digits, without trailing zeros.
+/// Formats a number to `digits` significant digits, without trailing zeros.
 pub(crate) fn significant(value: f64, digits: usize) -> String {
     if value.is_nan() {
         return "n/a".to_owned();
@@ -41,27 +41,27 @@ fn trimmed(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
-/// A number with its unit; a pure number alone.
+/// Formats a number with its unit; a dimensionless number without one.
 pub(crate) fn with_unit(value: f64, unit: &str) -> String {
     if unit == "1" || unit.is_empty() { number(value) } else { format!("{} {unit}", number(value)) }
 }
 
-/// A quantity with its unit in brackets, for an axis; a pure number alone.
+/// Formats the label of an axis: name and unit in brackets; the name alone for a dimensionless quantity.
 pub(crate) fn labelled(name: &str, unit: &str) -> String {
     if unit == "1" || unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") }
 }
 
-/// A share as percent, to two significant digits: `3.1 %`.
+/// Formats a fraction in percent, to two significant digits: `3.1 %`.
 pub(crate) fn percent(share: f64) -> String {
     format!("{} %", significant(100.0 * share, 2))
 }
 
-/// A count with its noun: `1 case`, `3 cases`.
+/// Formats a count with its noun: `1 case`, `3 cases`.
 pub(crate) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// A name that every file system takes: ASCII letters, digits, `_` and `.` stay, all else becomes one `-`.
+/// Returns a portable file name: ASCII letters, digits, `_` and `.` stay, each run of other characters becomes one `-`.
 pub(crate) fn file_name(name: &str) -> String {
     let mut safe = String::new();
     for c in name.chars() {
@@ -78,14 +78,14 @@ pub(crate) fn file_name(name: &str) -> String {
     if safe.is_empty() { "unnamed".to_owned() } else { safe.to_owned() }
 }
 
-/// Hands out file names, each only once, also where the file system ignores case.
+/// Generator of unique file names, also for file systems that ignore case.
 #[derive(Debug, Default)]
 pub(crate) struct FileNames {
     taken: Vec<String>,
 }
 
 impl FileNames {
-    /// A safe file name for `name` that was not handed out before.
+    /// Returns a portable file name for `name` that was not returned before.
     pub(crate) fn unique(&mut self, name: &str) -> String {
         let safe = file_name(name);
         let candidates = (1..).map(|i| if i == 1 { safe.clone() } else { format!("{safe}-{i}") });

@@ -1,18 +1,18 @@
-//! Text whose characters are all shown: none moves a cursor, clears a screen, ends a comment or turns what is read around.
+//! Escaping of control characters, which would move the cursor, clear the screen, end a comment or reverse the text.
 
 use std::borrow::Cow;
 
-/// The text with control characters written out, as `\u{1b}`; line ends and tabs stay.
+/// Escapes control characters, as `\u{1b}`; line ends and tabs stay.
 pub(crate) fn plain(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c.escape_unicode().to_string())
 }
 
-/// The same in one line: line ends and tabs are written out too.
+/// Escapes control characters, line ends and tabs, so that the text fits on one line.
 pub(crate) fn line(text: &str) -> String {
     plain(text).replace('\n', "\\n").replace('\t', "\\t")
 }
 
-/// The text with what `escape` writes for every character that acts.
+/// Replaces every control character by the result of `escape`.
 pub(crate) fn escaped(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
     if !text.contains(acts) {
         return Cow::Borrowed(text);
@@ -24,7 +24,7 @@ pub(crate) fn escaped(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, st
     Cow::Owned(plain)
 }
 
-/// Whether a terminal acts on a character instead of showing it: controls, and what turns the direction of the text.
+/// Returns true if a terminal acts on a character instead of showing it: controls and changes of the text direction.
 /// Source: Unicode 16.0, general category Cc; Unicode Standard Annex 9, section 2.
 pub(crate) fn acts(c: char) -> bool {
     (c.is_control() && !matches!(c, '\n' | '\t'))
@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn controls_are_written_out_and_all_else_stays() {
+    fn control_characters_are_escaped_and_others_stay() {
         for (text, shown) in [
             ("\u{1b}]0;title\u{7}", "\\u{1b}]0;title\\u{7}"),
             ("\u{1b}[2J\u{1b}[1;1H", "\\u{1b}[2J\\u{1b}[1;1H"),

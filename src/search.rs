@@ -1,4 +1,4 @@
-//! A search for the best point: problem, run, solver, conclusion.
+//! Search for the best point: problem, run, solver, outcome.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -10,50 +10,51 @@ use mops_core::{
 
 use mops_discrepancy::Diagnosis;
 
-/// How a study is solved.
+/// Options of [`crate::solve()`].
 #[derive(Clone)]
 pub struct Options {
-    /// The solver.
+    /// Solver and its options.
     pub solver: SolverChoice,
-    /// Largest number of points evaluated.
+    /// Largest number of evaluated points.
     pub max_evaluations: usize,
-    /// Number of threads; all cores where absent. It changes no bit of the result.
+    /// Number of threads; all cores if absent. The result does not depend on it, bit for bit.
     pub jobs: Option<usize>,
-    /// Effects that a diagnosis may find.
+    /// Candidate effects of a diagnosis.
     pub effects: Vec<Arc<dyn Effect>>,
-    /// Where points are kept, and what is known of them from before; it changes no bit of the result.
+    /// Store of evaluated points, read and extended by the run. The result does not depend on it, bit for bit, except for
+    /// [`EvaluationStore::begin`].
     pub keeping: Option<EvaluationStore>,
-    /// Asks the run to end, within a simulation too.
+    /// Handle that stops the run, also within a simulation.
     pub cancellation: Cancellation,
 }
 
-/// A store, and the study whose points it knows.
+/// Store of evaluated points, with the study that they belong to.
 #[derive(Clone)]
 pub struct EvaluationStore {
-    /// The study.
+    /// Study of the stored points.
     pub study: Study,
-    /// Its points.
+    /// Store of the points.
     pub store: Arc<dyn Store>,
-    /// The point of the unit box at which a search begins, instead of the start values; with one, the outcome reports how many
-    /// points were known.
+    /// Initial guess in the unit box, instead of the start values of the study. If set, the outcome reports the number of
+    /// reused points.
     pub begin: Option<Vec<f64>>,
 }
 
 impl Options {
-    /// The store, for a problem in which points have the values that it knows; else none.
+    /// Returns the store if its points have the same values in `problem`, else `None`.
     pub(crate) fn store(&self, problem: &Problem) -> Option<&dyn Store> {
         let keeping = self.keeping.as_ref()?;
         keeping.study.measures_as(problem.study()).then_some(&*keeping.store)
     }
 
-    /// Where a search begins, if not at the start values.
+    /// Returns the initial guess from the store, if it fits `problem`.
     fn begin(&self, problem: &Problem) -> Option<&[f64]> {
         let begin = self.keeping.as_ref()?.begin.as_deref()?;
         (self.store(problem).is_some() && begin.len() == problem.active().len()).then_some(begin)
     }
 }
 
-/// Points a run may evaluate where nothing else is said.
+/// Default budget of a run, in evaluated points.
 pub const DEFAULT_EVALUATIONS: usize = 20_000;
 
 impl Default for Options {
@@ -70,23 +71,23 @@ impl Default for Options {
     }
 }
 
-/// A solved study.
+/// Result of [`crate::solve()`].
 pub struct Solved {
-    /// What `result.json` holds.
+    /// Content of `result.json`.
     pub outcome: Outcome,
-    /// The problem.
+    /// Problem that was solved.
     pub problem: Problem,
-    /// The evaluation that is reported.
+    /// Evaluation at the reported point.
     pub best: Evaluation,
-    /// Every point, in the order of evaluation.
+    /// Every evaluated point, in the order of evaluation.
     pub archive: Vec<Record>,
-    /// Points of the front, in the order of the result; empty where none was looked for.
+    /// Points of the Pareto front, in the order of the result; empty for other tasks.
     pub front: Vec<Evaluation>,
-    /// What the model lacks, where that was searched.
+    /// Result of a diagnosis; `None` for other tasks.
     pub diagnosis: Option<Diagnosis>,
 }
 
-/// The solver or the task cannot treat the study: why, and what would; with the keys that lead to the place, if there is one.
+/// Reason why the solver or the task cannot handle the study, with a remedy and, if known, the key path in the study file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SolveError(pub StudyError);
 
@@ -99,10 +100,10 @@ impl std::fmt::Display for SolveError {
 
 impl std::error::Error for SolveError {}
 
-/// Whether a solver can do the task of a study, as far as that is known without a simulation.
+/// Checks that a solver can handle the task of a study, as far as possible without a simulation.
 ///
 /// # Errors
-/// The solver cannot treat the problem.
+/// If the solver does not accept the problem.
 pub fn suits(study: &Study, solver: &SolverChoice) -> Result<(), SolveError> {
     if solves(study) { accepts(solver, solver.make().as_ref(), &Problem::outline(study)) } else { Ok(()) }
 }
@@ -111,7 +112,7 @@ fn accepts(choice: &SolverChoice, solver: &dyn Solver, shape: &Shape) -> Result<
     solver.accepts(shape).map_err(|why| SolveError(StudyError::new(choice.kind, why).within("solver")))
 }
 
-/// Whether the task of a study needs a solver.
+/// Returns true if the task of a study needs a solver.
 pub(crate) fn solves(study: &Study) -> bool {
     match study.task() {
         Task::Design | Task::Calibration | Task::Pareto => true,
@@ -123,12 +124,12 @@ pub(crate) fn solves(study: &Study) -> bool {
     }
 }
 
-/// Searches for the best point, and concludes.
+/// Runs the solver and returns its outcome.
 ///
 /// # Errors
-/// The solver cannot treat the problem.
+/// If the solver does not accept the problem.
 pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
-    let begun = Instant::now();
+    let started = Instant::now();
     let problem = Problem::new(Arc::new(study));
     let mut solver = options.solver.make();
     accepts(&options.solver, solver.as_ref(), problem.shape())?;
@@ -145,44 +146,45 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     }
     let quiet = Quiet(watch);
     let pareto = pareto(&run, stop, (store, &quiet));
-    let ending = Ending { stop, pareto, seconds: begun.elapsed().as_secs_f64() };
+    let ending = Ending { stop, pareto, seconds: started.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
     outcome.methods = solver.methods().to_vec();
     outcome.found.slopes = slopes(&run, (store, &quiet));
-    outcome.seconds = begun.elapsed().as_secs_f64();
+    outcome.seconds = started.elapsed().as_secs_f64();
     outcome.reused = begin.map(|_| run.reused());
     let archive = run.archive().to_vec();
     drop(run);
     Ok(Solved { outcome, problem, best, archive, front: Vec::new(), diagnosis: None })
 }
 
-/// Looks at the start values alone, and concludes.
-pub(crate) fn look(study: Study, options: &Options, watch: &dyn Watch) -> Solved {
-    let begun = Instant::now();
+/// Evaluates the start values only and returns the outcome.
+pub(crate) fn evaluate_start(study: Study, options: &Options, watch: &dyn Watch) -> Solved {
+    let started = Instant::now();
     let problem = Problem::new(Arc::new(study));
     let concluding = problem.concluding();
     let mut run = Run::new(&problem, Budget { evaluations: 1 }, watch);
     if run.evaluate(&[problem.start()]).is_err() && run.best().is_none() {
-        // This single point is needed to conclude.
+        // The outcome needs this single point.
         run = Run::new(&concluding, Budget { evaluations: 1 }, &());
         let _ = run.evaluate(&[problem.start()]);
     }
-    // N.B.: as if it were interrupted, so that no start value is estimated either.
+    // N.B.: reported as interrupted, so that no initial states are estimated either.
     let ending = Ending { stop: Stop::Interrupted, pareto: Pareto::NotShown, seconds: 0.0 };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
     let stop = if watch.wants_stop() { watch.halt().into() } else { Stop::Converged };
     (outcome.solver, outcome.stop) = ("none".to_owned(), stop);
-    outcome.seconds = begun.elapsed().as_secs_f64();
+    outcome.seconds = started.elapsed().as_secs_f64();
     let archive = run.archive().to_vec();
     drop(run);
     Solved { outcome, problem, best, archive, front: Vec::new(), diagnosis: None }
 }
 
-/// The distance within which the slopes at the reported point describe the problem, in the unit box; that of the certificate,
-/// so that they are known from it.
+/// Difference step of the derivatives at the reported point, in the unit box. Equal to that of the Pareto certificate, whose
+/// derivatives are then reused.
 const NEAR: f64 = 1e-4;
 
-/// How the criteria of a design change with its tuners at the best point; nothing where the user does not want to wait.
+/// Returns the derivatives of the criteria of a design with respect to its tuners at the best point; `None` after a stop
+/// request.
 fn slopes(run: &Run<'_>, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Option<SlopesReport> {
     let problem = run.problem();
     if problem.study().task() != Task::Design || watch.wants_stop() {
@@ -192,7 +194,7 @@ fn slopes(run: &Run<'_>, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Op
     SlopesReport::at(problem, &mut probe, &run.best()?.point, NEAR)
 }
 
-/// Whether the best point is Pareto-optimal, as far as that is known.
+/// Checks the best point for Pareto optimality.
 fn pareto(run: &Run<'_>, stop: Stop, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Pareto {
     let problem = run.problem();
     match run.best().filter(|best| best.merit.is_feasible()) {

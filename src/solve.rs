@@ -1,14 +1,14 @@
-//! Does what a study is for.
+//! Entry point that performs the task of a study.
 
 use mops_core::{Cancellation, Evaluation, Halt, RunState, Study, Watch};
 
 use crate::search::{Options, SolveError, Solved};
 use crate::tasks;
 
-/// Does the task of a study; `watch` looks on and may end the run.
+/// Performs the task of a study; `watch` observes the run and may stop it.
 ///
 /// # Errors
-/// The solver cannot treat the problem.
+/// If the solver does not accept the problem.
 ///
 /// # Panics
 /// If the threads cannot be started.
@@ -17,12 +17,12 @@ pub fn solve(mut study: Study, options: &Options, watch: &dyn Watch) -> Result<S
     let watch = Cancellable { watch, cancellation: &options.cancellation };
     let threads = rayon::ThreadPoolBuilder::new().num_threads(options.jobs.unwrap_or(0)).build();
     let mut solved = threads.expect("threads can be started").install(|| tasks::perform(study, options, &watch))?;
-    // What is drawn and told of the result from now on concludes the run.
+    // Plots and reports of the result are evaluated even after a stop request.
     solved.problem = solved.problem.concluding();
     Ok(solved)
 }
 
-/// Looks on for somebody, and wants an end as soon as simulations are asked to end.
+/// Forwards to an observer, and requests a stop as soon as the cancellation is requested.
 struct Cancellable<'a> {
     watch: &'a dyn Watch,
     cancellation: &'a Cancellation,

@@ -274,7 +274,7 @@ fn every_effect_is_listed_and_has_a_page_with_its_strengths() {
         assert!(list.contains(effect.name()), "{}", effect.name());
     }
     let page = String::from_utf8(mops(&["describe", "stribeck-friction"]).output().unwrap().stdout).unwrap();
-    for part in ["-c (1 + rise exp(-(v/vs)^2)) sgn(v)", "joint", "dissipative", "neutral at 0", "Source: B. Armstrong"]
+    for part in ["-c (1 + rise exp(-(v/vs)^2)) sgn(v)", "joint", "dissipative", "null value 0", "Source: B. Armstrong"]
     {
         assert!(page.contains(part), "{part}: {page}");
     }
@@ -321,7 +321,7 @@ fn data_shows_columns_units_gaps_and_sampling() {
     let text = String::from_utf8(mops(&["data", "d.csv"]).current_dir(&folder).output().unwrap().stdout).unwrap();
     let phi: Vec<&str> = text.lines().find(|l| l.contains("phi")).unwrap().split_whitespace().collect();
     assert_eq!(&phi[..6], ["phi", "rad", "50", "1", "0", "49"]);
-    assert!(text.contains("runs from 0 to 4.9, steps 0.1 (median)"), "{text}");
+    assert!(text.contains("from 0 to 4.9, step 0.1 (median)"), "{text}");
 }
 
 #[test]

@@ -206,7 +206,7 @@ fn a_lock_is_waited_for_and_all_that_waited_is_written_once_it_is_gone() {
     assert!(points(&database) > committed);
     Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     std::io::Read::read_to_string(&mut stderr, &mut line).unwrap();
-    assert!(!line.contains("not all"), "{line}");
+    assert!(!line.contains("incomplete"), "{line}");
     assert_eq!(child.wait().unwrap().code(), Some(4));
     let (result, kept) = (result(&out), points(&database));
     assert!(kept as u64 >= result["evaluations"].as_u64().unwrap(), "{kept}: {result}");
@@ -224,7 +224,7 @@ fn a_lock_that_stays_costs_no_result_and_the_run_has_ended_all_the_same() {
     Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(4), "{}", said(&output));
-    assert!(said(&output).contains("evaluations could not be kept: database is locked"), "{}", said(&output));
+    assert!(said(&output).contains("evaluations could not be stored: database is locked"), "{}", said(&output));
     let result = result(&out);
     assert_eq!(result["stop"], "interrupted");
     // Neither the history nor a comparison takes it for unfinished, and no report is made of a part of it.
@@ -270,7 +270,7 @@ fn every_task_takes_the_folder_and_makes_it_its_own() {
     for task in [&LOCAL[..], &SHORT[..], &["diagnose", "furuta-swing", "--quiet"]] {
         let refused = mops(task, &busy);
         assert_eq!(refused.status.code(), Some(2));
-        assert!(said(&refused).contains("another run is writing in"), "{}", said(&refused));
+        assert!(said(&refused).contains("is in use by another run"), "{}", said(&refused));
     }
     assert_eq!(history(&busy)[0]["state"], "running");
     child.kill().unwrap();
@@ -340,7 +340,7 @@ fn a_folder_that_is_removed_while_the_run_goes_is_made_again_with_all_its_points
     Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(4), "{}", said(&output));
-    assert!(said(&output).contains("was removed while the run went; it is written again"), "{}", said(&output));
+    assert!(said(&output).contains("was removed during the run and has been restored"), "{}", said(&output));
     assert!(points(&out.join("evaluations.sqlite")) as u64 >= result(&out)["evaluations"].as_u64().unwrap());
     assert!(look("report", &out).status.success());
     // Where another run has taken the place meanwhile, nothing of it is touched.
@@ -351,7 +351,7 @@ fn a_folder_that_is_removed_while_the_run_goes_is_made_again_with_all_its_points
     Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(3), "{}", said(&output));
-    assert!(said(&output).contains("another run writes there now"), "{}", said(&output));
+    assert!(said(&output).contains("is now used by another run"), "{}", said(&output));
     assert!(!out.join("result.json").exists());
     other.kill().unwrap();
     other.wait().unwrap();

@@ -114,7 +114,7 @@ fn killed(arguments: &[&str], root: &Path, [prepare, keeps]: [&dyn Fn(&Path); 2]
         let mut again = mops(&STUDY, &out).arg("--resume").output().unwrap();
         let said = String::from_utf8_lossy(&again.stderr).into_owned();
         // Killed before it touched the run that was there, it has not begun.
-        if said.contains("holds another run") {
+        if said.contains("contains another run") {
             again = mops(&STUDY, &out).output().unwrap();
         }
         if result(&out).as_ref() != Some(&expected) || !passing(&out).is_empty() {

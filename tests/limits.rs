@@ -125,7 +125,7 @@ fn a_limit_of_time_ends_every_task_as_a_spent_budget_does() {
         assert_eq!(result["stop"], "budget", "{task:?}");
         assert_eq!(result["evaluations"].as_u64().unwrap() > 0, known, "{task:?}");
         let warnings = result["warnings"].to_string();
-        assert!(warnings.contains("the time limit of 0.5 s ended the run"), "{task:?}: {warnings}");
+        assert!(warnings.contains("stopped at the time limit of 0.5 s"), "{task:?}: {warnings}");
     }
     for wrong in ["0", "-1 s", "3 m", "soon"] {
         let limit = format!("--time-limit={wrong}");
@@ -262,7 +262,7 @@ fn what_cannot_be_printed_is_an_error_and_costs_no_result() {
     ] {
         let output = full(arguments);
         assert_eq!(output.status.code(), Some(3), "{arguments:?}");
-        assert!(said(&output).contains("standard output cannot be written"), "{arguments:?}: {}", said(&output));
+        assert!(said(&output).contains("cannot write to standard output"), "{arguments:?}: {}", said(&output));
     }
     assert_eq!(result(&root.path().join("out"))["evaluations"], 20);
     // A reader that has enough is no error.
@@ -292,7 +292,7 @@ fn devices_and_pipes_are_no_data_files() {
         assert!(said(&output).contains("study.toml:"), "{file}: {}", said(&output));
     }
     let output = mops(&["check", "/dev/zero"], root.path());
-    assert!(output.status.code() == Some(2) && said(&output).contains("no study"), "{}", said(&output));
+    assert!(output.status.code() == Some(2) && said(&output).contains("not a study"), "{}", said(&output));
 }
 
 #[test]
@@ -345,7 +345,7 @@ fn a_picked_study_overwrites_none_that_is_there() {
     assert!(name(&mops(&pick, root.path())).ends_with("picked-2.toml"));
     assert_eq!(fs::read_to_string(root.path().join("out/picked.toml")).unwrap(), "worked on");
     let refused = mops(&[&pick[..], &["--out", "out/picked.toml"]].concat(), root.path());
-    assert!(refused.status.code() == Some(2) && said(&refused).contains("is already there"), "{}", said(&refused));
+    assert!(refused.status.code() == Some(2) && said(&refused).contains("already exists"), "{}", said(&refused));
 }
 
 #[test]
@@ -379,7 +379,7 @@ fn a_linearisation_ends_with_its_time_limit() {
     fs::write(root.path().join("study.toml"), text).unwrap();
     let output = mops(&["linearise", "study.toml", "--out", "out", "--time-limit", "0.02"], root.path());
     assert_eq!(output.status.code(), Some(3), "{}", said(&output));
-    assert!(said(&output).contains("the time limit of 0.02 s came before it was done"), "{}", said(&output));
+    assert!(said(&output).contains("not finished within the time limit of 0.02 s"), "{}", said(&output));
     assert!(!root.path().join("out").exists());
     assert_eq!(mops(&["check", "study.toml"], root.path()).status.code(), Some(0));
 }

@@ -75,9 +75,9 @@ fn what_linearise_cannot_do_is_a_mistake_with_a_way_out() {
     let folder = tempfile::tempdir().unwrap();
     let file = study(folder.path(), PENDULUM);
     for (arguments, fact) in [
-        (vec!["--place=-5,-8"], "2 poles are asked for, but the system has 4 states"),
+        (vec!["--place=-5,-8"], "expected 4 poles, one per state, found 2"),
         (vec!["--place=-5,-8,-1+2i,-3"], "has no conjugate"),
-        (vec!["--lqr", "1,1"], "takes 4 weights of states and 1 of inputs"),
+        (vec!["--lqr", "1,1"], "expected 4 weights of states and 1 of inputs"),
         (vec!["--output", "thet"], "did you mean `theta`?"),
         (vec!["--at", "theta=1"], "no such tuner or parameter"),
     ] {
@@ -229,7 +229,7 @@ p = { peak = { signal = 'ph' }, usage = 'monitor' }
     let found = mops(&[&arguments[..], &["--free", "u", "--lqr", "1,1,1"]].concat()).output().unwrap();
     let text = String::from_utf8(found.stdout).unwrap();
     for part in
-        ["0.177312", "note: dry friction of `ph` is left out", "\n  (100 s)/(s^2 ", "zeros (1/s): 0\n", "u [N m]"]
+        ["0.177312", "note: dry friction of `ph` is ignored", "\n  (100 s)/(s^2 ", "zeros (1/s): 0\n", "u [N m]"]
     {
         assert!(text.contains(part), "{part}: {text}");
     }
@@ -256,7 +256,11 @@ slowest = { slowest-pole = { input = 'u1' }, usage = 'monitor' }
     let placed = mops(&["linearise", &file, "--place=-3,-3,-9,-9", "--out", out.to_str().unwrap()]).output().unwrap();
     let printed = String::from_utf8(placed.stdout).unwrap();
     assert!(placed.status.success(), "{}", String::from_utf8_lossy(&placed.stderr));
-    for part in ["controllability indices 3, 1", "one part in a million", "linearised.json and 8 plots are in"] {
+    for part in [
+        "controllability indices 3, 1",
+        "sensitivity: a relative change of A and B of 1e-6",
+        "linearised.json and 8 plots are in",
+    ] {
         assert!(printed.contains(part), "{part}: {printed}");
     }
     let feedback = &json(&out.join("linearised.json"))["feedback"];

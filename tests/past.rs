@@ -99,10 +99,10 @@ fn a_comparison_has_differences_in_percent_and_the_responses() {
     assert_eq!(all["criteria"][1]["name"], "nominal/settling");
     let page = folder.path().join("both.html");
     let text = said(&["compare", of_a, of_b, "--out", page.to_str().unwrap()]);
-    assert!(text.contains("B to A, %") && text.contains("nominal/overshoot"), "{text}");
+    assert!(text.contains("B vs A, %") && text.contains("nominal/overshoot"), "{text}");
     let page = std::fs::read_to_string(page).unwrap();
     assert!(page.contains("y in case nominal") && page.contains("series0") && page.contains("series1"), "{page}");
-    assert!(page.contains("<th scope=\"row\">nominal/overshoot</th>") && page.contains("B to A, %"), "{page}");
+    assert!(page.contains("<th scope=\"row\">nominal/overshoot</th>") && page.contains("B vs A, %"), "{page}");
     let said = refusal(&["compare", of_a, folder.path().join("c").to_str().unwrap()]);
-    assert!(said.contains("is no folder"), "{said}");
+    assert!(said.contains("is not a folder"), "{said}");
 }

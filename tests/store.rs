@@ -30,9 +30,9 @@ fn result(out: &Path) -> Value {
     result
 }
 
-/// Known points, evaluations that met one of them, and those that were simulated, as the terminal tells.
+/// Stored points, evaluations answered by one of them, and simulated evaluations, as printed by the terminal.
 fn counts(said: &str) -> [usize; 3] {
-    let line = said.lines().find(|line| line.contains("known points")).unwrap_or_else(|| panic!("{said}"));
+    let line = said.lines().find(|line| line.starts_with("cache: ")).unwrap_or_else(|| panic!("{said}"));
     let numbers: Vec<usize> = line.split(|c: char| !c.is_ascii_digit()).filter_map(|word| word.parse().ok()).collect();
     numbers.try_into().unwrap()
 }
@@ -210,7 +210,7 @@ fn what_another_study_left_is_refused_with_the_reason() {
     assert!(said.contains("`cases.nominal.b` was") && said.contains("-4.5"), "{said}");
     let nowhere = folder.path().join("nowhere");
     let said = refusal(&["run", "pid-design", "--out", place, "--reuse", nowhere.to_str().unwrap()]);
-    assert!(said.contains("holds no evaluations.sqlite"), "{said}");
+    assert!(said.contains("contains no evaluations.sqlite"), "{said}");
     std::fs::write(out.join("evaluations.sqlite"), "not a database").unwrap();
     let output = mops(&["run", "pid-design", "--out", place, "--resume"]).output().unwrap();
     assert!(matches!(output.status.code(), Some(2 | 3)), "{output:?}");
@@ -237,6 +237,6 @@ fn a_new_run_keeps_the_points_of_one_that_came_to_no_end() {
         .execute("UPDATE runs SET state = 'running', ended = NULL", [])
         .unwrap();
     let said = run("pid-design", &out, &SEARCH);
-    assert!(said.contains("evaluations of an unfinished run are now in"), "{said}");
+    assert!(said.contains("evaluations of an unfinished run were moved to"), "{said}");
     assert!(out.join("evaluations.previous.sqlite").exists());
 }

@@ -120,7 +120,7 @@ fn a_column_of_a_data_file_can_be_asked_for_its_order() {
     assert!(
         text.contains("persistently exciting of order 2")
             && text.contains("with 2 parameters")
-            && !text.contains("suffices, if"),
+            && !text.contains("sufficient, if"),
         "{text}"
     );
     let output = mops(&["data", data.to_str().unwrap(), "--excitation", "sinus"]).output().unwrap();

@@ -1,8 +1,8 @@
-//! The frame of a benchmark's page: pictures, then what the terminal says.
+//! Page of a benchmark: plots, then the tables of the terminal.
 
 use maud::{PreEscaped, html};
 
-/// The page; pictures as SVG.
+/// Returns the page as HTML; `pictures` are SVG.
 pub(super) fn page(title: &str, heading: &str, pictures: &[String], tables: &str, footer: &str) -> String {
     let body = html! {
         header { p class="task" { "benchmark" } h1 { (title) } }

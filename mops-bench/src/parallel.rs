@@ -1,4 +1,4 @@
-//! Many tasks on several threads, with results in the order of the tasks.
+//! Parallel execution of tasks, with results in the order of the tasks.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mops::Watch;
 
-/// Does every task on one of `jobs` threads, until `watch` wants an end; what was done by then, in the order of the tasks.
-/// A task that breaks is as one that gave nothing.
+/// Runs every task on one of `jobs` threads, until `watch` requests a stop. Returns the results so far, in the order of the
+/// tasks. A task that panics has no result.
 pub(crate) fn each<T: Sync, R: Send>(
     tasks: &[T],
     jobs: usize,
@@ -20,11 +20,11 @@ pub(crate) fn each<T: Sync, R: Send>(
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(task) = tasks.get(index) else { break };
             let result = catch_unwind(AssertUnwindSafe(|| work(task))).unwrap_or(None);
-            // What was interrupted is not what it would have been.
+            // The result of an interrupted task may be incomplete.
             if watch.wants_stop() {
                 break;
             }
-            let mut done = done.lock().expect("no thread breaks while it holds the list");
+            let mut done = done.lock().expect("no thread panics while it locks the list");
             done.push((index, result));
             #[allow(clippy::cast_precision_loss)]
             watch.stage(&format!("{} of {} cases", done.len(), tasks.len()), done.len() as f64 / tasks.len() as f64);
@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn results_stand_in_the_order_of_the_tasks_and_a_broken_one_is_left_out() {
+    fn results_are_in_the_order_of_the_tasks_without_those_that_panic() {
         let tasks: Vec<usize> = (0..40).collect();
         let squares = each(&tasks, 4, &(), |&i| {
             assert!(i != 7, "broken");
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_done_before_an_interruption_is_kept() {
+    fn results_before_an_interruption_are_kept() {
         let tasks: Vec<usize> = (0..40).collect();
         let done = each(&tasks, 1, &Until(AtomicUsize::new(5), AtomicBool::new(false)), |&i| Some(i));
         assert_eq!(done, [0, 1, 2, 3, 4]);

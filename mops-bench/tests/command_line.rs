@@ -1,4 +1,4 @@
-//! What a user sees of `mops-bench`.
+//! Tests of the command line of `mops-bench`.
 
 use assert_cmd::Command;
 use assert_cmd::cargo::cargo_bin_cmd;
@@ -11,7 +11,7 @@ fn bench(arguments: &[&str]) -> Command {
 }
 
 #[test]
-fn a_benchmark_of_solvers_leaves_results_that_can_be_compared() {
+fn a_benchmark_of_solvers_writes_results_that_can_be_compared() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("bench");
     let results = out.join("results.json");
@@ -38,7 +38,7 @@ fn a_benchmark_of_solvers_leaves_results_that_can_be_compared() {
     bench(&["minimax", "--problems", "CB22"]).assert().code(2);
 }
 
-/// What `mops-bench` prints for the given arguments.
+/// Returns the output of `mops-bench` for the given arguments.
 fn benched(arguments: &[&str]) -> String {
     let done = bench(arguments).arg("--quiet").output().unwrap();
     let text = String::from_utf8(done.stdout).unwrap();
@@ -77,24 +77,24 @@ fn a_benchmark_of_fronts_has_mean_hypervolume_and_distance_over_seeds() {
 }
 
 #[test]
-fn problems_without_known_minima_are_measured_by_the_best_of_all_solvers() {
+fn problems_without_known_minima_are_compared_with_the_best_of_all_solvers() {
     let text = benched(&["more-wild", "--problems", "1 n9 m45,4 n2 m2", "--solver", "auto"]);
     assert!(text.contains("simplex gradients: ") && text.contains("auto: 2 of 2 solved"), "{text}");
 }
 
-/// Exit status 2, and the fact and the way out on standard error.
+/// Exit status 2, with the error and its remedy on standard error.
 #[test]
-fn a_wrong_command_line_gets_one_error_and_the_way_out() {
+fn a_wrong_command_line_gets_one_error_and_its_remedy() {
     for (arguments, expected) in [
         (&["minimax", "--budget", "0"][..], "--budget"),
         (&["minimax", "--problems", "CB22"], "`minimax` has no problem `CB22`"),
-        (&["control", "--gradients"], "leave `--gradients` and `--noise` out"),
-        (&["zdt", "--noise", "0.1"], "leave `--noise` out"),
-        (&["minimax", "--noise", "2"], "between 0 and 1, not 2"),
+        (&["control", "--gradients"], "remove `--gradients` and `--noise`"),
+        (&["zdt", "--noise", "0.1"], "remove `--noise`"),
+        (&["minimax", "--noise", "2"], "between 0 and 1, found 2"),
         (&["minimax", "--solver", "nsga2", "--problems", "CB2"], "`nsga2` accepts none of these problems"),
         (&["minimax", "--solver", "squp"], "there is no solver `squp`"),
         (&["diagnosis", "--plants", "servos"], "`servos`"),
-        (&["diagnosis", "--sizes", "0.5"], "above 1, not 0.5"),
+        (&["diagnosis", "--sizes", "0.5"], "found 0.5"),
     ] {
         let done = bench(arguments).output().unwrap();
         let text = String::from_utf8(done.stderr).unwrap();

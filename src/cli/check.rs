@@ -1,4 +1,4 @@
-//! `mops check`: reads a study and its data, and runs nothing.
+//! `mops check`: reads a study and its data without running anything.
 
 use std::process::ExitCode;
 
@@ -14,7 +14,7 @@ use super::study::{StudyArguments, open};
 use crate::search::suits;
 use crate::terminal::{CommandError, number, print, table};
 
-/// What is checked.
+/// Arguments of `mops check`.
 #[derive(Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -69,12 +69,12 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     Ok(ExitCode::SUCCESS)
 }
 
-/// A table after an empty line; nothing where it has no rows.
+/// Formats a table after an empty line; returns an empty text if there are no rows.
 fn section(header: &[&str], right: &[usize], rows: Vec<Vec<String>>) -> String {
     if rows.is_empty() { String::new() } else { format!("\n{}", table(header, right, rows)) }
 }
 
-/// What an experiment measures.
+/// Returns one row for each measured channel of the experiment of a case.
 fn channels(study: &Study, case: &Case) -> Vec<Vec<String>> {
     let signals = || study.models().iter().flat_map(|(_, model)| &model.interface().signals);
     let of = |experiment: &Experiment| {
@@ -96,7 +96,7 @@ fn channels(study: &Study, case: &Case) -> Vec<Vec<String>> {
     case.experiment.as_ref().map_or_else(Vec::new, of)
 }
 
-/// Parameters that no tuner moves; one that is the same in all cases is one row.
+/// Returns one row for each parameter that is not a tuner; equal values in all cases share a row.
 fn fixed(study: &Study) -> Vec<Vec<String>> {
     let of_job = |job: &JobPlan| {
         let names = &study.models()[job.model].1.interface().parameters;

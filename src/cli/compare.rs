@@ -1,4 +1,4 @@
-//! `mops compare`: runs side by side.
+//! `mops compare`: compares runs side by side.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -8,27 +8,27 @@ use clap::Args;
 use mops_core::{Catalogue, Diagnostic, Problem};
 use serde_json::{Value, json};
 
-use super::past::Past;
+use super::past_run::PastRun;
 use crate::files;
 use crate::numbers::significant;
 use crate::report::{Responses, Rows, comparison_page};
 use crate::terminal::{CommandError, number, print, print_json, table};
 
-/// What is compared.
+/// Arguments of `mops compare`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Folders of runs, as --out had them; differences are to the first.
+    /// Output folders (--out) of the runs; differences are relative to the first.
     #[arg(required = true, num_args = 2..)]
     folders: Vec<PathBuf>,
-    /// Write a page with the responses of all of them drawn over each other.
+    /// Write an HTML page with the responses of all runs overlaid.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Print a JSON object instead of the tables.
+    /// Print a JSON object instead of tables.
     #[arg(long)]
     json: bool,
 }
 
-/// A quantity in all runs: name, unit, a value for each.
+/// Quantity with its value in each run.
 struct Line {
     name: String,
     unit: String,
@@ -36,11 +36,11 @@ struct Line {
 }
 
 pub(super) fn compare(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    let runs = arguments.folders.iter().map(|folder| Past::of(folder)).collect::<Result<Vec<_>, _>>()?;
-    let results: Vec<&Value> = runs.iter().map(|run| run.ended().unwrap_or(&Value::Null)).collect();
+    let runs = arguments.folders.iter().map(|folder| PastRun::open(folder)).collect::<Result<Vec<_>, _>>()?;
+    let results: Vec<&Value> = runs.iter().map(|run| run.finished_result().unwrap_or(&Value::Null)).collect();
     if results.iter().all(|result| result.is_null()) {
         return Err(Diagnostic::new("none of these runs has a result")
-            .with_help("`mops run --resume` takes a run to its end")
+            .with_help("finish a run with `mops run --resume`")
             .into());
     }
     let names: Vec<String> = runs.iter().map(|run| run.folder.display().to_string()).collect();
@@ -48,31 +48,31 @@ pub(super) fn compare(catalogue: &Catalogue, arguments: &Arguments) -> Result<Ex
     let of_case =
         |criterion: &Value| [&criterion["case"], &criterion["name"]].map(|v| v.as_str().unwrap_or_default()).join("/");
     let criteria = lines(&results, "criteria", of_case);
-    let whole = whole(&results);
-    let states: Vec<&str> = runs.iter().map(Past::state).collect();
+    let summary = summary(&results);
+    let states: Vec<&str> = runs.iter().map(PastRun::state).collect();
     if arguments.json {
         let of = |lines: &[Line]| -> Vec<Value> { lines.iter().map(json_of).collect() };
-        let all = json!({ "runs": names, "states": states, "outcome": of(&whole), "tuners": of(&tuners), "criteria": of(&criteria) });
+        let all = json!({ "runs": names, "states": states, "outcome": of(&summary), "tuners": of(&tuners), "criteria": of(&criteria) });
         print_json(&all)?;
     }
-    let tables = [(["Results", "run"], whole), (["Tuners", "tuner"], tuners), (["Criteria", "criterion"], criteria)];
+    let tables = [(["Results", "run"], summary), (["Tuners", "tuner"], tuners), (["Criteria", "criterion"], criteria)];
     let tables = tables.map(|(title, lines)| rows(title, names.len(), &lines));
     if !arguments.json {
-        print(&tables.iter().fold(legend(&names, &states, &results), |text, rows| text + "\n" + &in_words(rows)))?;
+        print(&tables.iter().fold(legend(&names, &states, &results), |text, rows| text + "\n" + &text_table(rows)))?;
     }
     if let Some(path) = &arguments.out {
-        let (responses, silent) = responses(catalogue, &runs, &results);
+        let (responses, missing_responses) = responses(catalogue, &runs, &results);
         let names: Vec<(String, String)> = names.into_iter().enumerate().map(|(i, name)| (letter(i), name)).collect();
-        let page = comparison_page(&names, &tables, &responses, &silent);
+        let page = comparison_page(&names, &tables, &responses, &missing_responses);
         files::write(path, page).map_err(CommandError::cannot_write(path))?;
         if !arguments.json {
-            print(&format!("\nthe responses are drawn in {}\n", path.display()))?;
+            print(&format!("\nthe responses are plotted in {}\n", path.display()))?;
         }
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the runs have under a key, by names in the order of their first appearance.
+/// Collects the entries under `key` of all results, by name, in the order of first appearance.
 fn lines(results: &[&Value], key: &str, name: impl Fn(&Value) -> String) -> Vec<Line> {
     let of = |result: &&Value| result[key].as_array().cloned().unwrap_or_default();
     let all: Vec<Vec<Value>> = results.iter().map(of).collect();
@@ -90,8 +90,8 @@ fn lines(results: &[&Value], key: &str, name: impl Fn(&Value) -> String) -> Vec<
     found
 }
 
-/// What each run as a whole came to.
-fn whole(results: &[&Value]) -> Vec<Line> {
+/// Collects the overall figures of the runs: worst scaled value, objective, violation, evaluations, time.
+fn summary(results: &[&Value]) -> Vec<Line> {
     let keys = [("worst_scaled", "1"), ("objective", "1"), ("violation", "1"), ("evaluations", "1"), ("seconds", "s")];
     let line = |(key, unit): (&str, &str)| Line {
         name: key.replace('_', " "),
@@ -101,7 +101,7 @@ fn whole(results: &[&Value]) -> Vec<Line> {
     keys.map(line).into()
 }
 
-/// How far each value is from the first, in percent of the first.
+/// Returns the difference of each value to the first, in percent of the first.
 fn differences(line: &Line) -> Vec<Option<f64>> {
     let first = line.values[0].filter(|first| *first != 0.0);
     line.values.iter().skip(1).map(|value| Some(100.0 * ((*value)? - first?) / first?.abs())).collect()
@@ -111,7 +111,7 @@ fn json_of(line: &Line) -> Value {
     json!({ "name": line.name, "unit": line.unit, "values": line.values, "differences_percent": differences(line) })
 }
 
-/// Which letter stands for which folder; and which of them have no result.
+/// Formats the legend: letter and folder of each run, with the state of runs without a result.
 fn legend(names: &[String], states: &[&str], results: &[&Value]) -> String {
     let line = |(i, name): (usize, &String)| {
         let state = if results[i].is_null() { format!(": {}, no result yet", states[i]) } else { String::new() };
@@ -120,7 +120,7 @@ fn legend(names: &[String], states: &[&str], results: &[&Value]) -> String {
     names.iter().enumerate().map(line).collect()
 }
 
-/// A, B, ... Z, then numbers.
+/// Returns the label of a run: A, B, ... Z, then numbers.
 fn letter(index: usize) -> String {
     let of_alphabet = u8::try_from(index).ok().filter(|index| *index < 26).map(|index| char::from(b'A' + index));
     of_alphabet.map_or_else(|| format!("{}", index + 1), String::from)
@@ -129,7 +129,7 @@ fn letter(index: usize) -> String {
 fn rows([title, what]: [&'static str; 2], runs: usize, lines: &[Line]) -> Rows {
     let mut header = vec![what.to_owned(), "unit".to_owned()];
     header.extend((0..runs).map(letter));
-    header.extend((1..runs).map(|i| format!("{} to A, %", letter(i))));
+    header.extend((1..runs).map(|i| format!("{} vs A, %", letter(i))));
     let percent = |difference: Option<f64>| match difference {
         Some(0.0) => "0".to_owned(),
         Some(difference) => format!("{}{}", if difference > 0.0 { "+" } else { "" }, significant(difference, 3)),
@@ -143,26 +143,26 @@ fn rows([title, what]: [&'static str; 2], runs: usize, lines: &[Line]) -> Rows {
     Rows { title, header, lines: lines.iter().map(row).collect() }
 }
 
-fn in_words(rows: &Rows) -> String {
+fn text_table(rows: &Rows) -> String {
     let header: Vec<&str> = rows.header.iter().map(String::as_str).collect();
     let numeric: Vec<usize> = (2..header.len()).collect();
     table(&header, &numeric, rows.lines.clone())
 }
 
-/// The responses of every run at its tuners; and of which there are none, and why.
-fn responses(catalogue: &Catalogue, runs: &[Past], results: &[&Value]) -> (Vec<Responses>, Vec<String>) {
-    let (mut found, mut silent) = (Vec::new(), Vec::new());
+/// Returns the responses of the runs at their results, and one sentence for each run without responses.
+fn responses(catalogue: &Catalogue, runs: &[PastRun], results: &[&Value]) -> (Vec<Responses>, Vec<String>) {
+    let (mut found, mut missing_responses) = (Vec::new(), Vec::new());
     for (i, (run, result)) in runs.iter().zip(results).enumerate() {
-        match at_result(catalogue, run, result) {
+        match problem_at_result(catalogue, run, result) {
             Ok((problem, tuners)) => found.push(Responses { name: letter(i), problem, tuners }),
-            Err(why) => silent.push(format!("No responses of {}: {}.", letter(i), why.message)),
+            Err(why) => missing_responses.push(format!("No responses for {}: {}.", letter(i), why.message)),
         }
     }
-    (found, silent)
+    (found, missing_responses)
 }
 
-/// The problem of a run, and the tuners of its result.
-fn at_result(catalogue: &Catalogue, run: &Past, result: &Value) -> Result<(Problem, Vec<f64>), Diagnostic> {
+/// Returns the problem of a run and the tuners of its result.
+fn problem_at_result(catalogue: &Catalogue, run: &PastRun, result: &Value) -> Result<(Problem, Vec<f64>), Diagnostic> {
     if result.is_null() {
         return Err(Diagnostic::new(format!("the run in {} is {}", run.folder.display(), run.state())));
     }
@@ -171,7 +171,7 @@ fn at_result(catalogue: &Catalogue, run: &Past, result: &Value) -> Result<(Probl
         let tuner = result["tuners"].as_array()?.iter().find(|tuner| tuner["name"] == name)?;
         tuner["value"].as_f64()
     };
-    let missing = |folder: &Path| Diagnostic::new(format!("the result in {} has not every tuner", folder.display()));
+    let missing = |folder: &Path| Diagnostic::new(format!("the result in {} lacks a tuner", folder.display()));
     let tuners = study.tuners().iter().map(|tuner| of(&tuner.name)).collect::<Option<Vec<f64>>>();
     let tuners = tuners.ok_or_else(|| missing(&run.folder))?;
     Ok((Problem::new(Arc::new(study)), tuners))

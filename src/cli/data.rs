@@ -1,4 +1,4 @@
-//! `mops data`: what is in a data file.
+//! `mops data`: summary of a data file.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -12,12 +12,12 @@ use mops_core::math;
 use super::findings;
 use crate::terminal::{CommandError, number, print, table};
 
-/// What is shown.
+/// Arguments of `mops data`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// A CSV file, or a MATLAB file of level 4 or 5.
+    /// CSV file, or MATLAB file of level 4 or 5.
     file: PathBuf,
-    /// Tell how rich this column is as an input: its order of persistent excitation.
+    /// Print the order of persistent excitation of this column as an input.
     #[arg(long, value_name = "COLUMN")]
     excitation: Option<String>,
 }
@@ -35,7 +35,7 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let (mut sampling, mut unknown) = (String::new(), Vec::new());
     for name in &names {
         let column = file.column(name)?;
-        // N.B.: a large file takes its memory once, so that nothing is gathered here.
+        // N.B.: values are not collected, as a second copy of a large file may not fit in memory.
         let finite = || column.values.iter().copied().filter(|v| v.is_finite());
         let (mut count, mut low, mut high) = (0, f64::INFINITY, f64::NEG_INFINITY);
         finite().for_each(|value| (count, low, high) = (count + 1, low.min(value), high.max(value)));
@@ -66,7 +66,7 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
     }
     if !unknown.is_empty() {
         let names = unknown.join(", ");
-        text += &format!("no noise of {names}: it takes {FEWEST} times four samples that follow each other evenly\n");
+        text += &format!("no noise estimate for {names}: needs {MIN_DIFFERENCES} groups of four consecutive samples\n");
     }
     for skipped in &file.skipped {
         text += &format!("skipped: {skipped}\n");
@@ -75,18 +75,18 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// How rich a column is, counted in samples.
+/// Formats the order of persistent excitation of a column.
 fn excitation(file: &DataFile, name: &str, shown: &str) -> Result<String, Diagnostic> {
     let column = file.column(name)?;
     if let Some(gap) = column.values.iter().position(|v| !v.is_finite()) {
         return Err(Diagnostic::new(format!("`{name}` has a gap at row {}", gap + 1))
-            .with_help("an input must be known throughout: fill the gap, or cut the file"));
+            .with_help("fill the gap or cut the file: an input needs a value at every sample"));
     }
     let time = file.time_column();
     let step = match time {
         Some(time) => spacing(file.column(&time)?.values).ok_or_else(|| {
             Diagnostic::new(format!("the samples are not equally spaced in `{time}`"))
-                .with_help("a study resamples them: task = \"excitation\" with `sample-time` in [excitation]")
+                .with_help("resample them in a study: task = \"excitation\" with `sample-time` in [excitation]")
         })?,
         None => f64::NAN,
     };
@@ -100,9 +100,9 @@ fn sample_time(name: &str, times: &[f64]) -> String {
     steps.sort_by(f64::total_cmp);
     let (Some(least), Some(most)) = (steps.first(), steps.last()) else { return String::new() };
     let median = steps[steps.len() / 2];
-    let order = if *least > 0.0 { "" } else { "; it does not always increase" };
+    let order = if *least > 0.0 { "" } else { "; not strictly increasing" };
     format!(
-        "`{name}` runs from {} to {}, steps {} (median) from {} to {}{order}",
+        "`{name}` from {} to {}, step {} (median), {} (min), {} (max){order}",
         number(times[0]),
         number(times[times.len() - 1]),
         number(median),
@@ -111,14 +111,14 @@ fn sample_time(name: &str, times: &[f64]) -> String {
     )
 }
 
-/// Third differences from which a noise is estimated, at least: its relative error is then some 20 %.
-const FEWEST: u32 = 20;
+/// Smallest number of third differences for a noise estimate; its relative error is then about 20 %.
+const MIN_DIFFERENCES: u32 = 20;
 
-/// Standard deviation of white noise on a smooth signal, from third differences, whose variance is 20 times as large.
+/// Estimates the standard deviation of white noise on a smooth signal from third differences, whose variance is 20 times that
+/// of the noise.
 ///
-/// The samples of a column may be fewer than the rows of the file: empty cells are none. Where two samples are half as far
-/// apart again as the median of the column there is a gap, and nothing is differenced across it. `None` where fewer than
-/// [`FEWEST`] differences are left.
+/// Empty cells of the column are skipped. A distance of more than 1.5 times the median distance between samples is a gap, and
+/// no difference is taken across a gap. Returns `None` with fewer than [`MIN_DIFFERENCES`] differences.
 #[allow(clippy::cast_precision_loss)]
 fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
     let times = times.filter(|times| times.len() == values.len());
@@ -140,14 +140,14 @@ fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
             sum += math::powi(run[3] - 3.0 * run[2] + 3.0 * run[1] - run[0], 2);
         }
     }
-    (count >= FEWEST).then(|| (sum / f64::from(count) / 20.0).sqrt())
+    (count >= MIN_DIFFERENCES).then(|| (sum / f64::from(count) / 20.0).sqrt())
 }
 
 #[cfg(test)]
 mod tests {
     use super::noise;
 
-    /// A steep ramp with an alternating error of 0.1, whose third differences are 0.8.
+    /// Steep ramp with an alternating error of 0.1, whose third differences are 0.8.
     fn ramp(n: i32) -> (Vec<f64>, Vec<f64>) {
         let values = (0..n).map(|i| 5.0 * f64::from(i) + if i % 2 == 0 { 0.1 } else { -0.1 });
         ((0..n).map(f64::from).collect(), values.collect())
@@ -169,7 +169,7 @@ mod tests {
         assert!(noise(&without(&values), None).unwrap() > 2.0 * expected);
         assert_eq!(noise(&values[..22], None), None);
         assert!(noise(&values[..23], None).is_some());
-        // A logger at a fifth of the rate of the file, with a gap of its own, with and without times.
+        // A logger at one fifth of the rate of the file, with an additional gap, with and without times.
         let sparse =
             |of: &dyn Fn(usize) -> f64| (0..500).map(|i| if i % 5 == 2 { of(i / 5) } else { f64::NAN }).collect();
         let rows: Vec<f64> = (0..500).map(|i| 0.01 * f64::from(i)).collect();

@@ -1,4 +1,4 @@
-//! `mops describe`: the manual page of a kind, an effect or a shipped study.
+//! `mops describe`: manual page of a kind, an effect, a study or a table of study files.
 
 use std::process::ExitCode;
 
@@ -10,11 +10,11 @@ use super::places::places;
 use super::study::text_of;
 use crate::terminal::{CommandError, print};
 
-/// What is described.
+/// Arguments of `mops describe`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// A kind of model, criterion or solver, an effect, a shipped study, a table of study files (study, models, tuners, cases,
-    /// experiments, criteria, solver), or a key of one, such as `step` or `hold`.
+    /// Kind of model, criterion or solver; effect; shipped study; table of study files (study, models, tuners, cases,
+    /// experiments, criteria, solver) or key of one, such as `step` or `hold`.
     name: String,
 }
 
@@ -43,7 +43,7 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         print(&page_of(study))?;
         return Ok(ExitCode::SUCCESS);
     }
-    // A key of a table, such as `step` or `hold`: the page of the table tells of it.
+    // A key of a table, such as `step` or `hold`, is described on the page of the table.
     let tables = mops_core::file::tables_with(name);
     if !tables.is_empty() {
         let pages = mops_core::file::tables().into_iter().filter(|(table, _)| tables.contains(table));
@@ -60,12 +60,12 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         .chain(catalogue.studies.iter().map(CatalogueStudy::name))
         .chain(mops_core::file::tables().into_iter().map(|(table, _)| table))
         .collect();
-    Err(Diagnostic::new(format!("nothing is called `{name}`"))
+    Err(Diagnostic::new(format!("no kind, effect, study or table is named `{name}`"))
         .with_help(suggestion(name, known.iter().copied()))
         .into())
 }
 
-/// The page of a study: its README and its file; of one built in Rust, the sentence that it brings.
+/// Returns the page of a study: its README and its study.toml, or the description of a study built in Rust.
 fn page_of(study: &CatalogueStudy) -> String {
     match study {
         CatalogueStudy::Built(built) => {

@@ -1,20 +1,20 @@
-//! `mops diagnose`: finds what the model of a study lacks, whatever the study is for.
+//! `mops diagnose`: runs a diagnosis of the model of a study, whatever the task of the study.
 
 use std::process::ExitCode;
 
 use clap::Args;
 use mops_core::Catalogue;
 
-use super::run::{Common, Search, go};
+use super::run::{CommonOptions, Search, execute};
 use crate::terminal::CommandError;
 
-/// What can be said to a diagnosis.
+/// Options of `mops diagnose`.
 #[derive(Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
-    common: Common,
+    common: CommonOptions,
 }
 
 pub(super) fn diagnose(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    go(catalogue, &arguments.common, &Search::Diagnosis)
+    execute(catalogue, &arguments.common, &Search::Diagnosis)
 }

@@ -1,4 +1,4 @@
-//! A diagnosis on the terminal: the verdict, what was found, errors before and after, what cannot be told apart.
+//! Text of a diagnosis on the terminal: verdict, effects found, errors before and after, indistinguishable effects.
 
 use mops_discrepancy::{Diagnosis, Verdict};
 
@@ -6,23 +6,23 @@ use crate::diagnosis::{errors, words};
 use crate::numbers::significant;
 use crate::terminal::{number, table};
 
-/// Effects of the ranking that are printed.
+/// Number of ranked effects that are printed.
 const SHOWN: usize = 6;
 
-/// Everything worth a line after a diagnosis.
+/// Formats the result of a diagnosis.
 pub(super) fn text(diagnosis: &Diagnosis, seconds: f64) -> String {
     let mut text = format!("\n{}\n", plain(&words::verdict(diagnosis)));
     if !diagnosis.found.is_empty() {
         text += &format!("\n{}", found(diagnosis));
     }
     for removed in &diagnosis.removed {
-        text += &plain(&format!("\ndeclared term taken away: {}\n", words::term(removed)));
+        text += &plain(&format!("\nterm removed from the model: {}\n", words::term(removed)));
     }
     if !diagnosis.before.is_empty() {
         text += &format!("\n{}", errors_table(diagnosis));
     }
-    let told = diagnosis.found.iter().flat_map(words::remarks);
-    let sentences: String = told.map(|sentence| format!("- {}\n", plain(&sentence))).collect();
+    let remarks = diagnosis.found.iter().flat_map(words::remarks);
+    let sentences: String = remarks.map(|sentence| format!("- {}\n", plain(&sentence))).collect();
     if !sentences.is_empty() {
         text += &format!("\n{sentences}");
     }
@@ -36,7 +36,7 @@ pub(super) fn text(diagnosis: &Diagnosis, seconds: f64) -> String {
         text += &format!("\n{}", noticeable(diagnosis));
     }
     if let Some(next) = &diagnosis.next_experiment {
-        text += &format!("\nto measure next: {}\n", plain(next));
+        text += &format!("\nnext experiment: {}\n", plain(next));
     }
     for note in &diagnosis.notes {
         text += &format!("\nnote: {}", plain(note));
@@ -47,13 +47,13 @@ pub(super) fn text(diagnosis: &Diagnosis, seconds: f64) -> String {
     let [probability, chance] = [words::probability(diagnosis.probability), significant(diagnosis.p_value, 2)];
     let of = words::of_what(diagnosis);
     text += &format!(
-        "\nprobability {of} {probability}; p-value of nothing missing {chance}; {} simulations, {seconds:.2} s\n",
+        "\nprobability {of} {probability}; p-value without a missing effect {chance}; {} simulations, {seconds:.2} s\n",
         diagnosis.simulations
     );
     text
 }
 
-/// Without the marks of names.
+/// Removes the backticks around names.
 fn plain(text: &str) -> String {
     text.replace('`', "")
 }
@@ -62,7 +62,7 @@ fn found(diagnosis: &Diagnosis) -> String {
     let mut rows = Vec::new();
     for found in &diagnosis.found {
         for (i, strength) in found.strengths.iter().enumerate() {
-            // What is the same in every row stands in the first.
+            // Cells common to all rows are filled in the first only.
             let once = |text: String| if i == 0 { text } else { String::new() };
             let [low, high] = strength.interval95.map_or([f64::NAN; 2], |ends| ends).map(|end| significant(end, 3));
             let known = strength.interval95.is_some();
@@ -79,7 +79,7 @@ fn found(diagnosis: &Diagnosis) -> String {
             ]);
         }
     }
-    let header = ["effect found", "place", "strength", "value", "95 % from", "to", "unit", "probability", "BIC gain"];
+    let header = ["effect found", "place", "parameter", "value", "95 % from", "to", "unit", "probability", "BIC gain"];
     table(&header, &[3, 4, 5, 7, 8], rows)
 }
 
@@ -112,7 +112,7 @@ fn ranking(diagnosis: &Diagnosis) -> String {
         ]
     });
     let mut text = table(
-        &["candidate", "place", "probability", "BIC gain", "absorbed", "strengths, from all data"],
+        &["candidate", "place", "probability", "BIC gain", "absorbed", "parameters, from all data"],
         &[2, 3, 4],
         rows.collect(),
     );
@@ -143,7 +143,7 @@ fn noticeable(diagnosis: &Diagnosis) -> String {
             strength.unit.clone(),
         ]
     });
-    table(&["would have been noticed", "place", "strength", "from", "unit"], &[3], rows.collect())
+    table(&["detectable effect", "place", "parameter", "at least", "unit"], &[3], rows.collect())
 }
 
 #[cfg(test)]

@@ -1,28 +1,28 @@
-//! The manual page of an effect that a model may lack.
+//! Manual page of an effect.
 
 use crate::terminal::number;
 use mops_core::{Dimension, Effect, EffectParameter, PortKind, Scope};
 
-/// Its definition, formula, places, strengths and source.
+/// Formats the page of an effect: definition, formula, places, parameters and source.
 pub(super) fn page(effect: &dyn Effect) -> String {
     let places: Vec<&str> = effect.ports().iter().copied().map(place).collect();
     let mut page = format!("{}\n\n{}\n\n    {}\n\n", effect.name(), effect.about(), effect.formula());
     page += &format!("Class: {}. Acts at: {}", effect.class().name(), places.join("; "));
     if let Some(companion) = effect.companion() {
-        page += &format!(". Companion: {}", place(companion));
+        page += &format!(". Second port: {}", place(companion));
     }
     page += ".\n";
     if let Some(wider) = effect.form_of() {
-        page += &format!("A form of: {wider}.\n");
+        page += &format!("Special case of: {wider}.\n");
     }
     if effect.states() > 0 {
-        let free = if effect.free_starts().is_empty() { "" } else { ", with a free start value in each experiment" };
-        page += &format!("States of its own: {}{free}.\n", effect.states());
+        let free = if effect.free_starts().is_empty() { "" } else { ", with a free initial state in each experiment" };
+        page += &format!("Additional states: {}{free}.\n", effect.states());
     }
     if effect.memory() > 0 && !effect.free_starts().is_empty() {
-        page += "The first value that it lets through is free in each experiment.\n";
+        page += "Its initial output is free in each experiment.\n";
     }
-    page += "\nStrengths:\n";
+    page += "\nParameters:\n";
     for strength in effect.strengths() {
         page += &format!("  {} ({})\n      {}\n", strength.name, facts(strength), strength.about);
     }
@@ -31,10 +31,10 @@ pub(super) fn page(effect: &dyn Effect) -> String {
 
 fn place(kind: PortKind) -> &'static str {
     match kind {
-        PortKind::Joint => "a joint (q its position, v its speed; added to its equation, positive forward)",
-        PortKind::Process => "a state of first order (x; added to its equation)",
-        PortKind::Actuator => "an actuator (u the command)",
-        PortKind::Sensor => "a sensor (y the signal)",
+        PortKind::Joint => "a joint (position q, speed v; added to its equation, positive forward)",
+        PortKind::Process => "a first-order state (x; added to its equation)",
+        PortKind::Actuator => "an actuator (command u)",
+        PortKind::Sensor => "a sensor (signal y)",
     }
 }
 
@@ -48,23 +48,23 @@ fn facts(strength: &EffectParameter) -> String {
         _ => facts.push("of either sign".into()),
     }
     match strength.neutral {
-        Some(neutral) if neutral.is_finite() => facts.push(format!("neutral at {}", number(neutral))),
-        Some(_) => facts.push("neutral at infinity".into()),
+        Some(neutral) if neutral.is_finite() => facts.push(format!("null value {}", number(neutral))),
+        Some(_) => facts.push("null value infinity".into()),
         None => {}
     }
     if strength.fixed {
-        facts.push("kept as tried".into());
+        facts.push("fixed at its grid value".into());
     }
     if strength.scope == Scope::Experiment {
-        facts.push("one for each experiment".into());
+        facts.push("one per experiment".into());
     }
     facts.join(", ")
 }
 
-/// The powers of the units at the place, in words.
+/// Formats the unit of a parameter as powers of the units at the place.
 fn unit(dimension: Dimension) -> String {
     let powers = [
-        ("what it adds", dimension.output),
+        ("added term", dimension.output),
         ("position", dimension.position),
         ("speed", dimension.speed),
         ("value", dimension.value),
@@ -79,9 +79,9 @@ fn unit(dimension: Dimension) -> String {
     let (above, below) = (text(1), text(-1));
     let above = if above.is_empty() { "1".into() } else { above.join(" ") };
     if below.is_empty() {
-        return format!("unit {above}");
+        return format!("unit: {above}");
     }
-    format!("unit {above}/{}", if below.len() > 1 { format!("({})", below.join(" ")) } else { below[0].clone() })
+    format!("unit: {above} per {}", if below.len() > 1 { format!("({})", below.join(" ")) } else { below[0].clone() })
 }
 
 #[cfg(test)]
@@ -91,9 +91,9 @@ mod tests {
 
     #[test]
     fn a_unit_is_spelt_out_as_powers() {
-        assert_eq!(unit(Dimension::ONE), "unit 1");
-        assert_eq!(unit(Dimension::OUTPUT.over(Dimension::SPEED.power(2))), "unit what it adds/speed^2");
+        assert_eq!(unit(Dimension::ONE), "unit: 1");
+        assert_eq!(unit(Dimension::OUTPUT.over(Dimension::SPEED.power(2))), "unit: added term per speed^2");
         let mass = Dimension::OUTPUT.over(Dimension::SPEED).over(Dimension::PER_TIME);
-        assert_eq!(unit(mass), "unit what it adds s/speed");
+        assert_eq!(unit(mass), "unit: added term s per speed");
     }
 }

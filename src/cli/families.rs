@@ -1,8 +1,8 @@
-//! Rows of a family such as `T[1]` to `T[100]`, told as one.
+//! Families of names such as `T[1]` to `T[100]`, merged into one row of a table.
 
 use std::ops::Range;
 
-/// Runs of names that differ in their index alone; every other name is a run of its own.
+/// Splits names into runs whose members differ only in their index; every other name is a run by itself.
 pub(super) fn runs(names: &[&str]) -> Vec<Range<usize>> {
     let base = |i: usize| names[i].split_once('[').filter(|(_, rest)| rest.ends_with(']')).map(|(base, _)| base);
     let mut runs: Vec<Range<usize>> = Vec::new();
@@ -15,7 +15,7 @@ pub(super) fn runs(names: &[&str]) -> Vec<Range<usize>> {
     runs
 }
 
-/// The name of a run: `T[1..100]`, or that of its one member.
+/// Returns the name of a run: `T[1..100]`, or the name of its only member.
 pub(super) fn spelled(first: &str, last: &str) -> String {
     match (first.strip_suffix(']'), last.split_once('[')) {
         (Some(start), Some((_, end))) if first != last => format!("{start}..{end}"),
@@ -23,8 +23,8 @@ pub(super) fn spelled(first: &str, last: &str) -> String {
     }
 }
 
-/// Rows of a table in which the members of a family, by the names in the column `name`, are one row where all else agrees;
-/// of more than six that differ the first two and the last are left.
+/// Merges rows of the same family, by the names in column `name`, if their other cells agree. Of more than six differing rows,
+/// only the first two and the last remain.
 pub(super) fn folded(rows: Vec<Vec<String>>, name: usize) -> Vec<Vec<String>> {
     let names: Vec<&str> = rows.iter().map(|row| row[name].as_str()).collect();
     let mut folded = Vec::new();

@@ -1,4 +1,4 @@
-//! What tasks found, and what the data of a calibration tell, as tables and sentences on the terminal.
+//! Text of the findings of tasks and of the identifiability of a calibration, for the terminal.
 
 use mops_core::identification::{ExcitationReport, RegressionReport, SensitivityReport};
 use mops_core::{Outcome, Pareto, SweepReport, TradeOffs};
@@ -8,13 +8,13 @@ use crate::numbers::significant;
 use crate::report::combination;
 use crate::terminal::{number, table};
 
-/// Everything that was found beside criteria and tuners; empty where there is nothing.
+/// Formats the findings other than criteria and tuners; empty if there are none.
 pub(super) fn text(outcome: &Outcome) -> String {
     let mut text = String::new();
     let calibration = outcome.calibration.as_ref();
     let inputs = calibration.map(|c| c.excitation.as_slice()).unwrap_or_default();
     if let Some(found) = calibration.and_then(|c| c.sensitivity.as_ref()) {
-        text += &format!("\nwhat the data can tell\n{}", sentences(&found.words));
+        text += &format!("\nidentifiability\n{}", sentences(&found.words));
     }
     if let Some(found) = &outcome.found.sensitivity {
         text += &sensitivity(found);
@@ -36,7 +36,7 @@ pub(super) fn text(outcome: &Outcome) -> String {
     text
 }
 
-/// The points of a front, one line each.
+/// Formats the points of a Pareto front, one line each.
 fn front(outcome: &Outcome, found: &TradeOffs) -> String {
     let active: Vec<&str> = outcome.tuners.iter().filter(|t| t.active).map(|t| t.name.as_str()).collect();
     let units = |name: &str| outcome.tuners.iter().find(|t| t.name == name).map_or("", |t| t.unit.as_str());
@@ -53,7 +53,7 @@ fn front(outcome: &Outcome, found: &TradeOffs) -> String {
         row.push(number(known.worst_scaled));
         row.push(match known.pareto {
             Pareto::CertifiedLocal => "yes, to first order".to_owned(),
-            Pareto::NotShown => "not shown".to_owned(),
+            Pareto::NotShown => "not certified".to_owned(),
             Pareto::No => "no".to_owned(),
         });
         let marks = [(found.nearest == i, "nearest to the demands"), (found.knee == Some(i), "knee")];
@@ -104,19 +104,19 @@ fn sensitivity(found: &SensitivityReport) -> String {
             },
         ]
     });
-    let header = ["tuner", "value", "unit", "effect", "std. error", "alone", "relative", "factor", ""];
+    let header = ["tuner", "value", "unit", "effect", "std. error", "others fixed", "relative", "inflation", ""];
     let mut text = format!("\n{}", table(&header, &[1, 3, 4, 5, 6, 7], rows.collect()));
     let largest = found.relative.eigenvalues.first().copied().unwrap_or(1.0);
     let eigen = found.relative.eigenvalues.iter().zip(&found.relative.eigenvectors).map(|(value, vector)| {
         let direction = combination(found, vector, 0.1).replace('`', "");
         vec![significant(*value, 5), significant(value / largest, 2), direction]
     });
-    let header = ["eigenvalue", "share", "direction, relative changes"];
+    let header = ["eigenvalue", "share", "direction (relative changes)"];
     text += &format!("\n{}\n{}", table(&header, &[0, 1], eigen.collect()), sentences(&found.words));
     text
 }
 
-/// Inputs, one line each, and a sentence for each.
+/// Formats the excitation of inputs, one line and one sentence each.
 pub(super) fn excitation(inputs: &[ExcitationReport]) -> String {
     let rows = inputs.iter().map(|input| {
         let least = if input.at_least { "at least " } else { "" };
@@ -125,7 +125,7 @@ pub(super) fn excitation(inputs: &[ExcitationReport]) -> String {
             input.input.clone(),
             format!("{least}{}", input.order),
             input.parameters.map_or_else(String::new, |n| n.to_string()),
-            if input.suffices { "yes".to_owned() } else { "in the long run, no".to_owned() },
+            if input.suffices { "yes".to_owned() } else { "no, asymptotically".to_owned() },
             share(input.eigenvalue),
             input.next_eigenvalue.map_or_else(String::new, share),
             input.transient.map_or_else(String::new, share),
@@ -138,16 +138,16 @@ pub(super) fn excitation(inputs: &[ExcitationReport]) -> String {
         "input",
         "order",
         "parameters",
-        "suffices, if linear",
+        "sufficient, if linear",
         "weakest direction",
         "next order",
         "with transients",
         "samples",
-        "every",
+        "sample time",
     ];
     let words: Vec<String> = inputs.iter().map(|input| input.words.clone()).collect();
     let rows: Vec<Vec<String>> = rows.collect();
-    // Of a file alone nobody knows how many parameters it is for.
+    // For a data file alone the number of parameters is unknown.
     let text = if inputs.iter().all(|input| input.parameters.is_none()) {
         let without = |row: Vec<String>| [&row[..3], &row[5..]].concat();
         let header = [&header[..3], &header[5..]].concat();

@@ -1,4 +1,4 @@
-//! `mops history`: the runs below a folder.
+//! `mops history`: lists the runs below a folder.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,19 +8,19 @@ use clap::Args;
 use mops_core::{Catalogue, Diagnostic};
 use serde_json::{Value, json};
 
-use super::past::{Past, date};
+use super::past_run::{PastRun, date};
 use crate::terminal::{CommandError, number, print, print_json, table};
 
-/// Folders within folders that are looked into, at most.
+/// Largest depth of searched folders.
 const DEPTH: usize = 8;
 
-/// Which runs are listed.
+/// Arguments of `mops history`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Folder below which runs are looked for.
+    /// Folder that is searched for runs, with its subfolders.
     #[arg(default_value = "results")]
     folder: PathBuf,
-    /// Print a JSON array instead of the table.
+    /// Print a JSON array instead of a table.
     #[arg(long)]
     json: bool,
 }
@@ -29,7 +29,7 @@ pub(super) fn history(_catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     let folder = &arguments.folder;
     if !folder.is_dir() {
         return Err(Diagnostic::new(format!("there is no folder `{}`", folder.display()))
-            .with_help("name the folder that --out had, or one above it; without --out runs go to results")
+            .with_help("name an output folder (--out) or a parent folder; without --out, runs are in results")
             .into());
     }
     let mut runs = Vec::new();
@@ -39,7 +39,7 @@ pub(super) fn history(_catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         let all: Vec<Value> = runs.iter().map(json_of).collect();
         print_json(&all)?;
     } else if runs.is_empty() {
-        print(&format!("no run left anything below {}\n", folder.display()))?;
+        print(&format!("no runs below {}\n", folder.display()))?;
     } else {
         let header = [
             "date (UTC)",
@@ -58,9 +58,9 @@ pub(super) fn history(_catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     Ok(ExitCode::SUCCESS)
 }
 
-/// The runs in a folder and below it; links are not followed.
-fn collect(folder: &Path, depth: usize, runs: &mut Vec<Past>) {
-    runs.extend(Past::read(folder));
+/// Collects the runs in a folder and its subfolders; symbolic links are not followed.
+fn collect(folder: &Path, depth: usize, runs: &mut Vec<PastRun>) {
+    runs.extend(PastRun::read(folder));
     if depth == 0 {
         return;
     }
@@ -71,12 +71,12 @@ fn collect(folder: &Path, depth: usize, runs: &mut Vec<Past>) {
     }
 }
 
-/// A run as an object.
-fn json_of(past: &Past) -> Value {
-    let of = |key: &str| past.ended().map_or(Value::Null, |result| result[key].clone());
+/// Converts a run to a JSON object.
+fn json_of(past: &PastRun) -> Value {
+    let of = |key: &str| past.finished_result().map_or(Value::Null, |result| result[key].clone());
     let run = past.run.as_ref().map(|(run, _)| run);
-    // A diagnosis has a verdict, and no scaled values.
-    let counts = |value: Value| if judges(past) { value } else { Value::Null };
+    // A diagnosis has a verdict and no scaled values.
+    let counts = |value: Value| if has_criteria(past) { value } else { Value::Null };
     let or = |key: &str, kept: Option<Value>| {
         kept.unwrap_or_else(|| past.result.as_ref().map_or(Value::Null, |r| r[key].clone()))
     };
@@ -85,7 +85,7 @@ fn json_of(past: &Past) -> Value {
         "study": or("study", run.map(|run| json!(run.name))), "task": or("task", run.map(|run| json!(run.task))),
         "state": past.state(), "worst_scaled": counts(of("worst_scaled")), "feasible": counts(of("feasible")),
         "evaluations": counts(
-            past.ended().map_or_else(|| json!(run.map(|run| run.evaluations)), |_| of("evaluations"))
+            past.finished_result().map_or_else(|| json!(run.map(|run| run.evaluations)), |_| of("evaluations"))
         ),
         "seconds": of("seconds"), "mops": or("mops", run.map(|run| json!(run.mops))),
         "seed": or("seed", run.map(|run| json!(run.seed))), "solver": or("solver", run.map(|run| json!(run.solver))),
@@ -93,17 +93,17 @@ fn json_of(past: &Past) -> Value {
     })
 }
 
-/// Whether the task of a run gives values to criteria.
-fn judges(past: &Past) -> bool {
+/// Returns true if the task of a run evaluates criteria.
+fn has_criteria(past: &PastRun) -> bool {
     let of_result = || past.result.as_ref().and_then(|result| result["task"].as_str());
     let task = past.run.as_ref().map(|(run, _)| run.task.as_str()).or_else(of_result);
     !matches!(task, Some("diagnosis" | "excitation"))
 }
 
-/// A run as a row of the table.
-fn row(past: &Past) -> Vec<String> {
-    let told = json_of(past);
-    let cell = |key: &str| match &told[key] {
+/// Converts a run to a row of the table.
+fn row(past: &PastRun) -> Vec<String> {
+    let report = json_of(past);
+    let cell = |key: &str| match &report[key] {
         Value::Null => String::new(),
         Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
         Value::String(text) => text.clone(),

@@ -6,7 +6,8 @@ use mops_core::math::{self, complex};
 
 use crate::report::{Color, Curve, CurveStyle, FrequencyCurve, Plot, bode, frequencies};
 
-/// The plots of a system with one input and one output, with the names of their files; or why one is not drawn.
+/// Draws the plots of a single-input, single-output system; returns the kind of each, and the plot or the reason why it is
+/// missing.
 pub(super) fn plots(system: &StateSpace, name: &str) -> Vec<(&'static str, Result<Plot, String>)> {
     let mut all = match of_frequencies(system, name) {
         Ok([magnitude, phase, nyquist]) => {
@@ -28,7 +29,7 @@ fn of_frequencies(system: &StateSpace, name: &str) -> Result<[Plot; 3], String> 
 }
 
 fn nyquist(response: &FrequencyResponse, values: &[Complex], name: &str) -> Plot {
-    // What is far away hides what happens around -1; a gain at frequency 0 is shown where it is moderate.
+    // The picture is limited to the neighbourhood of -1, and of the static gain if that is moderate.
     let limit = complex::norm(response.scalar(0.0)).clamp(1.5, 8.0) * 1.1;
     let limit = if limit.is_finite() { limit } else { 3.0 };
     let shown = |sign: f64| -> Vec<(f64, f64)> {
@@ -53,22 +54,21 @@ fn nyquist(response: &FrequencyResponse, values: &[Complex], name: &str) -> Plot
     }
 }
 
-/// The poles of the closed loop `k G/(1 + k G)` for gains k from 0 up, for a gain of the sign with which feedback is
-/// negative. A delay is left out.
+/// Draws the poles of the closed loop `k G/(1 + k G)` for gains k from 0 upwards, with negative feedback. A delay is ignored.
 fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
     let (poles, zeros) = (system.poles()?, zeros(system)?);
     let size = shown(poles.iter().chain(&zeros).map(|z| complex::norm(*z)).collect());
     let direct = system.d[(0, 0)];
     let closed = |k: f64| eigenvalues(&(&system.a - &system.b * &system.c * (k / (1.0 + k * direct))));
     let mut branches: Vec<Vec<Complex>> = poles.iter().map(|&pole| vec![pole]).collect();
-    // From one gain to the next no pole may move by more than a small part of the picture.
+    // The gain step is limited so that no pole moves by more than a small part of the picture.
     let (mut k, mut step) = (0.0, 1e-9);
     for _ in 0..6000 {
         let next = k + step;
         if next >= 1e15 || (1.0 + k * direct) * (1.0 + next * direct) <= 0.0 {
             break;
         }
-        // A gain at which the poles are not found is passed over.
+        // Gains at which the eigenvalue iteration fails are skipped.
         let Ok(roots) = closed(next) else {
             k = next;
             continue;
@@ -88,15 +88,15 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
         }
     }
     let limit = 2.0 * size;
-    // The picture is wider than high: what lies beside the others is not left out if there is room for it.
-    let beside = if poles.iter().chain(&zeros).any(|z| complex::norm(*z) > size) { 3.0 * limit } else { limit };
+    // The picture is wider than high: distant real parts are included.
+    let width = if poles.iter().chain(&zeros).any(|z| complex::norm(*z) > size) { 3.0 * limit } else { limit };
     let point =
-        |z: &Complex| if z.re.abs() <= beside && z.im.abs() <= limit { (z.re, z.im) } else { (f64::NAN, f64::NAN) };
+        |z: &Complex| if z.re.abs() <= width && z.im.abs() <= limit { (z.re, z.im) } else { (f64::NAN, f64::NAN) };
     let marks = |name: &str, of: &[Complex], style, color| Curve {
         name: match of.iter().filter(|z| !point(z).0.is_finite()).count() {
             _ if of.is_empty() => String::new(),
             0 => name.into(),
-            far => format!("{name} ({far} farther away)"),
+            far => format!("{name} ({far} outside the plot)"),
         },
         points: of.iter().map(point).collect(),
         style,
@@ -109,7 +109,7 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
         ..Curve::default()
     });
     Ok(Plot {
-        title: format!("root locus of {name}, for a growing gain in negative feedback"),
+        title: format!("root locus of {name}, negative feedback"),
         x_label: "real part (1/s)".into(),
         y_label: "imaginary part (1/s)".into(),
         curves: lines
@@ -125,8 +125,8 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
     })
 }
 
-/// Half the height of the picture that shows poles and zeros at these distances from 0: where a few lie ten times as far out
-/// as at least two others, those others and what lies around them.
+/// Returns half the height of the picture for poles and zeros at these distances from 0. If some lie ten times as far out as
+/// at least two others, the picture covers the neighbourhood of the others.
 fn shown(mut distances: Vec<f64>) -> f64 {
     distances.retain(|size| *size > 0.0);
     distances.sort_by(f64::total_cmp);
@@ -138,7 +138,7 @@ fn shown(mut distances: Vec<f64>) -> f64 {
     near.map_or(largest, |(_, pair)| (pair[0] * largest).sqrt().min(5.0 * pair[0]))
 }
 
-/// The roots in the order of the branches they continue: nearest first.
+/// Returns the roots in the order of the branches that they continue; the nearest pairs are matched first.
 fn matched(branches: &[Vec<Complex>], roots: Vec<Complex>) -> Vec<Complex> {
     let n = branches.len();
     let end = |i: usize| branches[i][branches[i].len() - 1];

@@ -1,4 +1,4 @@
-//! `mops linearise`: a model of a study as a linear system, and the design of state feedback for it.
+//! `mops linearise`: linearises a model of a study and designs state feedback for it.
 
 mod feedback;
 mod files;
@@ -19,50 +19,50 @@ use serde_json::{Value, json};
 use self::feedback::Wanted;
 use self::text::MANY;
 use super::study::{StudyArguments, open};
-use crate::terminal::{CommandError, Limit, or_end, print};
+use crate::terminal::{CommandError, Limit, exit_after, print};
 
-/// What is linearised, and what is done with it.
+/// Arguments of `mops linearise`.
 #[derive(Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
     study: StudyArguments,
-    /// The model; needed where the study has several.
+    /// Model; required if the study has several.
     #[arg(long)]
     model: Option<String>,
-    /// Value of a tuner, a parameter, a state or an input: --at theta="180 deg". States that are not named have their start
-    /// value, inputs the value that the case gives them at the start.
+    /// Value of a tuner, parameter, state or input: --at theta="180 deg". Other states have their initial value, other inputs
+    /// the initial value of the case.
     #[arg(long = "at", value_name = "NAME=VALUE")]
     at: Vec<String>,
-    /// The case whose parameters and inputs hold; the first where absent.
+    /// Case that supplies parameters and inputs [default: the first].
     #[arg(long)]
     case: Option<String>,
-    /// Only this input.
+    /// Show this input only.
     #[arg(long)]
     input: Option<String>,
-    /// Only this output.
+    /// Show this output only.
     #[arg(long)]
     output: Option<String>,
-    /// Move the operating point to the nearest equilibrium; states named with --at are held, and so are inputs.
+    /// Move the operating point to the nearest equilibrium; inputs and the states of --at stay fixed.
     #[arg(long)]
     equilibrium: bool,
-    /// A state or an input that the search for the equilibrium may move although it would be held.
+    /// Fixed state or input that the equilibrium search may change nevertheless.
     #[arg(long, value_name = "NAME", requires = "equilibrium")]
     free: Vec<String>,
-    /// State feedback u = -K x that places the poles: --place=-5,-8,-2+3i,-2-3i (1/s).
+    /// State feedback u = -K x by pole placement: --place=-5,-8,-2+3i,-2-3i (1/s).
     #[arg(long, value_name = "POLES", allow_hyphen_values = true)]
     place: Option<String>,
-    /// State feedback u = -K x by linear-quadratic optimisation: weights of the states, then of the inputs.
+    /// State feedback u = -K x by linear-quadratic regulation (LQR): weights of the states, then of the inputs.
     #[arg(long, value_name = "WEIGHTS", conflicts_with = "place")]
     lqr: Option<String>,
     #[command(flatten)]
     limit: Limit,
-    /// Folder for the plots and linearised.json; nothing is written where absent.
+    /// Folder for plots and linearised.json; without it, no files are written.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
 pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    or_end(arguments.limit);
+    exit_after(arguments.limit);
     let study = open(catalogue, &arguments.study)?.study;
     let (job, model) = chosen(&study, arguments)?;
     let (name, case) = (&study.models()[model].0, &study.cases()[study.jobs()[job].case]);
@@ -78,10 +78,10 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
     if !states.is_empty() {
         print(&format!("\n{}", text::operating_point(&states, &interface.inputs, &found)))?;
         for joint in &found.frictionless {
-            print(&format!("note: dry friction of `{joint}` is left out: a joint at rest has no linear friction\n"))?;
+            print(&format!("note: dry friction of `{joint}` is ignored: it has no linearisation at zero speed\n"))?;
         }
         for rough in found.rough.iter().filter(|rough| system.outputs.contains(&rough.of)) {
-            print(&format!("note: {rough}; C and D hold on one side\n"))?;
+            print(&format!("note: {rough}; C and D are one-sided derivatives\n"))?;
         }
     }
     let unit = |name: &str| text::unit_of(name, &states, &interface.inputs, &interface.signals);
@@ -110,12 +110,13 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
         });
         print(&files::write(folder, &system, &content)?)?;
     }
-    // A design that fails drops nothing else.
+    // A failed design is reported after all other output.
     feedback.transpose()?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Prints zeros and transfer functions of the channels, and gives them as JSON: of `all`, or of those that are shown.
+/// Prints zeros and transfer functions of the channels, and returns them as JSON: of all channels if `all`, else of the
+/// printed ones.
 fn channels(system: &StateSpace, poles: &[Complex], all: bool) -> Result<Vec<Value>, CommandError> {
     let mut values = Vec::new();
     let pairs = (0..system.inputs.len()).flat_map(|i| (0..system.outputs.len()).map(move |o| (i, o)));
@@ -148,15 +149,15 @@ fn channels(system: &StateSpace, poles: &[Complex], all: bool) -> Result<Vec<Val
     }
     let unseen = (system.inputs.len() * system.outputs.len()).saturating_sub(MANY);
     if unseen > 0 {
-        print(&format!("\nand {unseen} more; --input and --output pick one, {WHERE} has all\n"))?;
+        print(&format!("\nand {unseen} more; select one with --input and --output, or see {WHERE}\n"))?;
     }
     Ok(values)
 }
 
-/// Where what is not shown can be found.
+/// File that contains the parts that are not printed.
 const WHERE: &str = "linearised.json (--out DIR)";
 
-/// The job of the model and the case that are asked for.
+/// Returns the requested job (model-case pair) and its model, as indices.
 fn chosen(study: &Study, arguments: &Arguments) -> Result<(usize, usize), Diagnostic> {
     let models: Vec<&str> = study.models().iter().map(|(name, _)| name.as_str()).collect();
     let model = match &arguments.model {
@@ -176,10 +177,10 @@ fn chosen(study: &Study, arguments: &Arguments) -> Result<(usize, usize), Diagno
         None if !jobs.is_empty() => 0,
         None => {
             return Err(Diagnostic::new(format!("no criterion of the study reads `{}`", models[model]))
-                .with_help("add one with usage = \"monitor\", so that its parameters are known"));
+                .with_help("add a criterion with usage = \"monitor\"; it determines the parameters"));
         }
         Some(name) => cases.iter().position(|case| case == name).ok_or_else(|| {
-            Diagnostic::new(format!("`{}` is analysed in no case `{name}`", models[model]))
+            Diagnostic::new(format!("no criterion of the study reads `{}` in a case `{name}`", models[model]))
                 .with_help(suggestion(name, cases.iter().copied()))
         })?,
     };
@@ -188,7 +189,7 @@ fn chosen(study: &Study, arguments: &Arguments) -> Result<(usize, usize), Diagno
 
 type Named = Vec<(String, Quantity)>;
 
-/// The parameters of the job, and what is left of `--at`: states and inputs.
+/// Returns the parameters of the job, and the remaining values of `--at`: states and inputs.
 fn values(study: &Study, job: usize, given: &[String]) -> Result<(Vec<f64>, Named), Diagnostic> {
     let plan = &study.jobs()[job];
     let interface = study.models()[plan.model].1.interface();
@@ -196,9 +197,9 @@ fn values(study: &Study, job: usize, given: &[String]) -> Result<(Vec<f64>, Name
     let (mut direct, mut rest) = (Vec::new(), Vec::new());
     for text in given {
         let wrong = |why: String| Diagnostic::new(format!("`--at {text}`: {why}"));
-        let (name, value) = text.split_once('=').ok_or_else(|| {
-            Diagnostic::new(format!("`--at {text}` names no value")).with_help("write it as --at theta=0.1")
-        })?;
+        let (name, value) = text
+            .split_once('=')
+            .ok_or_else(|| Diagnostic::new(format!("`--at {text}` has no value")).with_help("write --at theta=0.1"))?;
         let (name, quantity) = (name.trim(), Quantity::parse(value).map_err(wrong)?);
         if let Some(i) = study.tuners().iter().position(|t| t.name == name) {
             tuners[i] = quantity.to(&study.tuners()[i].unit).map_err(wrong)?;
@@ -214,7 +215,7 @@ fn values(study: &Study, job: usize, given: &[String]) -> Result<(Vec<f64>, Name
     Ok((parameters, rest))
 }
 
-/// The system, with all inputs and outputs.
+/// Linearises the model with all its inputs and outputs.
 fn found(
     study: &Study,
     job: usize,
@@ -224,12 +225,11 @@ fn found(
 ) -> Result<Resting, CommandError> {
     let plan = &study.jobs()[job];
     let (model, case) = (&study.models()[plan.model].1, &study.cases()[plan.case]);
-    let undefined =
-        |failure: Failure| CommandError::Failure(format!("the model cannot be linearised there: {failure}"));
+    let undefined = |failure: Failure| CommandError::Failure(format!("the model cannot be linearised here: {failure}"));
     if model.interface().analysis == AnalysisKind::Linear {
         if let Some((name, _)) = at.first() {
-            return Err(Diagnostic::new(format!("`--at {name}`: a linear model has no such tuner or parameter"))
-                .with_help("the operating point of a linearised model stands in the study, under `linearise`")
+            return Err(Diagnostic::new(format!("`--at {name}`: the linear model has no such tuner or parameter"))
+                .with_help("the operating point of a linearised model is set in the study, under `linearise`")
                 .into());
         }
         let request = Job { case, parameters, signals: &[], horizon: plan.horizon };
@@ -250,24 +250,25 @@ fn found(
     }
     let options =
         Linearise { at, equilibrium: arguments.equilibrium, free: arguments.free.clone(), ..Linearise::default() };
-    let told = |StudyError { message, help, .. }: StudyError| Diagnostic { help, ..Diagnostic::new(message) };
-    let found = Linearised::new(Arc::clone(model), &options).map_err(told)?.at(case, parameters).map_err(undefined)?;
+    let diagnostic = |StudyError { message, help, .. }: StudyError| Diagnostic { help, ..Diagnostic::new(message) };
+    let linearised = Linearised::new(Arc::clone(model), &options).map_err(diagnostic)?;
+    let found = linearised.at(case, parameters).map_err(undefined)?;
     match found.rough.iter().find(|rough| rough.is_rate) {
         Some(rough) => Err(CommandError::Failure(format!(
-            "the model cannot be linearised there: {rough}; --at chooses another operating point"
+            "the model cannot be linearised here: {rough}; choose another operating point with --at"
         ))),
         None => Ok(found),
     }
 }
 
-/// The system with the inputs and outputs that are asked for.
+/// Returns the system reduced to the requested inputs and outputs.
 fn narrowed(system: &StateSpace, arguments: &Arguments) -> Result<StateSpace, Diagnostic> {
     let pick = |what: &str, wanted: &Option<String>, names: &[String]| -> Result<Vec<usize>, Diagnostic> {
         let Some(wanted) = wanted else {
-            // Inputs are signals too; as outputs they say nothing, unless they are asked for.
-            let told: Vec<usize> =
+            // Inputs are signals, too; as outputs they are trivial and shown only on request.
+            let shown: Vec<usize> =
                 (0..names.len()).filter(|&i| what == "input" || !system.inputs.contains(&names[i])).collect();
-            return Ok(if told.is_empty() { (0..names.len()).collect() } else { told });
+            return Ok(if shown.is_empty() { (0..names.len()).collect() } else { shown });
         };
         let place = names.iter().position(|name| name == wanted).ok_or_else(|| {
             Diagnostic::new(format!("the model has no {what} `{wanted}`"))

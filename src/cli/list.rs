@@ -1,4 +1,4 @@
-//! `mops list`: what is there, all of it or one sort.
+//! `mops list`: lists the content of the catalogue.
 
 use std::process::ExitCode;
 
@@ -8,14 +8,14 @@ use mops_core::{Catalogue, CatalogueStudy};
 
 use super::study::text_of;
 
-/// What is listed.
+/// Arguments of `mops list`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// One sort of thing alone.
+    /// List only this part of the catalogue.
     what: Option<Sort>,
 }
 
-/// A sort of thing that there is.
+/// Part of the catalogue.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Sort {
     Studies,
@@ -50,18 +50,19 @@ pub(super) fn list(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
         (Sort::Models, "models", models.collect()),
         (Sort::Criteria, "criteria", criteria.collect()),
         (Sort::Solvers, "solvers", solvers.collect::<Vec<_>>()),
-        (Sort::Effects, "effects a model may lack", effects.collect()),
+        (Sort::Effects, "effects (mops diagnose STUDY)", effects.collect()),
     ];
     let wanted = tables.into_iter().filter(|(sort, ..)| arguments.what.is_none_or(|what| what == *sort));
     let text: Vec<String> = wanted.map(|(_, title, rows)| table(&[title, ""], &[], rows)).collect();
     print(&format!(
-        "{}\nmops describe NAME tells all of one, and of the tables of a study file: study, models, tuners, cases,\nexperiments, criteria, solver.\n",
+        "{}\nFor details: mops describe NAME, also for the tables of a study file: study, models, tuners, cases,\n\
+         experiments, criteria, solver.\n",
         text.join("\n")
     ))?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// The text up to the end of its first statement; what stands between back-quotes is not looked into.
+/// Returns the text up to the end of its first statement; punctuation between backticks is skipped.
 fn first_statement(text: &str) -> String {
     let paragraph = text.split("\n\n").next().unwrap_or_default().replace('\n', " ");
     let mut quoted = false;
@@ -77,7 +78,7 @@ mod tests {
     use super::first_statement;
 
     #[test]
-    fn a_statement_ends_at_its_stop_but_not_inside_a_formula() {
+    fn a_statement_ends_at_punctuation_outside_formulas() {
         assert_eq!(first_statement("`sup { t : |y| > 1. }`, in s. More\n\nEven more"), "`sup { t : |y| > 1. }`, in s");
         assert_eq!(first_statement("A solver: it\nsolves"), "A solver");
     }

@@ -1,4 +1,4 @@
-//! The command line: what can be typed, and which file does it.
+//! The command line of `mops`: commands, and the module of each.
 
 mod check;
 mod compare;
@@ -10,19 +10,19 @@ mod effect;
 mod families;
 mod findings;
 mod history;
-mod keep;
 mod linear_plots;
 mod linearise;
 mod list;
 mod new;
 mod pareto;
-mod past;
+mod past_run;
 mod pick;
 mod places;
-mod remains;
 mod report;
+mod resume;
 mod robustness;
 mod run;
+mod run_files;
 mod schema;
 mod simulate;
 mod study;
@@ -38,27 +38,27 @@ use crate::terminal::{CommandError, print};
 
 /// Multi-objective parameter synthesis: design controllers and identify models from measurements.
 ///
-/// A study (a TOML file, or the name of a shipped one) names models, cases, tuners and criteria with their demands; mops
-/// chooses the tuners so that the worst scaled criterion is as small as it can be.
+/// A study (a TOML file, or the name of a shipped study) defines models, cases, tuners (the parameters to be chosen) and
+/// criteria with demands. mops chooses the tuners that minimise the worst scaled criterion (value / demand).
 #[derive(Parser)]
 #[command(
     name = "mops",
     version,
     max_term_width = 100,
     after_help = "\
-Begin with:
-  mops list                      what is there
+Start with:
+  mops list                      list models, criteria, solvers, effects and studies
   mops run pid-design            run a shipped study; open results/pid-design/report.html
-  mops new my-loop               write a commented study to start from
-  mops describe settling-time    what a kind computes, and its options
+  mops new my-loop               write a commented study template
+  mops describe settling-time    show the definition and the options of a kind
 
-Exit status: 0 done; 1 done, but a constraint is violated; 2 the study, its data or the command line is wrong; 3 the run
-failed; 4 a signal ended it, with the best so far written."
+Exit status: 0 done; 1 done, but a constraint is violated; 2 error in the study, its data or the command line; 3 the run
+failed; 4 stopped by a signal, with the best point saved."
 )]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Folder of studies to know by name, each a folder with study.toml; beside those in the variable MOPS_STUDIES.
+    /// Folder of studies that are found by name, each a folder with study.toml; adds to the folders in MOPS_STUDIES.
     #[arg(long = "studies", value_name = "DIR", global = true, help_heading = "Global options")]
     studies: Vec<PathBuf>,
 }
@@ -67,42 +67,42 @@ struct Arguments {
 enum Command {
     /// Solve a study and write result.json, report.html, plots and evaluations.
     Run(run::Arguments),
-    /// Find the front of a design study: the designs that no other is better than in every criterion.
+    /// Compute the Pareto front (the non-dominated designs) of a design study.
     Pareto(pareto::Arguments),
-    /// Pick the point of a finished front for other demands, and write a study that starts there.
+    /// Select the point of a Pareto front for new demands, and write a study that starts there.
     Pick(pick::Arguments),
-    /// Find the physical effect that the model of a calibration lacks, add it, and report before and after.
+    /// Find the physical effect missing from a calibrated model, add it, and report the errors before and after.
     Diagnose(diagnose::Arguments),
     /// List the runs below a folder: study, date, worst scaled value, evaluations.
     History(history::Arguments),
-    /// Show runs side by side: tuners, criteria, differences in percent; and a page with their responses.
+    /// Compare runs side by side: tuners, criteria, differences in percent, and a page with their responses.
     Compare(compare::Arguments),
-    /// Write the report of a run again, from what it left; of a run that was killed, as far as it came.
+    /// Rewrite the report of a run from its stored evaluations, also of an unfinished run.
     Report(report::Arguments),
     /// Check a study and its data without running anything.
     Check(check::Arguments),
-    /// List the kinds of model, criterion and solver, the effects a model may lack, and the shipped studies.
+    /// List models, criteria, solvers, effects and shipped studies.
     List(list::Arguments),
-    /// Describe a kind, an effect, a shipped study, or a signal list of a model: formula, options, units, source.
+    /// Describe a kind of model, criterion or solver, an effect, a study or a table of study files.
     Describe(describe::Arguments),
-    /// Write a commented study to start from, or a copy of a shipped one.
+    /// Write a commented study template, or a copy of a shipped study.
     New(new::Arguments),
-    /// Simulate a study once at given values: table of criteria, CSV and plots.
+    /// Simulate a study once at given values: table of criteria, CSV files and plots.
     Simulate(simulate::Arguments),
     /// Linearise a model of a study: A, B, C, D, poles, zeros, transfer functions, plots, state feedback.
     Linearise(linearise::Arguments),
-    /// Show what is in a data file: columns, units, ranges, gaps, sample time, noise.
+    /// Summarise a data file: columns, units, ranges, gaps, sample time, noise level.
     Data(data::Arguments),
     /// Print the JSON schema of study files, for completion in an editor.
     Schema,
     /// Print a completion script for a shell.
     Completions {
-        /// The shell.
+        /// Shell.
         shell: clap_complete::Shell,
     },
 }
 
-/// Parses the command line and does what it asks.
+/// Parses the command line and runs the command.
 pub(crate) fn main(catalogue: Catalogue) -> ExitCode {
     let Arguments { command, studies } = Arguments::parse();
     let of_environment = std::env::var_os("MOPS_STUDIES").unwrap_or_default();

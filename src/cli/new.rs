@@ -1,4 +1,4 @@
-//! `mops new`: a study to start from.
+//! `mops new`: writes a study template.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -10,24 +10,24 @@ use super::schema;
 use crate::files;
 use crate::terminal::{CommandError, print};
 
-/// What is written.
+/// Arguments of `mops new`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Folder to make; its name becomes the study's.
+    /// Folder to create; its name becomes the name of the study.
     folder: PathBuf,
     /// Copy this shipped study, with its data, instead of the commented template.
     #[arg(long, value_name = "STUDY")]
     from: Option<String>,
 }
 
-/// The commented study; `{name}` is replaced.
+/// Commented study template; `{name}` is replaced.
 const TEMPLATE: &str = include_str!("new.toml");
 
 pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let Arguments { folder, from } = arguments;
     if folder.exists() {
-        return Err(Diagnostic::new(format!("`{}` is already there", folder.display()))
-            .with_help("give a folder that does not exist; nothing was written")
+        return Err(Diagnostic::new(format!("`{}` already exists", folder.display()))
+            .with_help("name a new folder; nothing was written")
             .into());
     }
     let called = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_else(|| "study".into());
@@ -37,8 +37,8 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
             let names = catalogue.studies.iter().map(CatalogueStudy::name);
             let unknown = || Diagnostic::new(format!("no shipped study `{name}`")).with_help(suggestion(name, names));
             let CatalogueStudy::Shipped(study) = catalogue.study(name).ok_or_else(unknown)? else {
-                return Err(Diagnostic::new(format!("`{name}` is not a study of files in the program"))
-                    .with_help("copy its folder; a study built in Rust is copied in its crate")
+                return Err(Diagnostic::new(format!("`{name}` is not a shipped study"))
+                    .with_help("copy its folder, or for a study built in Rust its source code")
                     .into());
             };
             let own = |bytes: &[u8]| match std::str::from_utf8(bytes) {
@@ -66,7 +66,9 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
     let study = folder.join("study.toml");
     print(&format!("wrote {}; try: mops run {}\n", study.display(), study.display()))?;
     if from.is_none() && catalogue.study(&called).is_some() {
-        print(&format!("it is the commented template; `--from {called}` copies the shipped study of that name\n"))?;
+        print(&format!(
+            "note: this is the commented template; `--from {called}` copies the shipped study of that name\n"
+        ))?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,39 +1,40 @@
-//! `mops pareto`: the front of a design study, whatever the study is for.
+//! `mops pareto`: computes the Pareto front of a design study, whatever the task of the study.
 
 use std::process::ExitCode;
 
 use clap::Args;
 use mops_core::Catalogue;
 
-use super::run::{Common, Effort, Search, go};
+use super::run::{CommonOptions, Search, SolverOptions, execute};
 use crate::terminal::CommandError;
 
-/// What can be said to the search for a front.
+/// Options of `mops pareto`.
 #[derive(Args)]
 #[command(after_help = "\
-Every criterion that is minimised counts for itself: the result is the set of designs that no other is better than in all
-of them, about 30 points spread evenly, each solved for (solver weighted-chebyshev, by default, for up to three criteria).
+Each criterion with usage minimise is an objective of its own. The result is the Pareto front: about 30 evenly spread
+non-dominated designs, each the solution of an optimisation problem (default solver for up to three criteria:
+weighted-chebyshev).
 
-result.json has the points as `front`, in the order of their first criterion, and beside them `trade_offs`: the knee, the
-point nearest to the demands, what a unit of one criterion costs of another, and whether each point is Pareto-optimal.
-report.html shows them; hover over a point, or move from point to point with the arrow keys.
+result.json lists the points as `front`, sorted by the first criterion, and `trade_offs`: the knee, the point nearest to the
+demands, the exchange rates between criteria, and whether each point is certified as Pareto-optimal. report.html plots them;
+select a point with the pointer or the arrow keys.
 
 Examples:
-  mops pareto pid-design                      the front of overshoot and settling time
-  mops pareto pid-design --points 60          more points
+  mops pareto pid-design                      Pareto front of overshoot and settling time
+  mops pareto pid-design --points 60          with more points
   mops pick results/pid-design --demand settling=12
-                                              then: the point for other demands")]
+                                              afterwards: the point for other demands")]
 pub(super) struct Arguments {
     #[command(flatten)]
-    common: Common,
+    common: CommonOptions,
     #[command(flatten)]
-    effort: Effort,
-    /// Number of points, about; [pareto] of the study, or 30, where absent.
+    solver_options: SolverOptions,
+    /// Approximate number of points [default: [pareto] of the study, or 30].
     #[arg(long, value_parser = clap::value_parser!(u16).range(3..=200))]
     points: Option<u16>,
 }
 
 pub(super) fn pareto(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    let Arguments { common, effort, points } = arguments;
-    go(catalogue, common, &Search::Pareto { effort, points: *points })
+    let Arguments { common, solver_options, points } = arguments;
+    execute(catalogue, common, &Search::Pareto { solver_options, points: *points })
 }

@@ -1,4 +1,4 @@
-//! `mops pick`: the point of a finished front for other demands.
+//! `mops pick`: selects the point of a Pareto front for other demands.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,71 +14,70 @@ use serde_json::Value;
 
 use super::study::{StudyArguments, open_as};
 use crate::files;
-use crate::terminal::{CommandError, Limit, number, print, table, within};
+use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 use crate::toml_text::{self, TomlText, key, quoted};
 
-/// What can be said to the choice of a point.
+/// Options of `mops pick`.
 #[derive(Args)]
 #[command(after_help = "\
-The demands that are not named stay as they are in the study. Nearest is the point whose worst scaled value under these
-demands is least. From there the min-max problem of these demands is solved, in a few hundred simulations, and a study that
-starts at its solution is written: picked.toml, a design to run, change or build on.
+Other demands stay as in the study. The selected point has the smallest worst scaled value under the new demands. From
+there the min-max problem with these demands is solved in a few hundred simulations, and a study that starts at the solution
+is written to picked.toml.
 
 Examples:
   mops pareto pid-design
   mops pick results/pid-design --demand settling=12
   mops pick results/pid-design --demand settling='8 s' --demand overshoot=0.2 --no-refine")]
 pub(super) struct Arguments {
-    /// Folder of the result of `mops pareto`.
+    /// Output folder of `mops pareto`.
     folder: PathBuf,
-    /// Another demand on a criterion, in its unit or with one: settling=12, settling='12 s'.
+    /// New demand on a criterion, in its unit or with a unit: settling=12, settling='12 s'.
     #[arg(long = "demand", value_name = "CRITERION=VALUE", required = true, value_parser = demand)]
     demands: Vec<(String, String)>,
     #[command(flatten)]
     limit: Limit,
-    /// Stay at the point of the front instead of solving from there.
+    /// Keep the point of the front instead of solving from there.
     #[arg(long)]
     no_refine: bool,
-    /// The study, where it is not study.toml in the folder.
+    /// Study of the front [default: study.toml in the folder].
     #[arg(long, value_name = "FILE")]
     study: Option<PathBuf>,
-    /// The study file that is written, which must not be there yet; picked.toml in the folder where absent, or picked-2.toml
-    /// and so on.
+    /// New study file, which must not exist [default: picked.toml in the folder, or picked-2.toml and so on].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
-/// Points evaluated on the way from the front to the demands, at most.
-const EFFORT: usize = 1000;
+/// Budget of the optimisation from the point of the front, in evaluations.
+const REFINEMENT_BUDGET: usize = 1000;
 
 fn demand(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
             Ok((name.trim().to_owned(), value.trim().to_owned()))
         }
-        _ => Err("a demand is a criterion and a value, such as settling=12".to_owned()),
+        _ => Err("expected a criterion and a value, such as settling=12".to_owned()),
     }
 }
 
 pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let front = front(&arguments.folder)?;
     let path = arguments.study.clone().unwrap_or_else(|| arguments.folder.join("study.toml"));
-    let out = target(arguments)?;
+    let out = output_path(arguments)?;
     let open = |settings: Vec<String>| {
         let study = StudyArguments { study: path.display().to_string(), settings };
         open_as(catalogue, &study, &["study.task=\"design\"".to_owned(), "study.objective=\"max\"".to_owned()])
     };
     let before = open(Vec::new())?.study;
     for (name, _) in &arguments.demands {
-        known(&before, name)?;
+        check_criterion(&before, name)?;
     }
     let setting = |(name, value): &(String, String)| format!("criteria.{}.demand={}", key(name), written(value));
     let mut file = open(arguments.demands.iter().map(setting).collect())?;
-    file.study.cancelled_by(&within(arguments.limit));
+    file.study.cancelled_by(&cancel_after(arguments.limit));
     let problem = Problem::new(Arc::new(file.study.clone()));
     let (index, at) = nearest(&problem, &front, &path)?;
     let refined = if arguments.no_refine { None } else { refined(catalogue, &problem, &at) };
-    print(&told(&file.study, (index, front.len()), &at, refined.as_ref()))?;
+    print(&comparison(&file.study, (index, front.len()), &at, refined.as_ref()))?;
     let chosen = refined.as_ref().unwrap_or(&at);
     let text =
         fs::read_to_string(&path).map_err(|error| CommandError::Failure(format!("{}: {error}", path.display())))?;
@@ -87,10 +86,10 @@ pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     Ok(if chosen.merit.is_feasible() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-/// The file to write: none that is there, which somebody may have worked on.
-fn target(arguments: &Arguments) -> Result<PathBuf, Diagnostic> {
+/// Returns the path of the new study file, which must not exist.
+fn output_path(arguments: &Arguments) -> Result<PathBuf, Diagnostic> {
     match &arguments.out {
-        Some(out) if out.exists() => Err(Diagnostic::new(format!("`{}` is already there", out.display()))
+        Some(out) if out.exists() => Err(Diagnostic::new(format!("`{}` already exists", out.display()))
             .with_help("remove it, or choose another file with --out; nothing was written")),
         Some(out) => Ok(out.clone()),
         None => {
@@ -101,61 +100,58 @@ fn target(arguments: &Arguments) -> Result<PathBuf, Diagnostic> {
     }
 }
 
-/// The points of a finished front.
+/// Reads the points of a Pareto front.
 fn front(folder: &Path) -> Result<Vec<Value>, Diagnostic> {
     let path = folder.join("result.json");
-    let help = "give the folder that `mops pareto` has written, such as results/pid-pareto";
+    let help = "name the output folder of `mops pareto`, such as results/pid-pareto";
     let text = fs::read_to_string(&path)
         .map_err(|_| Diagnostic::new(format!("there is no result in `{}`", folder.display())).with_help(help))?;
     let result: Value = serde_json::from_str(&text)
-        .map_err(|error| Diagnostic::new(format!("`{}` is no result: {error}", path.display())).with_help(help))?;
+        .map_err(|error| Diagnostic::new(format!("cannot parse `{}`: {error}", path.display())).with_help(help))?;
     match result["front"].as_array() {
         Some(points) if !points.is_empty() && result.get("trade_offs").is_some() => Ok(points.clone()),
         _ => {
             let study = result["study"].as_str().unwrap_or("STUDY");
-            Err(Diagnostic::new(format!(
-                "the result in `{}` is that of a single design, and no front",
-                folder.display()
-            ))
-            .with_help(format!("find the front first: mops pareto {study}")))
+            Err(Diagnostic::new(format!("the result in `{}` is a single design, not a Pareto front", folder.display()))
+                .with_help(format!("compute the front first: mops pareto {study}")))
         }
     }
 }
 
-/// Refuses the name of a criterion that is not on the front.
-fn known(study: &Study, name: &str) -> Result<(), Diagnostic> {
+/// Checks that a criterion is an objective of the front.
+fn check_criterion(study: &Study, name: &str) -> Result<(), Diagnostic> {
     let minimised = || study.rows().iter().filter(|row| row.usage == Usage::Minimise).map(|row| row.name.as_str());
     if minimised().any(|known| known == name) {
         return Ok(());
     }
     if study.rows().iter().any(|row| row.name == name) {
-        return Err(Diagnostic::new(format!("`{name}` is not minimised, and so has no say on the front"))
-            .with_help("change its demand in the study, and find the front again"));
+        return Err(Diagnostic::new(format!("`{name}` is not an objective of the front: its usage is not minimise"))
+            .with_help("change its demand in the study, and compute the front again"));
     }
     let mut names: Vec<&str> = minimised().collect();
     names.dedup();
     Err(Diagnostic::new(format!("the front has no criterion `{name}`")).with_help(suggestion(name, names)))
 }
 
-/// A number as it is, a quantity with a unit in quotes.
+/// Formats a value as TOML: a number as it is, a quantity with a unit in quotes.
 fn written(value: &str) -> String {
     if value.parse::<f64>().is_ok() { value.to_owned() } else { quoted(value) }
 }
 
-/// The point of the front with the least worst scaled value under the demands of the problem, and its place.
+/// Returns the index and the evaluation of the point with the smallest worst scaled value under the demands of the problem.
 fn nearest(problem: &Problem, front: &[Value], study: &Path) -> Result<(usize, Evaluation), Diagnostic> {
     let tuners = problem.study().tuners();
     let mut best: Option<(usize, Evaluation)> = None;
     for (i, point) in front.iter().enumerate() {
         let values: Option<Vec<f64>> = tuners.iter().map(|tuner| point["tuners"][&tuner.name].as_f64()).collect();
         let values = values.ok_or_else(|| {
-            Diagnostic::new(format!("the front is not that of the study `{}`: their tuners differ", study.display()))
+            Diagnostic::new(format!("the front does not belong to the study `{}`: the tuners differ", study.display()))
                 .with_help("name the study of the front with --study")
         })?;
         let at = problem.evaluate_at(&values);
         if at.is_cancelled() {
-            return Err(Diagnostic::new("the time limit came before the points of the front were evaluated")
-                .with_help("give it more time with --time-limit"));
+            return Err(Diagnostic::new("the points of the front were not evaluated within the time limit")
+                .with_help("increase --time-limit"));
         }
         if best.as_ref().is_none_or(|(_, best)| at.merit.is_better_than(&best.merit)) {
             best = Some((i, at));
@@ -164,19 +160,19 @@ fn nearest(problem: &Problem, front: &[Value], study: &Path) -> Result<(usize, E
     Ok(best.expect("a front has points"))
 }
 
-/// The solution of the min-max problem from a point; `None` where nothing better is found.
+/// Solves the min-max problem from a point; returns `None` if no better point is found.
 fn refined(catalogue: &Catalogue, problem: &Problem, from: &Evaluation) -> Option<Evaluation> {
     let sqp = catalogue.solvers.iter().find(|kind| kind.name == "sqp")?.default_choice();
     let mut solver = sqp.make();
     solver.accepts(problem.shape()).ok()?;
-    let mut run = Run::new(problem, Budget { evaluations: EFFORT }, &());
+    let mut run = Run::new(problem, Budget { evaluations: REFINEMENT_BUDGET }, &());
     run.solve(solver.as_mut(), &from.point);
     let best = run.best()?;
     best.merit.is_better_than(&from.merit).then(|| problem.concluding().evaluate_at(&best.tuners))
 }
 
-/// The point beside what it was refined to.
-fn told(study: &Study, (index, of): (usize, usize), at: &Evaluation, refined: Option<&Evaluation>) -> String {
+/// Formats the point of the front and its refinement side by side.
+fn comparison(study: &Study, (index, of): (usize, usize), at: &Evaluation, refined: Option<&Evaluation>) -> String {
     let with = |header: &[&str], numeric: &[usize], rows: Vec<Vec<String>>| table(header, numeric, rows);
     let now = refined.map(|refined| criterion_reports(study, refined));
     let rows = criterion_reports(study, at).into_iter().enumerate().map(|(k, report)| {
@@ -206,19 +202,18 @@ fn told(study: &Study, (index, of): (usize, usize), at: &Evaluation, refined: Op
     let tuners = with(&["tuner", "point", second, "unit"], &[1, 2], rows.collect());
     let worst = number(at.merit.objective);
     let then = match refined {
-        Some(refined) => format!(
-            ", and {} where the min-max problem of these demands is solved from there",
-            number(refined.merit.objective)
-        ),
+        Some(refined) => {
+            format!(", {} after refinement (min-max problem solved from this point)", number(refined.merit.objective))
+        }
         None => String::new(),
     };
     format!(
-        "point {} of {of} is nearest to these demands: its worst scaled value is {worst}{then}\n\n{criteria}\n{tuners}",
+        "point {} of {of} is nearest to these demands: worst scaled value {worst}{then}\n\n{criteria}\n{tuners}",
         index + 1
     )
 }
 
-/// The text of a study that starts at the point, with the demands.
+/// Returns the text of a study that starts at the point, with the new demands.
 fn picked(text: &str, file: &StudyFile, at: &Evaluation, demands: &[(String, String)]) -> String {
     let mut text = TomlText::new(text);
     for (name, value) in demands {
@@ -235,7 +230,7 @@ fn picked(text: &str, file: &StudyFile, at: &Evaluation, demands: &[(String, Str
     if text.has(&["study", "objective"]) {
         text.set(&["study", "objective"], "\"max\"");
     }
-    let asked: Vec<String> = demands.iter().map(|(name, value)| format!("{name} = {value}")).collect();
-    text.head(&format!("A point of the front of {}, for {}.", file.study.name(), asked.join(", ")));
+    let demands: Vec<String> = demands.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    text.head(&format!("Point of the Pareto front of {}, for {}.", file.study.name(), demands.join(", ")));
     text.into_text()
 }

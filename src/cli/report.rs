@@ -1,4 +1,4 @@
-//! `mops report`: writes the page of a run again, from what the run left.
+//! `mops report`: rewrites the report of a run from its stored evaluations.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -6,80 +6,86 @@ use std::process::ExitCode;
 use clap::Args;
 use mops_core::{Catalogue, Diagnostic, Stop, suggestion};
 
-use super::keep;
-use super::past::Past;
+use super::past_run::PastRun;
+use super::resume;
 use crate::report::Report;
 use crate::search::{Options, Solved};
-use crate::store::{self, Identity, Keeper, RunRow, RunState};
+use crate::store::{self, Identity, Recorder, RunRow, RunState};
 use crate::terminal::{CommandError, print};
 
-/// Which page is written.
+/// Arguments of `mops report`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Folder of a run, as --out had it.
+    /// Output folder (--out) of a run.
     folder: PathBuf,
 }
 
-/// A run as it was, and the study it was for.
-pub(super) struct Again {
+/// Run restored from its database, with the text of its study.
+pub(super) struct Restored {
     pub solved: Solved,
     pub text: String,
 }
 
 pub(super) fn report(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let folder = &arguments.folder;
-    let past = Past::of(folder)?;
-    let Again { solved, text } = again(catalogue, &past)?;
-    let _claim = store::claim(folder)?;
+    let past = PastRun::open(folder)?;
+    let Restored { solved, text } = replay(catalogue, &past)?;
+    let _lock = store::lock_folder(folder)?;
     let Solved { outcome, problem, best, archive, front, .. } = &solved;
     let report = Report { outcome, problem, best, archive, front, diagnosis: None, text: &text };
     report.write(folder).map_err(CommandError::cannot_write(folder))?;
     let count = outcome.evaluations;
-    print(&format!("report.html and the plots of {count} evaluations are in {}\n", folder.display()))?;
+    print(&format!("report.html and plots from {count} evaluations are in {}\n", folder.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Goes through a run again: every point is answered from its database, and nothing is searched beyond them.
-fn again(catalogue: &Catalogue, past: &Past) -> Result<Again, CommandError> {
+/// Replays a run: every point is answered from its database, and the search ends at the first point that is not stored.
+fn replay(catalogue: &Catalogue, past: &PastRun) -> Result<Restored, CommandError> {
     let folder = &past.folder;
     let mut file = past.study(catalogue)?;
-    let Some((run, goes_on)) = &past.run else { unreachable!("a study was found in it") };
-    if *goes_on {
-        return Err(Diagnostic::new(format!("the run in {} goes on", folder.display()))
-            .with_help("it writes its report when it ends; `mops run --watch` shows one that goes")
+    let Some((run, is_running)) = &past.run else { unreachable!("a study was found in it") };
+    if *is_running {
+        return Err(Diagnostic::new(format!("the run in {} is still in progress", folder.display()))
+            .with_help("it writes its report at the end; `mops run --watch` shows a run in progress")
             .into());
     }
-    if !keep::keeps(&file.study) {
+    if !resume::stores_points(&file.study) {
         let task = &run.task;
         return Err(Diagnostic::new(format!(
-            "the run in {} is a {task}, which keeps no evaluations",
+            "the run in {} is a {task}, which stores no evaluations",
             folder.display()
         ))
-        .with_help(format!("`{}` does it again", run.command))
+        .with_help(format!("run it again: `{}`", run.command))
         .into());
     }
-    if cut_short(run) && keep::samples(&file.study) {
+    if ended_early(run) && resume::samples_uncertain(&file.study) {
         return Err(Diagnostic::new(format!(
-            "the run in {} came to no end, and what it found is not whole",
+            "the run in {} did not finish, and its findings are incomplete",
             folder.display()
         ))
-        .with_help(format!("`{} --resume` ends it, and simulates no known point again", plainly(run)))
+        .with_help(format!(
+            "finish it with `{} --resume`, which simulates no stored point again",
+            command_without_resume(run)
+        ))
         .into());
     }
     file.study.set_seed(run.seed);
     let options = options(catalogue, &file.solver, run)?;
     let identity = Identity::of(&file, &file.study, options.solver.kind);
-    let keeper = Keeper::look(folder, &file.study, &identity, &options.cancellation)?;
-    let (solved, _) = keep::solve_keeping(&file.study, &options, keeper, &());
+    let recorder = Recorder::replay(folder, &file.study, &identity, &options.cancellation)?;
+    let (solved, _) = resume::solve_recorded(&file.study, &options, recorder, &());
     let mut solved = solved.map_err(|why| Diagnostic::new(why.to_string()))?;
-    let (outcome, result) = (&mut solved.outcome, past.ended());
+    let (outcome, result) = (&mut solved.outcome, past.finished_result());
     let ended_with = result.and_then(|result| result["evaluations"].as_u64()).unwrap_or(0);
     if (outcome.evaluations as u64) < ended_with {
         let (there, folder) = (outcome.evaluations, folder.display());
         return Err(Diagnostic::new(format!(
             "the database in {folder} has {there} of the run's {ended_with} evaluations"
         ))
-        .with_help(format!("`{} --resume` simulates the others again, and writes the report", plainly(run)))
+        .with_help(format!(
+            "`{} --resume` simulates the others again and writes the report",
+            command_without_resume(run)
+        ))
         .into());
     }
     outcome.stop = match run.state {
@@ -91,20 +97,20 @@ fn again(catalogue: &Catalogue, past: &Past) -> Result<Again, CommandError> {
     if let Some(seconds) = result.and_then(|result| result["seconds"].as_f64()) {
         outcome.seconds = seconds;
     }
-    Ok(Again { solved, text: file.source.text.clone() })
+    Ok(Restored { solved, text: file.source.text.clone() })
 }
 
-/// The command line of a run, without `--resume`.
-fn plainly(run: &RunRow) -> String {
+/// Returns the command line of a run without `--resume`.
+fn command_without_resume(run: &RunRow) -> String {
     run.command.replace(" --resume", "")
 }
 
-/// Whether a run ended before its solver or its budget did.
-fn cut_short(run: &RunRow) -> bool {
+/// Returns true if the run ended before its solver or its budget did.
+fn ended_early(run: &RunRow) -> bool {
     matches!(run.state, RunState::Running | RunState::Interrupted)
 }
 
-/// The options the run had; of one that was cut short, with a budget of the points it has.
+/// Returns the options of the run. The budget of an unfinished run is the number of its evaluations.
 fn options(catalogue: &Catalogue, of_file: &mops_core::SolverChoice, run: &RunRow) -> Result<Options, Diagnostic> {
     let solver = if of_file.kind == run.solver {
         of_file.clone()
@@ -115,6 +121,6 @@ fn options(catalogue: &Catalogue, of_file: &mops_core::SolverChoice, run: &RunRo
             || Diagnostic::new(format!("no solver `{}`", run.solver)).with_help(suggestion(&run.solver, names));
         kind.ok_or_else(unknown)?.default_choice()
     };
-    let max_evaluations = if cut_short(run) { run.evaluations.max(1) } else { run.max_evaluations };
+    let max_evaluations = if ended_early(run) { run.evaluations.max(1) } else { run.max_evaluations };
     Ok(Options { solver, max_evaluations, effects: catalogue.effects.clone(), ..Options::default() })
 }

@@ -1,4 +1,4 @@
-//! Worst cases, distributions and effects over uncertain parameters, as tables and sentences on the terminal.
+//! Text of the findings over uncertain parameters: worst cases, distributions and sensitivities.
 
 use mops_core::{
     Estimated, Findings, GlobalSensitivityReport, MonteCarloReport, RobustReport, SensitivityMethod, Subject,
@@ -9,7 +9,7 @@ use super::findings::{known, sentences, share};
 use crate::numbers::significant;
 use crate::terminal::{number, table};
 
-/// Everything that was found where parameters are uncertain; empty where nothing was looked for.
+/// Formats the findings over uncertain parameters; empty if there are none.
 pub(super) fn text(found: &Findings) -> String {
     let mut text = String::new();
     if let Some(found) = &found.uncertainty {
@@ -30,7 +30,7 @@ pub(super) fn text(found: &Findings) -> String {
     text
 }
 
-/// What is uncertain.
+/// Formats the table of uncertain parameters.
 pub(super) fn parameters(list: &[UncertainReport]) -> String {
     let rows = list.iter().map(|p| {
         let [low, high] = p.bounds.map(known);
@@ -39,7 +39,7 @@ pub(super) fn parameters(list: &[UncertainReport]) -> String {
     format!("\n{}", table(&["uncertain", "nominal", "min", "max", "unit", "distribution"], &[1, 2, 3], rows.collect()))
 }
 
-/// Case and name of a criterion.
+/// Returns case and name of a criterion.
 fn subject(of: &Subject) -> [String; 2] {
     [of.case.clone(), of.criterion.clone()]
 }
@@ -88,7 +88,7 @@ fn robust(found: &RobustReport) -> String {
             added.join(", "),
         ]
     });
-    let header = ["round", "cases", "worst of these", "worst found", "violation found", "evaluations", "added"];
+    let header = ["round", "cases", "worst of cases", "worst found", "violation found", "evaluations", "added"];
     let rounds = table(&header, &[1, 2, 3, 4, 5], rows.collect());
     let tables =
         format!("{}\n{rounds}{}", parameters(&found.parameters), worst_table(&found.criteria, &found.parameters));
@@ -113,7 +113,7 @@ fn monte_carlo(found: &MonteCarloReport) -> String {
         row
     });
     let of_shares: Vec<String> = shares.iter().map(|p| format!("{} %", significant(100.0 * p, 4))).collect();
-    let mut header = vec!["case", "criterion", "nominal", "mean", "deviation"];
+    let mut header = vec!["case", "criterion", "nominal", "mean", "std. dev."];
     header.extend(of_shares.iter().map(String::as_str));
     header.extend(["unit", "demand met", if found.failed > 0 { "failed" } else { "" }]);
     let tables = format!("{}\n{}", parameters(&found.parameters), table(&header, &[2, 3, 4], rows.collect()));
@@ -127,7 +127,7 @@ fn global_sensitivity(found: &GlobalSensitivityReport) -> String {
             let mut row = subject(&c.of).to_vec();
             row.push(effect.parameter.clone());
             let bare = |value: Option<f64>| value.map_or_else(String::new, |v| significant(v, 4));
-            let told = |share: Option<Estimated>| {
+            let estimate = |share: Option<Estimated>| {
                 share.map_or_else(String::new, |Estimated { value, interval: [low, high] }| {
                     format!("{} [{}, {}]", significant(value, 3), significant(low, 3), significant(high, 3))
                 })
@@ -135,15 +135,19 @@ fn global_sensitivity(found: &GlobalSensitivityReport) -> String {
             if morris {
                 row.extend([bare(effect.magnitude), bare(effect.mean), bare(effect.deviation), c.of.unit.clone()]);
             } else {
-                row.extend([told(effect.first), told(effect.total)]);
+                row.extend([estimate(effect.first), estimate(effect.total)]);
             }
             row
         })
     });
     let effects = if morris {
-        table(&["case", "criterion", "parameter", "magnitude", "mean", "deviation", "unit"], &[3, 4, 5], rows.collect())
+        table(
+            &["case", "criterion", "parameter", "mean |effect|", "mean", "std. dev.", "unit"],
+            &[3, 4, 5],
+            rows.collect(),
+        )
     } else {
-        table(&["case", "criterion", "parameter", "alone", "and with others"], &[], rows.collect())
+        table(&["case", "criterion", "parameter", "first-order index", "total index"], &[], rows.collect())
     };
     format!("{}\n{effects}\n{}", parameters(&found.parameters), sentences(&found.words))
 }
@@ -153,14 +157,14 @@ fn uncertainty(found: &UncertaintyReport) -> String {
     if !found.profiles.is_empty() {
         let rows = found.profiles.iter().map(|p| {
             let [low, high] = [0, 1].map(|i| match p.ends[i] {
-                "open" => "none found".to_owned(),
+                "open" => "not found".to_owned(),
                 "bound" => format!("{} (bound)", number(p.interval[i])),
                 _ => number(p.interval[i]),
             });
             let [from, to] = p.linear_interval.map(number);
             vec![p.parameter.clone(), number(p.value), low, high, from, to, p.unit.clone()]
         });
-        let header = ["profile", "estimate", "from", "to", "first order from", "to", "unit"];
+        let header = ["profile", "estimate", "from", "to", "linear from", "to", "unit"];
         text += &format!("\n{}", table(&header, &[1, 2, 3, 4, 5], rows.collect()));
     }
     if let Some(bootstrap) = &found.bootstrap {

@@ -1,4 +1,4 @@
-//! `mops run`: solves a study and leaves the result behind.
+//! `mops run`: solves a study and writes the result.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -8,97 +8,97 @@ use clap::{Args, ValueEnum};
 use mops_core::file::StudyFile;
 use mops_core::{Catalogue, Diagnostic, Halt, Stop, Study, StudyError, Task, Watch, suggestion};
 
-use super::remains::{PATIENCE, Remains};
+use super::run_files::{DISK_TIMEOUT, RunFiles};
 use super::study::{StudyArguments, home, open_as, without_settings};
-use super::{diagnosis, findings, keep, tables};
+use super::{diagnosis, findings, resume, tables};
 use crate::numbers::file_name;
 use crate::search::{DEFAULT_EVALUATIONS, Options, Solved, solves, suits};
 use crate::store::Start;
-use crate::terminal::{CommandError, Limit, Progress, listen, print, print_json, say};
+use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, eprint_line, print, print_json};
 use crate::watch::{Both, Page};
 
-/// What `mops diagnose` sets.
+/// Setting made by `mops diagnose`.
 const DIAGNOSIS: &str = "study.task=\"diagnosis\"";
 
-/// What `mops pareto` sets.
+/// Setting made by `mops pareto`.
 const PARETO: &str = "study.task=\"pareto\"";
 
-/// What can be said to every run.
+/// Options of every command that runs a study.
 #[derive(Args)]
-pub(super) struct Common {
+pub(super) struct CommonOptions {
     #[command(flatten)]
     study: StudyArguments,
-    /// Folder for the result; results/<study> where absent.
+    /// Folder for the result [default: results/<study>].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Seed of all random numbers.
     #[arg(long)]
     seed: Option<u64>,
-    /// Number of threads; all cores where absent. The result is the same, bit for bit, with any number and on any processor.
+    /// Number of threads [default: all cores]. The result is identical, bit for bit, for any number and on any processor.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
     #[command(flatten)]
     limit: Limit,
-    /// Say nothing but errors.
+    /// Print errors only.
     #[arg(long)]
     quiet: bool,
-    /// Serve a live page of the run to this machine: best point against the demands, convergence, failures, time left.
+    /// Serve a live page of the run: best point and demands, convergence, failures, time left.
     ///
-    /// The address is printed; it holds a secret, and nobody else on the machine or in the network finds it.
+    /// Prints the URL. It contains a random token, and the server listens on localhost only.
     #[arg(long)]
     watch: bool,
-    /// Show convergence, and the best criteria against their demands, in the terminal while the run goes.
+    /// Show convergence, and the best criteria with their demands, in the terminal during the run.
     #[arg(long, conflicts_with_all = ["quiet", "json"])]
     dashboard: bool,
-    /// Print result.json on standard output, and nothing else.
+    /// Print result.json to standard output, and nothing else.
     #[arg(long)]
     json: bool,
-    /// Of a diagnosis: write the repaired model as source too, repaired.rs.
+    /// Diagnosis only: also write the repaired model as source code, repaired.rs.
     #[arg(long, value_name = "LANGUAGE")]
     export: Option<Language>,
 }
 
-/// A language that a repaired model is written in.
+/// Language of the exported model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Language {
-    /// A program that builds and solves the repaired study.
+    /// Rust program that builds and solves the repaired study.
     Rust,
 }
 
-/// What can be said to a run.
+/// Options of `mops run`.
 #[derive(Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
-    common: Common,
+    common: CommonOptions,
     #[command(flatten)]
-    effort: Effort,
+    solver_options: SolverOptions,
 }
 
-/// By which solver, and how long.
+/// Solver, budget and stored evaluations of a run.
 #[derive(Args)]
-pub(super) struct Effort {
+pub(super) struct SolverOptions {
     #[command(flatten)]
-    keep: keep::Beginning,
-    /// Kind of solver, with its default options, instead of the study's.
+    start: resume::StartOptions,
+    /// Kind of solver, with its default options, instead of the solver of the study.
     #[arg(long)]
     solver: Option<String>,
-    /// Largest number of points evaluated.
+    /// Budget: largest number of evaluated points.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     max_evaluations: Option<u64>,
 }
 
-/// What is done with the study.
+/// Work to be done with a study.
 pub(super) enum Search<'a> {
-    /// What it is for, with this solver and budget where they are given.
-    Task(&'a Effort),
-    /// What its model lacks.
+    /// Task of the study, with the solver and the budget of the command line, if given.
+    Task(&'a SolverOptions),
+    /// A diagnosis.
     Diagnosis,
-    /// Its front, of so many points where that is said.
-    Pareto { effort: &'a Effort, points: Option<u16> },
+    /// The Pareto front, with the given number of points.
+    Pareto { solver_options: &'a SolverOptions, points: Option<u16> },
 }
 
 impl Search<'_> {
-    /// What it sets in the study.
+    /// Returns the settings that the command makes in the study.
     fn settings(&self) -> Vec<String> {
         match self {
             Self::Task(_) => Vec::new(),
@@ -110,33 +110,37 @@ impl Search<'_> {
         }
     }
 
-    fn effort(&self) -> Option<&Effort> {
+    fn solver_options(&self) -> Option<&SolverOptions> {
         match self {
-            Self::Task(effort) | Self::Pareto { effort, .. } => Some(effort),
+            Self::Task(solver_options) | Self::Pareto { solver_options, .. } => Some(solver_options),
             Self::Diagnosis => None,
         }
     }
 }
 
 pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    go(catalogue, &arguments.common, &Search::Task(&arguments.effort))
+    execute(catalogue, &arguments.common, &Search::Task(&arguments.solver_options))
 }
 
-/// Runs the study and leaves the result behind.
-pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>) -> Result<ExitCode, CommandError> {
+/// Runs the study and writes the result.
+pub(super) fn execute(
+    catalogue: &Catalogue,
+    arguments: &CommonOptions,
+    search: &Search<'_>,
+) -> Result<ExitCode, CommandError> {
     let mut file = open_as(catalogue, &arguments.study, &search.settings())?;
     if arguments.export.is_some() && file.study.task() != Task::Diagnosis {
         return Err(Diagnostic::new(
-            "`--export` writes the repaired model of a diagnosis, and this study is for something else",
+            "`--export` writes the repaired model of a diagnosis, but the task of this study is another one",
         )
-        .with_help("call `mops diagnose`, or leave `--export` out")
+        .with_help("use `mops diagnose`, or remove `--export`")
         .into());
     }
     if let Some(seed) = arguments.seed {
         file.study.set_seed(seed);
     }
-    let (chosen, limit) = search.effort().map_or((None, None), |e| (e.solver.as_deref(), e.max_evaluations));
-    let start = search.effort().map_or(Start::Fresh, |effort| effort.keep.start());
+    let (chosen, limit) = search.solver_options().map_or((None, None), |e| (e.solver.as_deref(), e.max_evaluations));
+    let start = search.solver_options().map_or(Start::Fresh, |solver_options| solver_options.start.start());
     let solver = match chosen {
         None => file.solver.clone(),
         Some(name) => {
@@ -156,12 +160,15 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
         jobs: arguments.jobs.map(usize::from),
         effects: catalogue.effects.clone(),
         keeping: None,
-        cancellation: listen(arguments.limit, "interrupted: saving the best point; press Ctrl-C again to quit now"),
+        cancellation: cancel_on_signal(
+            arguments.limit,
+            "interrupted: saving the best point; press Ctrl-C again to quit now",
+        ),
     };
-    // Before anything of an earlier run is touched.
+    // Before any file of an earlier run is changed.
     suits(&file.study, &options.solver).map_err(|why| refused(&why.0, &file, options.solver.kind))?;
     let talks = !arguments.quiet && !arguments.json;
-    // N.B.: the name of a study is no path, wherever the study comes from.
+    // N.B.: the name of a study is never used as a path.
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(file_name(file.study.name())));
     let mut progress = Progress::new(talks, options.max_evaluations, &options.cancellation);
     if arguments.dashboard {
@@ -169,43 +176,43 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
     }
     if talks {
         for warning in file.study.warnings() {
-            say(&format!("warning: {warning}"));
+            eprint_line(&format!("warning: {warning}"));
         }
     }
-    let mut said = Said::default();
-    said.of(if talks { print(&introduction(&file.study, &options)) } else { Ok(()) });
+    let mut first_error = FirstError::default();
+    first_error.record(if talks { print(&introduction(&file.study, &options)) } else { Ok(()) });
     let home = home(catalogue, &arguments.study);
     let settings: Vec<String> = arguments.study.settings.iter().cloned().chain(search.settings()).collect();
-    // What the command sets is part of what was said: a report that is written again needs it.
+    // `mops report` needs the settings of the command, too.
     let asked = StudyArguments { study: arguments.study.study.clone(), settings: settings.clone() };
-    let keeper = keep::open((&folder, &start), (&file, &asked), &home, &options)?;
-    if let Some(note) = keeper.note.as_ref().filter(|_| talks) {
-        say(&format!("note: {note}"));
+    let recorder = resume::open((&folder, &start), (&file, &asked), &home, &options)?;
+    if let Some(note) = recorder.note.as_ref().filter(|_| talks) {
+        eprint_line(&format!("note: {note}"));
     }
-    let (known, id) = (keeper.known(), keeper.id.clone());
+    let (known, id) = (recorder.known(), recorder.id.clone());
     let page = arguments.watch.then(|| watch(&file.study, &options)).transpose()?;
     let both = page.as_ref().map(|page| Both { page, other: &progress });
     let watch: &dyn Watch = both.as_ref().map_or(&progress, |both| both);
-    let (solved, mut opened) = keep::solve_keeping(&file.study, &options, keeper, watch);
+    let (solved, mut finished) = resume::solve_recorded(&file.study, &options, recorder, watch);
     progress.finish();
     let mut solved = match solved {
         Ok(solved) => solved,
         Err(why) => {
-            opened.withdraw();
+            finished.discard();
             return Err(refused(&why.0, &file, options.solver.kind).into());
         }
     };
     solved.outcome.run = Some(id);
-    let ended_early = options.cancellation.requested();
+    let stopped_early = options.cancellation.requested();
     if let (Stop::Budget, Some(limit), Some(Halt::Budget)) =
-        (solved.outcome.stop, arguments.limit.time_limit, ended_early)
+        (solved.outcome.stop, arguments.limit.time_limit, stopped_early)
     {
-        let way_out = if keep::keeps(&file.study) { "; --resume continues it where it was" } else { "" };
-        let warning = format!("the time limit of {} s ended the run{way_out}", limit.as_secs_f64());
+        let help = if resume::stores_points(&file.study) { "; --resume continues the run" } else { "" };
+        let warning = format!("stopped at the time limit of {} s{help}", limit.as_secs_f64());
         solved.outcome.warnings.push(warning);
     }
-    let told = keep::told(&start, known, &opened);
-    let remains = Remains {
+    let cache_summary = resume::cache_summary(&start, known, &finished);
+    let files = RunFiles {
         folder: &folder,
         solved: &solved,
         text: &file.source.text,
@@ -217,72 +224,72 @@ pub(super) fn go(catalogue: &Catalogue, arguments: &Common, search: &Search<'_>)
         export: arguments.export.is_some(),
     };
 
-    // What was found is shown whatever becomes of the files.
-    let held = opened.hold();
-    let result = match &held {
-        // A full disk was waited for already, where evaluations had to go.
-        Ok(_) => remains.write_result(if opened.is_whole() { PATIENCE } else { Duration::ZERO }),
+    // The result is printed even if the files cannot be written.
+    let in_place = finished.ensure_in_place();
+    let result = match &in_place {
+        // If evaluations are missing, the writer has already waited for a full disk.
+        Ok(_) => files.write_result(if finished.is_whole() { DISK_TIMEOUT } else { Duration::ZERO }),
         Err(why) => Err(CommandError::Failure(why.clone())),
     };
     if arguments.json {
-        said.of(print_json(&solved.outcome));
+        first_error.record(print_json(&solved.outcome));
     } else if talks {
-        said.of(print(&(shown(&solved) + &told)));
+        first_error.record(print(&(result_text(&solved) + &cache_summary)));
     }
-    if let Ok(Some(note)) = &held {
-        say(&format!("warning: {note}"));
+    if let Ok(Some(note)) = &in_place {
+        eprint_line(&format!("warning: {note}"));
     }
-    let written = result.and_then(|()| remains.write_others());
+    let written = result.and_then(|()| files.write_others());
     if let Some(page) = page {
         page.finish(&folder);
     }
-    if let Some(trouble) = opened.end(keep::state(solved.outcome.stop), solved.outcome.evaluations) {
-        say(&format!("warning: not all of the run is in the database: {trouble}"));
+    if let Some(error) = finished.end(resume::state(solved.outcome.stop), solved.outcome.evaluations) {
+        eprint_line(&format!("warning: the database of the run is incomplete: {error}"));
     }
     if talks && written.is_ok() {
-        said.of(print(&format!("\nresult, report and plots are in {}\n", folder.display())));
+        first_error.record(print(&format!("\nresult, report and plots are in {}\n", folder.display())));
     }
     written?;
-    said.0?;
-    status(&solved, &folder, ended_early.is_some())
+    first_error.0?;
+    status(&solved, &folder, stopped_early.is_some())
 }
 
-/// The exit status of a run whose result is written.
-fn status(solved: &Solved, folder: &Path, ended_early: bool) -> Result<ExitCode, CommandError> {
+/// Returns the exit status of a run whose result is written.
+fn status(solved: &Solved, folder: &Path, stopped_early: bool) -> Result<ExitCode, CommandError> {
     if solved.outcome.stop == Stop::Interrupted {
         return Ok(ExitCode::from(4));
     }
     if solved.best.scaled.is_none() {
         let failed = solved.best.failures.first().map(|(_, failure)| format!(": {failure}"));
-        let early = || if ended_early { " in time" } else { "" }.to_owned();
+        let early = || if stopped_early { " in time" } else { "" }.to_owned();
         let (why, folder) = (failed.unwrap_or_else(early), folder.display());
         return Err(CommandError::Failure(format!("no point could be simulated{why}; the result is in {folder}")));
     }
     Ok(if solved.outcome.feasible { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-/// The first thing that could not be printed: a run goes on all the same.
-struct Said(Result<(), CommandError>);
+/// First error in printing; the run continues in spite of it.
+struct FirstError(Result<(), CommandError>);
 
-impl Default for Said {
+impl Default for FirstError {
     fn default() -> Self {
         Self(Ok(()))
     }
 }
 
-impl Said {
-    fn of(&mut self, printed: Result<(), CommandError>) {
+impl FirstError {
+    fn record(&mut self, printed: Result<(), CommandError>) {
         if self.0.is_ok() {
             self.0 = printed;
         }
     }
 }
 
-/// A result in tables and sentences.
-fn shown(solved: &Solved) -> String {
+/// Formats a result as tables and sentences.
+fn result_text(solved: &Solved) -> String {
     let tables = match &solved.diagnosis {
         Some(found) => diagnosis::text(found, solved.outcome.seconds),
-        // Without a verdict, or of inputs alone, there are no criteria to show.
+        // No criteria exist without a verdict or for an analysis of inputs.
         None if matches!(solved.outcome.task, Task::Diagnosis | Task::Excitation) => {
             solved.outcome.warnings.iter().map(|warning| format!("warning: {warning}\n")).collect()
         }
@@ -291,15 +298,16 @@ fn shown(solved: &Solved) -> String {
     tables + &findings::text(&solved.outcome)
 }
 
-/// The live page of a run; its address is all that is said of it.
+/// Opens the live page of a run and prints its URL.
 fn watch(study: &Study, options: &Options) -> Result<Page, CommandError> {
-    let cannot = |error| CommandError::Failure(format!("no page can be served for --watch: {error}"));
+    let cannot = |error| CommandError::Failure(format!("cannot serve the page of --watch: {error}"));
     let page = Page::open(study, options.solver.kind, options.max_evaluations).map_err(cannot)?;
-    say(&format!("watch the run at {}", page.address()));
+    eprint_line(&format!("watch the run at {}", page.address()));
     Ok(page)
 }
 
-/// A study that cannot be treated; the place is shown where there is one: the file does not name a solver of the command line.
+/// Returns the error for a study that the solver or task refuses. The position in the file is given if there is one; a solver
+/// from the command line has none.
 fn refused(why: &StudyError, file: &StudyFile, solver: &str) -> Diagnostic {
     let of_command_line = solver != file.solver.kind && why.path.first().is_some_and(|key| key == "solver");
     if why.path.is_empty() || of_command_line {
@@ -316,7 +324,7 @@ fn introduction(study: &Study, options: &Options) -> String {
         let (count, channels) = experiments.fold((0, 0), |(n, m), e| (n + 1, m + e.channels.len()));
         let model = &study.name();
         return format!(
-            "{model}: {active} tuners, {count} experiments with {channels} channels; looking for what the model lacks\n"
+            "{model}: {active} tuners, {count} experiments with {channels} channels; searching for missing effects\n"
         );
     }
     format!(
@@ -325,6 +333,6 @@ fn introduction(study: &Study, options: &Options) -> String {
         active,
         study.rows().len(),
         study.cases().len(),
-        if solves(study) { options.solver.kind } else { "none (nothing is solved)" }
+        if solves(study) { options.solver.kind } else { "none (no optimisation)" }
     )
 }

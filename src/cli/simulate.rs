@@ -1,4 +1,4 @@
-//! `mops simulate`: runs a study's models once at given values.
+//! `mops simulate`: simulates the models of a study once at given values.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -13,9 +13,9 @@ use super::tables::criteria;
 use crate::files;
 use crate::numbers::FileNames;
 use crate::report::{Color, Curve, Plot, points};
-use crate::terminal::{CommandError, Limit, number, print, table, within};
+use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 
-/// What is simulated.
+/// Arguments of `mops simulate`.
 #[derive(Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -23,22 +23,22 @@ pub(super) struct Arguments {
     /// Value of a tuner instead of its start value: --at k=5.48 --at "Ti=4.67 s".
     #[arg(long = "at", value_name = "TUNER=VALUE")]
     at: Vec<String>,
-    /// Only this case.
+    /// Simulate this case only.
     #[arg(long)]
     case: Option<String>,
-    /// Number of evenly spaced times in the CSV file.
+    /// Number of equally spaced samples in the CSV file.
     #[arg(long, default_value_t = 1001, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
     samples: u32,
     #[command(flatten)]
     limit: Limit,
-    /// Folder for CSV files and plots; nothing is written where absent.
+    /// Folder for CSV files and plots; without it, no files are written.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
 pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let mut study = open(catalogue, &arguments.study)?.study;
-    study.cancelled_by(&within(arguments.limit));
+    study.cancelled_by(&cancel_after(arguments.limit));
     let tuners = values(&study, &arguments.at)?;
     if let Some(case) = &arguments.case {
         let names = study.cases().iter().map(|c| c.name.as_str());
@@ -78,7 +78,7 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
                 print(&format!("\n{model} in case {case}: {failure}\n"))?;
             }
             Ok(Analysis::Linear(system)) => {
-                print(&format!("\n{model} in case {case}: a linear system with {} states\n", system.states.len()))?;
+                print(&format!("\n{model} in case {case}: linear system with {} states\n", system.states.len()))?;
             }
             Ok(Analysis::Time(response)) => {
                 print(&format!("\n{model} in case {case}\n\n{}", summary(study, plan.model, &response)))?;
@@ -94,19 +94,19 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         print(&format!("\nCSV files and plots are in {}\n", folder.display()))?;
     }
     if failed {
-        Err(CommandError::Failure("a simulation, or a criterion that counts, has no value".into()))
+        Err(CommandError::Failure("a simulation failed or a criterion has no value".into()))
     } else {
         Ok(ExitCode::SUCCESS)
     }
 }
 
-/// Values of all tuners: the start values, and what the command line puts over them.
+/// Returns the values of all tuners: the start values, overridden by the command line.
 fn values(study: &Study, given: &[String]) -> Result<Vec<f64>, CommandError> {
     let mut values = study.start();
     for text in given {
-        let (name, value) = text.split_once('=').ok_or_else(|| {
-            Diagnostic::new(format!("`--at {text}` names no value")).with_help("write it as --at k=5.48")
-        })?;
+        let (name, value) = text
+            .split_once('=')
+            .ok_or_else(|| Diagnostic::new(format!("`--at {text}` has no value")).with_help("write --at k=5.48"))?;
         let names = study.tuners().iter().map(|t| t.name.as_str());
         let index = study.tuners().iter().position(|t| t.name == name.trim()).ok_or_else(|| {
             Diagnostic::new(format!("the study has no tuner `{}`", name.trim()))
@@ -123,7 +123,7 @@ fn values(study: &Study, given: &[String]) -> Result<Vec<f64>, CommandError> {
             || (tuner.value_at(tuner.position_of(value)) - value).abs() <= 1e-9 * (1.0 + value.abs());
         if !on_grid {
             print(&format!(
-                "note: {} = {} is not a value it can be tuned to, {} to {}\n",
+                "note: {} = {} is outside its bounds [{}, {}] or off its grid\n",
                 tuner.name,
                 number(value),
                 number(low),
@@ -155,7 +155,7 @@ fn summary(study: &Study, model: usize, response: &Response) -> String {
     let work = response.work;
     text += &format!("\n{} steps, {} rejected, {} derivatives\n", work.steps, work.rejected, work.derivatives);
     if work.rough > 0 {
-        text += &format!("in {} steps rounding limits the accuracy, not the tolerance\n", work.rough);
+        text += &format!("accuracy limited by rounding in {} steps\n", work.rough);
     }
     for event in response.events.iter().take(20) {
         text += &format!("{:>12} s  {}\n", number(event.time), event.what);
@@ -166,7 +166,7 @@ fn summary(study: &Study, model: usize, response: &Response) -> String {
     text
 }
 
-/// A simulation, and the name of its files.
+/// Simulation with the prefix of its file names.
 struct Simulated<'a> {
     name: String,
     study: &'a Study,
@@ -175,7 +175,7 @@ struct Simulated<'a> {
 }
 
 impl Simulated<'_> {
-    /// Writes samples and plots, under names that no other simulation has.
+    /// Writes samples and plots, under names that are unique among all simulations.
     fn write(&self, folder: &Path, samples: u32, names: &mut FileNames) -> Result<(), CommandError> {
         let Self { name, study, model, response } = self;
         std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
@@ -221,7 +221,7 @@ impl Simulated<'_> {
     }
 }
 
-/// At most six places from `first` to `last`, evenly spread, both ends among them.
+/// Returns at most six evenly spread indices from `first` to `last`, ends included.
 fn spread(first: usize, last: usize) -> Vec<usize> {
     let steps = (last - first).clamp(1, 5);
     let mut places: Vec<usize> = (0..=steps).map(|i| first + i * (last - first) / steps).collect();

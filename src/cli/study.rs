@@ -1,4 +1,4 @@
-//! Opens studies: files, folders, shipped ones.
+//! Opening of studies: files, folders, shipped and built studies.
 
 use std::convert::Infallible;
 use std::io::{ErrorKind, Read};
@@ -10,27 +10,27 @@ use mops_core::{BuiltStudy, Catalogue, CatalogueStudy, Diagnostic, Shipped, Sour
 
 use crate::toml_text::quoted;
 
-/// Which study, and what goes over it.
+/// Study and settings that override it.
 #[derive(Args)]
 pub(super) struct StudyArguments {
-    /// A study file, or the name of a shipped study (see `mops list`).
+    /// Study file, or name of a shipped study (see `mops list`).
     pub study: String,
-    /// Replace or add a value of the study: --set tuners.k.start=5 --set study.task=sensitivity. What is not TOML is a text.
+    /// Set a value of the study: --set tuners.k.start=5 --set study.task=sensitivity. A value that is not TOML is a string.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = as_toml)]
     pub settings: Vec<String>,
 }
 
-/// Where a study and its data are.
+/// Location of a study and its data.
 pub(super) enum Home {
-    /// In a file; data are in its folder.
+    /// Study file; data paths are relative to its folder.
     File(PathBuf),
-    /// Files in the program.
+    /// Files included in the program.
     Shipped(Shipped),
-    /// Built in Rust.
+    /// Study built in Rust.
     Built(BuiltStudy),
 }
 
-/// Where the study is; a folder stands for the study in it.
+/// Returns the location of the study; a folder means the study.toml in it.
 pub(super) fn home(catalogue: &Catalogue, arguments: &StudyArguments) -> Home {
     let path = Path::new(&arguments.study);
     match catalogue.study(&arguments.study).filter(|_| !path.is_file()) {
@@ -41,13 +41,13 @@ pub(super) fn home(catalogue: &Catalogue, arguments: &StudyArguments) -> Home {
 }
 
 impl Home {
-    /// Returns the place of a study of the catalogue.
+    /// Returns the location of a study of the catalogue.
     fn of(known: &CatalogueStudy) -> Self {
         match known {
             CatalogueStudy::Shipped(shipped) => Self::Shipped(*shipped),
             CatalogueStudy::Folder(folder) => Self::File(folder.file()),
             CatalogueStudy::Built(built) => Self::Built(built.clone()),
-            other => unreachable!("`{}` is of a sort that this program does not know", other.name()),
+            other => unreachable!("`{}` is an unknown sort of study", other.name()),
         }
     }
 }
@@ -57,8 +57,8 @@ pub(super) fn open(catalogue: &Catalogue, arguments: &StudyArguments) -> Result<
     open_as(catalogue, arguments, &[])
 }
 
-/// A setting as TOML: a value that is none is a text, `criteria.settling.demand=12 s`. Values that begin as TOML does, and
-/// numbers with a decimal comma, are left as they are, so that their mistakes are told.
+/// Converts a setting to TOML: a value that is not TOML becomes a string, `criteria.settling.demand=12 s`. Values that start
+/// like TOML, and numbers with a decimal comma, stay as they are, so that their errors are reported.
 fn as_toml(setting: &str) -> Result<String, Infallible> {
     let is_toml = toml::de::DeTable::parse(setting).is_ok();
     let Some((key, value)) = setting.split_once('=').filter(|_| !is_toml) else { return Ok(setting.to_owned()) };
@@ -70,7 +70,7 @@ fn as_toml(setting: &str) -> Result<String, Infallible> {
     Ok(format!("{key}={}", quoted(value)))
 }
 
-/// The same with more settings.
+/// Reads and checks a study with additional settings.
 pub(super) fn open_as(
     catalogue: &Catalogue,
     arguments: &StudyArguments,
@@ -90,7 +90,7 @@ pub(super) fn open_as(
     mops_core::file::read(catalogue, &source.name, &source.text, settings, &Folder(folder))
 }
 
-/// Text of a file of a study: of one in the program or in a folder.
+/// Returns the text of a file of a shipped study or of a study folder.
 pub(super) fn text_of(study: &CatalogueStudy, name: &str) -> Option<String> {
     match study {
         CatalogueStudy::Shipped(shipped) => shipped.file(name).map(|bytes| String::from_utf8_lossy(bytes).into_owned()),
@@ -99,21 +99,21 @@ pub(super) fn text_of(study: &CatalogueStudy, name: &str) -> Option<String> {
     }
 }
 
-/// Digest of this program, which builds studies in Rust: another build may give other values.
+/// Returns the digest of this program, which builds studies in Rust: another build may give other values.
 fn program() -> String {
     let bytes = std::env::current_exe().and_then(std::fs::read);
     bytes.map_or_else(|_| String::new(), |bytes| mops_core::file::digest(&bytes))
 }
 
-/// Adds the studies in `folders` to the catalogue: every folder in them that has a `study.toml`, by its name.
+/// Adds the studies in `folders` to the catalogue: every subfolder that has a `study.toml`, by its name.
 ///
 /// # Errors
-/// A folder cannot be read.
+/// If a folder cannot be read.
 pub(super) fn with_folders(mut catalogue: Catalogue, folders: &[PathBuf]) -> Result<Catalogue, Diagnostic> {
     for folder in folders {
         let cannot = |error: std::io::Error| {
-            Diagnostic::new(format!("the folder of studies {} cannot be read: {error}", folder.display()))
-                .with_help("name a folder of study folders, in --studies or in the variable MOPS_STUDIES")
+            Diagnostic::new(format!("cannot read the folder of studies {}: {error}", folder.display()))
+                .with_help("set --studies or MOPS_STUDIES to a folder of study folders")
         };
         let mut paths = Vec::new();
         for entry in std::fs::read_dir(folder).map_err(cannot)? {
@@ -127,20 +127,20 @@ pub(super) fn with_folders(mut catalogue: Catalogue, folders: &[PathBuf]) -> Res
     Ok(catalogue)
 }
 
-/// Bytes of a study, at most: what has no end, such as a device, ends there.
+/// Largest size of a study in bytes; also limits endless sources such as devices.
 const LONGEST: u64 = 64 << 20;
 
-/// The bytes of a study; it may come out of a pipe.
+/// Reads the bytes of a study, also from a pipe.
 fn read_text(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     std::fs::File::open(path)?.take(LONGEST + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > LONGEST {
-        return Err(std::io::Error::other(format!("it is longer than {} MiB, and so no study", LONGEST >> 20)));
+        return Err(std::io::Error::other(format!("not a study: larger than {} MiB", LONGEST >> 20)));
     }
     Ok(bytes)
 }
 
-/// Reads a study whose text is known; `home` is the file it was in, or the name of a shipped study.
+/// Reads a study from its text; `home` is its original file, or the name of a shipped study.
 pub(super) fn read_at(
     catalogue: &Catalogue,
     home: &Path,
@@ -159,7 +159,7 @@ pub(super) fn read_at(
     mops_core::file::read(catalogue, &name, text, settings, &Folder(folder))
 }
 
-/// The text of a study file as it was before settings of the command line were put at its end.
+/// Returns the text of a study file without the settings of the command line that were appended to it.
 pub(super) fn without_settings<'t>(text: &'t str, settings: &[String]) -> &'t str {
     let all: String = settings.iter().map(|setting| format!("# --set {setting}\n")).collect();
     text.strip_suffix(all.as_str()).unwrap_or(text)
@@ -169,16 +169,15 @@ fn no_study(catalogue: &Catalogue, study: &str, error: &std::io::Error) -> Diagn
     let path = Path::new(study);
     if path.is_dir() {
         return Diagnostic::new(format!("the folder `{study}` has no study.toml"))
-            .with_help("name the study file; `mops new` writes one into a folder that is not there yet");
+            .with_help("name the study file; `mops new` writes one into a new folder");
     }
     if error.kind() != ErrorKind::NotFound {
-        return Diagnostic::new(format!("`{study}` cannot be read: {error}")).with_help("check its permissions");
+        return Diagnostic::new(format!("cannot read `{study}`: {error}")).with_help("check its permissions");
     }
     if path.extension().is_some() || path.components().count() > 1 {
         return Diagnostic::new(format!("there is no file `{study}`"))
-            .with_help("`mops new` writes a study to start from; `mops list` names the shipped ones");
+            .with_help("`mops new` writes a template; `mops list` lists the shipped studies");
     }
     let names = catalogue.studies.iter().map(CatalogueStudy::name);
-    Diagnostic::new(format!("there is no file `{study}`, nor a shipped study of that name"))
-        .with_help(suggestion(study, names))
+    Diagnostic::new(format!("there is no file and no shipped study `{study}`")).with_help(suggestion(study, names))
 }

@@ -1,14 +1,14 @@
-//! Tables on the terminal: aligned, with units.
+//! Tables of criteria and tuners on the terminal, and the summary of a run.
 
 use crate::terminal::{number, table};
-use mops_core::{CriterionReport, Outcome, Task, Usage};
+use mops_core::{CriterionReport, Outcome, Stop, Task, Usage};
 
-/// The criteria at the start and at another point, side by side.
+/// Formats the criteria at the start values and at another point, side by side.
 pub(super) fn criteria(start: &[CriterionReport], best: &[CriterionReport], best_name: &str) -> String {
     criteria_without(&[], start, best, best_name)
 }
 
-/// The same without some columns.
+/// Formats the criteria as [`criteria`], without some columns.
 fn criteria_without(
     left_out: &[usize],
     start: &[CriterionReport],
@@ -42,8 +42,8 @@ fn criteria_without(
             best.name.clone(),
             usage(best.usage).to_owned(),
             demand,
-            beside_its_demand(start),
-            beside_its_demand(best),
+            value_text(start),
+            value_text(best),
             best.unit.clone(),
             scaled(start),
             scaled(best),
@@ -59,13 +59,13 @@ fn criteria_without(
     }
 }
 
-/// The value of a criterion, with as many digits as it takes to tell it from a demand that it misses.
-fn beside_its_demand(criterion: &CriterionReport) -> String {
+/// Formats the value of a criterion, with enough digits to distinguish it from a demand that it misses.
+fn value_text(criterion: &CriterionReport) -> String {
     let limit = criterion.demand.or(criterion.bad).filter(|_| !criterion.met);
     crate::numbers::apart(criterion.value, limit, 6)
 }
 
-/// A table without some of its columns; those of numbers are the ones that hold nothing else.
+/// Formats a table without some of its columns. Columns that contain only numbers are aligned to the right.
 fn without(left_out: &[usize], header: &[&str], mut rows: Vec<Vec<String>>) -> String {
     let kept: Vec<usize> = (0..header.len()).filter(|column| !left_out.contains(column)).collect();
     let header: Vec<&str> = kept.iter().map(|&column| header[column]).collect();
@@ -78,7 +78,7 @@ fn without(left_out: &[usize], header: &[&str], mut rows: Vec<Vec<String>>) -> S
     table(&header, &numeric, rows)
 }
 
-/// Everything worth a line after a run.
+/// Formats the outcome of a run: criteria, tuners, calibration errors, failures, warnings and a summary.
 pub(super) fn outcome(outcome: &Outcome) -> String {
     let solved = outcome.solver != "none";
     let best_name = if solved { "optimum" } else { "start" };
@@ -86,9 +86,9 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
     let mut text = String::new();
     if summed {
         let [now, start] = [outcome.objective, outcome.start.objective].map(number);
-        text += &format!("\nobjective, the sum of the scaled values: {now} (start {start})\n");
+        text += &format!("\nobjective (sum of scaled values): {now} (start {start})\n");
     }
-    // Where nothing was solved there is but one point; a sum has no demand to meet.
+    // Without a solver there is only one point; a sum has no demand.
     let left_out: &[usize] = match (solved, summed) {
         (false, _) => &[4, 7],
         (true, true) => &[9],
@@ -141,31 +141,36 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
     }
     for failure in &outcome.failures {
         text += &format!(
-            "\n{} of model {} in case {}: {} times",
-            failure.failure, failure.model, failure.case, failure.count
+            "\nmodel {} in case {}: {}, {} times",
+            failure.model, failure.case, failure.failure, failure.count
         );
     }
     for warning in &outcome.warnings {
         text += &format!("\nwarning: {warning}");
     }
-    let stop = format!("{:?}", outcome.stop).to_lowercase();
+    let stop = match outcome.stop {
+        Stop::Converged => "converged",
+        Stop::Budget => "stopped at the budget",
+        Stop::Stalled => "stalled",
+        Stop::Interrupted => "interrupted",
+    };
     let counts = |usage: &[Usage], missed: bool| {
         outcome.criteria.iter().filter(|c| usage.contains(&c.usage) && (!missed || !c.met)).count()
     };
     let constraints = match (outcome.feasible, counts(&[Usage::Inequality, Usage::Equality], false)) {
         (true, 0) => String::new(),
-        (true, _) => "every constraint holds; ".to_owned(),
+        (true, _) => "constraints satisfied; ".to_owned(),
         (false, _) if outcome.violation.is_finite() => {
-            format!("a constraint is violated by {} of its demand; ", number(outcome.violation))
+            format!("constraint violated by {} of its demand; ", number(outcome.violation))
         }
         _ => "no point has a value; ".to_owned(),
     };
     let demands = match (outcome.task, counts(&[Usage::Minimise], true)) {
         (Task::Calibration, _) => String::new(),
         _ if counts(&[Usage::Minimise], false) == 0 => "nothing to minimise; ".to_owned(),
-        (_, 0) => "every demand is met; ".to_owned(),
-        (_, 1) => "1 demand is not met; ".to_owned(),
-        (_, n) => format!("{n} demands are not met; "),
+        (_, 0) => "all demands met; ".to_owned(),
+        (_, 1) => "1 demand missed; ".to_owned(),
+        (_, n) => format!("{n} demands missed; "),
     };
     let reached = match outcome.task {
         _ if counts(&[Usage::Minimise], false) == 0 => String::new(),
@@ -178,12 +183,12 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
             format!("worst scaled value {now} (start {start}); ")
         }
     };
-    // What uncertainty makes of it is told below.
+    // The effect of uncertain parameters follows below.
     let nominal = outcome.found.worst_case.is_some() || outcome.found.monte_carlo.is_some();
     let nominal = if nominal { "without uncertainty: " } else { "" };
-    let stop = if solved { stop } else { "nothing was solved: looked at the start values".to_owned() };
+    let stop = if solved { stop } else { "start values only, no optimisation" };
     text += &format!(
-        "\n{nominal}{constraints}{demands}{reached}{stop} after {} evaluations, {} simulations, {:.2} s\n",
+        "\n{nominal}{constraints}{demands}{reached}{stop}; {} evaluations, {} simulations, {:.2} s\n",
         outcome.evaluations, outcome.simulations, outcome.seconds
     );
     text

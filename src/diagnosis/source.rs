@@ -47,8 +47,8 @@ pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String 
 use std::error::Error;
 use std::path::Path;
 
-use mops::file::{{self, Files}};
-use mops::{{{imports}}};
+use mops::core::file::{{self, Files}};
+use mops::core::{{{imports}}};
 
 /// Folder that data paths are relative to.
 const FOLDER: &str = {folder:?};

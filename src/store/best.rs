@@ -1,12 +1,12 @@
-//! The known point at which a run begins that uses the points of another.
+//! Initial guess of a run that reuses the points of another run.
 
 use mops_core::{Merit, Problem};
 
 use super::bytes;
 use super::database::Points;
 
-/// The point of the unit box at which the best known point under the demands of the problem lies, of those that the problem
-/// can reach: within the bounds, and with its values of the tuners that are kept.
+/// Returns the best stored point under the demands of the problem, as a point of the unit box. Points outside the bounds, or
+/// with other values of inactive tuners, are excluded.
 pub(super) fn best(points: &Points, problem: &Problem) -> Option<Vec<f64>> {
     let mut best: Option<(Merit, &Vec<u64>, Vec<f64>)> = None;
     for (key, known) in points {
@@ -15,7 +15,7 @@ pub(super) fn best(points: &Points, problem: &Problem) -> Option<Vec<f64>> {
         }
         let tuners: Vec<f64> = key.iter().map(|&bits| f64::from_bits(bits)).collect();
         let Some(found) = problem.known(&tuners, known).filter(|found| found.scaled.is_some()) else { continue };
-        // Of equals the one with the smaller key, whatever the order of a map.
+        // Ties are decided by the key, so that the order of the map does not matter.
         let wins = best.as_ref().is_none_or(|(merit, of, _)| {
             found.merit.is_better_than(merit) || (!merit.is_better_than(&found.merit) && key < *of)
         });
@@ -29,7 +29,8 @@ pub(super) fn best(points: &Points, problem: &Problem) -> Option<Vec<f64>> {
     Some(best?.2)
 }
 
-/// The place of a tuner's value within its bounds, to the bit: the place from which that very value comes, if there is one.
+/// Returns the position of a tuner value in the unit interval, exact to the bit: the position that maps to this very value, if
+/// one exists.
 fn position(problem: &Problem, tuner: usize, value: f64) -> f64 {
     let tuner = &problem.study().tuners()[tuner];
     let near = tuner.position_of(value);

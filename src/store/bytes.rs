@@ -1,29 +1,29 @@
-//! Numbers as bytes: little-endian, bit by bit, so that what is read is what was computed.
+//! Conversion of numbers to little-endian bytes, without loss of bits.
 
 use mops_core::{RowSlopes, Value};
 
-/// The bytes of numbers.
+/// Converts numbers to bytes.
 pub(super) fn of_numbers(numbers: &[f64]) -> Vec<u8> {
     numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
-/// The numbers that bytes stand for; what is left over is no number.
+/// Converts bytes to numbers; an incomplete number at the end is ignored.
 pub(super) fn numbers(bytes: &[u8]) -> Vec<f64> {
     let number = |chunk: &[u8]| f64::from_le_bytes(chunk.try_into().expect("chunks of eight"));
     bytes.chunks_exact(8).map(number).collect()
 }
 
-/// The tuners by which a point is known: minus zero, to which small negative numbers round, is zero.
+/// Returns the key of a point: the bits of its tuners, with negative zero, to which small numbers round, replaced by zero.
 pub(super) fn key(tuners: &[f64]) -> Vec<u64> {
     tuners.iter().map(|value| (value + 0.0).to_bits()).collect()
 }
 
-/// The bytes of a key.
+/// Converts a key to bytes.
 pub(super) fn of_key(key: &[u64]) -> Vec<u8> {
     key.iter().flat_map(|word| word.to_le_bytes()).collect()
 }
 
-/// Lists of numbers that belong to rows: for each the row, the length, the numbers.
+/// Converts lists of numbers to bytes: for each list the row, the length, the numbers.
 pub(super) fn of_lists<'a>(lists: impl Iterator<Item = (usize, &'a [f64])>) -> Vec<u8> {
     let mut bytes = Vec::new();
     for (row, numbers) in lists {
@@ -34,7 +34,7 @@ pub(super) fn of_lists<'a>(lists: impl Iterator<Item = (usize, &'a [f64])>) -> V
     bytes
 }
 
-/// The lists that bytes stand for; `None` where they are cut short.
+/// Converts bytes to lists of numbers; returns `None` if they are truncated.
 pub(super) fn lists(bytes: &[u8]) -> Option<Vec<(usize, Vec<f64>)>> {
     let mut rest = bytes;
     let mut lists = Vec::new();
@@ -48,7 +48,7 @@ pub(super) fn lists(bytes: &[u8]) -> Option<Vec<(usize, Vec<f64>)>> {
     Some(lists)
 }
 
-/// Derivatives of rows: for each coordinate a list that begins with the derivative of the value.
+/// Converts derivatives of rows to bytes: for each coordinate a list that starts with the derivative of the value.
 pub(super) fn of_slopes(slopes: &RowSlopes) -> Vec<u8> {
     let lists: Vec<(usize, Vec<f64>)> = (slopes.iter())
         .flat_map(|(row, along)| {
@@ -58,7 +58,7 @@ pub(super) fn of_slopes(slopes: &RowSlopes) -> Vec<u8> {
     of_lists(lists.iter().map(|(row, numbers)| (*row, numbers.as_slice())))
 }
 
-/// The derivatives that bytes stand for; `None` where they are cut short.
+/// Converts bytes to derivatives; returns `None` if they are truncated.
 pub(super) fn slopes(bytes: &[u8]) -> Option<RowSlopes> {
     let mut slopes = RowSlopes::new();
     for (row, numbers) in lists(bytes)? {

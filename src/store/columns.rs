@@ -1,4 +1,4 @@
-//! What is known of a point, as columns of its table.
+//! Conversion between a stored point and the columns of its table.
 
 use std::collections::HashMap;
 
@@ -8,10 +8,10 @@ use serde_json::json;
 
 use super::bytes;
 
-/// Criteria, notes, failures, residuals.
+/// Columns of a point: criteria, notes, failures, residuals.
 pub(super) type Columns = (Vec<u8>, Option<String>, Option<String>, Option<Vec<u8>>);
 
-/// What is known of a point, as columns: criteria, notes, failures, residuals.
+/// Converts the values of a point to columns.
 pub(super) fn columns(known: &Known, rows: usize) -> Columns {
     let mut criteria = vec![f64::NAN; rows];
     let mut notes = serde_json::Map::new();
@@ -30,7 +30,7 @@ pub(super) fn columns(known: &Known, rows: usize) -> Columns {
                     Failure::Criterion(why) => ("criterion", None, Some(why)),
                     Failure::Cancelled => continue,
                 };
-                // As text, which keeps every bit and what is no number.
+                // Times are written as text, which preserves every bit, infinities and NaN.
                 failures.push(json!({ "job": job, "kind": kind, "at": at.map(f64::to_string), "why": why }));
             }
             Ok(values) => {
@@ -63,7 +63,8 @@ pub(super) fn columns(known: &Known, rows: usize) -> Columns {
     )
 }
 
-/// What the columns of a point say; a job is known if it failed, or as far as its rows have a value or none for a reason.
+/// Converts the columns of a point to its values. A job is known if it failed, or for those of its rows that have a value or a
+/// reason for a missing one.
 pub(super) fn known(
     row: &Row<'_>,
     study: &Study,
@@ -91,7 +92,7 @@ pub(super) fn known(
                 return Some(Err(why["why"].as_str().unwrap_or_default().to_owned()));
             }
             let number = *criteria.get(index).filter(|number| number.is_finite())?;
-            // A note; or a note and a horizon, where nothing was reached.
+            // Either a note, or a note and the horizon if the target was never reached.
             let written = &notes[index.to_string()];
             let missed = written
                 .is_array()

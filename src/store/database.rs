@@ -1,4 +1,4 @@
-//! The tables of `evaluations.sqlite`, and every statement that reads or writes them.
+//! Tables of `evaluations.sqlite`, and all statements that read or write them.
 
 use std::collections::HashMap;
 use std::fs::{self, Metadata};
@@ -10,9 +10,9 @@ use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, Row, params}
 
 use super::bytes;
 use super::columns::{columns, known};
-use super::runs::{RunRow, RunState, begin, now, run_row};
+use super::runs::{RunRow, RunState, insert_run, now, run_row};
 
-/// `PRAGMA application_id`: the letters of mops.
+/// `PRAGMA application_id`: "mops" in ASCII.
 const APPLICATION: i32 = i32::from_be_bytes(*b"mops");
 
 /// Version of the tables.
@@ -22,7 +22,7 @@ const TABLES: &str = "
 CREATE TABLE runs (
     id INTEGER PRIMARY KEY,
     begun INTEGER NOT NULL,            -- seconds since 1970-01-01 UTC
-    ended INTEGER,                     -- the same; NULL while it runs, and where it was killed
+    ended INTEGER,                     -- seconds since 1970-01-01 UTC; NULL while it runs, or after a kill
     state TEXT NOT NULL,               -- running, converged, budget, stalled, interrupted
     mops TEXT NOT NULL,                -- version of the program
     command TEXT NOT NULL,             -- command line
@@ -31,67 +31,68 @@ CREATE TABLE runs (
     name TEXT NOT NULL,                -- name of the study
     task TEXT NOT NULL,
     text TEXT NOT NULL,                -- the study file, settings at its end
-    identity TEXT NOT NULL,            -- JSON: what the study says and the digests of its data
+    identity TEXT NOT NULL,            -- JSON: content of the study and digests of its data
     seed INTEGER NOT NULL,
     solver TEXT NOT NULL,
     max_evaluations INTEGER NOT NULL,
-    begin BLOB,                        -- point of the unit box where it began, float64; NULL: at the start values
+    begin BLOB,                        -- initial guess in the unit box, float64; NULL: the start values
     evaluations INTEGER NOT NULL,      -- points of this run so far
-    reused INTEGER NOT NULL            -- those of them that were known already
+    reused INTEGER NOT NULL            -- points among them that were stored already
 );
 CREATE TABLE points (
     id INTEGER PRIMARY KEY,            -- in the order of evaluation
     run INTEGER NOT NULL REFERENCES runs (id),
     tuners BLOB NOT NULL UNIQUE,       -- values of all tuners (and uncertain parameters), float64 little-endian
-    criteria BLOB NOT NULL,            -- values of all rows, float64 little-endian; NaN where there is none
-    notes TEXT,                        -- JSON: row -> note on its value, or [note, horizon] where it was never reached
+    criteria BLOB NOT NULL,            -- values of all rows, float64 little-endian; NaN for a missing value
+    notes TEXT,                        -- JSON: row -> note on its value, or [note, horizon] for a target never reached
     failures TEXT,                     -- JSON: jobs that failed, rows without a value
-    residuals BLOB                     -- lists: row, length, float64; absent where none are needed or room is short
+    residuals BLOB                     -- lists: row, length, float64; NULL if not needed or the size limit is reached
 );
 CREATE TABLE slopes (
-    tuners BLOB NOT NULL,              -- the point
-    reach REAL NOT NULL,               -- the distance within which they describe it, in the unit box
-    slopes BLOB,                       -- lists, one per row and coordinate; NULL: there are none
+    tuners BLOB NOT NULL,              -- point of the derivatives
+    reach REAL NOT NULL,               -- difference step in the unit box
+    slopes BLOB,                       -- derivatives: lists, one per row and coordinate; NULL: none exist
     PRIMARY KEY (tuners, reach)
 ) WITHOUT ROWID;
 ";
 
-/// An open database.
+/// Open database.
 pub(crate) struct Database {
     pub(super) connection: Connection,
-    /// Where it is, and the file that had this name when it was opened; none in memory.
+    /// Path, and metadata of the file when it was opened; `None` in memory.
     ///
-    /// N.B.: not an open file: to close one takes the locks of all connections of this process to it.
+    /// N.B.: not an open file, as closing it would release the locks of all connections of this process.
     pub(super) place: Option<(PathBuf, Metadata)>,
 }
 
-/// A point as it is written.
+/// Row of the table of points.
 pub(super) struct PointRow {
     pub tuners: Vec<u64>,
     pub known: Known,
 }
 
-/// Points by their tuners.
+/// Stored points by their key.
 pub(super) type Points = HashMap<Vec<u64>, Known>;
 
-/// Derivatives by tuners and reach.
+/// Stored derivatives by key and difference step.
 pub(super) type Slopes = HashMap<(Vec<u64>, u64), Option<RowSlopes>>;
 
 impl Database {
-    /// An empty one in memory.
+    /// Creates an empty database in memory.
     ///
     /// # Errors
-    /// There is no memory.
+    /// If there is no memory.
     pub(super) fn in_memory() -> rusqlite::Result<Self> {
         let connection = Connection::open_in_memory()?;
         prepare(&connection)?;
         Ok(Self { connection, place: None })
     }
 
-    /// Opens one that is there, to write or only to read; `None` where the file is none of mops, or of another format.
+    /// Opens an existing database, for writing or read-only; returns `None` if the file is not from mops or has another
+    /// format.
     ///
     /// # Errors
-    /// The file cannot be read.
+    /// If the file cannot be read.
     pub fn open(path: &Path, writes: bool) -> rusqlite::Result<Option<Self>> {
         match Self::read(path, writes) {
             Err(error) if error.sqlite_error_code() == Some(ErrorCode::NotADatabase) => Ok(None),
@@ -111,28 +112,28 @@ impl Database {
         Ok(Some(Self { connection, place }))
     }
 
-    /// Prepares it for a run that writes often. A killed process loses nothing that is committed; a machine without power,
+    /// Switches to a write-ahead log, for frequent writes. A killed process loses no committed data; a loss of power may lose
     /// the last moments.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// If the file cannot be written.
     pub(super) fn write_ahead(&self) -> rusqlite::Result<()> {
         self.connection.pragma_update(None, "journal_mode", "WAL")?;
         self.connection.pragma_update(None, "synchronous", "NORMAL")
     }
 
-    /// Whether a commit waits for others who have the file, instead of failing at once.
+    /// Sets whether a commit waits for a lock of another program, instead of failing at once.
     ///
     /// # Errors
-    /// Never, as far as is known.
+    /// If SQLite refuses the timeout.
     pub(super) fn waits(&self, waits: bool) -> rusqlite::Result<()> {
         self.connection.busy_timeout(if waits { WAITS } else { Duration::ZERO })
     }
 
-    /// The run that began last.
+    /// Returns the run that started last.
     ///
     /// # Errors
-    /// The file cannot be read.
+    /// If the file cannot be read.
     pub fn last_run(&self) -> rusqlite::Result<Option<RunRow>> {
         let columns = "begun, state, mops, command, home, settings, name, task, text, identity, seed, solver, \
                        max_evaluations, begin, evaluations";
@@ -140,30 +141,30 @@ impl Database {
         self.connection.query_row(&sql, [], run_row).optional()
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     ///
     /// # Errors
-    /// The file cannot be read.
+    /// If the file cannot be read.
     pub fn count(&self) -> rusqlite::Result<usize> {
         self.connection.query_row("SELECT count(*) FROM points", [], |row| size(row, 0))
     }
 
-    /// Enters a run that begins; its number.
-    pub(super) fn begin(&self, run: &RunRow) -> rusqlite::Result<i64> {
-        begin(&self.connection, run)
+    /// Inserts a new run; returns its id.
+    pub(super) fn insert_run(&self, run: &RunRow) -> rusqlite::Result<i64> {
+        insert_run(&self.connection, run)
     }
 
-    /// Writes how a run ended; the number of its points where it told of none before.
+    /// Writes the end of a run, and the number of its points if none was written before.
     pub(super) fn end(&self, run: i64, state: RunState, reused: usize, points: usize) -> rusqlite::Result<()> {
         let sql = "UPDATE runs SET ended = ?, state = ?, reused = ?, \
                    evaluations = CASE WHEN evaluations = 0 THEN ? ELSE evaluations END WHERE id = ?";
         self.connection.execute(sql, params![now(), state.name(), integer(reused), integer(points), run])?;
-        // One file, which can be read where nothing can be written; while somebody reads it stays as it is.
+        // Merges the log into one file, which is readable from a read-only folder. Has no effect while another program reads.
         let _ = self.connection.pragma_update(None, "journal_mode", "DELETE");
         Ok(())
     }
 
-    /// Writes points and derivatives, and how many points the run has where that is known, all or nothing.
+    /// Writes points, derivatives and, if given, the number of points of the run in one transaction.
     pub(super) fn write(
         &mut self,
         run: i64,
@@ -196,7 +197,7 @@ impl Database {
         transaction.commit()
     }
 
-    /// All points, for a study with the same jobs and rows.
+    /// Reads all points, for a study with the same jobs and rows.
     pub(super) fn points(
         &self,
         study: &Study,
@@ -213,7 +214,7 @@ impl Database {
         Ok(points)
     }
 
-    /// Removes points at which more than so many tuners have values: those at uncertain parameters that are others now.
+    /// Removes points with more than `tuners` values: those with values of uncertain parameters that have changed.
     pub(super) fn forget_beyond(&self, tuners: usize) -> rusqlite::Result<()> {
         let most = integer(8 * tuners);
         self.connection.execute("DELETE FROM points WHERE length(tuners) > ?", [most])?;
@@ -221,12 +222,12 @@ impl Database {
         Ok(())
     }
 
-    /// Removes all derivatives: those along the coordinates of another unit box.
+    /// Removes all derivatives, as they belong to the coordinates of another unit box.
     pub(super) fn forget_slopes(&self) -> rusqlite::Result<()> {
         self.connection.execute("DELETE FROM slopes", []).map(|_| ())
     }
 
-    /// All derivatives.
+    /// Reads all derivatives.
     pub(super) fn slopes(&self) -> rusqlite::Result<Slopes> {
         let mut statement = self.connection.prepare("SELECT tuners, reach, slopes FROM slopes")?;
         let mut rows = statement.query([])?;
@@ -234,7 +235,7 @@ impl Database {
         while let Some(row) = rows.next()? {
             let key = bytes::key(&bytes::numbers(row.get_ref(0)?.as_blob()?));
             let found = row.get_ref(2)?.as_blob_or_null()?.map(bytes::slopes);
-            // What is cut short is not known.
+            // Truncated derivatives are ignored.
             match found {
                 None => slopes.insert((key, row.get::<_, f64>(1)?.to_bits()), None),
                 Some(Some(found)) => slopes.insert((key, row.get::<_, f64>(1)?.to_bits()), Some(found)),
@@ -244,7 +245,7 @@ impl Database {
         Ok(slopes)
     }
 
-    /// Bytes that residuals and derivatives take.
+    /// Returns the size of residuals and derivatives, in bytes.
     pub(super) fn room_taken(&self) -> rusqlite::Result<usize> {
         let sql = "SELECT (SELECT coalesce(sum(length(residuals)), 0) FROM points) + \
                    (SELECT coalesce(sum(length(slopes)), 0) FROM slopes)";
@@ -252,16 +253,16 @@ impl Database {
     }
 }
 
-/// How long others who have the file are waited for.
+/// Time to wait for a lock of another program.
 pub(super) const WAITS: Duration = Duration::from_secs(5);
 
-/// Whether what went wrong may pass: somebody else has the file, or the disk is full.
-pub(super) fn is_passing(error: &rusqlite::Error) -> bool {
+/// Returns true for an error that may be temporary: a lock of another program, or a full disk.
+pub(super) fn is_temporary(error: &rusqlite::Error) -> bool {
     let passing = [ErrorCode::DatabaseBusy, ErrorCode::DatabaseLocked, ErrorCode::DiskFull];
     error.sqlite_error_code().is_some_and(|code| passing.contains(&code))
 }
 
-/// Makes the tables.
+/// Creates the tables.
 pub(super) fn prepare(connection: &Connection) -> rusqlite::Result<()> {
     connection.pragma_update(None, "application_id", APPLICATION)?;
     connection.pragma_update(None, "user_version", FORMAT)?;

@@ -1,4 +1,4 @@
-//! How a run ended whose database could not be told: a note beside it, which the next run removes.
+//! Note on the end of a run, next to a database that could not be written. The next run removes it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,10 +8,11 @@ use serde::{Deserialize, Serialize};
 use super::runs::{RunRow, RunState};
 use crate::files;
 
-/// The end of a run, for the row of the run that began at the same time.
+/// End of a run, for the row with the same start time.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Ending {
-    begun: i64,
+    #[serde(rename = "begun")]
+    started: i64,
     state: String,
     evaluations: usize,
 }
@@ -21,18 +22,18 @@ impl Ending {
         folder.join("evaluations.ended.json")
     }
 
-    /// Notes the end of a run, as far as that can be written either.
-    pub(super) fn note(folder: &Path, begun: i64, state: RunState, evaluations: usize) {
-        let ending = Self { begun, state: state.name().to_owned(), evaluations };
+    /// Writes a note on the end of a run; errors are ignored.
+    pub(super) fn note(folder: &Path, started: i64, state: RunState, evaluations: usize) {
+        let ending = Self { started, state: state.name().to_owned(), evaluations };
         let text = serde_json::to_string(&ending).expect("numbers and words are JSON") + "\n";
         let _ = files::write(&Self::path(folder), text);
     }
 
-    /// The row of the last run with what the note says of it, if there is one.
+    /// Completes the row of the last run from the note, if there is one.
     pub(super) fn complete(folder: &Path, run: RunRow) -> RunRow {
         let read = files::read(&Self::path(folder)).ok();
         let noted: Option<Self> = read.and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        match noted.filter(|noted| noted.begun == run.begun && run.state == RunState::Running) {
+        match noted.filter(|noted| noted.started == run.started && run.state == RunState::Running) {
             Some(noted) => RunRow { state: RunState::of(&noted.state), evaluations: noted.evaluations, ..run },
             None => run,
         }

@@ -1,53 +1,53 @@
-//! What a study says, and which of it determines the values of points.
+//! Identity of a run, and the differences between two studies that change the values of points.
 
 use mops_core::Study;
 use mops_core::file::StudyFile;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Which study a run was for: two runs with the same one are the same run.
+/// Identity of a run: study, data, solver and seed. Two runs with equal identities have the same result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Identity {
-    /// Version of the program: another one may compute other values.
+    /// Version of the program; another version may compute other values.
     mops: String,
-    /// What the study file says, settings included.
+    /// Content of the study file, settings included.
     study: Value,
     /// Data files, with a digest of their bytes.
     data: Vec<(String, String)>,
-    /// Names of the tuners, in their order.
+    /// Names of the tuners, in order.
     tuners: Vec<String>,
-    /// Names of the rows, in their order.
+    /// Names of the rows, in order.
     rows: Vec<String>,
-    /// Names and units of the uncertain parameters, in their order.
+    /// Names and units of the uncertain parameters, in order.
     uncertain: Vec<String>,
-    /// The solver of the run.
+    /// Solver of the run.
     solver: String,
-    /// The seed of the run.
+    /// Seed of the run.
     seed: u64,
 }
 
-/// Where two studies differ.
+/// Difference between two studies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Difference {
-    /// Keys from the study down.
+    /// Keys that lead to the value.
     path: Vec<String>,
     before: String,
     after: String,
 }
 
-/// What a difference means.
+/// Consequence of a difference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Meaning {
-    /// The values of points may be others.
+    /// The values of points may change.
     Values,
-    /// Points have the same values, and the solver takes another way among them.
-    Way,
-    /// How long the run may be.
+    /// The values of points stay the same, but the solver may visit other points.
+    Path,
+    /// Only the budget changes.
     Budget,
 }
 
 impl Identity {
-    /// Of a study that is about to be run.
+    /// Returns the identity of a run of the study.
     pub fn of(file: &StudyFile, study: &Study, solver: &str) -> Self {
         Self {
             mops: env!("CARGO_PKG_VERSION").to_owned(),
@@ -61,23 +61,23 @@ impl Identity {
         }
     }
 
-    /// What keeps a run of `self` from being continued as one of `now`, in words.
+    /// Returns the differences that prevent a run of `self` from being continued as a run of `now`, as text.
     pub fn refuses_to_continue(&self, now: &Self) -> Option<String> {
-        told(self.differences(now).iter().filter(|d| d.meaning() != Meaning::Budget))
+        summary(self.differences(now).iter().filter(|d| d.meaning() != Meaning::Budget))
     }
 
-    /// What makes the values of points in a run of `self` unfit for one of `now`, in words.
+    /// Returns the differences that make the points of a run of `self` invalid for a run of `now`, as text.
     pub fn refuses_to_reuse(&self, now: &Self) -> Option<String> {
-        told(self.differences(now).iter().filter(|d| d.meaning() == Meaning::Values))
+        summary(self.differences(now).iter().filter(|d| d.meaning() == Meaning::Values))
     }
 
-    /// Whether the coordinates of the unit box mean the same, so that derivatives do.
+    /// Returns true if the coordinates of the unit box, and hence the derivatives, have the same meaning.
     pub fn has_coordinates_of(&self, now: &Self) -> bool {
         let of = |identity: &Self, table: &str| identity.study.get(table).cloned();
         ["tuners", "cases", "experiments"].iter().all(|table| of(self, table) == of(now, table))
     }
 
-    /// Whether values of the uncertain parameters mean the same.
+    /// Returns true if the values of the uncertain parameters have the same meaning.
     pub fn has_uncertain_of(&self, now: &Self) -> bool {
         self.uncertain == now.uncertain
     }
@@ -97,13 +97,15 @@ impl Difference {
             ["study", "solver", "max-evaluations"] => Meaning::Budget,
             ["study", "models" | "cases", ..] | ["mops" | "data" | "rows", ..] => Meaning::Values,
             ["tuners", ..] => Meaning::Values,
-            ["study", "experiments", _, "role"] => Meaning::Way,
+            ["study", "experiments", _, "role"] => Meaning::Path,
             ["study", "experiments", ..] => Meaning::Values,
-            ["study", "criteria", _, "usage" | "demand" | "good" | "bad" | "weight"] => Meaning::Way,
+            ["study", "criteria", _, "usage" | "demand" | "good" | "bad" | "weight"] => Meaning::Path,
             ["study", "criteria", ..] => Meaning::Values,
-            ["study", "tuners", _, "start" | "min" | "max" | "scale" | "integer" | "values" | "active"] => Meaning::Way,
+            ["study", "tuners", _, "start" | "min" | "max" | "scale" | "integer" | "values" | "active"] => {
+                Meaning::Path
+            }
             ["study", "tuners", ..] => Meaning::Values,
-            _ => Meaning::Way,
+            _ => Meaning::Path,
         }
     }
 
@@ -111,10 +113,10 @@ impl Difference {
         let path: Vec<&str> = self.path.iter().map(String::as_str).collect();
         let name = match path.as_slice() {
             ["study", rest @ ..] => rest.join("."),
-            ["data", ..] => return "a data file is another".to_owned(),
-            ["tuners", ..] => return "the tuners are others".to_owned(),
-            ["rows", ..] => return "the criteria are others".to_owned(),
-            ["uncertain", ..] => return "the uncertain parameters are others".to_owned(),
+            ["data", ..] => return "a data file has changed".to_owned(),
+            ["tuners", ..] => return "the tuners have changed".to_owned(),
+            ["rows", ..] => return "the criteria have changed".to_owned(),
+            ["uncertain", ..] => return "the uncertain parameters have changed".to_owned(),
             ["mops"] => "the version of mops".to_owned(),
             _ => path.join("."),
         };
@@ -122,8 +124,8 @@ impl Difference {
     }
 }
 
-/// The first differences in one sentence.
-fn told<'d>(differences: impl Iterator<Item = &'d Difference>) -> Option<String> {
+/// Formats the first three differences in one sentence; returns `None` without differences.
+fn summary<'d>(differences: impl Iterator<Item = &'d Difference>) -> Option<String> {
     let mut texts: Vec<String> = Vec::new();
     for text in differences.map(Difference::text) {
         if !texts.contains(&text) {
@@ -132,15 +134,15 @@ fn told<'d>(differences: impl Iterator<Item = &'d Difference>) -> Option<String>
     }
     let more = texts.len().saturating_sub(3);
     texts.truncate(3);
-    let told = texts.join("; ");
+    let text = texts.join("; ");
     match more {
-        0 if told.is_empty() => None,
-        0 => Some(told),
-        more => Some(format!("{told}; and {more} more")),
+        0 if text.is_empty() => None,
+        0 => Some(text),
+        more => Some(format!("{text}; and {more} more")),
     }
 }
 
-/// Values that differ, with the keys that lead to them; values that are no table differ as a whole.
+/// Collects the values that differ, with their keys; values other than tables are compared as a whole.
 fn compare(path: &mut Vec<String>, before: &Value, after: &Value, found: &mut Vec<Difference>) {
     match (before, after) {
         (Value::Object(a), Value::Object(b)) => {
@@ -151,7 +153,7 @@ fn compare(path: &mut Vec<String>, before: &Value, after: &Value, found: &mut Ve
                 path.pop();
             }
         }
-        // A table that was written short, or not at all, is compared key by key all the same.
+        // A missing table is compared as an empty one.
         (Value::Object(_), Value::Null) => compare(path, before, &Value::Object(serde_json::Map::default()), found),
         (Value::Null, Value::Object(_)) => compare(path, &Value::Object(serde_json::Map::default()), after, found),
         _ if before == after => {}
@@ -159,7 +161,7 @@ fn compare(path: &mut Vec<String>, before: &Value, after: &Value, found: &mut Ve
     }
 }
 
-/// A value in an error message.
+/// Formats a value for an error message, shortened to 60 characters.
 fn short(value: &Value) -> String {
     match value {
         Value::Null => "absent".to_owned(),

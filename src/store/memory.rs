@@ -1,4 +1,4 @@
-//! What a run knows from before, and the way of what it learns to the writer.
+//! In-memory store of a run: points from earlier runs, and new points on their way to the writer.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::SyncSender;
@@ -9,51 +9,52 @@ use mops_core::{Cancellation, Evaluation, Known, RowSlopes, RunState, Store, Val
 use super::bytes;
 use super::database::{PointRow, Points, Slopes};
 
-/// Bytes that residuals and derivatives may take in a database; beyond them points keep their criteria alone, and what a
-/// solver needs of their residuals is simulated again.
+/// Largest size in bytes of residuals and derivatives in a database. Beyond it, only criteria are stored, and residuals that a
+/// solver needs are simulated again.
 pub(super) const ROOM: usize = 256 << 20;
 
-/// What goes to the writer, in the order in which it happened.
+/// Message to the writer, in chronological order.
 pub(super) enum Message {
-    /// A point was learned.
+    /// New point.
     Point(PointRow),
-    /// Derivatives were learned.
+    /// New derivatives.
     Slopes(Vec<u64>, f64, Option<RowSlopes>),
-    /// Where the run stands: may be told once all before it is written.
+    /// Progress of the run, to be reported after all earlier messages are written.
     State(RunState),
-    /// The best point changed.
+    /// New best point.
     Best(Box<Evaluation>),
-    /// A stage of what counts no points.
+    /// Stage of work that evaluates no points.
     Stage(String, f64),
-    /// There is no more.
+    /// Last message.
     End,
 }
 
-/// The memory of a run.
+/// In-memory store of a run.
 pub(super) struct Memory {
-    /// What is known from before, and what the run learns: a certificate asks again what a search asked.
+    /// Points of earlier runs and of this run: a certificate asks again for points of the search.
     pub points: RwLock<Points>,
     pub slopes: RwLock<Slopes>,
-    /// Where nothing new is looked for: who is asked to end at a point that is not known.
+    /// Cancellation that is requested at a point that is not stored; `None` if such points are simulated.
     pub closed: Option<Cancellation>,
-    /// Whether what is known stands in another database, from which it is taken over point by point.
+    /// True if the stored points are in another database, from which used points are copied.
     pub foreign: bool,
     pub sender: SyncSender<Message>,
-    /// Bytes that are left for residuals and derivatives.
+    /// Remaining size in bytes for residuals and derivatives.
     pub room: AtomicUsize,
-    /// Points answered without a simulation, and points simulated.
+    /// Number of points answered without a simulation.
     pub reused: AtomicUsize,
+    /// Number of simulated points.
     pub simulated: AtomicUsize,
 }
 
 impl Memory {
-    /// Takes room for so many numbers, if there is some.
-    fn takes(&self, numbers: usize) -> bool {
+    /// Reserves space for `numbers` numbers; returns false if there is not enough.
+    fn reserve(&self, numbers: usize) -> bool {
         let take = |left: usize| left.checked_sub(8 * numbers);
         numbers == 0 || self.room.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take).is_ok()
     }
 
-    // N.B.: a writer that is gone has told why; the run goes on without it.
+    // N.B.: a writer that has ended has reported the reason; the run continues without it.
     fn send(&self, message: Message) {
         let _ = self.sender.send(message);
     }
@@ -85,7 +86,7 @@ impl Store for Memory {
         };
         self.simulated.fetch_add(1, Ordering::Relaxed);
         known.into_iter().for_each(|known| new.complete(known));
-        if !self.takes(values(&new).map(|value| value.residuals.len()).sum()) {
+        if !self.reserve(values(&new).map(|value| value.residuals.len()).sum()) {
             new.jobs.iter_mut().filter_map(|(_, values)| values.as_mut().ok()).flatten().for_each(|(_, value)| {
                 if let Ok(value) = value {
                     value.residuals.clear();
@@ -93,7 +94,7 @@ impl Store for Memory {
             });
         }
         points.insert(key.clone(), new.clone());
-        // Before somebody else adds to the point: what is written last is what is known last.
+        // Sent under the lock of the points, so that the last message holds the latest values of the point.
         self.send(Message::Point(PointRow { tuners: key, known: new }));
     }
 
@@ -104,7 +105,7 @@ impl Store for Memory {
 
     fn learned_slopes(&self, tuners: &[f64], reach: f64, slopes: Option<RowSlopes>) {
         let numbers = slopes.iter().flatten().flat_map(|(_, along)| along).map(|slope| 3 + slope.residuals.len()).sum();
-        if self.takes(numbers) {
+        if self.reserve(numbers) {
             self.send(Message::Slopes(bytes::key(tuners), reach, slopes));
         }
     }

@@ -1,4 +1,4 @@
-//! The table of runs: a row for every one that wrote in the folder.
+//! Table of runs, with one row for every run in the folder.
 
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -12,18 +12,18 @@ use super::bytes;
 use super::database::{integer, size};
 use super::identity::Identity;
 
-/// How a run stands.
+/// State of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RunState {
-    /// It goes on, or was killed.
+    /// In progress, or killed.
     Running,
-    /// It came to its end.
+    /// Converged.
     Converged,
-    /// It spent its budget.
+    /// Budget spent.
     Budget,
-    /// It could not improve any more.
+    /// No further improvement.
     Stalled,
-    /// The user ended it.
+    /// Stopped by the user.
     Interrupted,
 }
 
@@ -36,7 +36,7 @@ impl RunState {
         (Self::Interrupted, "interrupted"),
     ];
 
-    /// As it stands in the table.
+    /// Returns the name in the table.
     pub fn name(self) -> &'static str {
         Self::ALL.iter().find(|(state, _)| *state == self).map_or("running", |(_, name)| name)
     }
@@ -46,10 +46,10 @@ impl RunState {
     }
 }
 
-/// A run, as it stands in its table.
+/// Row of the table of runs.
 #[derive(Debug, Clone)]
 pub(crate) struct RunRow {
-    pub begun: i64,
+    pub started: i64,
     pub state: RunState,
     pub mops: String,
     pub command: String,
@@ -62,24 +62,24 @@ pub(crate) struct RunRow {
     pub seed: u64,
     pub solver: String,
     pub max_evaluations: usize,
-    pub begin: Option<Vec<f64>>,
+    pub start_point: Option<Vec<f64>>,
     pub evaluations: usize,
 }
 
 impl RunRow {
-    /// What the run was asked, as a digest: a result with the same one belongs to it.
+    /// Returns the digest of the identity of the run; a result with the same digest belongs to the run.
     pub fn id(&self) -> String {
         digest(self.identity.as_bytes())
     }
 }
 
-/// Enters a run that begins; its number.
-pub(super) fn begin(connection: &Connection, run: &RunRow) -> rusqlite::Result<i64> {
+/// Inserts a new run; returns its id.
+pub(super) fn insert_run(connection: &Connection, run: &RunRow) -> rusqlite::Result<i64> {
     connection.execute(
         "INSERT INTO runs (begun, state, mops, command, home, settings, name, task, text, identity, seed, solver, \
          max_evaluations, begin, evaluations, reused) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0, 0)",
         params![
-            run.begun,
+            run.started,
             RunState::Running.name(),
             run.mops,
             run.command,
@@ -92,13 +92,13 @@ pub(super) fn begin(connection: &Connection, run: &RunRow) -> rusqlite::Result<i
             run.seed.cast_signed(),
             run.solver,
             integer(run.max_evaluations),
-            run.begin.as_deref().map(bytes::of_numbers),
+            run.start_point.as_deref().map(bytes::of_numbers),
         ],
     )?;
     Ok(connection.last_insert_rowid())
 }
 
-/// A path in a column: as text, or by its bytes where it is none.
+/// Path in a column: as text, or as bytes if it is not valid UTF-8.
 struct Home<'p>(&'p Path);
 
 impl ToSql for Home<'_> {
@@ -117,7 +117,7 @@ fn home_of(value: ValueRef<'_>) -> rusqlite::Result<PathBuf> {
     Ok(PathBuf::from(value.as_str()?))
 }
 
-/// Seconds since 1970-01-01 UTC.
+/// Returns the time in seconds since 1970-01-01 UTC.
 pub(super) fn now() -> i64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
     i64::try_from(since).unwrap_or(i64::MAX)
@@ -125,7 +125,7 @@ pub(super) fn now() -> i64 {
 
 pub(super) fn run_row(row: &Row<'_>) -> rusqlite::Result<RunRow> {
     Ok(RunRow {
-        begun: row.get(0)?,
+        started: row.get(0)?,
         state: RunState::of(&row.get::<_, String>(1)?),
         mops: row.get(2)?,
         command: row.get(3)?,
@@ -138,15 +138,15 @@ pub(super) fn run_row(row: &Row<'_>) -> rusqlite::Result<RunRow> {
         seed: row.get::<_, i64>(10)?.cast_unsigned(),
         solver: row.get(11)?,
         max_evaluations: size(row, 12)?,
-        begin: row.get_ref(13)?.as_blob_or_null()?.map(bytes::numbers),
+        start_point: row.get_ref(13)?.as_blob_or_null()?.map(bytes::numbers),
         evaluations: size(row, 14)?,
     })
 }
 
-/// The row of a run that begins now.
+/// Returns the row of a run that starts now.
 pub(crate) fn row(identity: &Identity) -> RunRow {
     RunRow {
-        begun: now(),
+        started: now(),
         state: RunState::Running,
         mops: env!("CARGO_PKG_VERSION").to_owned(),
         command: std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" "),
@@ -159,7 +159,7 @@ pub(crate) fn row(identity: &Identity) -> RunRow {
         seed: 0,
         solver: String::new(),
         max_evaluations: 0,
-        begin: None,
+        start_point: None,
         evaluations: 0,
     }
 }

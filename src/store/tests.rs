@@ -7,9 +7,9 @@ use mops_core::file::StudyFile;
 use mops_core::{CatalogueStudy, Failure, Known, Missed, Problem, RowSlopes, RowValue, Study, Value};
 
 use super::database::{Database, PointRow};
-use super::{FILE, Identity, Keeper, Refusal, RunState, Start, bytes, row};
+use super::{FILE, Identity, OpenError, Recorder, RunState, Start, bytes, row};
 
-/// A shipped study with settings.
+/// Reads a shipped study with settings.
 fn file(name: &str, settings: &[&str]) -> StudyFile {
     let catalogue = crate::catalogue();
     let Some(CatalogueStudy::Shipped(shipped)) = catalogue.study(name) else { panic!("{name} is shipped") };
@@ -18,23 +18,23 @@ fn file(name: &str, settings: &[&str]) -> StudyFile {
 }
 
 #[test]
-fn every_shipped_study_measures_as_itself_so_that_its_points_are_kept() {
+fn every_shipped_study_measures_as_itself_so_that_its_points_are_stored() {
     for known in crate::catalogue().studies {
         let name = known.name();
         let study = file(name, &[]).study;
         assert!(study.measures_as(&study.clone()), "{name}");
     }
-    // Start values of `tank-level` are expressions, of which no number is known beforehand.
+    // Initial states of `tank-level` are expressions without a known number.
     let [one, other] = ["900 cm2", "901 cm2"]
         .map(|area| file("tank-level", &[&format!("models.plant.equations.constants.A1=\"{area}\"")]).study);
     assert!(!one.measures_as(&other));
 }
 
-/// A database in memory with these points and derivatives of a study.
+/// Creates a database in memory with the given points and derivatives of a study.
 fn written(study: &Study, points: &[PointRow], slopes: &[(Vec<u64>, f64, Option<RowSlopes>)]) -> Database {
     let file = file("pid-design", &[]);
     let mut database = Database::in_memory().unwrap();
-    let run = database.begin(&row(&Identity::of(&file, &file.study, "auto"))).unwrap();
+    let run = database.insert_run(&row(&Identity::of(&file, &file.study, "auto"))).unwrap();
     database.write(run, study.rows().len(), points, slopes, Some(points.len())).unwrap();
     database
 }
@@ -44,7 +44,7 @@ fn read(database: &Database, study: &Study) -> super::database::Points {
 }
 
 #[test]
-fn what_is_written_of_a_point_is_read_bit_by_bit() {
+fn points_are_read_as_written_bit_by_bit() {
     let study = file("pid-design-multi-case", &[]).study;
     let all = study.rows();
     let rows_of = |job: usize| (0..all.len()).filter(move |&row| all[row].job == job);
@@ -68,7 +68,7 @@ fn what_is_written_of_a_point_is_read_bit_by_bit() {
     let (last, with_values) = (values.pop().unwrap(), values);
     assert!(with_values.len() >= 2);
     let without: Vec<RowValue> = rows_of(2).map(|row| (row, last.1.clone())).collect();
-    // Of every point the first job failed in another way; jobs that were not run are not known.
+    // The first job of each point fails in a different way; jobs that were not run are not stored.
     let points: Vec<PointRow> = (failures.iter().enumerate())
         .map(|(i, failure)| PointRow {
             tuners: bytes::key(&[i as f64, -0.0, 1.0 / 3.0]),
@@ -86,7 +86,7 @@ fn what_is_written_of_a_point_is_read_bit_by_bit() {
 }
 
 #[test]
-fn derivatives_are_read_as_they_were_written_and_so_is_that_there_are_none() {
+fn derivatives_and_missing_derivatives_are_read_as_written() {
     let study = file("pid-design", &[]).study;
     let slope = |number: f64, residuals: &[f64]| Value { number, residuals: residuals.to_vec(), ..Value::default() };
     let rows: RowSlopes = vec![
@@ -98,14 +98,14 @@ fn derivatives_are_read_as_they_were_written_and_so_is_that_there_are_none() {
     let found = written(&study, &[], &slopes).slopes().unwrap();
     assert_eq!(found[&(key.clone(), 1e-3_f64.to_bits())], Some(rows));
     assert_eq!(found[&(key, 1e-4_f64.to_bits())], None);
-    // A list that is cut short is none.
+    // Truncated lists are rejected.
     let whole = bytes::of_lists([(3, &[1.0, 2.0][..])].into_iter());
     assert_eq!(bytes::lists(&whole), Some(vec![(3, vec![1.0, 2.0])]));
     assert!((1..whole.len()).all(|end| bytes::lists(&whole[..end]).is_none()));
     assert_eq!(bytes::lists(&[0xff; 16]), None);
 }
 
-/// Everything that a file of study.toml says either may change, or must not.
+/// Each entry of study.toml either may change or must not.
 #[test]
 fn demands_bounds_and_solvers_may_change_and_what_is_simulated_may_not() {
     let identity = |settings: &[&str]| {
@@ -130,8 +130,8 @@ fn demands_bounds_and_solvers_may_change_and_what_is_simulated_may_not() {
         let other = identity(&[way]);
         assert_eq!(plain.refuses_to_reuse(&other), None, "{way}");
         let key = way.split('=').next().unwrap();
-        let told = plain.refuses_to_continue(&other).unwrap_or_default();
-        assert!(told.contains(key) || told.contains("solver"), "{way}: {told}");
+        let why = plain.refuses_to_continue(&other).unwrap_or_default();
+        assert!(why.contains(key) || why.contains("solver"), "{way}: {why}");
     }
     for values in [
         "cases.nominal.b=-4.5",
@@ -146,13 +146,13 @@ fn demands_bounds_and_solvers_may_change_and_what_is_simulated_may_not() {
         assert!(plain.refuses_to_reuse(&other).is_some(), "{values}");
         assert!(plain.refuses_to_continue(&other).is_some(), "{values}");
     }
-    // How long a run may be is no other run; a word for the numbers is the same number.
+    // Neither another budget nor another notation of the same number makes another run.
     assert_eq!(plain.refuses_to_continue(&identity(&["solver.max-evaluations=7"])), None);
     assert_eq!(plain.refuses_to_continue(&identity(&["tuners.k.start=4.00"])), None);
 }
 
 #[test]
-fn what_is_known_makes_the_evaluation_a_simulation_makes_under_any_demand() {
+fn stored_values_give_the_evaluation_of_a_simulation_under_any_demand() {
     let problem = |settings: &[&str]| Problem::new(Arc::new(file("pid-design-multi-case", settings).study));
     let (plain, asking) = (problem(&[]), problem(&["criteria.overshoot.demand=0.3"]));
     for place in [0.1, 0.35, 0.5, 0.8] {
@@ -164,7 +164,7 @@ fn what_is_known_makes_the_evaluation_a_simulation_makes_under_any_demand() {
             assert!(again.learned.is_none());
             assert_eq!(format!("{:?}", again.evaluation), format!("{:?}", problem.evaluate(&point)));
         }
-        // Of what is half known the other half is simulated.
+        // The missing half of a half-stored point is simulated.
         let half = Known { jobs: known.jobs.iter().step_by(2).cloned().collect() };
         let again = asking.evaluate_keeping(&point, Some(half.clone()));
         let missing: HashSet<usize> = again.learned.unwrap().jobs.iter().map(|(job, _)| *job).collect();
@@ -175,17 +175,17 @@ fn what_is_known_makes_the_evaluation_a_simulation_makes_under_any_demand() {
     }
 }
 
-/// A run of the shipped study in a folder.
-fn begun(folder: &Path, start: &Start) -> Result<Keeper, Refusal> {
+/// Starts a run of the shipped study in a folder.
+fn start_run(folder: &Path, start: &Start) -> Result<Recorder, OpenError> {
     let file = file("pid-design", &[]);
     let identity = Identity::of(&file, &file.study, "auto");
-    Keeper::open(folder, start, &file.study, &identity, &row(&identity))
+    Recorder::open(folder, start, &file.study, &identity, &row(&identity))
 }
 
-/// Ends a run after it has learned so many points.
-fn ended(keeper: Keeper, points: usize, state: RunState) {
-    let store = keeper.store();
-    let ((), opened) = keeper.run(&(), |_| {
+/// Ends a run after `points` new points.
+fn end_run(recorder: Recorder, points: usize, state: RunState) {
+    let store = recorder.store();
+    let ((), opened) = recorder.run(&(), |_| {
         for i in 0..points {
             let value = Value { number: 0.5, ..Value::default() };
             store.answered(&[i as f64, 1.0, 1.0], Some(Known { jobs: vec![(0, Ok(vec![(0, Ok(value))]))] }));
@@ -194,12 +194,12 @@ fn ended(keeper: Keeper, points: usize, state: RunState) {
     assert_eq!(opened.end(state, points), None);
 }
 
-/// What a run leaves that is killed while it begins, by the calls after which it is: the next one begins, or goes on.
+/// Leftovers of a run that was killed at its start, one for each stage. The next run starts anew or is resumed.
 #[test]
-fn a_run_begins_or_goes_on_wherever_the_last_one_was_killed() {
+fn a_run_starts_or_is_resumed_wherever_the_last_one_was_killed() {
     type Leave = fn(&Path);
     let connection = |path: &Path| rusqlite::Connection::open(path).unwrap();
-    // What is left, and the points that are known then.
+    // Leftovers, and the least number of points stored in them.
     let states: [(&str, Leave, usize); 9] = [
         ("nothing", |_| (), 0),
         ("a lock", |folder| fs::write(folder.join("evaluations.lock"), "").unwrap(), 0),
@@ -224,21 +224,25 @@ fn a_run_begins_or_goes_on_wherever_the_last_one_was_killed() {
         (
             "no run yet",
             |folder| {
-                ended(begun(folder, &Start::Fresh).ok().unwrap(), 0, RunState::Running);
+                end_run(start_run(folder, &Start::Fresh).ok().unwrap(), 0, RunState::Running);
                 rusqlite::Connection::open(folder.join(FILE)).unwrap().execute("DELETE FROM runs", []).unwrap();
             },
             0,
         ),
-        ("the end not entered", |folder| ended(begun(folder, &Start::Fresh).ok().unwrap(), 7, RunState::Running), 7),
+        (
+            "the end not entered",
+            |folder| end_run(start_run(folder, &Start::Fresh).ok().unwrap(), 7, RunState::Running),
+            7,
+        ),
         (
             "a log that was not taken over",
             |folder| {
-                // As the files are while the run goes.
-                let keeper = begun(folder, &Start::Fresh).ok().unwrap();
-                let store = keeper.store();
+                // Copies the files during the run.
+                let recorder = start_run(folder, &Start::Fresh).ok().unwrap();
+                let store = recorder.store();
                 let copy = folder.join("copy");
                 fs::create_dir(&copy).unwrap();
-                let ((), opened) = keeper.run(&(), |watch| {
+                let ((), opened) = recorder.run(&(), |watch| {
                     for i in 0..300 {
                         let value = Value { number: 0.5, ..Value::default() };
                         store.answered(
@@ -247,7 +251,7 @@ fn a_run_begins_or_goes_on_wherever_the_last_one_was_killed() {
                         );
                     }
                     watch.stage("written so far", 0.5);
-                    // Until points are committed: the log grows before.
+                    // The log grows before points are committed.
                     let reader = rusqlite::Connection::open(folder.join(FILE)).unwrap();
                     let written = || reader.query_row("SELECT count(*) FROM points", [], |row| row.get(0));
                     while written().unwrap_or(0) < 256 {
@@ -269,9 +273,13 @@ fn a_run_begins_or_goes_on_wherever_the_last_one_was_killed() {
     for (what, leave, least) in states {
         let root = tempfile::tempdir().unwrap();
         leave(root.path());
-        let keeper = begun(root.path(), &Start::Resume).unwrap_or_else(|_| panic!("{what}: it is refused"));
-        assert!(keeper.known() >= least && (least > 0 || keeper.known() == 0), "{what}: {} points", keeper.known());
-        ended(keeper, 10, RunState::Converged);
+        let recorder = start_run(root.path(), &Start::Resume).unwrap_or_else(|_| panic!("{what}: it is refused"));
+        assert!(
+            recorder.known() >= least && (least > 0 || recorder.known() == 0),
+            "{what}: {} points",
+            recorder.known()
+        );
+        end_run(recorder, 10, RunState::Converged);
         let mut names: Vec<_> = fs::read_dir(root.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         names.sort();
         assert_eq!(names, [FILE], "{what}");
@@ -282,20 +290,20 @@ fn a_run_begins_or_goes_on_wherever_the_last_one_was_killed() {
 }
 
 #[test]
-fn a_database_of_others_is_set_aside_with_its_log_and_beside_no_other_log() {
+fn a_foreign_database_is_renamed_with_its_log_and_next_to_no_other_log() {
     let root = tempfile::tempdir().unwrap();
     let at = |name: &str| root.path().join(name);
-    // As a program that was killed leaves it: all that it wrote is in the log.
+    // State after a killed program: all its data are in the log.
     let other = rusqlite::Connection::open(at("other")).unwrap();
     other.execute_batch("PRAGMA journal_mode=WAL; CREATE TABLE mine (x); INSERT INTO mine VALUES (7);").unwrap();
     for end in ["", "-wal"] {
         fs::copy(at(&format!("other{end}")), at(&format!("{FILE}{end}"))).unwrap();
     }
-    // The log of a database that is gone has the first name.
+    // The first name is taken by the log of a removed database.
     fs::copy(at("other-wal"), at("evaluations.previous.sqlite-wal")).unwrap();
-    let keeper = begun(root.path(), &Start::Fresh).ok().unwrap();
-    assert!(keeper.note.as_ref().unwrap().contains("evaluations.previous-2.sqlite"), "{:?}", keeper.note);
-    ended(keeper, 3, RunState::Converged);
+    let recorder = start_run(root.path(), &Start::Fresh).ok().unwrap();
+    assert!(recorder.note.as_ref().unwrap().contains("evaluations.previous-2.sqlite"), "{:?}", recorder.note);
+    end_run(recorder, 3, RunState::Converged);
     assert!(!at("evaluations.sqlite-wal").exists() && at("evaluations.previous.sqlite-wal").exists());
     let mine = rusqlite::Connection::open(at("evaluations.previous-2.sqlite")).unwrap();
     assert_eq!(mine.query_row("SELECT x FROM mine", [], |row| row.get::<_, i64>(0)), Ok(7));

@@ -1,4 +1,4 @@
-//! The thread that writes: points in batches, and what is told of a run only once it is written.
+//! Writer thread: writes points in batches, and reports progress of a run only after it is written.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::thread;
@@ -6,30 +6,30 @@ use std::time::{Duration, Instant};
 
 use mops_core::{Evaluation, Halt, RowSlopes, RunState, Watch};
 
-use super::database::{Database, PointRow, is_passing};
+use super::database::{Database, PointRow, is_temporary};
 use super::memory::{Memory, Message};
 
-/// Points and derivatives that are written together, at most, unless earlier ones could not be written.
+/// Number of points and derivatives after which they are written, unless the last attempt failed.
 const BATCH: usize = 256;
 
-/// Points and derivatives in one transaction, at most: of many that waited for room, some may find it.
+/// Largest number of points and derivatives in one transaction. After a full disk, some of many chunks may fit.
 const CHUNK: usize = 4096;
 
-/// How long a point waits to be written, at most; and how long after a failure it is tried again.
+/// Longest time before a point is written, and time between attempts after a failure.
 const PERIOD: Duration = Duration::from_millis(500);
 
-/// What could not be written to the end.
+/// Points that could not be written.
 pub(super) struct Unwritten {
     /// Number of points.
     pub points: usize,
     pub why: String,
 }
 
-/// What is to be written and told.
+/// Writer with its pending messages.
 struct Writer<'w> {
     database: Database,
     run: i64,
-    /// Rows of the study.
+    /// Number of rows of the study.
     rows: usize,
     watch: &'w dyn Watch,
     points: Vec<PointRow>,
@@ -37,20 +37,21 @@ struct Writer<'w> {
     evaluations: usize,
     state: Option<RunState>,
     best: Option<Box<Evaluation>>,
-    /// When it was last tried to write.
+    /// Time of the last attempt to write.
     tried: Instant,
-    /// Why nothing can be written at present.
-    trouble: Option<String>,
-    /// Whether that is a lock, or a full disk.
-    may_pass: bool,
+    /// Error of the last attempt, if it failed.
+    error: Option<String>,
+    /// True if the error is a lock or a full disk.
+    is_temporary: bool,
 }
 
-/// Writes until there is no more, and then for `patience` what could not be written; the database, and what is left.
+/// Writes all messages, then retries unwritten points for at most `timeout`. Returns the database, and the points that could
+/// not be written.
 pub(super) fn write(
     (database, run, rows): (Database, i64, usize),
     messages: &Receiver<Message>,
     watch: &dyn Watch,
-    patience: Duration,
+    timeout: Duration,
 ) -> (Database, Option<Unwritten>) {
     let mut writer = Writer {
         database,
@@ -63,8 +64,8 @@ pub(super) fn write(
         state: None,
         best: None,
         tried: Instant::now(),
-        trouble: None,
-        may_pass: false,
+        error: None,
+        is_temporary: false,
     };
     loop {
         match messages.recv_timeout(PERIOD.saturating_sub(writer.tried.elapsed()).max(Duration::from_millis(1))) {
@@ -73,16 +74,16 @@ pub(super) fn write(
             Err(RecvTimeoutError::Timeout) => writer.commit(),
         }
     }
-    let until = Instant::now() + patience;
+    let until = Instant::now() + timeout;
     loop {
         writer.commit();
-        if writer.trouble.is_none() || !writer.may_pass || Instant::now() > until {
+        if writer.error.is_none() || !writer.is_temporary || Instant::now() > until {
             break;
         }
         thread::sleep(PERIOD / 5);
     }
     let points = writer.points.len();
-    (writer.database, writer.trouble.map(|why| Unwritten { points, why }))
+    (writer.database, writer.error.map(|why| Unwritten { points, why }))
 }
 
 impl Writer<'_> {
@@ -99,30 +100,30 @@ impl Writer<'_> {
             }
             Message::Best(best) => self.best = Some(best),
             Message::Stage(what, done) => {
-                if self.trouble.is_none() {
+                if self.error.is_none() {
                     self.commit();
                 }
                 self.watch.stage(&what, done);
             }
             Message::End => {}
         }
-        if self.points.len() + self.slopes.len() >= BATCH && self.trouble.is_none() {
+        if self.points.len() + self.slopes.len() >= BATCH && self.error.is_none() {
             self.commit();
         }
     }
 
-    /// Writes what there is, then tells of it. What cannot be written stays, and nothing is told of it.
+    /// Writes the pending points, then reports the progress. After an error, points stay pending and nothing is reported.
     fn commit(&mut self) {
         self.tried = Instant::now();
         if let Err(error) = self.write_all() {
-            self.may_pass = is_passing(&error);
-            if self.trouble.is_none() {
+            self.is_temporary = is_temporary(&error);
+            if self.error.is_none() {
                 self.watch.keeping(Some(&error.to_string()));
             }
-            self.trouble = Some(error.to_string());
+            self.error = Some(error.to_string());
             return;
         }
-        if self.trouble.take().is_some() {
+        if self.error.take().is_some() {
             self.watch.keeping(None);
         }
         if let Some(state) = self.state.take() {
@@ -152,19 +153,19 @@ impl Writer<'_> {
     }
 }
 
-/// Looks on for somebody who is told only of what is written.
-pub(super) struct Behind<'w> {
+/// Observer that passes progress to the writer, which reports it to `watch` after it is written.
+pub(super) struct DelayedWatch<'w> {
     pub memory: &'w Memory,
     pub watch: &'w dyn Watch,
 }
 
-impl Behind<'_> {
+impl DelayedWatch<'_> {
     fn send(&self, message: Message) {
         let _ = self.memory.sender.send(message);
     }
 }
 
-impl Watch for Behind<'_> {
+impl Watch for DelayedWatch<'_> {
     fn wants_stop(&self) -> bool {
         self.watch.wants_stop()
     }

@@ -1,9 +1,9 @@
-//! Many pieces of work in parallel, while somebody looks on.
+//! Parallel processing of many items, with progress reports.
 
 use mops_core::Watch;
 use rayon::prelude::*;
 
-/// A part of what a task does: its name, and the shares of the whole at which it begins and ends.
+/// Stage of a task: its name, and the shares of the whole task at its start and end.
 #[derive(Clone, Copy)]
 pub(super) struct Stage<'a> {
     pub what: &'a str,
@@ -11,8 +11,8 @@ pub(super) struct Stage<'a> {
     pub to: f64,
 }
 
-/// Does the work for every item; answers in the order of the items, fewer of them where the user ends it. The number of
-/// threads changes no bit.
+/// Applies `work` to every item. Returns the results in the order of the items; after a stop request, only the first ones. The
+/// results do not depend on the number of threads, bit for bit.
 #[allow(clippy::cast_precision_loss)]
 pub(super) fn each<T: Sync, R: Send>(
     items: &[T],
@@ -31,7 +31,7 @@ pub(super) fn each<T: Sync, R: Send>(
             stage.from + share * (stage.to - stage.from),
         );
         let results: Vec<R> = batch.par_iter().map(&work).collect();
-        // Some of them may have been cut off.
+        // Some results of an interrupted batch may be incomplete.
         if watch.wants_stop() {
             break;
         }

@@ -1,5 +1,5 @@
-//! The store of a study, for a problem that was made from it: its simulations are those of the study, some of them at values of
-//! the uncertain parameters.
+//! Store of a study, adapted to a problem derived from it. Simulations of the problem are those of the study, some of them at
+//! other values of the uncertain parameters.
 
 use std::sync::Arc;
 
@@ -7,23 +7,26 @@ use mops_core::{CachedPoint, Cancellation, Evaluation, Halt, Known, Problem, Row
 
 use crate::search::Options;
 
-/// A store in which a point goes by the values of all tuners and, where they are set, of the uncertain parameters after them.
+/// Store for a derived problem. The key of a point is the values of all tuners, followed by those of the uncertain parameters
+/// if they are set.
+///
+/// A part of the problem is the set of its jobs with the same values of the uncertain parameters.
 #[derive(Clone)]
 pub(super) struct Copies {
     store: Arc<dyn Store>,
-    /// Values of uncertain parameters that are no tuners of the problem; none for what the study has itself.
+    /// Values of the uncertain parameters of each part; empty for the cases of the study itself.
     parts: Vec<Vec<f64>>,
-    /// Of every job of the problem its part, and its index in the study.
+    /// Part and index in the study of each job of the problem.
     jobs: Vec<(usize, usize)>,
-    /// Of every row of the problem its part, and its index in the study.
+    /// Part and index in the study of each row of the problem.
     rows: Vec<(usize, usize)>,
-    /// Whether the coordinates of the unit box are those of the study, so that derivatives are.
+    /// True if the coordinates of the unit box, and hence the derivatives, are those of the study.
     same_coordinates: bool,
 }
 
 impl Copies {
-    /// The store that the options name, for a problem with the study `made`, which was made from `study` and has these
-    /// scenarios; `None` where nothing is kept, or not of this study.
+    /// Returns the store of the options for a problem with the study `made`, derived from `study` with these scenarios. Returns
+    /// `None` without a store, or if the store belongs to another study.
     pub fn of(options: &Options, study: &Study, made: &Study, scenarios: &[Scenario]) -> Option<Self> {
         let keeping = options.keeping.as_ref().filter(|keeping| keeping.study.measures_as(study))?;
         let mut parts: Vec<Vec<f64>> = Vec::new();
@@ -48,7 +51,7 @@ impl Copies {
         Some(Self { store: Arc::clone(&keeping.store), parts, jobs, rows, same_coordinates })
     }
 
-    /// The same for a problem with one of the rows alone.
+    /// Returns the store for a problem with only one of the rows.
     pub fn of_row(&self, row: usize) -> Self {
         Self { rows: vec![self.rows[row]], ..self.clone() }
     }
@@ -57,13 +60,13 @@ impl Copies {
         [tuners, &self.parts[part]].concat()
     }
 
-    /// The row of the problem that is this row of the study in a part.
+    /// Returns the row of the problem that corresponds to a row of the study in a part.
     fn row(&self, part: usize, origin: usize) -> Option<usize> {
         self.rows.iter().position(|row| *row == (part, origin))
     }
 
-    /// What is known of a part, as the problem numbers it.
-    fn made(&self, part: usize, known: &Known) -> Known {
+    /// Converts stored values of a part from the indices of the study to those of the problem.
+    fn to_problem(&self, part: usize, known: &Known) -> Known {
         let of = |(job, &(_, origin)): (usize, &(usize, usize))| {
             let values = known.job(origin)?.as_ref().map_err(Clone::clone).map(|values| {
                 values.iter().filter_map(|(row, value)| Some((self.row(part, *row)?, value.clone()))).collect()
@@ -74,8 +77,8 @@ impl Copies {
         Known { jobs: jobs.filter_map(of).collect() }
     }
 
-    /// What was learned of a part, as the study numbers it.
-    fn original(&self, part: usize, learned: &Known) -> Option<Known> {
+    /// Converts new values of a part from the indices of the problem to those of the study.
+    fn to_study(&self, part: usize, learned: &Known) -> Option<Known> {
         let of_part = learned.jobs.iter().filter(|(job, _)| self.jobs[*job].0 == part);
         let of = |(job, values): &(usize, mops_core::JobValues)| {
             let values = values.as_ref().map_err(Clone::clone);
@@ -89,15 +92,15 @@ impl Copies {
 
 impl Store for Copies {
     fn known(&self, tuners: &[f64]) -> Option<Known> {
-        let of = |part: usize| Some(self.made(part, &self.store.known(&self.key(tuners, part))?));
+        let of = |part: usize| Some(self.to_problem(part, &self.store.known(&self.key(tuners, part))?));
         let jobs: Vec<_> = (0..self.parts.len()).filter_map(of).flat_map(|known| known.jobs).collect();
         (!jobs.is_empty()).then_some(Known { jobs })
     }
 
     fn answered(&self, tuners: &[f64], learned: Option<Known>) {
         for part in 0..self.parts.len() {
-            let (key, learned) = (self.key(tuners, part), learned.as_ref().and_then(|l| self.original(part, l)));
-            // Nothing may have been asked of a part.
+            let (key, learned) = (self.key(tuners, part), learned.as_ref().and_then(|l| self.to_study(part, l)));
+            // A part may have no evaluated row.
             if learned.is_some() || self.store.is_known(&key) {
                 self.store.answered(&key, learned);
             }
@@ -122,7 +125,7 @@ impl Store for Copies {
     }
 
     fn learned_slopes(&self, tuners: &[f64], reach: f64, slopes: Option<RowSlopes>) {
-        // Where there are none, nobody knows in which of several parts.
+        // Missing derivatives cannot be assigned to one of several parts.
         if !self.same_coordinates || (slopes.is_none() && self.parts.len() > 1) {
             return;
         }
@@ -136,17 +139,17 @@ impl Store for Copies {
     }
 }
 
-/// Evaluates given values of all tuners in every case, as far as they are not known.
+/// Evaluates all cases at given values of all tuners, using stored values where available.
 pub(super) fn evaluate_at(problem: &Problem, tuners: &[f64], store: Option<&Copies>) -> Evaluation {
-    kept((problem, true), tuners, store, |known| problem.evaluate_at_keeping(tuners, known))
+    evaluate_stored((problem, true), tuners, store, |known| problem.evaluate_at_keeping(tuners, known))
 }
 
-/// Evaluates a point of the unit box, as far as it is not known.
+/// Evaluates a point of the unit box, using stored values where available.
 pub(super) fn evaluate(problem: &Problem, point: &[f64], store: Option<&Copies>) -> Evaluation {
-    kept((problem, false), &problem.tuners_at(point), store, |known| problem.evaluate_keeping(point, known))
+    evaluate_stored((problem, false), &problem.tuners_at(point), store, |known| problem.evaluate_keeping(point, known))
 }
 
-fn kept(
+fn evaluate_stored(
     (problem, every): (&Problem, bool),
     tuners: &[f64],
     store: Option<&Copies>,

@@ -1,4 +1,4 @@
-//! `task = "diagnosis"`: which physical effect the model lacks.
+//! `task = "diagnosis"`: finds the physical effect missing from the model.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -7,28 +7,28 @@ use mops_core::{DiagnosisTask, Effect, Study, StudyError, Watch, suggestion};
 use mops_discrepancy::Diagnosis;
 
 use crate::diagnosis::block;
-use crate::search::{Options, SolveError, Solved, look};
+use crate::search::{Options, SolveError, Solved, evaluate_start};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
-    let begun = Instant::now();
+    let started = Instant::now();
     let mut solved = match search(&study, options, watch) {
         Ok(diagnosis) => of(study, options, diagnosis),
-        Err(_) if watch.wants_stop() => ended(study, options, watch),
+        Err(_) if watch.wants_stop() => interrupted(study, options, watch),
         Err(why) => return Err(why),
     };
-    solved.outcome.seconds = begun.elapsed().as_secs_f64();
+    solved.outcome.seconds = started.elapsed().as_secs_f64();
     Ok(solved)
 }
 
-/// The search itself, over the effects that the task leaves.
+/// Runs the diagnosis over the effects selected by the task.
 fn search(study: &Study, options: &Options, watch: &dyn Watch) -> Result<Diagnosis, SolveError> {
     let task = &study.tasks().diagnosis;
     let effects = effects(task, &options.effects)?;
-    let asked = mops_discrepancy::Options { max_effects: task.max_effects, level: task.level, seed: study.seed() };
-    mops_discrepancy::diagnose(study, &effects, &asked, watch).map_err(SolveError)
+    let options = mops_discrepancy::Options { max_effects: task.max_effects, level: task.level, seed: study.seed() };
+    mops_discrepancy::diagnose(study, &effects, &options, watch).map_err(SolveError)
 }
 
-/// The effects that the task leaves. N.B.: names in a study file were checked when it was read.
+/// Returns the effects selected by the task. N.B.: names in a study file are checked when the file is read.
 fn effects(task: &DiagnosisTask, all: &[Arc<dyn Effect>]) -> Result<Vec<Arc<dyn Effect>>, SolveError> {
     let known = |name: &&String| all.iter().any(|effect| effect.name() == **name);
     if let Some(unknown) = task.effects.iter().flatten().chain(&task.without).find(|name| !known(name)) {
@@ -39,26 +39,27 @@ fn effects(task: &DiagnosisTask, all: &[Arc<dyn Effect>]) -> Result<Vec<Arc<dyn 
     }
     let left: Vec<_> = all.iter().filter(|effect| task.tries(effect.name())).cloned().collect();
     if left.is_empty() {
-        let mistake = StudyError::new("without", "no effect is left to try").with_help("leave some of them in");
+        let mistake =
+            StudyError::new("without", "no effect is left to try").with_help("exclude fewer effects in `without`");
         return Err(SolveError(mistake.within("diagnosis")));
     }
     Ok(left)
 }
 
-/// The outcome of a diagnosis that was ended: nothing was found out.
-fn ended(study: Study, options: &Options, watch: &dyn Watch) -> Solved {
-    let mut solved = look(study.without_criteria(), options, watch);
+/// Returns the outcome of an interrupted diagnosis, without findings.
+fn interrupted(study: Study, options: &Options, watch: &dyn Watch) -> Solved {
+    let mut solved = evaluate_start(study.without_criteria(), options, watch);
     let outcome = &mut solved.outcome;
     (outcome.solver, outcome.evaluations, outcome.calibration) = ("discrepancy".to_owned(), 0, None);
     outcome.front.clear();
-    outcome.warnings.push("the diagnosis was ended before it came to a verdict".to_owned());
+    outcome.warnings.push("the diagnosis was stopped before it reached a verdict".to_owned());
     solved
 }
 
-/// The outcome of a diagnosis: its tuners are those of the repaired model.
+/// Returns the outcome of a diagnosis, with the tuners of the repaired model.
 pub(crate) fn of(study: Study, options: &Options, diagnosis: Diagnosis) -> Solved {
-    // Criteria have no say in this: every channel counts with its noise.
-    let mut solved = look(study.without_criteria(), options, &());
+    // A diagnosis ignores the criteria: every channel is weighted by its noise level.
+    let mut solved = evaluate_start(study.without_criteria(), options, &());
     let outcome = &mut solved.outcome;
     let study = solved.problem.study();
     for (report, tuner) in outcome.tuners.iter_mut().zip(study.tuners()) {
@@ -87,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_task_says_which_effects_are_tried() {
+    fn the_task_selects_the_effects_that_are_tried() {
         let all = Options::default().effects;
         let tried = |effects: Option<&[&str]>, without: &[&str]| {
             let owned = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
@@ -104,7 +105,7 @@ mod tests {
         );
     }
 
-    /// The names of the effects left.
+    /// Returns the names of the selected effects.
     fn effects_of(task: &DiagnosisTask, all: &[Arc<dyn Effect>]) -> Result<Vec<&'static str>, String> {
         let left = effects(task, all).map_err(|why| why.to_string())?;
         Ok(left.iter().map(|effect| effect.name()).collect())

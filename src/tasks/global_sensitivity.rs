@@ -1,4 +1,4 @@
-//! `task = "sensitivity"` with `method = "morris"` or `"sobol"`: effects of the uncertain parameters over their whole ranges.
+//! `task = "sensitivity"` with `method = "morris"` or `"sobol"`: global sensitivity to the uncertain parameters.
 
 use std::sync::Arc;
 
@@ -13,15 +13,17 @@ use super::copies::{Copies, evaluate_at};
 use crate::numbers::significant;
 use crate::search::{Options, Solved};
 
-/// Trajectories of Morris, and samples of Sobol, where nothing is said.
+/// Default number of trajectories of the Morris method.
 const TRAJECTORIES: usize = 20;
+/// Default number of samples of the Sobol method.
 const SAMPLES: usize = 512;
 
-/// Confidence of the intervals, and the bootstrap samples they rest on.
+/// Confidence level of the intervals.
 const LEVEL: f64 = 0.95;
+/// Number of bootstrap samples for the intervals.
 const REPLICATES: usize = 500;
 
-/// The effects at the design that was found; the points of a sample stay together.
+/// Adds the global sensitivities at the design. A sample counts only if all its points have a value.
 pub(super) fn add(solved: &mut Solved, options: &Options, watch: &dyn Watch) {
     let task = solved.problem.study().tasks().sensitivity;
     let over = Arc::new(solved.problem.study().over_uncertain(&solved.best.tuners));
@@ -58,7 +60,7 @@ pub(super) fn add(solved: &mut Solved, options: &Options, watch: &dyn Watch) {
     let sound = |row: usize| {
         let whole = points.iter().zip(&answers).filter(move |(_, a)| a.iter().all(|values| values[row].is_some()));
         whole.map(move |(p, a)| {
-            (p.clone(), a.iter().map(|values| values[row].expect("just seen")).collect::<Vec<f64>>())
+            (p.clone(), a.iter().map(|values| values[row].expect("checked above")).collect::<Vec<f64>>())
         })
     };
     let criteria = over.rows().iter().enumerate().map(|(i, row)| {
@@ -121,7 +123,7 @@ fn effects(
     names.zip(found).map(one).collect()
 }
 
-/// The effects in sentences.
+/// Formats the sensitivities as sentences.
 fn words(report: &GlobalSensitivityReport, random: bool, asked: usize) -> Vec<String> {
     let mut words = Vec::new();
     for found in &report.criteria {
@@ -130,7 +132,7 @@ fn words(report: &GlobalSensitivityReport, random: bool, asked: usize) -> Vec<St
         let mut sorted: Vec<&EffectReport> = found.effects.iter().collect();
         sorted.sort_by(|a, b| size(b).total_cmp(&size(a)));
         let Some(strongest) = sorted.first().filter(|e| size(e) > 0.0) else {
-            words.push(format!("{place} does not vary with the uncertain parameters, or has too few values."));
+            words.push(format!("{place} does not depend on the uncertain parameters, or has too few values."));
             continue;
         };
         let unit = if found.of.unit == "1" { String::new() } else { format!(" {}", found.of.unit) };
@@ -139,14 +141,18 @@ fn words(report: &GlobalSensitivityReport, random: bool, asked: usize) -> Vec<St
                 let first: f64 = found.effects.iter().filter_map(|e| e.first).map(|f| f.value).sum();
                 let together = 1.0 - first;
                 let rest = if together > 0.05 {
-                    format!("; {} of it come about by several parameters together", percent(together))
+                    format!("; interactions between parameters account for {}", percent(together))
                 } else {
                     String::new()
                 };
-                format!("`{}` takes part in {} of the variance of {place}{rest}.", strongest.parameter, percent(total))
+                format!(
+                    "`{}` accounts for {} of the variance of {place}, interactions included{rest}.",
+                    strongest.parameter,
+                    percent(total)
+                )
             }
             None => format!(
-                "`{}` moves {place} most, by {}{unit} over its range in the mean.",
+                "`{}` has the largest effect on {place}: {}{unit} over its range on average.",
                 strongest.parameter,
                 significant(size(strongest), 3)
             ),
@@ -157,14 +163,14 @@ fn words(report: &GlobalSensitivityReport, random: bool, asked: usize) -> Vec<St
             .map(|e| format!("`{}`", e.parameter))
             .collect();
         if !weak.is_empty() {
-            words.push(format!("Hardly any effect on {place}: {}.", weak.join(", ")));
+            words.push(format!("Negligible effect on {place}: {}.", weak.join(", ")));
         }
     }
     if report.failed > 0 {
-        words.push(format!("{} of {asked} samples were left out: a simulation or a criterion failed.", report.failed));
+        words.push(format!("{} of {asked} samples were discarded: a simulation or a criterion failed.", report.failed));
     }
     if random && report.method == SensitivityMethod::Sobol {
-        words.push("The Sobol sequence has too few dimensions: the samples were drawn at random.".to_owned());
+        words.push("The samples are random, as the Sobol sequence has too few dimensions.".to_owned());
     }
     words
 }

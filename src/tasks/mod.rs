@@ -1,4 +1,4 @@
-//! What a study can be for: a line for every task, and a file for each that is more than a search.
+//! Tasks of a study: one line for each, and one file for each that is more than a search.
 
 mod batches;
 mod copies;
@@ -17,14 +17,14 @@ use std::time::Instant;
 
 use mops_core::{Halt, Place, Stop, Study, Task, Watch};
 
-use crate::search::{Options, SolveError, Solved, look, search};
+use crate::search::{Options, SolveError, Solved, evaluate_start, search};
 
-/// Does the task of the study.
+/// Performs the task of the study.
 ///
 /// # Errors
-/// The solver cannot treat the problem.
+/// If the solver does not accept the problem.
 pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
-    let begun = Instant::now();
+    let started = Instant::now();
     let mut solved = match study.task() {
         Task::Design if study.tasks().robust.is_some() => robust::perform(study, options, watch)?,
         Task::Design => search(study, options, watch)?,
@@ -41,18 +41,18 @@ pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         Task::WorstCase => worst_case::perform(study, options, watch)?,
         Task::MonteCarlo => monte_carlo::perform(study, options, watch)?,
     };
-    // A search may have come to its end before; what follows it has not.
+    // The search may have finished before the interruption, but not the work that follows it.
     if watch.wants_stop() && watch.halt() == Halt::Interrupted {
         solved.outcome.stop = Stop::Interrupted;
     }
-    solved.outcome.seconds = begun.elapsed().as_secs_f64();
+    solved.outcome.seconds = started.elapsed().as_secs_f64();
     Ok(solved)
 }
 
-/// The point that a task asks for.
+/// Returns the point at which a task is performed: the start values or the optimum.
 fn at(place: Place, study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     match place {
-        Place::Start => Ok(look(study, options, watch)),
+        Place::Start => Ok(evaluate_start(study, options, watch)),
         Place::Optimum => search(study, options, watch),
     }
 }

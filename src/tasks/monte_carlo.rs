@@ -1,4 +1,4 @@
-//! `task = "monte-carlo"`: how the criteria are distributed where parameters are uncertain.
+//! `task = "monte-carlo"`: distribution of the criteria under uncertain parameters.
 
 use std::sync::Arc;
 
@@ -72,7 +72,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     Ok(solved)
 }
 
-/// Whether a sample meets the demand of a row; one without a value does not.
+/// Returns true if a sample meets the demand of a row; false if it has no value.
 fn met(row: &Row, at: &Evaluation, index: usize) -> bool {
     at.readings[index].is_some_and(|reading| row.is_met(reading.scaled))
 }
@@ -111,7 +111,7 @@ fn distribution(
     }
 }
 
-/// The distributions in sentences.
+/// Formats the distributions as sentences.
 fn words(
     criteria: &[DistributionReport],
     all: Option<ShareReport>,
@@ -119,10 +119,10 @@ fn words(
     samples: usize,
 ) -> Vec<String> {
     let percent = |share: f64| format!("{} %", significant(100.0 * share, 4));
-    let told = |share: &ShareReport| {
+    let estimate = |share: &ShareReport| {
         let [low, high] = share.interval;
         format!(
-            "{} of {samples} samples ({}; with {} confidence {} to {})",
+            "{} of {samples} samples ({}; {} confidence interval {} to {})",
             share.count,
             percent(share.share),
             percent(task.level),
@@ -130,15 +130,15 @@ fn words(
             percent(high)
         )
     };
-    let mut words: Vec<String> = all.iter().map(|all| format!("Every demand is met in {}.", told(all))).collect();
+    let mut words: Vec<String> = all.iter().map(|all| format!("All demands are met in {}.", estimate(all))).collect();
     for found in criteria {
         let DistributionReport { of, mean, deviation, met, failed, .. } = found;
         let unit = if of.unit == "1" { String::new() } else { format!(" {}", of.unit) };
-        let demand = met.as_ref().map_or_else(String::new, |met| format!(" Its demand is met in {}.", told(met)));
+        let demand = met.as_ref().map_or_else(String::new, |met| format!(" Its demand is met in {}.", estimate(met)));
         let failed =
-            if *failed > 0 { format!(" {failed} samples have no value, and count as not met.") } else { String::new() };
+            if *failed > 0 { format!(" {failed} samples have no value and count as missed.") } else { String::new() };
         words.push(format!(
-            "`{}` in case `{}` is {}{unit} in the mean, with a standard deviation of {}{unit}.{demand}{failed}",
+            "`{}` in case `{}` has the mean {}{unit} and the standard deviation {}{unit}.{demand}{failed}",
             of.criterion,
             of.case,
             significant(*mean, 4),
@@ -147,8 +147,7 @@ fn words(
     }
     if task.method != Sampling::Random {
         words.push(
-            "The samples are spread evenly, not drawn independently: means and shares are more accurate than their intervals say."
-                .to_owned(),
+            "The intervals are conservative, as the samples are evenly spread instead of independent.".to_owned(),
         );
     }
     words

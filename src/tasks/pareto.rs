@@ -1,4 +1,4 @@
-//! `task = "pareto"`: the designs that no other is better than in every criterion.
+//! `task = "pareto"`: Pareto front of a design.
 
 use std::time::Instant;
 
@@ -10,10 +10,10 @@ use crate::numbers::significant;
 use crate::search::{Options, SolveError, Solved, search};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
-    let begun = Instant::now();
+    let started = Instant::now();
     let mut solved = search(study, options, watch)?;
     let problem = &solved.problem;
-    // Certificates ask for points of their own, which are no part of the search that is looked at.
+    // The points of the certificates are not part of the observed search.
     let quiet = Quiet(watch);
     let mut run = Run::new(problem, Budget { evaluations: usize::MAX }, &quiet);
     let concluding = problem.concluding();
@@ -42,24 +42,24 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         solved.outcome.found.trade_offs = Some(found);
     }
     solved.front = front.into_iter().map(|point| point.at).collect();
-    solved.outcome.seconds = begun.elapsed().as_secs_f64();
+    solved.outcome.seconds = started.elapsed().as_secs_f64();
     Ok(solved)
 }
 
-/// Values of all tuners of a point as the result has it.
+/// Returns the values of all tuners of a point in the result.
 fn tuners(problem: &Problem, point: &serde_json::Value) -> Vec<f64> {
     let value = |tuner: &mops_core::Tuner| point["tuners"][&tuner.name].as_f64().expect("every tuner has a value");
     problem.study().tuners().iter().map(value).collect()
 }
 
-/// The front in sentences.
+/// Formats the Pareto front as sentences.
 fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<String> {
     let ends = found.criteria.iter().enumerate().map(|(k, criterion)| {
         let [best, worst] = [criterion.best, criterion.worst].map(|value| amount(value, &criterion.unit));
         format!("{} from {best} to {worst}", name(found, k))
     });
     let mut words = vec![format!(
-        "The front has {} points: {}. None of them is better than another in every criterion.",
+        "The Pareto front has {} points: {}. All points are mutually non-dominated.",
         front.len(),
         ends.collect::<Vec<_>>().join(", ")
     )];
@@ -80,7 +80,7 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<Strin
     };
     let nearest = found.nearest;
     words.push(format!(
-        "Point {} is nearest to the demands: {}, at {}; its worst scaled value is {}.{}",
+        "Point {} is nearest to the demands: {}, at {}; worst scaled value {}.{}",
         nearest + 1,
         values(nearest),
         place(nearest),
@@ -88,19 +88,19 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<Strin
         price(found, nearest)
     ));
     match found.knee {
-        Some(knee) if knee == nearest => words.push("It is the knee of the front as well.".to_owned()),
+        Some(knee) if knee == nearest => words.push(format!("Point {} is also the knee of the front.", knee + 1)),
         Some(knee) => words.push(format!(
-            "Point {} is the knee, where one criterion begins to cost most of the other: {}, at {}.{}",
+            "Point {} is the knee of the front (beyond it, improving one criterion costs much of the other): {}, at {}.{}",
             knee + 1,
             values(knee),
             place(knee),
             price(found, knee)
         )),
-        None => words.push("The front has no knee: it bulges away from the ideal point.".to_owned()),
+        None => words.push("The front is concave and has no knee.".to_owned()),
     }
     let of = |pareto: Pareto| found.points.iter().filter(|point: &&FrontPoint| point.pareto == pareto).count();
     words.push(format!(
-        "{} of the {} points are Pareto-optimal to first order; of {} nothing was shown, and {} can be improved at no cost.",
+        "{} of {} points satisfy the first-order Pareto conditions; {} could not be checked; {} are dominated.",
         of(Pareto::CertifiedLocal),
         found.points.len(),
         of(Pareto::NotShown),
@@ -109,7 +109,8 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<Strin
     words
 }
 
-/// What a round step of the first criterion, small beside its range over the front, costs of the second at a point.
+/// Formats the exchange rate at a point: the cost, in the second criterion, of a round step of the first one that is small
+/// relative to its range over the front.
 fn price(found: &TradeOffs, i: usize) -> String {
     let (Some(weights), [first, second]) = (&found.points[i].weights, found.criteria.as_slice()) else {
         return String::new();
@@ -120,7 +121,7 @@ fn price(found: &TradeOffs, i: usize) -> String {
     }
     let cost = step * (weights[0] / weights[1]).abs();
     format!(
-        " There, {} better by {} costs {} of {}.",
+        " Exchange rate: improving {} by {} costs {} of {}.",
         name(found, 0),
         amount(step, &first.unit),
         amount(cost, &second.unit),
@@ -128,7 +129,7 @@ fn price(found: &TradeOffs, i: usize) -> String {
     )
 }
 
-/// A criterion between backticks; with its case where there is more than one.
+/// Formats the name of a criterion, with its case if the name is not unique.
 fn name(found: &TradeOffs, k: usize) -> String {
     let short = |key: &str| key.split_once('/').map_or(key.to_owned(), |(_, name)| name.to_owned());
     let own = short(&found.criteria[k].key);

@@ -1,4 +1,4 @@
-//! A design with `[robust]`: against the worst cases of a box, which are searched and added until none is worse.
+//! Robust design with `[robust]`: worst cases in a box are searched and added until none is worse.
 
 use std::sync::Arc;
 
@@ -9,16 +9,17 @@ use mops_core::{
 
 use super::batches::Stage;
 use super::copies::Copies;
-use super::worst_case::{NO_GUARANTEE, Question, Region, Worst, sentence};
+use super::worst_case::{Effort, NO_GUARANTEE, Region, Worst, sentence};
 use crate::numbers::significant;
 use crate::search::{EvaluationStore, Options, SolveError, Solved, search};
 
-/// Outer approximation: solve for the cases at hand, search the box for worse ones, add them, and so on. The worst over the
-/// cases at hand is what no design can do better in, as far as the solver finds the optimum; the worst that is found in the
-/// box is what this design does.
+/// Outer approximation: solves for the present cases, searches the box for worse cases, adds them, and repeats.
+///
+/// The optimum over the present cases is a lower bound for every design, provided that the solver finds the optimum. The worst
+/// case found in the box is the value of the present design.
 ///
 /// Source: J. W. Blankenship, J. E. Falk, Journal of Optimization Theory and Applications 19 (1976) 261-281 (algorithm 2.1).
-/// N.B.: there the worst case is found exactly; here it is searched, so that a promise is left out.
+/// N.B.: the paper assumes an exact worst case; here it is the result of a search, so that no guarantee is given.
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let task = study.tasks().robust.clone().expect("the study asks for it");
     let mut rounds = Rounds { study, task, scenarios: Vec::new(), done: Vec::new(), worst: Vec::new() };
@@ -58,19 +59,19 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let mut solved = rounds.conclude(last, options, stop);
     (solved.outcome.evaluations, solved.outcome.simulations) = (archive.len(), simulations);
     solved.outcome.reused = options.keeping.as_ref().and_then(|keeping| keeping.begin.as_ref()).map(|_| reused);
-    // Cases are added at the end: what a round did not know has no value.
+    // Cases are appended: rows added after a round have no value in its points.
     let rows = solved.problem.study().rows().len();
     archive.iter_mut().for_each(|record: &mut Record| record.values.resize(rows, f64::NAN));
     solved.archive = archive;
     Ok(solved)
 }
 
-/// Shows a round's search for a design as a stage: its points are no share of the whole, and count all the same.
+/// Observer of the design search of one round; reports it as a stage, and counts its points in the whole run.
 struct Designing<'a> {
     watch: &'a dyn Watch,
     round: usize,
     cases: usize,
-    /// Points of the rounds before.
+    /// Number of points of the previous rounds.
     before: usize,
 }
 
@@ -101,19 +102,19 @@ impl Watch for Designing<'_> {
     }
 }
 
-/// What was done so far.
+/// Rounds so far.
 struct Rounds {
     study: Study,
     task: RobustTask,
-    /// Worst cases that were added.
+    /// Added worst cases.
     scenarios: Vec<Scenario>,
     done: Vec<RoundReport>,
-    /// Of every round, what was found in the box.
+    /// Worst cases found in the box in each round.
     worst: Vec<Vec<Worst>>,
 }
 
 impl Rounds {
-    /// The study with all cases, from the design of the round before.
+    /// Returns the study with all cases, starting at the design of the previous round.
     fn to_solve(&self) -> Study {
         let mut study = self.study.with_scenarios(&self.scenarios);
         if let Some(before) = self.done.last() {
@@ -126,8 +127,8 @@ impl Rounds {
         study
     }
 
-    /// Where the points of a round are kept: with those of the study. The first begins where the run does, the others at the
-    /// design of the round before.
+    /// Returns the store for the points of a round, which is that of the study. The first round starts where the run starts,
+    /// later rounds at the design of the previous round.
     fn keeping(&self, study: &Study, options: &Options) -> Option<EvaluationStore> {
         let store: Arc<dyn Store> = Arc::new(Copies::of(options, &self.study, study, &self.scenarios)?);
         let begin = options.keeping.as_ref().and_then(|keeping| keeping.begin.clone());
@@ -136,11 +137,12 @@ impl Rounds {
         Some(EvaluationStore { study: study.clone(), store, begin })
     }
 
-    /// Searches the box around a design, and adds what is worse than the cases at hand; whether there is any.
+    /// Searches the box around a design and adds the cases that are worse than the present ones. Returns true if a case was
+    /// added.
     fn search(&mut self, solved: &Solved, options: &Options, watch: &dyn Watch) -> bool {
-        let question = Question { samples: self.task.samples, starts: self.task.starts };
+        let effort = Effort { samples: self.task.samples, starts: self.task.starts };
         let counts = |row: &mops_core::Row| row.usage != Usage::Monitor;
-        let region = Region::new(&self.study, &solved.best.tuners, counts, question).keeping(options, &self.study);
+        let region = Region::new(&self.study, &solved.best.tuners, counts, effort).keeping(options, &self.study);
         let what = format!("round {}: searching the worst cases", self.done.len() + 1);
         let (worst, simulations) = region.search(watch, Stage { what: &what, from: 0.0, to: 1.0 });
         let merit = solved.best.merit;
@@ -157,7 +159,7 @@ impl Rounds {
             };
             let failed = worst.report.failure.as_ref().map(|f| f.at.iter().map(|c| c.value).collect::<Vec<f64>>());
             let values = match failed {
-                // Where a criterion has no value the design does not hold at all.
+                // A failed criterion counts as a violation.
                 Some(at) => at,
                 None if excess > self.task.tolerance => worst.at.clone(),
                 None => continue,
@@ -192,7 +194,7 @@ impl Rounds {
         any
     }
 
-    /// A name that no case has.
+    /// Returns an unused case name.
     fn name(&self, criterion: &str) -> String {
         let taken = |name: &String| {
             self.study.cases().iter().any(|c| c.name == *name) || self.scenarios.iter().any(|s| s.name == *name)
@@ -203,23 +205,23 @@ impl Rounds {
             .expect("there is always a next number")
     }
 
-    /// The round whose design has the best worst case.
+    /// Returns the round whose design has the best worst case.
     fn chosen(&self) -> Option<usize> {
         let tolerance = self.task.tolerance;
-        let worth = |i: usize| {
+        let merit = |i: usize| {
             let RoundReport { violation_found: violation, found, .. } = self.done[i];
-            // A search that was ended knows nothing.
+            // An interrupted search has no result.
             let known = !self.worst[i].is_empty();
             if known { (if violation > tolerance { violation } else { 0.0 }, found) } else { (f64::INFINITY, found) }
         };
         let failing = |i: usize| self.worst[i].iter().any(|w| w.report.failed > 0 || w.at.is_empty());
         (0..self.done.len()).min_by(|&i, &j| {
-            let (a, b) = (worth(i), worth(j));
+            let (a, b) = (merit(i), merit(j));
             failing(i).cmp(&failing(j)).then(a.0.total_cmp(&b.0)).then(a.1.total_cmp(&b.1))
         })
     }
 
-    /// The outcome of the chosen design over all cases, those found last included.
+    /// Returns the outcome of the chosen design over all cases, including those found last.
     fn conclude(self, last: Solved, options: &Options, stop: Stop) -> Solved {
         let Some(chosen) = self.chosen() else { return Solved { archive: Vec::new(), ..last } };
         let settled = self.done.last().is_some_and(|round| round.added.is_empty());
@@ -227,15 +229,15 @@ impl Rounds {
         let problem = Problem::new(Arc::new(self.study.with_scenarios(&self.scenarios))).concluding();
         let mut run = Run::new(&problem, Budget { evaluations: 1 }, &());
         if run.evaluate(&[problem.point_of(design)]).is_err() {
-            // Nobody waits for it any more: the result is that of the last round.
+            // Cancelled: returns the result of the last round.
             return Solved { archive: Vec::new(), ..last };
         }
         let pareto = if chosen + 1 == self.done.len() { last.outcome.pareto } else { Pareto::NotShown };
         let (mut outcome, best) = conclude(&run, &options.solver, Ending { stop, pareto, seconds: 0.0 });
         drop(run);
         (outcome.failures, outcome.methods) = (last.outcome.failures, last.outcome.methods);
-        let question = Question { samples: 1, starts: 1 };
-        let region = Region::new(&self.study, design, |_| true, question);
+        let effort = Effort { samples: 1, starts: 1 };
+        let region = Region::new(&self.study, design, |_| true, effort);
         let mut report = RobustReport {
             words: Vec::new(),
             parameters: uncertain_reports(region.study()),
@@ -252,7 +254,7 @@ impl Rounds {
     }
 }
 
-/// By how much a constraint is violated at its worst.
+/// Returns the violation of a constraint at its worst case.
 fn violation(worst: &Worst) -> f64 {
     if worst.subject.usage == Usage::Equality { worst.severity() } else { worst.scaled - 1.0 }
 }
@@ -263,38 +265,36 @@ fn words(report: &RobustReport, stop: Stop) -> Vec<String> {
     let number = |value: f64| significant(value, 4);
     let rounds = report.rounds.len();
     let end = match (report.settled, stop) {
-        (true, _) => format!(
-            "after {rounds} rounds the search found nothing worse than the cases at hand by more than {}",
-            number(report.tolerance)
-        ),
-        (false, Stop::Interrupted) => "interrupted before the search found nothing worse".to_owned(),
-        (false, Stop::Budget) => "the budget was spent before the search found nothing worse".to_owned(),
-        (false, _) => format!("the search still found worse cases after {rounds} rounds"),
+        (true, _) => {
+            format!("after {rounds} rounds no case was found that is worse by more than {}", number(report.tolerance))
+        }
+        (false, Stop::Interrupted) => "interrupted while worse cases were still found".to_owned(),
+        (false, Stop::Budget) => "the budget was spent while worse cases were still found".to_owned(),
+        (false, _) => format!("worse cases were still found after {rounds} rounds"),
     };
     let mut words = vec![format!("{added} worst cases were added; {end}.")];
     let violated = match number(round.violation_found) {
         _ if round.violation_found <= FEASIBLE => String::new(),
         by if round.violation_found <= report.tolerance => {
             format!(
-                ", and a constraint is missed there by {by} of its demand, which the tolerance of {} allows",
+                "; a constraint is violated by {by} of its demand, within the tolerance of {}",
                 number(report.tolerance)
             )
         }
-        by => format!(", and a constraint is violated there by {by} of its demand"),
+        by => format!("; a constraint is violated by {by} of its demand"),
     };
     if round.found.is_finite() {
         words.push(format!(
-            "The design is that of round {}: its worst scaled value that was found in the box is {}{violated}; over the cases \
-             that it was made for it is {}.",
+            "Design of round {}: worst scaled value {} over the cases of the design, {} found in the box{violated}.",
             report.chosen + 1,
-            number(round.found),
-            number(round.for_cases)
+            number(round.for_cases),
+            number(round.found)
         ));
     }
     let best = report.rounds.iter().map(|round| round.for_cases).filter(|v| v.is_finite()).fold(f64::NAN, f64::max);
     if best.is_finite() && round.found.is_finite() {
         words.push(format!(
-            "No design can do better than {} in these cases, if the solver found the optimum for them; the gap is {}.",
+            "Lower bound {} (if the solver found the optimum for the added cases); gap {}.",
             number(best),
             number((round.found - best).max(0.0))
         ));

@@ -1,5 +1,5 @@
-//! `task = "sensitivity"`: which tuners, or which combinations of them, the data or the criteria determine; or which
-//! uncertain parameters matter.
+//! `task = "sensitivity"`: local sensitivity (tuners and combinations of tuners that the data or the criteria determine), or
+//! global sensitivity to the uncertain parameters.
 
 use mops_core::identification::{Point, sensitivity_at};
 use mops_core::{Place, SensitivityMethod, Study, Watch};
@@ -14,15 +14,14 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         global_sensitivity::add(&mut solved, options, watch);
         return Ok(solved);
     }
-    // A calibration has found it already.
+    // A calibration has already computed the sensitivities.
     let known = solved.outcome.calibration.as_mut().and_then(|calibration| calibration.sensitivity.take());
     let point = if task.at == Place::Optimum { Point::Minimum } else { Point::Elsewhere };
     let found = known.or_else(|| sensitivity_at(&solved.problem, &solved.best.tuners, point, task.zero));
     if found.is_none() && watch.wants_stop() {
         solved.outcome.stop = watch.halt().into();
     } else if found.is_none() {
-        let why =
-            "the sensitivities could not be computed: a simulation failed, or nothing that counts depends on a tuner";
+        let why = "the sensitivities could not be computed: a simulation failed, or no criterion depends on a tuner";
         solved.outcome.warnings.push(why.to_owned());
     }
     solved.outcome.found.sensitivity = found;

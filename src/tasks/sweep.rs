@@ -1,4 +1,4 @@
-//! `task = "sweep"`: the objective over one tuner, or over two.
+//! `task = "sweep"`: objective over one or two tuners.
 
 use mops_core::{Axis, Budget, Merit, Oracle, Problem, Run, Scale, Study, SweepAxis, SweepReport, Watch};
 
@@ -6,11 +6,11 @@ use super::at;
 use crate::numbers::significant;
 use crate::search::{Options, SolveError, Solved};
 
-/// Share of all points, the lowest, that count as the valley.
+/// Share of the points, those with the lowest objective, that count as the valley.
 const VALLEY: f64 = 0.05;
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
-    let task = study.tasks().sweep.clone().expect("a study with this task says what is swept");
+    let task = study.tasks().sweep.clone().expect("a study with this task defines the sweep");
     let mut solved = at(task.at, study, options, watch)?;
     let problem = &solved.problem;
     let axes: Vec<&Axis> = std::iter::once(&task.x).chain(&task.y).collect();
@@ -84,7 +84,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     Ok(solved)
 }
 
-/// The values along an axis, evenly as the tuner's range is spread.
+/// Returns the values along an axis, equally spaced on the scale of the tuner.
 #[allow(clippy::cast_precision_loss)]
 fn spread(problem: &Problem, axis: &Axis) -> Vec<f64> {
     let tuner = &problem.study().tuners()[axis.tuner];
@@ -93,7 +93,7 @@ fn spread(problem: &Problem, axis: &Axis) -> Vec<f64> {
     (0..axis.points).map(|i| tuner.value_at(from + (to - from) * i as f64 / last)).collect()
 }
 
-/// The sweep in sentences.
+/// Formats the sweep as sentences.
 fn words(sweep: &SweepReport) -> Vec<String> {
     let number = |value: f64| significant(value, 4);
     let place = |[x, y, _]: [f64; 3]| {
@@ -111,7 +111,7 @@ fn words(sweep: &SweepReport) -> Vec<String> {
     let highest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let lowest = all.iter().copied().fold(f64::INFINITY, f64::min);
     let mut words = vec![format!(
-        "The best point of the sweep is {} with an objective of {}; the objective runs from {} to {}.",
+        "The best point of the sweep is {} with objective {}; the objective ranges from {} to {}.",
         place(sweep.best),
         number(sweep.best[2]),
         number(lowest),
@@ -132,7 +132,7 @@ fn words(sweep: &SweepReport) -> Vec<String> {
     };
     let along_y = sweep.y.as_ref().map_or_else(String::new, |y| format!(" and {}", range(y, &rows)));
     words.push(format!(
-        "The lowest twentieth of the points, up to an objective of {}, spans {}{along_y}.",
+        "The 5 % of points with the lowest objective, up to {}, span {}{along_y}.",
         number(level),
         range(&sweep.x, &columns)
     ));

@@ -1,4 +1,4 @@
-//! What ends a run before its solver does: Ctrl-C and its like, and a limit of time.
+//! Early stop of a run: signals such as Ctrl-C, and the time limit.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -7,72 +7,72 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use mops_core::{Cancellation, Halt, Quantity, Unit};
 
-use super::write::say;
+use super::write::eprint_line;
 
-/// How long something may take.
+/// Time limit of a command.
 #[derive(Args, Clone, Copy)]
 pub(crate) struct Limit {
-    /// End after this time with what is known by then, as after a spent budget: a number of seconds, or "10 min".
+    /// Stop after this time, in seconds or with a unit ("10 min"), and keep the results so far.
     ///
-    /// A simulation that is cut off does not count. `mops run --resume` continues the run.
+    /// An unfinished simulation is discarded. `mops run --resume` continues the run.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub time_limit: Option<Duration>,
 }
 
-/// The share of its time so far that a run may take to conclude, once it was asked to end, and bounds for that.
-const CONCLUDES: u32 = 20;
-const LEAST: Duration = Duration::from_secs(1);
-const MOST: Duration = Duration::from_secs(10);
+/// Time that a run may take to conclude after a stop request: the run time so far divided by this number, within bounds.
+const CONCLUDING_SHARE: u32 = 20;
+const MIN_CONCLUDING: Duration = Duration::from_secs(1);
+const MAX_CONCLUDING: Duration = Duration::from_secs(10);
 
-/// Begins to listen for signals (INT, TERM, HUP) and to wait for the limit, either of which asks a run to end; `heard` is said
-/// at the first signal. The second one ends the program.
-pub(crate) fn listen(limit: Limit, heard: &'static str) -> Cancellation {
-    let (begun, cancellation) = (Instant::now(), Cancellation::default());
-    let (of_signals, first) = (cancellation.clone(), AtomicBool::new(true));
-    // Where a handler cannot be set, a signal ends the program as usual.
+/// Returns a cancellation that is requested by a signal (INT, TERM, HUP) or by the time limit. The first signal prints
+/// `notice`, the second one ends the program.
+pub(crate) fn cancel_on_signal(limit: Limit, notice: &'static str) -> Cancellation {
+    let (started, cancellation) = (Instant::now(), Cancellation::default());
+    let (on_signal, first) = (cancellation.clone(), AtomicBool::new(true));
+    // Without a handler, a signal ends the program as usual.
     let _ = ctrlc::set_handler(move || {
         if !first.swap(false, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        of_signals.request(Halt::Interrupted);
-        say(heard);
-        let insists = of_signals.clone();
-        let _ = thread::Builder::new().spawn(move || insist(&insists, begun.elapsed()));
+        on_signal.request(Halt::Interrupted);
+        eprint_line(notice);
+        let after_signal = on_signal.clone();
+        let _ = thread::Builder::new().spawn(move || insist(&after_signal, started.elapsed()));
     });
     wait(limit, &cancellation);
     cancellation
 }
 
-/// Waits for the limit alone: a signal ends the program as usual.
-pub(crate) fn within(limit: Limit) -> Cancellation {
+/// Returns a cancellation that is requested by the time limit only; a signal ends the program as usual.
+pub(crate) fn cancel_after(limit: Limit) -> Cancellation {
     let cancellation = Cancellation::default();
     wait(limit, &cancellation);
     cancellation
 }
 
-/// Ends the program after the limit with an error: for what has nothing to tell before it is done, and writes whole files.
-pub(crate) fn or_end(limit: Limit) {
+/// Ends the program with an error at the time limit, for commands without intermediate results that write files atomically.
+pub(crate) fn exit_after(limit: Limit) {
     let Some(limit) = limit.time_limit else { return };
     let _ = thread::Builder::new().spawn(move || {
         thread::sleep(limit);
-        say(&format!("error: the time limit of {} s came before it was done", limit.as_secs_f64()));
+        eprint_line(&format!("error: not finished within the time limit of {} s", limit.as_secs_f64()));
         std::process::exit(3);
     });
 }
 
 fn wait(limit: Limit, cancellation: &Cancellation) {
     let Some(limit) = limit.time_limit else { return };
-    let of_clock = cancellation.clone();
+    let on_timeout = cancellation.clone();
     let _ = thread::Builder::new().spawn(move || {
         thread::sleep(limit);
-        of_clock.request(Halt::Budget);
-        insist(&of_clock, limit);
+        on_timeout.request(Halt::Budget);
+        insist(&on_timeout, limit);
     });
 }
 
-/// Lets a run of this age conclude, and then ends that too.
+/// Gives a run of this age time to conclude, and then cancels its concluding simulations.
 fn insist(cancellation: &Cancellation, age: Duration) {
-    thread::sleep((age / CONCLUDES).clamp(LEAST, MOST));
+    thread::sleep((age / CONCLUDING_SHARE).clamp(MIN_CONCLUDING, MAX_CONCLUDING));
     cancellation.insist();
 }
 
@@ -81,7 +81,7 @@ fn duration(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(seconds)
         .ok()
         .filter(|limit| !limit.is_zero())
-        .ok_or_else(|| format!("`{text}` is no time a run can take"))
+        .ok_or_else(|| format!("expected a positive time such as `10 min`, found `{text}`"))
 }
 
 #[cfg(test)]

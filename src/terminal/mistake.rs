@@ -1,4 +1,4 @@
-//! A mistake in a file or on the command line, as the terminal shows it.
+//! Display of an error in a file or on the command line, with its source line.
 
 use std::borrow::Cow;
 use std::io::{IsTerminal, Write};
@@ -9,11 +9,11 @@ use mops_core::Diagnostic;
 
 use crate::plain::plain;
 
-/// Characters of a line that are shown on either side of a mistake.
+/// Number of characters of a line shown on either side of an error.
 const AROUND: usize = 200;
 
-/// A text as it is shown, with a place in it: without control characters, and of long lines what is near the place. The lines
-/// keep their numbers.
+/// Returns a text for display and the position in it: control characters are escaped, long lines are cut around the
+/// position, line numbers are preserved.
 fn shown(text: &str, place: Range<usize>) -> (String, Range<usize>) {
     let (mut shown, mut start, mut end) = (String::new(), None, None);
     let mut offset = 0;
@@ -21,7 +21,7 @@ fn shown(text: &str, place: Range<usize>) -> (String, Range<usize>) {
         let after = offset + line.len();
         let body = line.trim_end_matches('\n').trim_end_matches('\r');
         let is_last = after == text.len() && body.len() == line.len();
-        // Of other lines the beginning is shown.
+        // Other lines are shown from their start.
         let is_here = (offset..after).contains(&place.start) || is_last && place.start == after;
         let here = if is_here { (place.start - offset).min(body.len()) } else { 0 };
         let from = body[..here].char_indices().rev().nth(AROUND - 1).map_or(0, |(i, _)| i);
@@ -43,7 +43,7 @@ fn shown(text: &str, place: Range<usize>) -> (String, Range<usize>) {
     (shown, start..end.unwrap_or(start).max(start))
 }
 
-/// Shows a mistake on standard error: file, line and column, the fact, the source line, the way out.
+/// Prints an error to standard error: file, line and column, message, source line, help.
 pub(super) fn show(diagnostic: &Diagnostic) {
     let mut shown = MietteDiagnostic::new(plain(&diagnostic.message));
     shown.help = diagnostic.help.as_deref().map(plain).map(Cow::into_owned);
@@ -53,7 +53,7 @@ pub(super) fn show(diagnostic: &Diagnostic) {
                 diagnostic.label.as_deref().map_or_else(|| "here".to_owned(), |label| plain(label).into_owned());
             let (start, end) = (span.start.min(source.text.len()), span.end.min(source.text.len()));
             let (start, end) = (source.text.floor_char_boundary(start), source.text.floor_char_boundary(end));
-            // A mistake spanning lines is pointed at by its first.
+            // An error over several lines is marked on the first one.
             let end = source.text[start..end].find('\n').map_or(end, |first| start + first);
             let (text, span) = self::shown(&source.text, start..end);
             shown.labels = Some(vec![LabeledSpan::at(span, label)]);

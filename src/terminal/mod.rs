@@ -1,4 +1,4 @@
-//! What programs on the terminal share: error messages, tables, progress, Ctrl-C.
+//! Shared parts of the command-line programs: error messages, tables, progress, Ctrl-C.
 
 mod limits;
 mod mistake;
@@ -12,11 +12,11 @@ use std::process::ExitCode;
 
 use mops_core::Diagnostic;
 
-pub(crate) use limits::{Limit, listen, or_end, within};
+pub(crate) use limits::{Limit, cancel_after, cancel_on_signal, exit_after};
 pub use progress::Progress;
 pub use table::{number, table};
 pub use write::print;
-pub(crate) use write::{print_json, say};
+pub(crate) use write::{eprint_line, print_json};
 
 /// Reason why a command ends without its result.
 #[derive(Debug)]
@@ -38,7 +38,7 @@ impl CommandError {
     /// Returns a conversion of write errors at `path`, for `map_err`.
     pub fn cannot_write(path: &Path) -> impl FnOnce(std::io::Error) -> Self + use<> {
         let path: PathBuf = path.to_owned();
-        move |error| Self::Failure(format!("{} cannot be written: {error}", path.display()))
+        move |error| Self::Failure(format!("cannot write {}: {error}", path.display()))
     }
 
     /// Writes the error to standard error, a mistake with its source line, and returns the exit status.
@@ -50,7 +50,7 @@ impl CommandError {
                 ExitCode::from(2)
             }
             Self::Failure(message) => {
-                say(&format!("error: {message}"));
+                eprint_line(&format!("error: {message}"));
                 ExitCode::from(3)
             }
         }

@@ -1,4 +1,4 @@
-//! Shows how a run goes.
+//! Progress of a run on the terminal.
 
 use std::fmt::Write as _;
 use std::io::IsTerminal;
@@ -9,37 +9,37 @@ use std::sync::{Mutex, PoisonError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mops_core::{Cancellation, CriterionReport, Evaluation, Halt, RunState, Study, Usage, Watch, criterion_reports};
 
-use super::limits::{Limit, listen};
+use super::limits::{Limit, cancel_on_signal};
 use super::sparkline::sparkline;
 use super::table::number;
-use super::write::say;
+use super::write::eprint_line;
 use crate::plain::plain;
 
-/// A progress bar on standard error, with the best objective so far; it passes on that an end is wanted.
+/// Progress bar on standard error with the best objective so far; forwards stop requests to the run.
 pub struct Progress {
     bar: ProgressBar,
     cancellation: Cancellation,
-    /// Whether the bar shows stages instead of points.
+    /// True if the bar shows stages instead of points.
     staged: AtomicBool,
-    /// The stage that was last said in a line of its own, and when, in seconds; `None` where a bar says it.
-    said: Option<Mutex<(String, f64)>>,
-    /// The study whose criteria are shown below the bar, where they are.
+    /// Stage that was last printed on its own line, and the time in s; `None` if a bar is shown.
+    printed: Option<Mutex<(String, f64)>>,
+    /// Study whose criteria are shown below the bar, if any.
     study: Option<Study>,
-    /// What stands below the bar.
-    below: Mutex<Below>,
+    /// Lines below the bar.
+    dashboard: Mutex<Dashboard>,
 }
 
-/// The lines below the bar.
+/// Lines below the bar.
 #[derive(Default)]
-struct Below {
+struct Dashboard {
     criteria: String,
-    /// Evaluations and objective where the best point got better.
+    /// Number of evaluations and objective at each improvement of the best point.
     curve: Vec<(usize, f64)>,
 }
 
-impl Below {
-    /// A better point; of many, every second one goes.
-    fn better(&mut self, evaluations: usize, objective: f64) {
+impl Dashboard {
+    /// Adds an improvement; every second one is dropped when the list is full.
+    fn add(&mut self, evaluations: usize, objective: f64) {
         if self.curve.last().is_some_and(|(_, last)| objective.to_bits() == last.to_bits()) {
             return;
         }
@@ -54,16 +54,16 @@ impl Below {
     }
 }
 
-/// Letters of the curve.
+/// Width of the sparkline, in characters.
 const SPARKS: usize = 40;
 
 impl Progress {
-    /// Shows the bar, where `shown`; stages in lines where standard error is no terminal.
+    /// Creates the progress bar of a run, visible if `shown`. Stages are printed as lines if standard error is no terminal.
     pub(crate) fn new(shown: bool, budget: usize, cancellation: &Cancellation) -> Self {
         let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(budget as u64), target);
         let style = "{bar:30} {pos}/{len} evaluations, at most {eta} left, {msg}";
-        bar.set_style(ProgressStyle::with_template(style).expect("the template is right"));
+        bar.set_style(ProgressStyle::with_template(style).expect("the template is valid"));
         Self::with(bar, shown, cancellation.clone())
     }
 
@@ -73,15 +73,19 @@ impl Progress {
         let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(None, target);
         let limit = Limit { time_limit: None };
-        Self::with(bar, shown, listen(limit, "interrupted: keeping the finished cases; press Ctrl-C again to quit now"))
+        Self::with(
+            bar,
+            shown,
+            cancel_on_signal(limit, "interrupted: keeping the finished cases; press Ctrl-C again to quit now"),
+        )
     }
 
     fn with(bar: ProgressBar, shown: bool, cancellation: Cancellation) -> Self {
-        let said = (shown && !std::io::stderr().is_terminal()).then(Mutex::default);
-        Self { bar, cancellation, staged: AtomicBool::new(false), said, study: None, below: Mutex::default() }
+        let printed = (shown && !std::io::stderr().is_terminal()).then(Mutex::default);
+        Self { bar, cancellation, staged: AtomicBool::new(false), printed, study: None, dashboard: Mutex::default() }
     }
 
-    /// Shows the convergence, and the criteria of the best point, below the bar.
+    /// Adds the convergence and the criteria of the best point below the bar.
     #[must_use]
     pub(crate) fn with_criteria_of(self, study: &Study) -> Self {
         Self { study: Some(study.clone()), ..self }
@@ -93,7 +97,7 @@ impl Progress {
         if self.wants_stop() { ExitCode::from(4) } else { ExitCode::SUCCESS }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
@@ -111,16 +115,13 @@ impl Watch for Progress {
     fn evaluated(&self, state: &RunState) {
         self.bar.set_position(state.evaluations as u64);
         let failed = if state.failed > 0 { format!(", {} failed", state.failed) } else { String::new() };
-        let violation = if state.best.is_feasible() {
-            String::new()
-        } else {
-            format!(", violated by {:.3e}", state.best.violation)
-        };
-        let mut below = self.below.lock().unwrap_or_else(PoisonError::into_inner);
+        let violation =
+            if state.best.is_feasible() { String::new() } else { format!(", violation {:.3e}", state.best.violation) };
+        let mut dashboard = self.dashboard.lock().unwrap_or_else(PoisonError::into_inner);
         let mut lines = String::new();
         if self.study.is_some() {
-            below.better(state.evaluations, state.best.objective);
-            lines = format!("\n  {}{}", sparkline(&below.curve, state.evaluations, SPARKS), below.criteria);
+            dashboard.add(state.evaluations, state.best.objective);
+            lines = format!("\n  {}{}", sparkline(&dashboard.curve, state.evaluations, SPARKS), dashboard.criteria);
         }
         let best = format!("best {:.6}{violation}{failed}{lines}", state.best.objective);
         self.bar.set_message(plain(&best).into_owned());
@@ -129,28 +130,28 @@ impl Watch for Progress {
     fn improved(&self, best: &Evaluation) {
         if let Some(study) = &self.study {
             let criteria = lines(&criterion_reports(study, best));
-            self.below.lock().unwrap_or_else(PoisonError::into_inner).criteria = criteria;
+            self.dashboard.lock().unwrap_or_else(PoisonError::into_inner).criteria = criteria;
         }
     }
 
     fn stage(&self, what: &str, done: f64) {
-        // Stages are no points: the bar shows their share of the whole, in thousandths.
+        // Stages count no points: the bar shows the finished share, in thousandths.
         if !self.staged.swap(true, Ordering::Relaxed) {
             let style = "{bar:30} {percent:>3} %, {elapsed} so far, {msg}";
-            self.bar.set_style(ProgressStyle::with_template(style).expect("the template is right"));
+            self.bar.set_style(ProgressStyle::with_template(style).expect("the template is valid"));
             self.bar.set_length(1000);
         }
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         self.bar.set_position((1000.0 * done.clamp(0.0, 1.0)) as u64);
         self.bar.set_message(plain(what).into_owned());
-        if let Some(said) = &self.said {
-            // A log has no bar to overwrite: the longer a run, the rarer the lines, but for stages of another kind.
-            let mut said = said.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(printed) = &self.printed {
+            // A log has no bar to overwrite: lines of the same kind of stage become rarer as the run gets longer.
+            let mut printed = printed.lock().unwrap_or_else(PoisonError::into_inner);
             let now = self.bar.elapsed().as_secs_f64();
             let kind = what.split([';', '0', '1', '2', '3', '4', '5', '6', '7', '8', '9']).next().unwrap_or(what);
-            if said.0 != kind || now - said.1 >= (0.05 * now).max(1.0) {
-                say(&format!("{now:>7.1} s  {what}"));
-                *said = (kind.to_owned(), now);
+            if printed.0 != kind || now - printed.1 >= (0.05 * now).max(1.0) {
+                eprint_line(&format!("{now:>7.1} s  {what}"));
+                *printed = (kind.to_owned(), now);
             }
         }
     }
@@ -158,18 +159,18 @@ impl Watch for Progress {
     fn keeping(&self, trouble: Option<&str>) {
         let text = match trouble {
             Some(why) => {
-                format!("warning: evaluations cannot be written ({why}); they wait in memory and are tried again")
+                format!("warning: evaluations cannot be written ({why}); they stay in memory until the next attempt")
             }
-            None => "note: evaluations are written again, and none is missing".to_owned(),
+            None => "note: evaluations are written again; none is missing".to_owned(),
         };
-        self.bar.suspend(|| say(&text));
+        self.bar.suspend(|| eprint_line(&text));
     }
 }
 
-/// Criteria on the terminal, at most.
+/// Largest number of criteria shown.
 const LINES: usize = 20;
 
-/// A line for every criterion: name, value, demand, and a bar from 0 to 2 in whose middle the demand is.
+/// Formats one line for each criterion: name, value, demand, and a bar of the scaled value from 0 to 2.
 fn lines(criteria: &[CriterionReport]) -> String {
     let name = |criterion: &CriterionReport| format!("{}/{}", criterion.case, criterion.name);
     let width = criteria.iter().map(|criterion| name(criterion).chars().count()).max().unwrap_or(0);
@@ -189,7 +190,7 @@ fn lines(criteria: &[CriterionReport]) -> String {
     text
 }
 
-/// A scaled value as a bar of 20 places; `|` is the demand.
+/// Formats a scaled value as a bar of 20 characters; `|` marks the demand, 1.
 fn bar(scaled: f64) -> String {
     let filled = if scaled.is_nan() { 0.0 } else { 10.0 * scaled.clamp(0.0, 2.0) };
     let place = |i: u32| if f64::from(i) < filled { '=' } else { ' ' };

@@ -1,4 +1,4 @@
-//! Tables on the terminal: columns aligned, numbers to the right.
+//! Tables on the terminal.
 
 use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, presets};
 

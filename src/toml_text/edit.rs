@@ -1,11 +1,12 @@
-//! Putting values into a TOML text, and taking entries away.
+//! Insertion, replacement and removal of entries of a TOML text.
 
 use super::entries::{Entry, Form, entries, header_of, last_line, own_end};
 use super::{TomlText, keys, owned};
 use crate::plain::line;
 
 impl TomlText {
-    /// Puts `value`, written as TOML, under these keys: instead of the value or the table that is there, or where it belongs.
+    /// Sets the entry at `path` to `value`, written as TOML. An existing value or table is replaced, a new entry is inserted
+    /// where its table is.
     pub(crate) fn set(&mut self, path: &[&str], value: &str) {
         let mut entries = entries(&self.0);
         match entries.iter().find(|entry| entry.path == path).map(|entry| &entry.form) {
@@ -41,7 +42,8 @@ impl TomlText {
                     self.0.insert_str(after, &format!("{} = {value}\n", keys(below)));
                     return;
                 }
-                // Written with dots in the table above: so is the new one. Else a table of its own follows the last one.
+                // The key is written with dots in the enclosing braces. Otherwise it follows the last entry of the table, under
+                // a header of its own if the table has headers.
                 Form::Implied
                     if entries
                         .iter()
@@ -66,7 +68,7 @@ impl TomlText {
         }
         let (table, key) = path.split_at(path.len() - 1);
         if table.is_empty() {
-            // What belongs to no table stands before all of them.
+            // Top-level keys are inserted before the first table.
             let headers =
                 entries.iter().filter_map(|e| if let Form::Header(span) = &e.form { Some(span.start) } else { None });
             let first =
@@ -77,7 +79,7 @@ impl TomlText {
         }
     }
 
-    /// Takes a table away, however it is written.
+    /// Removes a table, whatever its form.
     fn clear(&mut self, path: &[&str]) {
         let path = owned(path);
         let below = |text: &Self| {
@@ -88,12 +90,12 @@ impl TomlText {
         while let Some(leaf) = below(self) {
             let before = self.0.clone();
             self.remove(&leaf.iter().map(String::as_str).collect::<Vec<_>>(), "replaced");
-            assert!(self.0 != before, "an entry that is there can be taken away");
+            assert!(self.0 != before, "an existing entry can be removed");
         }
         self.remove(&path.iter().map(String::as_str).collect::<Vec<_>>(), "replaced");
     }
 
-    /// Takes an entry away: within braces it is cut out, elsewhere its lines become comments.
+    /// Removes an entry: within braces it is deleted, elsewhere its lines become comments, with the reason `why` above them.
     pub(crate) fn remove(&mut self, path: &[&str], why: &str) {
         let entries = entries(&self.0);
         let path = owned(path);
@@ -135,7 +137,7 @@ impl TomlText {
         }
     }
 
-    /// Where keys joined by dots begin, of which the last one begins at `last`, with `more` before it.
+    /// Returns the start of a dotted key whose last part starts at `last` and is preceded by `more` parts.
     fn start_of_keys(&self, last: usize, more: usize) -> usize {
         (0..more).fold(last, |start, _| {
             let key = self.0[..start].trim_end().trim_end_matches('.').trim_end();
@@ -154,7 +156,7 @@ impl TomlText {
         })
     }
 
-    /// The start of the line after a place.
+    /// Returns the start of the line after a position.
     fn end_of_line(&self, at: usize) -> usize {
         self.0[at..].find('\n').map_or(self.0.len(), |end| at + end + 1)
     }

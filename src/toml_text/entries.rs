@@ -1,4 +1,4 @@
-//! What stands in a TOML text, and where.
+//! Entries of a TOML text with their positions.
 
 use std::ops::Range;
 
@@ -7,19 +7,19 @@ use toml::de::{DeTable, DeValue};
 
 use super::owned;
 
-/// How a table is written down.
+/// Form of an entry.
 pub(super) enum Form {
-    /// `[a.b]`; the bytes of the header.
+    /// Table with a header `[a.b]`; byte range of the header.
     Header(Range<usize>),
-    /// `{ ... }`; its bytes.
+    /// Inline table `{ ... }`; its byte range.
     Inline(Range<usize>),
-    /// By what stands below it alone: `a.b = 1`, or `[a.b]` for `a`.
+    /// Table defined only by its entries: `a.b = 1`, or `[a.b]` for `a`.
     Implied,
-    /// No table: a value; its bytes.
+    /// Value other than a table; its byte range.
     Value(Range<usize>),
 }
 
-/// What stands in the text: the keys that lead to it, the place of its last key, its form.
+/// Entry of the text: its keys, the position of its last key, its form.
 pub(super) struct Entry {
     pub(super) path: Vec<String>,
     pub(super) key: Range<usize>,
@@ -27,9 +27,9 @@ pub(super) struct Entry {
     pub(super) empty: bool,
 }
 
-/// Every entry, in the order of the text within its table.
+/// Returns all entries; those of a table are in the order of the text.
 pub(super) fn entries(text: &str) -> Vec<Entry> {
-    let table = DeTable::parse(text).expect("a study that was read is right TOML, and every edit keeps it so");
+    let table = DeTable::parse(text).expect("a study that was read is valid TOML, and every edit keeps it valid");
     let mut all = Vec::new();
     walk(text, table.get_ref(), &[], &mut all);
     all
@@ -59,7 +59,7 @@ fn form<'v, 't>(text: &str, value: &'v Spanned<DeValue<'t>>) -> (Form, Option<&'
     }
 }
 
-/// The header that a place stands under, if this entry is one before it.
+/// Returns the path and the header of an entry, if it is a header before the position.
 pub(super) fn header_of(entry: &Entry, place: usize) -> Option<(&Vec<String>, &Range<usize>)> {
     match &entry.form {
         Form::Header(span) if span.end <= place => Some((&entry.path, span)),
@@ -67,7 +67,7 @@ pub(super) fn header_of(entry: &Entry, place: usize) -> Option<(&Vec<String>, &R
     }
 }
 
-/// Where the last thing below a path ends.
+/// Returns the end of the last entry below a path.
 pub(super) fn last_line(entries: &[Entry], path: &[&str]) -> usize {
     let below = entries.iter().filter(|entry| entry.path.starts_with(&owned(path)));
     let end = |entry: &Entry| match &entry.form {
@@ -77,7 +77,7 @@ pub(super) fn last_line(entries: &[Entry], path: &[&str]) -> usize {
     below.map(end).max().unwrap_or(0)
 }
 
-/// Where the last entry that stands right under a header ends, or the header itself.
+/// Returns the end of the last entry directly below a header, or the end of the header if there is none.
 pub(super) fn own_end(entries: &[Entry], header: &Range<usize>) -> usize {
     let headers = entries.iter().filter_map(|e| if let Form::Header(span) = &e.form { Some(span.start) } else { None });
     let next = headers.filter(|&start| start > header.start).min().unwrap_or(usize::MAX);

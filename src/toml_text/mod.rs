@@ -1,4 +1,4 @@
-//! Edits of a TOML text that leave all else as it is: comments, order, spaces.
+//! Edits of a TOML text that preserve comments, order and spaces.
 
 mod edit;
 mod entries;
@@ -11,7 +11,7 @@ use entries::{Entry, Form, entries};
 
 use crate::plain::plain;
 
-/// A TOML text that can be edited. It must be right: what is edited was read before.
+/// TOML text to be edited. It must be valid, as a text is parsed before it is edited.
 pub(crate) struct TomlText(String);
 
 impl TomlText {
@@ -27,7 +27,7 @@ impl TomlText {
         self.0
     }
 
-    /// Every value with the keys that lead to it; tables in braces count by what is in them.
+    /// Returns every value with its keys; inline tables contribute their entries.
     pub(crate) fn values(&self) -> Vec<(Vec<String>, String)> {
         let value = |entry: Entry| match entry.form {
             Form::Value(span) => Some((entry.path, self.0[span].to_owned())),
@@ -37,19 +37,19 @@ impl TomlText {
         entries(&self.0).into_iter().filter_map(value).collect()
     }
 
-    /// Puts a comment above all else.
+    /// Inserts a comment at the start of the text.
     pub(crate) fn head(&mut self, comment: &str) {
-        // Of control characters a comment may have tabs alone.
+        // The only control character allowed in a comment is the tab.
         let lines: String = comment.lines().map(|line| format!("# {}\n", plain(line))).collect();
         self.0.insert_str(0, &format!("{lines}\n"));
     }
 
-    /// Whether something stands there.
+    /// Returns true if the entry exists.
     pub(crate) fn has(&self, path: &[&str]) -> bool {
         entries(&self.0).iter().any(|entry| entry.path == path)
     }
 
-    /// The keys of a table, in the order of the text.
+    /// Returns the keys of a table, in the order of the text.
     pub(crate) fn keys(&self, path: &[&str]) -> Vec<String> {
         let path = owned(path);
         let below = |entry: Entry| match entry.path.strip_prefix(path.as_slice()) {
@@ -59,7 +59,7 @@ impl TomlText {
         entries(&self.0).into_iter().filter_map(below).collect()
     }
 
-    /// The text of a value, or of a table in braces.
+    /// Returns the text of a value or of an inline table.
     pub(crate) fn get(&self, path: &[&str]) -> Option<&str> {
         match entries(&self.0).into_iter().find(|entry| entry.path == path)?.form {
             Form::Value(span) | Form::Inline(span) => Some(&self.0[span]),
@@ -67,7 +67,7 @@ impl TomlText {
         }
     }
 
-    /// What a value that is a text says.
+    /// Returns the content of a string value.
     pub(crate) fn words(&self, path: &[&str]) -> Option<String> {
         let value = format!("v = {}", self.get(path)?);
         let table = DeTable::parse(&value).ok()?;
@@ -75,8 +75,8 @@ impl TomlText {
     }
 }
 
-/// A study with `key=value` settings in their places, for another folder: `locate` leads from the path of a data file to the
-/// path as it counts from there.
+/// Returns a study with its `key=value` settings merged, for another folder. `locate` converts the path of a data file to be
+/// relative to that folder.
 pub(crate) fn settled(text: &str, settings: &[String], locate: &dyn Fn(&str) -> String) -> TomlText {
     let mut text = TomlText::new(text);
     for setting in settings {
@@ -97,18 +97,18 @@ fn owned(path: &[&str]) -> Vec<String> {
     path.iter().map(|&key| key.to_owned()).collect()
 }
 
-/// Keys with dots between them, in quotes where they need some.
+/// Joins keys by dots, quoted if necessary.
 fn keys(path: &[&str]) -> String {
     path.iter().map(|key| self::key(key)).collect::<Vec<_>>().join(".")
 }
 
-/// A key, in quotes if it needs some.
+/// Returns a key as TOML, quoted if necessary.
 pub(crate) fn key(key: &str) -> String {
     let bare = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
     if bare { key.to_owned() } else { quoted(key) }
 }
 
-/// A text as TOML writes it, in one line: a key may have no other form.
+/// Returns a text as a TOML string on one line, as keys require.
 pub(crate) fn quoted(text: &str) -> String {
     if !text.contains(char::is_control) {
         return toml::Value::String(text.to_owned()).to_string();
@@ -121,7 +121,7 @@ pub(crate) fn quoted(text: &str) -> String {
     format!("\"{}\"", text.chars().map(escaped).collect::<String>())
 }
 
-/// A number as TOML writes it.
+/// Returns a number as TOML.
 pub(crate) fn number(value: f64) -> String {
     format!("{value:?}")
 }

@@ -1,4 +1,4 @@
-//! Edits leave all else as it is.
+//! Edits preserve the rest of the text.
 
 use proptest::prelude::*;
 use toml::{Table, Value};
@@ -38,7 +38,7 @@ fn edited(edit: impl FnOnce(&mut TomlText)) -> String {
 }
 
 #[test]
-fn a_value_is_replaced_where_it_stands_and_its_comment_stays() {
+fn a_value_is_replaced_in_place_and_its_comment_stays() {
     assert_eq!(edited(|t| t.set(&["study", "name"], "\"x\"")), TEXT.replace("\"swing\" #", "\"x\" #"));
     let started = edited(|t| t.set(&["tuners", "b", "start"], "7.0"));
     assert_eq!(started, TEXT.replace("start = 2e-3", "start = 7.0"));
@@ -71,7 +71,7 @@ fn a_new_value_goes_where_its_table_is_whatever_its_form() {
 }
 
 #[test]
-fn what_is_removed_becomes_a_comment_that_says_why() {
+fn a_removed_entry_becomes_a_comment_with_the_reason() {
     assert_eq!(edited(|t| t.remove(&["tuners", "b"], "not needed")), TEXT.replace("b  = {", "# not needed\n# b  = {"));
     assert_eq!(
         edited(|t| t.remove(&["tuners", "bp"], "gone")),
@@ -99,7 +99,7 @@ fn keys_and_texts_are_quoted_where_they_must_be() {
     assert_eq!(text.keys(&["tuners"]), ["b", "bp", "d"]);
 }
 
-/// A document, or what a setting says: numbers and tables under a few keys.
+/// Generates a document or a setting: numbers and tables under a few keys.
 fn tables() -> impl Strategy<Value = Value> {
     let number = (0i64..100).prop_map(Value::Integer);
     let keys = prop::sample::select(vec!["a", "b", "c \n\"d"]);
@@ -111,7 +111,7 @@ fn tables() -> impl Strategy<Value = Value> {
     inner.prop_map(|value| if value.is_table() { value } else { Value::Table(Table::from_iter([("a".into(), value)])) })
 }
 
-/// A table as text, its tables in braces, with dots or under headers as `forms` has it in turn.
+/// Formats a table as text. `forms` selects the form of each nested table: braces, dots or a header.
 fn rendered(table: &Table, [header, above]: [&[String]; 2], forms: &mut impl Iterator<Item = u8>) -> String {
     let (mut own, mut later) = (String::new(), String::new());
     for (key, value) in table {
@@ -155,7 +155,7 @@ fn a_value_written_with_dots_within_braces_is_replaced_as_a_whole() {
     }
 }
 
-/// What a study is with a setting over it.
+/// Merges a setting into a table.
 fn merged(into: &mut Table, from: &Table) {
     for (key, value) in from {
         match (into.get_mut(key), value) {
@@ -169,7 +169,7 @@ proptest! {
     #![proptest_config(mops_tiers::property(20_000))]
 
     #[test]
-    fn a_text_with_its_settings_says_what_the_study_was_read_as(
+    fn a_text_with_merged_settings_equals_the_study_as_read(
         document in tables(),
         settings in prop::collection::vec(tables(), 0..3),
         forms in prop::collection::vec(0u8..3, 12),

@@ -1,8 +1,8 @@
-//! A live page of a run, for this machine alone: `http://127.0.0.1:PORT/TOKEN/`. It shows and changes nothing.
+//! Live page of a run on localhost, `http://127.0.0.1:PORT/TOKEN/`. The page is read-only.
 //!
-//! The port is the system's choice and the token 128 random bits, so that no other page or user finds it by guessing. The
-//! run only leaves its newest state; viewers, each on a thread of their own, take it when they can, and one that is slow
-//! misses states and holds up nobody.
+//! The operating system chooses the port. The token has 128 random bits, so that other pages and users cannot guess the URL.
+//! The run only publishes its latest state. Each viewer reads it on a thread of its own; a slow viewer misses states and
+//! delays neither the run nor other viewers.
 
 mod request;
 mod server;
@@ -17,7 +17,7 @@ use mops_core::{Evaluation, Halt, RunState, Study, Watch};
 use server::Server;
 use state::Live;
 
-/// The live page of a run.
+/// Live page of a run.
 pub(crate) struct Page {
     server: Server,
     live: Arc<Live>,
@@ -27,25 +27,25 @@ impl Page {
     /// Opens the page for a run of this study.
     ///
     /// # Errors
-    /// No port of this machine can be listened to.
+    /// If no port of this machine is available.
     pub fn open(study: &Study, solver: &str, budget: usize) -> io::Result<Self> {
         let live = Arc::new(Live::new(study.clone(), solver, budget));
         Ok(Self { server: Server::open(Arc::clone(&live))?, live })
     }
 
-    /// Where it can be looked at.
+    /// Returns the URL of the page.
     pub fn address(&self) -> String {
         self.server.address()
     }
 
-    /// Tells that the run is over and where its result is; viewers have a moment to hear it.
+    /// Publishes the end of the run and the folder of its result, and gives viewers a moment to read it.
     pub fn finish(self, folder: &Path) {
         self.live.finish(&folder.display().to_string());
         self.server.close();
     }
 }
 
-/// Watches for the page, and for somebody else.
+/// Observer that notifies the page and another observer.
 pub(crate) struct Both<'w> {
     pub(crate) page: &'w Page,
     pub(crate) other: &'w dyn Watch,

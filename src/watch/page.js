@@ -1,28 +1,28 @@
-// Shows the newest state of the run. States come as server-sent events; each is whole, so that one may be missed.
+// Shows the latest state of the run. States are received as server-sent events; each is complete, so that some may be missed.
 "use strict";
 
 const at = (id) => document.getElementById(id);
 const text = (id, value) => { if (at(id).textContent !== value) at(id).textContent = value; };
 
-/** A number to so many significant digits, without trailing zeros. */
+/** Formats a number to `digits` significant digits, without trailing zeros. */
 function number(value, digits = 5) {
   if (value === null || value === undefined) return "n/a";
   return String(Number(value.toPrecision(digits)));
 }
 
-/** A time in s, min or h. */
+/** Formats a time in s, min or h. */
 function time(seconds) {
-  if (seconds === null || seconds === undefined) return "not known yet";
+  if (seconds === null || seconds === undefined) return "unknown";
   if (seconds < 120) return `${number(seconds, seconds < 10 ? 2 : 3)} s`;
   return seconds < 7200 ? `${number(seconds / 60, 3)} min` : `${number(seconds / 3600, 3)} h`;
 }
 
-/** An element with attributes and children; texts are never read as markup. */
+/** Creates an element with attributes and children; text is never parsed as markup. */
 function element(name, attributes = {}, ...children) {
-  const made = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.append(...children);
-  return made;
+  const node = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  node.append(...children);
+  return node;
 }
 
 function bar(criterion) {
@@ -36,8 +36,8 @@ function bar(criterion) {
 }
 
 function criterionRow(criterion) {
-  const asked = criterion.demand !== null;
-  const demand = asked ? `${criterion.at_least ? "at least " : ""}${number(criterion.demand)}` : "none";
+  const demanded = criterion.demand !== null;
+  const demand = demanded ? `${criterion.at_least ? "at least " : ""}${number(criterion.demand)}` : "none";
   const tone = criterion.met ? "met" : criterion.constraint ? "missed" : "above";
   return element("tr", {},
     element("th", { scope: "row" }, criterion.name),
@@ -45,8 +45,8 @@ function criterionRow(criterion) {
     element("td", { class: "number" }, demand),
     element("td", { class: "number" }, element("strong", {}, number(criterion.value))),
     element("td", {}, criterion.unit),
-    element("td", {}, asked ? bar(criterion) : ""),
-    element("td", {}, asked ? element("span", { class: tone }, criterion.met ? "met" : "not met") : ""));
+    element("td", {}, demanded ? bar(criterion) : ""),
+    element("td", {}, demanded ? element("span", { class: tone }, criterion.met ? "met" : "not met") : ""));
 }
 
 function tunerRow(tuner) {
@@ -56,7 +56,7 @@ function tunerRow(tuner) {
     mark.style.left = `${100 * tuner.position}%`;
     cell.append(element("span", { class: "range", "aria-hidden": "true" }, mark));
   } else {
-    cell.append("kept");
+    cell.append("fixed");
   }
   return element("tr", {},
     element("th", { scope: "row" }, tuner.name),
@@ -64,7 +64,7 @@ function tunerRow(tuner) {
     element("td", {}, tuner.unit), cell);
 }
 
-/** Round steps between two ends, about `count` of them. */
+/** Returns about `count` round numbers between two ends. */
 function ticks(low, high, count) {
   const rough = (high - low) / count;
   const power = 10 ** Math.floor(Math.log10(rough));
@@ -76,15 +76,15 @@ function ticks(low, high, count) {
 
 const NS = "http://www.w3.org/2000/svg";
 
-/** A part of the drawing. */
+/** Creates an SVG element. */
 function drawn(name, attributes, content = "") {
-  const made = document.createElementNS(NS, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.textContent = content;
-  return made;
+  const node = document.createElementNS(NS, name);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  node.textContent = content;
+  return node;
 }
 
-/** The curve of the best objective: steps, in another colour while a constraint is violated. */
+/** Draws the best objective as a step curve, in another colour while a constraint is violated. */
 function curve(state) {
   const points = state.curve.filter((p) => p[1] !== null);
   const svg = at("curve");
@@ -125,11 +125,11 @@ function verdict(state) {
     ? ["mixed", "No point has a value yet"]
     : best.feasible
       ? [best.objective <= 1 || state.task !== "design" ? "good" : "mixed", `Best objective ${number(best.objective, 6)}`]
-      : ["bad", `Best objective ${number(best.objective, 6)}, a constraint violated by ${number(best.violation, 3)}`];
-  const where = state.over !== null ? `. The run is over; its result and report.html are in ${state.over}` : "";
+      : ["bad", `Best objective ${number(best.objective, 6)}, constraint violated by ${number(best.violation, 3)}`];
+  const where = state.over !== null ? `. The run is over; result and report.html are in ${state.over}` : "";
   const stage = state.stage ? ` (${state.stage})` : "";
   at("verdict").className = `verdict ${tone}`;
-  const trouble = state.trouble ? `. Evaluations cannot be written (${state.trouble}): newer ones wait in memory` : "";
+  const trouble = state.trouble ? `. Evaluations cannot be written (${state.trouble}); new ones stay in memory` : "";
   text("verdict", sentence + stage + trouble + where);
 }
 
@@ -155,13 +155,13 @@ const events = new EventSource("events");
 events.onmessage = (event) => show(JSON.parse(event.data));
 events.addEventListener("over", (event) => { show(JSON.parse(event.data)); events.close(); });
 events.onerror = () => {
-  // A run that was killed says nothing any more: after a while the page says so.
+  // A killed run sends no last state; the page reports this after a timeout.
   if (events.readyState === EventSource.CLOSED) return;
   clearTimeout(window.silence);
   window.silence = setTimeout(() => {
     if (events.readyState !== EventSource.OPEN) {
       at("verdict").className = "verdict mixed";
-      text("verdict", "The run cannot be reached: it is over or was ended");
+      text("verdict", "No connection: the run is over or was killed");
     }
   }, 4000);
 };

@@ -1,26 +1,26 @@
-//! What a browser may ask for: three files and a stream of states, by GET, at this machine's own name.
+//! Requests of a browser: three files and a stream of states, by GET, with the host name of this machine.
 
-/// What is answered.
+/// Answer to a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Answer {
     /// The page.
     Page,
-    /// Its style sheet.
+    /// The style sheet.
     Style,
-    /// Its script.
+    /// The script.
     Script,
-    /// States, as they come.
+    /// The stream of states.
     Events,
-    /// Status and reason.
+    /// Refusal, with status and reason.
     Refused(u16, &'static str),
-    /// The head is not complete yet.
+    /// No answer yet, as the head is incomplete.
     More,
 }
 
-/// Bytes of the head of a request, at most.
+/// Largest size of the head of a request, in bytes.
 pub(super) const LONGEST: usize = 8192;
 
-/// The answer to the head of a request; `port` and `token` are those of the page.
+/// Returns the answer to the head of a request, for the port and the token of the page.
 pub(super) fn answer(head: &[u8], port: u16, token: &str) -> Answer {
     let mut headers = [httparse::EMPTY_HEADER; 64];
     let mut request = httparse::Request::new(&mut headers);
@@ -33,7 +33,7 @@ pub(super) fn answer(head: &[u8], port: u16, token: &str) -> Answer {
         Ok(httparse::Status::Complete(_)) => {}
     }
     let mut hosts = request.headers.iter().filter(|header| header.name.eq_ignore_ascii_case("host"));
-    // A page of another name that leads here (DNS rebinding) says its own name.
+    // A foreign page that was redirected here (DNS rebinding) sends its own host name.
     let ours = ["127.0.0.1", "localhost"].map(|host| format!("{host}:{port}"));
     let is_ours = |host: &httparse::Header<'_>| ours.iter().any(|our| host.value.eq_ignore_ascii_case(our.as_bytes()));
     if !(hosts.next().is_some_and(is_ours) && hosts.next().is_none()) {
@@ -53,7 +53,7 @@ pub(super) fn answer(head: &[u8], port: u16, token: &str) -> Answer {
     }
 }
 
-/// Whether two texts are the same, in a time that does not tell how far they agree.
+/// Compares two texts in constant time, so that the time does not reveal a common prefix.
 fn same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b)) == 0
 }
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_request_is_refused_and_half_of_one_waited_for() {
+    fn an_invalid_request_is_refused_and_an_incomplete_one_is_awaited() {
         assert_eq!(asked("GET /secret/ HTTP/1.1\r\nHo"), Answer::More);
         assert_eq!(asked("\u{1}\u{2}\u{3}\r\n\r\n"), Answer::Refused(400, "Bad Request"));
         let long = format!("GET /secret/ HTTP/1.1\r\nX: {}", "x".repeat(LONGEST));

@@ -1,5 +1,4 @@
-//! Connections to the live page: each has a thread, a few seconds to say what it wants and to take what it gets, and there
-//! are only so many.
+//! Server of the live page: one thread per connection, a time limit for requests and answers, and a limit on connections.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -12,27 +11,27 @@ use std::time::{Duration, Instant};
 use super::request::{Answer, LONGEST, answer};
 use super::state::Live;
 
-/// Viewers at once, at most: connections that have named the address.
+/// Largest number of simultaneous viewers: connections that have requested the URL.
 const CONNECTIONS: usize = 32;
 
-/// Connections that have not said yet what they want, at most. Of more, the oldest is ended: a browser says it at once, and who
-/// opens connections and says nothing keeps nobody away.
+/// Largest number of connections without a request. The oldest of more is closed, so that idle connections block nobody: a
+/// browser sends its request at once.
 const PENDING: usize = 32;
 
-/// Time for a request, and for the viewer to take a part of the answer.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// Time limit for a request, and for the viewer to receive a part of the answer.
+const TIMEOUT: Duration = Duration::from_secs(5);
 
-/// States are at least so far apart. A browser that draws them takes its time from the run.
+/// Shortest time between two states, as drawing in the browser takes time from the run.
 const PACE: Duration = Duration::from_millis(500);
 
-/// A stream says something at least so often, so that a viewer that left is noticed.
-const PULSE: Duration = Duration::from_secs(2);
+/// Longest time between two messages of a stream; a failed write shows that the viewer has left.
+const HEARTBEAT: Duration = Duration::from_secs(2);
 
 const PAGE: &str = include_str!("page.html");
 const SCRIPT: &str = include_str!("page.js");
 const OWN_STYLE: &str = include_str!("page.css");
 
-/// The server of a page.
+/// Server of the live page.
 pub(super) struct Server {
     port: u16,
     token: String,
@@ -41,16 +40,16 @@ pub(super) struct Server {
 
 struct Shared {
     live: Arc<Live>,
-    /// Connections that have not said yet what they want, in the order in which they came.
+    /// Connections without a request, in the order of arrival.
     pending: Mutex<VecDeque<(u64, TcpStream)>>,
     connections: AtomicUsize,
-    /// Streams that wait for a state, and so will take the last one at once.
+    /// Number of streams that wait for a state and will take the last one at once.
     waiting: AtomicUsize,
     closed: AtomicBool,
 }
 
 impl Server {
-    /// Begins to listen.
+    /// Starts to listen.
     pub fn open(live: Arc<Live>) -> io::Result<Self> {
         let listener = TcpListener::bind(SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0))?;
         let port = listener.local_addr()?.port();
@@ -75,14 +74,14 @@ impl Server {
         format!("http://127.0.0.1:{}/{}/", self.port, self.token)
     }
 
-    /// Ends it. Viewers who wait for the last state get it; those who say nothing, or take nothing, are not waited for.
+    /// Stops the server. Viewers that wait for the last state receive it; idle or stuck connections are not awaited.
     pub fn close(self) {
         let until = Instant::now() + Duration::from_secs(1);
         while self.shared.waiting.load(Ordering::Relaxed) > 0 && Instant::now() < until {
             thread::sleep(Duration::from_millis(2));
         }
         self.shared.closed.store(true, Ordering::Relaxed);
-        // Wakes who listens.
+        // Wakes the listening thread.
         let _ = TcpStream::connect(SocketAddrV4::new(Ipv4Addr::LOCALHOST, self.port));
     }
 }
@@ -93,14 +92,14 @@ fn listen(listener: &TcpListener, port: u16, token: &str, shared: &Arc<Shared>) 
             return;
         }
         let Ok(stream) = stream else {
-            // Too many open files, say: it may pass.
+            // For example too many open files, which may be temporary.
             thread::sleep(Duration::from_millis(100));
             continue;
         };
         let Ok(waiting) = stream.try_clone() else { continue };
-        shared.waits((number, waiting));
+        shared.add_pending((number, waiting));
         let (token, shared) = (token.to_owned(), Arc::clone(shared));
-        // N.B.: without a thread the connection is dropped, and the viewer comes again.
+        // N.B.: without a thread the connection is dropped, and the viewer reconnects.
         let _ = thread::Builder::new().name("viewer".into()).spawn(move || {
             let _ = serve(stream, (port, &token), number, &shared);
         });
@@ -108,8 +107,8 @@ fn listen(listener: &TcpListener, port: u16, token: &str, shared: &Arc<Shared>) 
 }
 
 impl Shared {
-    /// A connection came that has said nothing yet.
-    fn waits(&self, connection: (u64, TcpStream)) {
+    /// Adds a connection without a request.
+    fn add_pending(&self, connection: (u64, TcpStream)) {
         let mut pending = self.pending.lock().unwrap_or_else(PoisonError::into_inner);
         pending.push_back(connection);
         if pending.len() > PENDING
@@ -119,16 +118,16 @@ impl Shared {
         }
     }
 
-    /// It has said what it wants, or left.
-    fn said(&self, number: u64) {
+    /// Removes a connection that has sent its request or was closed.
+    fn remove_pending(&self, number: u64) {
         self.pending.lock().unwrap_or_else(PoisonError::into_inner).retain(|(of, _)| *of != number);
     }
 }
 
-/// One of so many connections.
-struct Place(Arc<Shared>);
+/// Slot for one viewer.
+struct Slot(Arc<Shared>);
 
-impl Place {
+impl Slot {
     fn take(shared: &Arc<Shared>) -> Option<Self> {
         if shared.connections.fetch_add(1, Ordering::Relaxed) >= CONNECTIONS {
             shared.connections.fetch_sub(1, Ordering::Relaxed);
@@ -138,26 +137,26 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for Slot {
     fn drop(&mut self) {
         self.0.connections.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
 fn serve(mut stream: TcpStream, (port, token): (u16, &str), number: u64, shared: &Arc<Shared>) -> io::Result<()> {
-    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(TIMEOUT))?;
     stream.set_nodelay(true)?;
-    let wanted = read(&mut stream, port, token);
-    shared.said(number);
-    let wanted = wanted?;
-    // Who names the address takes a place; without one the connection is dropped, and the viewer comes again.
-    let named = !matches!(wanted, Answer::Refused(..) | Answer::More);
-    let _place = match named.then(|| Place::take(shared)) {
+    let request = read(&mut stream, port, token);
+    shared.remove_pending(number);
+    let request = request?;
+    // A viewer with the right URL takes a slot; without a free slot the connection is dropped, and the viewer reconnects.
+    let authorised = !matches!(request, Answer::Refused(..) | Answer::More);
+    let _slot = match authorised.then(|| Slot::take(shared)) {
         Some(None) => return Ok(()),
-        place => place.flatten(),
+        slot => slot.flatten(),
     };
     let style = || [crate::report::STYLE, OWN_STYLE].concat();
-    match wanted {
+    match request {
         Answer::Page => whole(&mut stream, "200 OK", "text/html; charset=utf-8", &page(shared)),
         Answer::Style => whole(&mut stream, "200 OK", "text/css; charset=utf-8", &style()),
         Answer::Script => whole(&mut stream, "200 OK", "text/javascript; charset=utf-8", SCRIPT),
@@ -169,16 +168,16 @@ fn serve(mut stream: TcpStream, (port, token): (u16, &str), number: u64, shared:
     }
 }
 
-/// The page with the state of this moment in it.
+/// Returns the page with the current state embedded.
 fn page(shared: &Shared) -> String {
     let (_, _, state) = shared.live.after(0, Duration::ZERO);
-    // In a page, `<` could end the block that the state is in.
+    // `<` could close the script element that contains the state.
     PAGE.replace("{{state}}", &state.replace('<', "\\u003c"))
 }
 
-/// Reads the head of a request: all of it within [`PATIENCE`], however slowly it comes.
+/// Reads the head of a request within [`TIMEOUT`] in total.
 fn read(stream: &mut TcpStream, port: u16, token: &str) -> io::Result<Answer> {
-    let until = Instant::now() + PATIENCE;
+    let until = Instant::now() + TIMEOUT;
     let mut head = Vec::new();
     let mut part = [0; 1024];
     loop {
@@ -202,7 +201,7 @@ fn read(stream: &mut TcpStream, port: u16, token: &str) -> io::Result<Answer> {
     }
 }
 
-/// What every answer says: nobody keeps it, and the page loads nothing from elsewhere.
+/// Headers of every answer: no caching, and no content from other origins.
 const HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
     Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; connect-src 'self'; \
     img-src data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'\r\nConnection: close\r\n";
@@ -213,16 +212,16 @@ fn whole(stream: &mut TcpStream, status: &str, kind: &str, body: &str) -> io::Re
     stream.write_all([head.as_bytes(), body.as_bytes()].concat().as_slice())
 }
 
-/// Server-sent events. Source: HTML Living Standard, section 9.2.
+/// Writes server-sent events. Source: HTML Living Standard, section 9.2.
 fn events(stream: &mut TcpStream, shared: &Shared) -> io::Result<()> {
     let head = format!("HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\n{HEADERS}\r\n");
     stream.write_all(head.as_bytes())?;
     let (mut seen, mut pace) = (0, Duration::ZERO);
     loop {
-        let waiting = Waiting::begin(&shared.waiting);
+        let waiting = Waiting::start(&shared.waiting);
         shared.live.pause(pace);
-        let (version, over, state) = shared.live.after(seen, PULSE);
-        // The last state is waited for until it is taken.
+        let (version, over, state) = shared.live.after(seen, HEARTBEAT);
+        // The stream still counts as waiting until the last state is sent.
         let _waiting = over.then_some(waiting);
         let name = if over { "event: over\n" } else { "" };
         stream.write_all(format!("{name}data: {state}\n\n").as_bytes())?;
@@ -233,11 +232,11 @@ fn events(stream: &mut TcpStream, shared: &Shared) -> io::Result<()> {
     }
 }
 
-/// A stream that waits, as long as this lives.
+/// Guard that counts a waiting stream.
 struct Waiting<'a>(&'a AtomicUsize);
 
 impl<'a> Waiting<'a> {
-    fn begin(count: &'a AtomicUsize) -> Self {
+    fn start(count: &'a AtomicUsize) -> Self {
         count.fetch_add(1, Ordering::Relaxed);
         Self(count)
     }

@@ -1,4 +1,4 @@
-//! The newest state of a run, as the page shows it.
+//! Latest state of a run for the live page.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -6,46 +6,47 @@ use std::time::{Duration, Instant};
 use mops_core::{Evaluation, Merit, RunState, Study, Usage, criterion_reports};
 use serde_json::{Value, json};
 
-/// Points of the curve, at most: of more, every second one goes.
+/// Largest number of points of the curve; every second one of more is dropped.
 const CURVE: usize = 600;
 
-/// The newest state; what nobody took is gone when a newer one comes.
+/// Latest state of a run, shared with the viewers; unread states are overwritten.
 pub(super) struct Live {
     study: Study,
     solver: String,
-    begun: Instant,
+    started: Instant,
     state: Mutex<Newest>,
     changed: Condvar,
 }
 
 struct Newest {
-    /// Counts the changes, from 1.
+    /// Number of changes, starting at 1.
     version: u64,
     run: RunState,
     stage: Option<(String, f64)>,
     best: Option<Evaluation>,
-    /// Evaluations, objective and violation where the best point changed.
+    /// Number of evaluations, objective and violation at each change of the best point.
     curve: Vec<(usize, Merit)>,
-    /// Why evaluations cannot be written at present.
-    trouble: Option<String>,
-    /// Seconds, and where the result is, once the run is over.
+    /// Reason why evaluations cannot be written, if so.
+    write_error: Option<String>,
+    /// Time in s and folder of the result, after the end of the run.
     over: Option<(f64, String)>,
 }
 
 impl Live {
     pub fn new(study: Study, solver: &str, budget: usize) -> Self {
         let run = RunState { evaluations: 0, budget, failed: 0, best: Merit::FAILED };
-        let state = Newest { version: 1, run, stage: None, best: None, curve: Vec::new(), trouble: None, over: None };
+        let state =
+            Newest { version: 1, run, stage: None, best: None, curve: Vec::new(), write_error: None, over: None };
         Self {
             study,
             solver: solver.to_owned(),
-            begun: Instant::now(),
+            started: Instant::now(),
             state: Mutex::new(state),
             changed: Condvar::new(),
         }
     }
 
-    // A viewer that panicked leaves a state that is as good as any.
+    // After a panic of a viewer the state is still valid.
     fn newest(&self) -> MutexGuard<'_, Newest> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -84,39 +85,41 @@ impl Live {
         self.change(|newest| newest.stage = Some((what.to_owned(), done)));
     }
 
-    pub fn keeping(&self, trouble: Option<&str>) {
-        self.change(|newest| newest.trouble = trouble.map(str::to_owned));
+    pub fn keeping(&self, error: Option<&str>) {
+        self.change(|newest| newest.write_error = error.map(str::to_owned));
     }
 
     pub fn finish(&self, folder: &str) {
-        let seconds = self.begun.elapsed().as_secs_f64();
+        let seconds = self.started.elapsed().as_secs_f64();
         self.change(|newest| newest.over = Some((seconds, folder.to_owned())));
     }
 
-    /// Waits for so long, or until the run is over.
-    pub fn pause(&self, patience: Duration) {
-        let goes_on = |newest: &mut Newest| newest.over.is_none();
-        drop(self.changed.wait_timeout_while(self.newest(), patience, goes_on));
+    /// Waits for the given time, or until the run is over.
+    pub fn pause(&self, time: Duration) {
+        let in_progress = |newest: &mut Newest| newest.over.is_none();
+        drop(self.changed.wait_timeout_while(self.newest(), time, in_progress));
     }
 
-    /// The state as JSON once it is newer than `seen`, or after `patience`; its version, and whether the run is over.
-    pub fn after(&self, seen: u64, patience: Duration) -> (u64, bool, String) {
+    /// Waits until the state is newer than version `seen`, at most for `timeout`. Returns the version, true if the run is over,
+    /// and the state as JSON.
+    pub fn after(&self, seen: u64, timeout: Duration) -> (u64, bool, String) {
         let newest = self.newest();
-        let waits = |newest: &mut Newest| newest.version <= seen;
-        let waited = self.changed.wait_timeout_while(newest, patience, waits);
+        let is_old = |newest: &mut Newest| newest.version <= seen;
+        let waited = self.changed.wait_timeout_while(newest, timeout, is_old);
         let (newest, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        (newest.version, newest.over.is_some(), self.told(&newest).to_string())
+        (newest.version, newest.over.is_some(), self.json(&newest).to_string())
     }
 
-    fn told(&self, newest: &Newest) -> Value {
+    fn json(&self, newest: &Newest) -> Value {
         let run = newest.run;
-        let seconds = newest.over.as_ref().map_or_else(|| self.begun.elapsed().as_secs_f64(), |(seconds, _)| *seconds);
+        let seconds =
+            newest.over.as_ref().map_or_else(|| self.started.elapsed().as_secs_f64(), |(seconds, _)| *seconds);
         let share = match &newest.stage {
             Some((_, done)) => *done,
             #[allow(clippy::cast_precision_loss)]
             None => run.evaluations as f64 / run.budget.max(1) as f64,
         };
-        // At the speed so far; a solver that converges ends earlier.
+        // Extrapolated from the speed so far; an upper bound, as a solver that converges ends earlier.
         let left = (share > 0.0).then(|| (seconds * (1.0 / share - 1.0)).max(0.0));
         let curve: Vec<Value> = (newest.curve.iter())
             .map(|(at, merit)| json!([at, merit.objective, merit.violation, merit.is_feasible()]))
@@ -126,7 +129,7 @@ impl Live {
             "evaluations": run.evaluations, "budget": run.budget, "failed": run.failed,
             "seconds": seconds, "left": left, "share": share,
             "stage": newest.stage.as_ref().map(|(what, _)| what),
-            "trouble": &newest.trouble,
+            "trouble": &newest.write_error,
             "over": newest.over.as_ref().map(|(_, folder)| folder),
             "best": newest.best.as_ref().map(|best| json!({
                 "objective": best.merit.objective, "violation": best.merit.violation, "feasible": best.merit.is_feasible(),
@@ -139,7 +142,7 @@ impl Live {
 
     fn criteria(&self, best: &Evaluation) -> Vec<Value> {
         let reports = criterion_reports(&self.study, best);
-        let told = reports.into_iter().map(|criterion| {
+        let criteria = reports.into_iter().map(|criterion| {
             json!({
                 "name": criterion.name, "case": criterion.case, "usage": criterion.usage, "unit": criterion.unit,
                 "demand": criterion.demand.or(criterion.bad), "at_least": criterion.at_least,
@@ -147,17 +150,17 @@ impl Live {
                 "constraint": matches!(criterion.usage, Usage::Inequality | Usage::Equality),
             })
         });
-        told.collect()
+        criteria.collect()
     }
 
     fn tuners(&self, best: &Evaluation) -> Vec<Value> {
         let tuners = self.study.tuners().iter().zip(&best.tuners);
-        let told = |(tuner, value): (&mops_core::Tuner, &f64)| {
+        let json_of = |(tuner, value): (&mops_core::Tuner, &f64)| {
             json!({
                 "name": tuner.name, "value": value, "unit": tuner.unit.to_string(), "active": tuner.active,
                 "position": tuner.active.then(|| tuner.position_of(*value)),
             })
         };
-        tuners.map(told).collect()
+        tuners.map(json_of).collect()
     }
 }

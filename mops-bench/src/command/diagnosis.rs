@@ -10,58 +10,60 @@ use mops::{Catalogue, Diagnostic};
 use mops::terminal::{CommandError, Progress, print};
 
 use super::{folder, tables, write};
-use crate::diagnosis::{self, Beside, Kind, Plan, Tools};
+use crate::diagnosis::{self, Comparisons, Kind, Plan, Tools};
 
 /// Options of `mops-bench diagnosis`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Cases that lack one effect: effects take turns, then sizes.
+    /// Number of cases with one missing effect, cycling through the effects, then through the sizes.
     #[arg(long, default_value_t = 200)]
     cases: usize,
-    /// Cases that lack two effects.
+    /// Number of cases with two missing effects.
     #[arg(long, default_value_t = 20)]
     two: usize,
-    /// Cases that lack nothing.
+    /// Number of cases without a missing effect.
     #[arg(long, default_value_t = 100)]
     none: usize,
-    /// Cases that lack what no catalogue has.
+    /// Number of cases with a missing effect that is not in the catalogue.
     #[arg(long, default_value_t = 20)]
     outside: usize,
-    /// Plants, separated by commas; all where absent.
+    /// Plants, separated by commas [default: all].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     plants: Vec<String>,
-    /// Effects, as the test bed calls them, separated by commas; all where absent.
+    /// Effects, by their names in the test bed, separated by commas [default: all].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     effects: Vec<String>,
-    /// Errors of the refitted base model, in units of the noise.
+    /// Sizes of the effects: errors of the refitted nominal model, in units of the noise.
     #[arg(long, value_delimiter = ',', value_name = "NUMBERS", default_values_t = mops_testbed::SIZES)]
     sizes: Vec<f64>,
-    /// Seed of the cases, and of the diagnosis.
+    /// Seed of the cases and of the diagnosis.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Only the cases of these names, as `cases.csv` of an earlier run with the same options spells them; their studies and
-    /// data go to the folder too. Choose another folder than that of the earlier run, whose tables would be lost.
+    /// Run only the cases with these names, as listed in cases.csv of an earlier run with the same options.
+    ///
+    /// Their studies and data are also written to the folder. Use another folder than that of the earlier run, as its tables
+    /// would be overwritten.
     #[arg(long, value_delimiter = ',', value_name = "NAMES", conflicts_with = "folder")]
     only: Vec<String>,
-    /// Number of cases that run at once, each on one thread; all cores where absent.
+    /// Number of parallel cases, each on one thread [default: all cores].
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Folder for a page and tables of all cases and of the strengths found.
+    /// Folder for a page and for tables of the cases and of the estimated effect parameters.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Put another tool beside the diagnosis.
+    /// Compare the diagnosis with another tool.
     #[arg(long, value_name = "TOOL")]
     against: Option<Rival>,
-    /// Diagnose every case so many times more, with other orders of the catalogue and other seeds, and count what agrees.
+    /// Number of additional diagnoses of each case, with shuffled catalogue and other seeds, to count equal findings.
     #[arg(long, value_name = "NUMBER", default_value_t = 0, conflicts_with = "folder")]
     orders: u64,
-    /// Try no more effects than are missing: what the intervals are worth, without the search.
-    #[arg(long, conflicts_with = "folder")]
-    told: bool,
-    /// Diagnose the cases of a folder instead: a folder each, with case.json and data.
+    /// Try only the missing effects, to measure the coverage of intervals without the search.
+    #[arg(long = "told", conflicts_with = "folder")]
+    known_effects: bool,
+    /// Diagnose the cases in a folder instead, each a folder with case.json and data files.
     #[arg(long, value_name = "DIR")]
     folder: Option<PathBuf>,
-    /// Where the answers to these go; `answers` where absent.
+    /// Folder for the answers to these cases [default: answers].
     #[arg(long, value_name = "DIR", requires = "folder")]
     answers: Option<PathBuf>,
     /// Show no progress.
@@ -69,10 +71,10 @@ pub(super) struct Arguments {
     quiet: bool,
 }
 
-/// Another tool.
+/// Tool for comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Rival {
-    /// The model refitted with every effect in turn, and the least BIC believed.
+    /// Refit of the model with each effect in turn; selection of the smallest BIC.
     BruteForce,
 }
 
@@ -91,15 +93,16 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     let plan = plan(arguments)?;
     let named = plan.named();
     if let Some(unknown) = plan.only.iter().find(|name| !named.iter().any(|trial| trial.name == **name)) {
-        let fact = format!("these options make no case `{unknown}`");
+        let fact = format!("no case `{unknown}` with these options");
         return Err(Diagnostic::new(fact)
-            .with_help("repeat the options of the run that has it in its cases.csv")
+            .with_help("repeat the options of the run whose cases.csv lists the case")
             .into());
     }
     let progress = Progress::of_cases(!arguments.quiet);
     let tools = Tools { catalogue, watch: &progress, seed: arguments.seed };
-    let beside = Beside { brute_force: against, orders: arguments.orders, told: arguments.told };
-    let results = diagnosis::run(&plan, tools, jobs, beside);
+    let comparisons =
+        Comparisons { brute_force: against, orders: arguments.orders, known_effects: arguments.known_effects };
+    let results = diagnosis::run(&plan, tools, jobs, comparisons);
     progress.finish();
     let text = tables::all(&results);
     print(&text)?;
@@ -119,7 +122,7 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     Ok(progress.status())
 }
 
-/// What is asked for, names checked.
+/// Returns the plan of the benchmark, with names checked.
 fn plan(arguments: &Arguments) -> Result<Plan, Diagnostic> {
     let all_plants: Vec<&str> = mops_testbed::plants().iter().map(|plant| plant.name).collect();
     let all_effects: Vec<&str> = mops_testbed::effects().iter().map(|effect| effect.name).collect();
@@ -130,8 +133,8 @@ fn plan(arguments: &Arguments) -> Result<Plan, Diagnostic> {
         (Kind::Outside, arguments.outside),
     ];
     if let Some(size) = arguments.sizes.iter().find(|&&size| !(size > 1.0 && size.is_finite())) {
-        let fact = format!("a base model that lacks something has an error above 1, not {size}");
-        return Err(Diagnostic::new(fact).with_help("`--sizes 20,5,2,1.3`"));
+        let fact = format!("expected sizes above 1 (errors of the nominal model, in units of the noise), found {size}");
+        return Err(Diagnostic::new(fact).with_help("for example `--sizes 20,5,2,1.3`"));
     }
     Ok(Plan {
         plants: chosen(&arguments.plants, &all_plants, "plant")?,
@@ -143,7 +146,7 @@ fn plan(arguments: &Arguments) -> Result<Plan, Diagnostic> {
     })
 }
 
-/// The names asked for; all where none are.
+/// Returns the requested names without duplicates; all names if none are requested.
 fn chosen(asked: &[String], all: &[&str], what: &str) -> Result<Vec<String>, Diagnostic> {
     if let Some(unknown) = asked.iter().find(|name| !all.contains(&name.as_str())) {
         let fact = format!("the test bed has no {what} `{unknown}`");

@@ -1,4 +1,4 @@
-//! The answers to a folder of cases, and what of them is printed.
+//! Answers to a folder of cases, as files and as a table.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -10,7 +10,7 @@ use mops::terminal::{CommandError, number, print, table};
 
 use crate::diagnosis::{Answer, Cases, Reply, Tools, spelt};
 
-/// Diagnoses every case of a folder, writes the answers, and prints a line for each.
+/// Diagnoses every case of a folder, writes the answers and prints a table.
 pub(super) fn answer(
     cases: &Path,
     answers: &Path,
@@ -20,23 +20,23 @@ pub(super) fn answer(
 ) -> Result<ExitCode, CommandError> {
     let cases = Cases::find(cases).map_err(Diagnostic::new)?;
     std::fs::create_dir_all(answers).map_err(CommandError::cannot_write(answers))?;
-    let refused = Mutex::new(None);
+    let first_error = Mutex::new(None);
     let replies = cases.run(tools, jobs, against, |reply| {
-        if let Err(trouble) = leave(answers, reply) {
-            refused.lock().expect("no thread breaks while it holds it").get_or_insert(trouble);
+        if let Err(error) = write_answer(answers, reply) {
+            first_error.lock().expect("no thread panics while it locks the error").get_or_insert(error);
         }
     });
-    if let Some(trouble) = refused.into_inner().expect("all threads have ended") {
-        return Err(trouble);
+    if let Some(error) = first_error.into_inner().expect("all threads have ended") {
+        return Err(error);
     }
     print(&text(&replies))?;
     print(&format!("\nanswers, predictions and studies are in {}\n", answers.display()))?;
-    let failed = replies.iter().any(|reply| reply.said.is_err());
+    let failed = replies.iter().any(|reply| reply.answer.is_err());
     Ok(if failed { ExitCode::from(3) } else { ExitCode::SUCCESS })
 }
 
-/// Writes what there is of a case.
-fn leave(answers: &Path, reply: &Reply) -> Result<(), CommandError> {
+/// Writes the study and, if there is one, the answer of a case.
+fn write_answer(answers: &Path, reply: &Reply) -> Result<(), CommandError> {
     let write = |name: String, content: &str| {
         let path = answers.join(name);
         std::fs::write(&path, content).map_err(CommandError::cannot_write(&path))
@@ -45,37 +45,37 @@ fn leave(answers: &Path, reply: &Reply) -> Result<(), CommandError> {
     if !reply.study.is_empty() {
         write(format!("{name}.toml"), &reply.study)?;
     }
-    let Ok(said) = &reply.said else { return Ok(()) };
-    write(format!("{name}.json"), &said.json)?;
-    said.predictions.iter().try_for_each(|(file, content)| write(format!("{name}_{file}.csv"), content))
+    let Ok(answer) = &reply.answer else { return Ok(()) };
+    write(format!("{name}.json"), &answer.json)?;
+    answer.predictions.iter().try_for_each(|(file, content)| write(format!("{name}_{file}.csv"), content))
 }
 
 fn text(replies: &[Reply]) -> String {
-    let beside = |reply: &Reply| reply.brute.as_ref().map_or_else(String::new, brute);
-    let rows = replies.iter().map(|reply| match &reply.said {
+    let brute_cell = |reply: &Reply| reply.brute.as_ref().map_or_else(String::new, brute);
+    let rows = replies.iter().map(|reply| match &reply.answer {
         Err(why) => {
             let mut cells = vec![reply.name.clone(), "failed".to_owned(), String::new(), why.clone()];
             cells.resize(8, String::new());
-            cells.push(beside(reply));
+            cells.push(brute_cell(reply));
             cells
         }
-        Ok(said) => {
-            let found = said.answer.found.iter().map(|((effect, place), _)| format!("{effect} at {place}"));
-            let found = found.chain(said.answer.unexplained_at.iter().map(|place| format!("something at {place}")));
+        Ok(answer) => {
+            let found = answer.summary.found.iter().map(|((effect, place), _)| format!("{effect} at {place}"));
+            let found = found.chain(answer.summary.unexplained_at.iter().map(|place| format!("unknown at {place}")));
             let errors = |which: usize| {
-                let each: Vec<String> = said.errors.iter().map(|(_, pair)| format!("{:.2}", pair[which])).collect();
+                let each: Vec<String> = answer.errors.iter().map(|(_, pair)| format!("{:.2}", pair[which])).collect();
                 each.join(", ")
             };
             vec![
                 reply.name.clone(),
-                spelt(said.answer.verdict).to_owned(),
-                number(said.answer.probability),
+                spelt(answer.summary.verdict).to_owned(),
+                number(answer.summary.probability),
                 found.collect::<Vec<_>>().join(" + "),
                 errors(0),
                 errors(1),
-                format!("{:.1}", said.answer.seconds),
-                said.answer.simulations.to_string(),
-                beside(reply),
+                format!("{:.1}", answer.summary.seconds),
+                answer.summary.simulations.to_string(),
+                brute_cell(reply),
             ]
         }
     });
@@ -84,8 +84,8 @@ fn text(replies: &[Reply]) -> String {
     table(&header, &[2, 6, 7], rows.collect())
 }
 
-fn brute(said: &Result<Answer, String>) -> String {
-    match said {
+fn brute(answer: &Result<Answer, String>) -> String {
+    match answer {
         Err(why) => why.clone(),
         Ok(answer) => {
             let found =

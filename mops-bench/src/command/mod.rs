@@ -35,9 +35,10 @@ struct Arguments {
 enum Benchmark {
     /// Find missing effects in simulated experiments: rates, reliability of probabilities, coverage of intervals, time.
     ///
-    /// The experiments come from a simulator that shares no code with models and effects: plants with drawn parameters,
-    /// effects at drawn places, of a size at which the refitted nominal model has the requested error, in units of the
-    /// noise. Ctrl-C ends the benchmark and keeps the finished cases.
+    /// The experiments come from a simulator that shares no code with models and effects. Parameters of the plants and places
+    /// of the effects are random. The size of an effect is the error of the refitted nominal model in units of the noise.
+    ///
+    /// Ctrl-C ends the benchmark and keeps the finished cases.
     Diagnosis(diagnosis::Arguments),
     /// Print the JSON schema of case.json, the format of the cases of `diagnosis --folder`.
     Schema,

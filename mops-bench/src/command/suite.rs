@@ -13,37 +13,37 @@ use mops::terminal::{CommandError, Progress, number, print, table};
 use super::write;
 use crate::solvers::{self, Plan, Results, Row, Score, Suite, data_profile, published, spreads, suites};
 
-/// What can be said to the benchmark of a suite.
+/// Options of the benchmark of a suite.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// Solvers to measure, separated by commas or given one by one.
+    /// Solver to measure; several are separated by commas or given one by one.
     #[arg(long = "solver", value_name = "SOLVER", default_value = "auto", value_delimiter = ',')]
     solvers: Vec<String>,
-    /// Give solvers exact slopes instead of differences.
+    /// Provide exact gradients instead of finite differences.
     #[arg(long)]
     gradients: bool,
-    /// Runs of every problem, with seeds 1, 2, ...
+    /// Number of runs of each problem, with seeds 1, 2, ...
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Evaluations a run may take, for every variable and one more; as is usual for the suite where absent.
+    /// Budget of a run, as a multiple of n + 1 evaluations for n variables [default: usual budget of the suite].
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..))]
     budget: Option<u32>,
-    /// Relative noise that is added to all values; what is reached is judged without it.
+    /// Relative noise added to all values; results are judged without it.
     #[arg(long, default_value_t = 0.0, value_name = "NUMBER")]
     noise: f64,
-    /// Problems by name; all where absent.
+    /// Problems, separated by commas [default: all].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     problems: Vec<String>,
-    /// Problems solved at a time; all cores where absent. One gives the truest times.
+    /// Number of problems solved in parallel [default: all cores]; 1 gives the most accurate times.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
     /// Folder for results.json and a page with profiles.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Results of another time, to put beside these.
+    /// Compare with the results.json of an earlier benchmark.
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
-    /// List the problems with their source, and run nothing.
+    /// List the problems with known solutions and sources, without running them.
     #[arg(long)]
     list: bool,
     /// Show no progress.
@@ -51,7 +51,7 @@ pub(super) struct Arguments {
     quiet: bool,
 }
 
-/// One of the suites, each a command of its own.
+/// Selected suite; each suite is a command.
 pub(super) struct Chosen {
     suite: Suite,
     arguments: Arguments,
@@ -99,7 +99,7 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
         return Ok(ExitCode::SUCCESS);
     }
     let before = arguments.against.as_deref().map(|path| read(path, suite)).transpose()?;
-    posable(suite, arguments)?;
+    check_options(suite, arguments)?;
     let plan = Plan {
         suite: *suite,
         solvers: arguments.solvers.iter().map(|name| solver(catalogue, name.trim())).collect::<Result<_, _>>()?,
@@ -110,7 +110,7 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
         only: problems(suite, &arguments.problems)?,
     };
     if let Some(idle) = plan.idle(catalogue) {
-        let help = format!("`mops describe {}` says for what it is", idle.kind);
+        let help = format!("`mops describe {}` lists the problems that it accepts", idle.kind);
         return Err(Diagnostic::new(format!("`{}` accepts none of these problems", idle.kind)).with_help(help).into());
     }
     if let Some(folder) = &arguments.out {
@@ -132,7 +132,7 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
     Ok(progress.status())
 }
 
-/// The known solution of a problem: minima, and the tuners at the optimum of a study; or the volume of a front.
+/// Formats the known solution of a problem: minima, with the tuners at the optimum of a study, or the hypervolume of a front.
 fn solution(subject: &solvers::Subject) -> String {
     let list = |values: &[f64]| values.iter().copied().map(number).collect::<Vec<_>>().join(", ");
     match subject.answer() {
@@ -166,18 +166,18 @@ fn problems(suite: &Suite, asked: &[String]) -> Result<Vec<String>, Diagnostic> 
     }
 }
 
-/// Studies are posed as they are, and a front has no true members where there is noise.
-fn posable(suite: &Suite, arguments: &Arguments) -> Result<(), Diagnostic> {
+/// Checks that the suite supports the options: studies have fixed gradients and noise, and fronts are not measured under noise.
+fn check_options(suite: &Suite, arguments: &Arguments) -> Result<(), Diagnostic> {
     let is_noisy = arguments.noise != 0.0;
     let subjects = suite.subjects();
     let wrong = if is_noisy && !(arguments.noise > 0.0 && arguments.noise < 1.0) {
-        Diagnostic::new(format!("the noise is relative, between 0 and 1, not {}", arguments.noise))
+        Diagnostic::new(format!("expected a relative noise between 0 and 1, found {}", arguments.noise))
     } else if subjects.iter().any(solvers::Subject::is_study) && (arguments.gradients || is_noisy) {
-        Diagnostic::new(format!("`{}` has studies, whose slopes and noise are their own", suite.name))
-            .with_help("leave `--gradients` and `--noise` out")
+        Diagnostic::new(format!("`{}` has studies, which define gradients and noise themselves", suite.name))
+            .with_help("remove `--gradients` and `--noise`")
     } else if is_noisy && subjects.iter().any(solvers::Subject::has_front) {
-        Diagnostic::new(format!("`{}` has fronts, which are not measured under noise", suite.name))
-            .with_help("leave `--noise` out")
+        Diagnostic::new(format!("`{}` has Pareto fronts, which are not measured under noise", suite.name))
+            .with_help("remove `--noise`")
     } else {
         return Ok(());
     };
@@ -187,10 +187,10 @@ fn posable(suite: &Suite, arguments: &Arguments) -> Result<(), Diagnostic> {
 fn read(path: &Path, suite: &Suite) -> Result<Results, Diagnostic> {
     let mistake = |why: String| Diagnostic::new(format!("{}: {why}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| mistake(error.to_string()))?;
-    let unread = |error: serde_json::Error| mistake(format!("no results of a benchmark of solvers: {error}"));
+    let unread = |error: serde_json::Error| mistake(format!("not the results of a solver benchmark: {error}"));
     let results: Results = serde_json::from_str(&text).map_err(unread)?;
     if results.suite != suite.name {
-        return Err(mistake(format!("these are results of `{}`, not of `{}`", results.suite, suite.name)));
+        return Err(mistake(format!("expected results of `{}`, found results of `{}`", suite.name, results.suite)));
     }
     Ok(results)
 }
@@ -198,18 +198,18 @@ fn read(path: &Path, suite: &Suite) -> Result<Results, Diagnostic> {
 fn text(results: &Results, before: Option<&Results>) -> String {
     let has_fronts = results.rows.iter().any(|row| row.front.is_some());
     let mut text = if has_fronts { fronts(results, before) } else { minima(results, before) };
-    for (results, which) in [(Some(results), "These results are"), (before, "Those of before are")] {
+    for (results, which) in [(Some(results), "These"), (before, "The earlier")] {
         if results.is_some_and(|results| results.interrupted) {
-            text.push_str(&format!("{which} not whole: the benchmark was interrupted.\n"));
+            text.push_str(&format!("{which} results are incomplete: the benchmark was interrupted.\n"));
         }
     }
     text
 }
 
-/// What is reached beside the known minima.
+/// Formats the reached objectives with the known minima, and a summary of each solver.
 fn minima(results: &Results, before: Option<&Results>) -> String {
     let seeds = results.rows.iter().any(|row| row.seed > 1);
-    let mut header = vec!["problem", "solver", "n", "m", "f*", "reached", "violation", "to 1e-3", "to the end"];
+    let mut header = vec!["problem", "solver", "n", "m", "f*", "reached", "violation", "to 1e-3", "to solved"];
     header.extend(["all", "ms", "solved"]);
     let earlier = before.map(|before| match before.solvers()[..] {
         [only] => format!("before, {only}"),
@@ -223,28 +223,29 @@ fn minima(results: &Results, before: Option<&Results>) -> String {
     let is_relative = suite.is_some_and(|suite| suite.relative);
     let reached = if is_relative {
         format!(
-            "a feasible point has all but 1e-3, and {fine:e}, of the way from the start to f*, the least of all solvers"
+            "a feasible point has all but 1e-3, and {fine:e}, of the reduction from the start to f*, the least value of all \
+             solvers"
         )
     } else {
         format!(
-            "a point that violates nothing by more than 1e-6, which may take it below f*, is at most 1e-3, and {fine:e} or \
-             what the problem's source allows, above f*, relative to the larger of 1 and |f*|"
+            "a point with violation at most 1e-6 (which may be below f*) is at most 1e-3, and {fine:e} or the tolerance of the \
+             problem's source, above f*, relative to max(1, |f*|)"
         )
     };
     let slopes = |results: &Results| match results.slopes.as_str() {
-        "exact" => "slopes by dual numbers, which count as no evaluation",
-        _ => "slopes by differences",
+        "exact" => "exact gradients (dual numbers), not counted as evaluations",
+        _ => "gradients by finite differences",
     };
     let noise = if results.noise > 0.0 {
-        format!("; a noise of {} on all values, judged without it", results.noise)
+        format!("; relative noise of {} on all values, judged without noise", results.noise)
     } else {
         String::new()
     };
     let has_studies = suite.is_some_and(|suite| suite.subjects().iter().any(solvers::Subject::is_study));
-    let how = if has_studies { "slopes as the studies have them" } else { slopes(results) };
-    text.push_str(&format!("\nTo 1e-3, to the end: evaluations until {reached}; {how}{noise}.\n"));
+    let gradients = if has_studies { "gradients as in the studies" } else { slopes(results) };
+    text.push_str(&format!("\nTo 1e-3, to solved: evaluations until {reached}; {gradients}{noise}.\n"));
     if let Some(before) = before.filter(|before| before.slopes != results.slopes || before.noise != results.noise) {
-        text.push_str(&format!("Before: {}, a noise of {}.\n", slopes(before), before.noise));
+        text.push_str(&format!("Before: {}, relative noise of {}.\n", slopes(before), before.noise));
     }
     for (name, results) in [(Some(results), ""), (before, "before: ")].into_iter().filter_map(|(r, n)| Some((n, r?))) {
         for solver in results.solvers() {
@@ -257,7 +258,7 @@ fn minima(results: &Results, before: Option<&Results>) -> String {
     text
 }
 
-/// Shares of problems solved within 10, 30 and 100 simplex gradients.
+/// Formats the shares of problems solved within 10, 30 and 100 simplex gradients.
 fn shares(name: &str, results: &Results) -> String {
     let mut text = String::new();
     for solver in results.solvers() {
@@ -268,8 +269,8 @@ fn shares(name: &str, results: &Results) -> String {
             [10.0, 30.0, 100.0].map(|gradients| format!("{:.2}", within(gradients))).join(" / ")
         };
         text.push_str(&format!(
-            "{name}{solver}: share solved within 10 / 30 / 100 simplex gradients: {} to 1e-3, {} to {:e} of what the best \
-             solver gains\n",
+            "{name}{solver}: share solved within 10 / 30 / 100 simplex gradients: {} to 1e-3, {} to {:e} of the best \
+             reduction\n",
             of(|row| row.to_rough),
             of(|row| row.to_fine),
             results.accuracy
@@ -278,7 +279,7 @@ fn shares(name: &str, results: &Results) -> String {
     text
 }
 
-/// Fronts: one line for every problem, over all seeds.
+/// Formats the results for Pareto fronts, one line for every problem, over all seeds.
 fn fronts(results: &Results, before: Option<&Results>) -> String {
     let mut header = vec!["problem", "solver", "seeds", "evaluations", "volume", "sd", "of front", "all points"];
     header.extend(["distance", "sd", "pymoo volume", "distance"]);
@@ -311,9 +312,9 @@ fn fronts(results: &Results, before: Option<&Results>) -> String {
     let mut text =
         table(&header, &[2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12], spreads(results).into_iter().map(row).collect());
     text.push_str(
-        "\nVolume, distance: hypervolume and inverted generational distance of the members of the last generation, mean and \
-         standard deviation over seeds; all points: hypervolume of everything evaluated. pymoo: NSGA-II with 100 members over \
-         250 generations, of three objectives NSGA-III with 92 (DTLZ1: over 400 generations).\n",
+        "\nVolume, distance: hypervolume and inverted generational distance of the last generation, mean and standard \
+         deviation (sd) over seeds; all points: hypervolume of all evaluated points. pymoo: NSGA-II with 100 members and 250 \
+         generations; for three objectives NSGA-III with 92 members (DTLZ1: 400 generations).\n",
     );
     for solver in results.solvers() {
         text.push_str(&summary("", results, solver));
@@ -352,20 +353,20 @@ fn summary(name: &str, results: &Results, solver: &str) -> String {
     let of = results.summary(solver);
     let count = |count: Option<f64>| count.map_or("-".to_owned(), number);
     let claims = if of.false_claims > 0 {
-        format!(", {} claim an optimum that violates a constraint", of.false_claims)
+        format!(", {} converged to a point that violates a constraint", of.false_claims)
     } else {
         String::new()
     };
     if of.judged == 0 {
         return format!(
-            "{name}{}: {} runs on problems without one known minimum: none is called solved; {:.2} s, {:.0} ns per \
-             evaluation of its own{claims}\n",
+            "{name}{}: {} runs, not judged (no single known minimum); {:.2} s, solver overhead {:.0} ns per \
+             evaluation{claims}\n",
             of.solver, of.runs, of.seconds, of.nanoseconds
         );
     }
     format!(
-        "{name}{}: {} of {} solved ({:.1} %), median evaluations of those that got there {} to 1e-3 and {} to \
-         the end; {:.2} s in all, {:.0} ns per evaluation of the solver's own{claims}\n",
+        "{name}{}: {} of {} solved ({:.1} %), median evaluations of successful runs {} to 1e-3 and {} to solved; {:.2} s \
+         in total, solver overhead {:.0} ns per evaluation{claims}\n",
         of.solver,
         of.solved,
         of.judged,

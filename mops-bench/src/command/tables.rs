@@ -1,11 +1,11 @@
-//! The results of the benchmark in tables.
+//! Tables of the diagnosis benchmark.
 
 use std::fmt::Write;
 
 use crate::diagnosis::{Bin, Kind, Rate, Results, Row, brier, deciles, reliability, uniformity};
 use mops::terminal::table;
 
-/// Everything.
+/// Formats all tables.
 pub(super) fn all(results: &Results) -> String {
     let mut text = String::new();
     for part in [
@@ -24,11 +24,11 @@ pub(super) fn all(results: &Results) -> String {
     text
 }
 
-/// Stated probabilities beside what came true, by what they are of.
+/// Returns pairs of stated probability and outcome, for verdicts and for effects.
 pub(super) fn stated(rows: &[Row]) -> [(&'static str, Vec<(f64, bool)>); 2] {
     let answered = || rows.iter().filter_map(|row| row.answer.as_ref().ok().map(|answer| (row, answer)));
     let verdicts = answered().map(|(row, answer)| (answer.probability, row.judgement.verdict));
-    // N.B.: of two missing effects either may be named first.
+    // N.B.: either of two missing effects may be ranked first.
     let effects = answered().filter(|(_, answer)| answer.first().is_some());
     let effects = effects.map(|(row, answer)| (answer.found[0].1, row.judgement.first));
     [("verdicts", verdicts.filter(known).collect()), ("effects", effects.filter(known).collect())]
@@ -50,12 +50,12 @@ fn percent(rate: Rate) -> String {
     format!("{} % ({} to {}) of {}", shown(rate.share()), shown(low), shown(high), rate.of)
 }
 
-/// Per effect and size: how often the true effect is first, or in the set that is stated.
+/// Formats the detection rates by effect and size: true effect ranked first, or in the reported set.
 fn effects(rows: &[Row]) -> String {
     by(rows, "effect", |row| row.truth.first().map(|(effect, _)| effect.clone()))
 }
 
-/// The same per plant.
+/// Formats the detection rates by plant.
 fn places(rows: &[Row]) -> String {
     by(rows, "plant", |row| Some(row.plant.clone()))
 }
@@ -94,7 +94,7 @@ fn by(rows: &[Row], what: &str, key: impl Fn(&Row) -> Option<String>) -> String 
     table(&header, &numeric, lines)
 }
 
-/// Mean number of effects in the sets stated.
+/// Formats the mean number of effects in the reported sets.
 #[allow(clippy::cast_precision_loss)]
 fn mean_set(rows: &[&Row]) -> String {
     let answers = rows.iter().filter_map(|row| row.answer.as_ref().ok()).filter(|answer| answer.first().is_some());
@@ -102,16 +102,16 @@ fn mean_set(rows: &[&Row]) -> String {
     if sizes.is_empty() { String::new() } else { format!("{:.1}", sizes.iter().sum::<f64>() / sizes.len() as f64) }
 }
 
-/// Decisions by kind of case, beside brute force where it ran.
+/// Formats the decisions by kind of case, with those of brute force if it was run.
 fn summary(results: &Results) -> String {
     let kinds = [
-        (Kind::One, "one effect missing: decisions right"),
+        (Kind::One, "one effect missing: correct decisions"),
         (Kind::Two, "two effects missing: both found"),
         (Kind::Nothing, "nothing missing: false alarms"),
-        (Kind::Outside, "outside of the catalogue: declared unexplained"),
+        (Kind::Outside, "effect not in the catalogue: verdict unexplained"),
     ];
-    let tell = |rows: &[Row], kind: Kind| {
-        // No answer is a wrong one, but no alarm.
+    let rate_of_kind = |rows: &[Row], kind: Kind| {
+        // A failed diagnosis counts as a wrong decision, but not as a false alarm.
         let own = rows.iter().filter(|row| row.kind == kind && (row.answer.is_ok() || kind != Kind::Nothing));
         let rate = Rate::of(own.map(|row| match kind {
             Kind::Two => row.judgement.both == Some(true),
@@ -126,16 +126,17 @@ fn summary(results: &Results) -> String {
         cells.extend(against.then(|| of(&results.brute)));
         cells
     };
-    let mut lines: Vec<Vec<String>> = kinds.iter().map(|(kind, name)| line(name, &|rows| tell(rows, *kind))).collect();
+    let mut lines: Vec<Vec<String>> =
+        kinds.iter().map(|(kind, name)| line(name, &|rows| rate_of_kind(rows, *kind))).collect();
     lines.retain(|line| !line[1].is_empty());
     let decided = |rows: &[Row]| {
         let rate = Rate::of(rows.iter().map(|row| row.judgement.decision));
         if rate.of == 0 { String::new() } else { percent(rate) }
     };
-    lines.push(line("all: decisions right", &decided));
+    lines.push(line("all: correct decisions", &decided));
     let again = Rate::of(results.rows.iter().flat_map(|row| row.agreeing.iter().copied()));
     if again.of > 0 {
-        let mut cells = vec!["other orders of the catalogue and seeds: the same findings".to_owned(), percent(again)];
+        let mut cells = vec!["other catalogue orders and seeds: same findings".to_owned(), percent(again)];
         cells.extend(against.then(String::new));
         lines.push(cells);
     }
@@ -145,20 +146,20 @@ fn summary(results: &Results) -> String {
     header.extend(against.then_some("brute force"));
     let mut text = table(&header, &[], lines);
     if results.unmade > 0 {
-        writeln!(text, "{} cases asked for cannot be made: their size is out of reach", results.unmade)
+        writeln!(text, "{} requested cases could not be generated: their size cannot be reached", results.unmade)
             .expect("a text takes everything");
     }
     text
 }
 
-/// Median, and what 9 of 10 stay below.
+/// Formats the median and the 90 % quantile.
 #[allow(clippy::cast_precision_loss)]
 fn spread(rows: &[Row], of: impl Fn((f64, f64)) -> f64, digits: usize) -> String {
     let answers = rows.iter().filter_map(|row| row.answer.as_ref().ok());
     let mut values: Vec<f64> = answers.map(|answer| of((answer.seconds, answer.simulations as f64))).collect();
     values.sort_by(f64::total_cmp);
     let Some(last) = values.len().checked_sub(1) else { return String::new() };
-    format!("median {:.digits$}, 9 of 10 below {:.digits$}", values[last / 2], values[last * 9 / 10])
+    format!("median {:.digits$}, 90 % below {:.digits$}", values[last / 2], values[last * 9 / 10])
 }
 
 fn probabilities(rows: &[Row]) -> String {
@@ -187,15 +188,15 @@ fn p_values(rows: &[Row]) -> String {
     let (distance, limit) = uniformity(&values);
     let tenths: Vec<String> = deciles(&values).iter().map(usize::to_string).collect();
     format!(
-        "p-value where nothing is missing: distance from uniform {distance:.3} (5 % of uniform samples exceed {limit:.3}); \
-         by tenths {}\n",
+        "p-values without a missing effect: distance from uniform {distance:.3} (5 % critical value {limit:.3}); counts by \
+         decile {}\n",
         tenths.join(" ")
     )
 }
 
 fn coverage(rows: &[Row]) -> String {
     let covered = || rows.iter().flat_map(|row| &row.judgement.covered);
-    let rate = Rate::of(covered().map(|c| c.holds()));
+    let rate = Rate::of(covered().map(|c| c.covers()));
     if rate.of == 0 {
         return String::new();
     }
@@ -207,20 +208,20 @@ fn coverage(rows: &[Row]) -> String {
         let mut off: Vec<f64> = own.iter().map(|c| (c.value / c.truth - 1.0).abs()).collect();
         off.sort_by(f64::total_cmp);
         let median = format!("{:.1} %", 100.0 * off[off.len() / 2]);
-        vec![(*name).to_owned(), rate_of(&own.iter().map(|c| c.holds()).collect::<Vec<_>>()), median]
+        vec![(*name).to_owned(), rate_of(&own.iter().map(|c| c.covers()).collect::<Vec<_>>()), median]
     });
     let mut sizes: Vec<f64> = rows.iter().map(|row| row.size).collect();
     sizes.sort_by(|a, b| b.total_cmp(a));
     sizes.dedup();
     let by_size = sizes.iter().filter_map(|&size| {
-        let held = rows.iter().filter(|row| row.size == size).flat_map(|row| &row.judgement.covered);
-        let rate = Rate::of(held.map(|c| c.holds()));
+        let covered = rows.iter().filter(|row| row.size == size).flat_map(|row| &row.judgement.covered);
+        let rate = Rate::of(covered.map(|c| c.covers()));
         (rate.of > 0).then(|| format!(" size {size}: {}\n", percent(rate)))
     });
     let by_size: String = by_size.collect();
-    let header = ["strength", "truth inside", "median error"];
+    let header = ["parameter", "truth inside", "median error"];
     format!(
-        "95 % intervals of found strengths hold the truth: {}\n{by_size}{}",
+        "coverage of the 95 % intervals of effect parameters: {}\n{by_size}{}",
         percent(rate),
         table(&header, &[1, 2], lines.collect())
     )
@@ -258,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tables_give_rates_per_effect_false_alarms_and_what_failed() {
+    fn the_tables_give_rates_per_effect_false_alarms_and_failures() {
         let coulomb = || Ok(answers::coulomb());
         let nothing = || Ok(answers::nothing());
         let mut steady = row(Kind::One, true, coulomb());
@@ -276,8 +277,8 @@ mod tests {
         let cells: Vec<&str> = line("coulomb-friction").split_whitespace().collect();
         assert_eq!(cells[1..], ["1/3", "1/3", "3/3", "3.0", "1/3", "1/3"]);
         assert!(line("nothing missing").contains("50 % (1 to 99) of 2"), "{}", line("nothing missing"));
-        assert!(line("other orders").contains("75 %") && line("other orders").ends_with("of 4"));
-        assert!(text.contains("1 cases asked for cannot be made") && text.contains("case failed: it diverges"));
+        assert!(line("other catalogue orders").contains("75 %") && line("other catalogue orders").ends_with("of 4"));
+        assert!(text.contains("1 requested cases could not be generated") && text.contains("case failed: it diverges"));
         assert!(text.contains("probabilities of verdicts: Brier score") && text.contains("distance from uniform"));
     }
 }

@@ -1,10 +1,10 @@
-//! Answers by hand, for tests of what is made of them.
+//! Hand-written answers for tests.
 
 use mops::discrepancy::Verdict;
 
 use super::tool::{Answer, Named};
 
-/// The verdict `none`.
+/// Returns an answer with the verdict `none`.
 pub(crate) fn nothing() -> Answer {
     Answer {
         verdict: Verdict::None,
@@ -19,7 +19,7 @@ pub(crate) fn nothing() -> Answer {
     }
 }
 
-/// Coulomb friction at `joint:phi`, with two effects there that the data cannot distinguish from it.
+/// Returns an answer with Coulomb friction at `joint:phi` and two indistinguishable effects there.
 pub(crate) fn coulomb() -> Answer {
     let there = |effect: &str| -> Named { (effect.into(), "joint:phi".into()) };
     Answer {
@@ -33,7 +33,7 @@ pub(crate) fn coulomb() -> Answer {
     }
 }
 
-/// The verdict `unexplained`, at `process:x`.
+/// Returns an answer with the verdict `unexplained` at `process:x`.
 pub(crate) fn unexplained() -> Answer {
     Answer {
         verdict: Verdict::Unexplained,

@@ -1,4 +1,4 @@
-//! Folders of cases by others: `case.json` with a plant's equations, and its data; answers in the same form.
+//! Folders of external cases: `case.json` with the equations of a plant, and its data files.
 
 mod answer;
 mod declared;
@@ -16,37 +16,37 @@ use answer::{answer, predictions};
 use declared::Declared;
 pub(crate) use declared::schema;
 
-/// A folder of cases.
+/// Folder of cases.
 pub(crate) struct Cases {
-    /// The folders of the cases, by name.
+    /// Folders of the cases, sorted by name.
     folders: Vec<PathBuf>,
 }
 
-/// What is left behind of a case.
+/// Result of a case.
 pub(crate) struct Reply {
-    /// The case.
+    /// Name of the case.
     pub name: String,
-    /// The study, a file that runs by itself.
+    /// Diagnosed study, a self-contained file.
     pub study: String,
-    /// The answer, the tables of predictions by file; or why there is none.
-    pub said: Result<Said, String>,
-    /// What brute force says, where it was asked.
+    /// Answer, or the reason why there is none.
+    pub answer: Result<CaseAnswer, String>,
+    /// Answer of brute force, if requested.
     pub brute: Option<Result<Answer, String>>,
 }
 
-/// An answer.
-pub(crate) struct Said {
-    /// As a file.
+/// Answer to a case.
+pub(crate) struct CaseAnswer {
+    /// Answer as JSON.
     pub json: String,
-    /// Data files, and the outputs predicted for them.
+    /// Predicted outputs as CSV, by data file.
     pub predictions: Vec<(String, String)>,
-    /// In short.
-    pub answer: Answer,
+    /// Answer for the table.
+    pub summary: Answer,
     /// Errors by experiment, before and after.
     pub errors: Vec<(String, [f64; 2])>,
 }
 
-/// Data files of a case; the ones its declaration names, and no other.
+/// Data files of a case; only those declared by the case can be read.
 struct Data<'a> {
     folder: &'a Path,
     declared: &'a Declared,
@@ -61,7 +61,7 @@ impl Files for Data<'_> {
         }
         let bytes = std::fs::read(self.folder.join(name))?;
         Ok(String::from_utf8(bytes)
-            .map_or_else(std::string::FromUtf8Error::into_bytes, |text| without_odd_units(&text)))
+            .map_or_else(std::string::FromUtf8Error::into_bytes, |text| without_unknown_units(&text)))
     }
 
     fn show(&self, path: &str) -> String {
@@ -70,13 +70,13 @@ impl Files for Data<'_> {
 }
 
 impl Cases {
-    /// Looks for them: folders with a `case.json`.
+    /// Finds the cases in a folder: its subfolders with a `case.json`.
     ///
     /// # Errors
-    /// The folder cannot be read, or has none.
+    /// If the folder cannot be read or has no case.
     pub fn find(folder: &Path) -> Result<Self, String> {
         let shown = folder.display();
-        let entries = std::fs::read_dir(folder).map_err(|error| format!("{shown} cannot be read: {error}"))?;
+        let entries = std::fs::read_dir(folder).map_err(|error| format!("cannot read {shown}: {error}"))?;
         let mut folders: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
         folders.retain(|path| path.join("case.json").is_file());
         folders.sort();
@@ -86,11 +86,11 @@ impl Cases {
         Ok(Self { folders })
     }
 
-    /// Diagnoses all of them; `leave` gets every reply as soon as it is there.
-    pub fn run(&self, tools: Tools<'_>, jobs: usize, against: bool, leave: impl Fn(&Reply) + Sync) -> Vec<Reply> {
+    /// Diagnoses all cases; `write` is called with every reply as soon as it is available.
+    pub fn run(&self, tools: Tools<'_>, jobs: usize, against: bool, write: impl Fn(&Reply) + Sync) -> Vec<Reply> {
         each(&self.folders, jobs, tools.watch, |folder| {
             let reply = reply(folder, tools, against);
-            leave(&reply);
+            write(&reply);
             Some(reply)
         })
     }
@@ -103,32 +103,38 @@ fn reply(folder: &Path, tools: Tools<'_>, against: bool) -> Reply {
     let study = declared.and_then(|declared| Ok((declared.study(&name, folder)?, declared)));
     let (study, declared) = match study {
         Ok(read) => read,
-        Err(why) => return Reply { name, study: String::new(), said: Err(why), brute: None },
+        Err(why) => return Reply { name, study: String::new(), answer: Err(why), brute: None },
     };
-    let said = guarded(|| diagnosed(&name, &study, &declared, folder, tools));
-    let ask = || {
+    let answer = guarded(|| diagnosed(&name, &study, &declared, folder, tools));
+    let brute_force = || {
         let read = tools.study(&format!("{name}.toml"), &study, &Data { folder, declared: &declared })?;
         tools.brute_force(&read)
     };
-    let brute = against.then(|| guarded(ask));
-    Reply { name, study, said, brute }
+    let brute = against.then(|| guarded(brute_force));
+    Reply { name, study, answer, brute }
 }
 
-fn diagnosed(name: &str, text: &str, declared: &Declared, folder: &Path, tools: Tools<'_>) -> Result<Said, String> {
+fn diagnosed(
+    name: &str,
+    text: &str,
+    declared: &Declared,
+    folder: &Path,
+    tools: Tools<'_>,
+) -> Result<CaseAnswer, String> {
     let study = tools.study(&format!("{name}.toml"), text, &Data { folder, declared })?;
     let times: Vec<(String, Vec<f64>)> = study.cases().iter().filter_map(times).collect();
     let (diagnosis, seconds) = tools.diagnose(study)?;
     let after = |name: &str| diagnosis.after.iter().find(|e| e.name == name).map_or(f64::NAN, |e| e.normalised);
-    Ok(Said {
+    Ok(CaseAnswer {
         json: answer(name, declared, &diagnosis, seconds, &tools.catalogue.effects),
         predictions: predictions(declared, &diagnosis, &times),
         errors: diagnosis.before.iter().map(|e| (e.name.clone(), [e.normalised, after(&e.name)])).collect(),
-        answer: Answer::of(&diagnosis, seconds),
+        summary: Answer::of(&diagnosis, seconds),
     })
 }
 
-/// A data file whose header has no units that are none: its numbers count as they stand.
-fn without_odd_units(text: &str) -> Vec<u8> {
+/// Removes unknown units from the header of a data file; its numbers are then used as they are.
+fn without_unknown_units(text: &str) -> Vec<u8> {
     let (header, rows) = text.split_once('\n').unwrap_or((text, ""));
     let cells =
         header.split(',').map(|cell| match cell.trim().strip_suffix(']').and_then(|cell| cell.split_once('[')) {
@@ -138,7 +144,7 @@ fn without_odd_units(text: &str) -> Vec<u8> {
     format!("{}\n{rows}", cells.collect::<Vec<_>>().join(",")).into_bytes()
 }
 
-/// Name and sample times of an experiment.
+/// Returns the name and the sample times of an experiment.
 fn times(case: &mops::Case) -> Option<(String, Vec<f64>)> {
     let channels = &case.experiment.as_ref()?.channels;
     let channel = channels.iter().max_by_key(|channel| channel.times.len())?;
@@ -149,7 +155,7 @@ fn times(case: &mops::Case) -> Option<(String, Vec<f64>)> {
 mod tests {
     use super::*;
 
-    /// A cart that pulls a trailer, in units that are partly unknown, with a second output.
+    /// Cart that pulls a trailer, in partly unknown units, with a second output.
     const CASE: &str = r#"{ "case": "c", "states": [ { "name": "x", "unit": "m" }, { "name": "v", "unit": "m/s" } ],
         "inputs": [ { "name": "u", "unit": "knots" } ],
         "outputs": [ { "name": "x", "column": "x_m", "unit": "m", "equals_state": "x", "noise_std": 0.1, "noise_std_total": 0.2 },
@@ -163,7 +169,7 @@ mod tests {
     const DATA: &str = "t[s],u[knots],x_m[m],far_m[m]\n0,0,0,0\n0.1,1,0.1,0.2\n0.2,1,0.3,0.6\n0.3,0,0.4,0.8\n";
 
     #[test]
-    fn a_case_becomes_a_study_that_is_read_and_only_named_files_are_open() {
+    fn a_case_becomes_a_valid_study_and_only_declared_files_are_read() {
         let folder = tempfile::tempdir().unwrap();
         let folder = folder.path();
         for name in ["calibration.csv", "validation_1.csv", "truth.json"] {
@@ -183,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn the_schema_in_the_repository_is_that_of_the_reader() {
+    fn the_schema_in_the_repository_is_up_to_date() {
         assert_eq!(include_str!("../../case.schema.json"), schema());
     }
 
@@ -194,21 +200,21 @@ mod tests {
     }
 
     #[test]
-    fn inputs_are_held_as_the_case_says_and_an_unknown_word_is_a_mistake() {
+    fn the_input_hold_of_a_case_is_used_and_an_unknown_word_is_an_error() {
         let study = |hold: &str| {
             let case = CASE.replacen("\"states\"", &format!("\"input_hold\": \"{hold}\", \"states\""), 1);
             Declared::read(&case).unwrap().study("c", Path::new("folder"))
         };
-        for (said, hold) in
+        for (word, hold) in
             [("zoh (held)", "zero"), ("foh", "first"), ("piecewise linear", "first"), ("band-limited", "band-limited")]
         {
-            assert!(study(said).unwrap().contains(&format!("hold = \"{hold}\"")), "{said}");
+            assert!(study(word).unwrap().contains(&format!("hold = \"{hold}\"")), "{word}");
         }
         assert!(study("cubic").unwrap_err().contains("`cubic`"));
     }
 
     #[test]
-    fn places_are_spelt_as_the_case_spells_them() {
+    fn places_are_spelt_as_in_the_case() {
         let declared = Declared::read(CASE).unwrap();
         assert_eq!(answer::located("joint:x", &declared.locations), "process:x");
         assert_eq!(answer::located("sensor:x", &declared.locations), "sensor:x");

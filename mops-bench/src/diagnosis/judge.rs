@@ -1,4 +1,4 @@
-//! An answer beside the truth.
+//! Comparison of an answer with the truth.
 
 use mops::discrepancy::Verdict;
 use mops_testbed::{Trial, TrueEffect, Truth};
@@ -7,67 +7,68 @@ use super::names::{names, strengths};
 use super::plan::Kind;
 use super::tool::{Answer, Named};
 
-/// A true strength, and what was said of it.
+/// Estimated parameter of an effect, with its true value.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Covered {
-    /// Effect and strength.
+    /// Names of the effect and of the parameter.
     pub name: String,
-    /// Its true value.
+    /// True value.
     pub truth: f64,
-    /// Its value.
+    /// Estimate.
     pub value: f64,
-    /// The interval stated.
+    /// Reported 95 % interval.
     pub interval: [f64; 2],
 }
 
 impl Covered {
-    /// Whether the interval holds the truth.
-    pub fn holds(&self) -> bool {
+    /// Returns true if the interval contains the true value.
+    pub fn covers(&self) -> bool {
         (self.interval[0]..=self.interval[1]).contains(&self.truth)
     }
 }
 
-/// How an answer stands beside the truth.
+/// Judgement of an answer.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Judgement {
-    /// The verdict is right.
+    /// True if the verdict is correct.
     pub verdict: bool,
-    /// The decision is right: the verdict, and with an effect a true one, or one that no data could tell from it, first.
+    /// True if the decision is correct: the verdict is correct and, if an effect is missing, a true effect or an equivalent one
+    /// is ranked first.
     pub decision: bool,
-    /// A true effect, or one that no data could tell from it, is first, at a place that is right.
+    /// True if a true effect, or an equivalent one, is ranked first at a correct place.
     pub first: bool,
-    /// A true effect is in the set of what the data cannot tell apart.
+    /// True if a true effect is in the set of indistinguishable effects.
     pub in_set: bool,
-    /// The place named first is right.
+    /// True if the place of the first effect is correct.
     pub place: bool,
-    /// Both effects are found, where there are two.
+    /// True if both of two missing effects are found; `None` if fewer than two are missing.
     pub both: Option<bool>,
-    /// Strengths of true effects that were found.
+    /// Estimated parameters of true effects that were found.
     pub covered: Vec<Covered>,
 }
 
-/// A case with the answer.
+/// Case with its answer and judgement.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Row {
     /// Name of the case.
     pub name: String,
-    /// Its plant.
+    /// Name of the plant.
     pub plant: String,
-    /// What is missing.
+    /// Kind of the case.
     pub kind: Kind,
-    /// Size asked for; 0 where nothing is missing.
+    /// Requested size; 0 if nothing is missing.
     pub size: f64,
-    /// True effects as the catalogue calls them, and their places.
+    /// True effects, by their names in the catalogue, and their places.
     pub truth: Vec<Named>,
-    /// What the tool says, or why it says nothing.
+    /// Answer of the tool, or the reason why there is none.
     pub answer: Result<Answer, String>,
-    /// How that stands beside the truth.
+    /// Judgement of the answer.
     pub judgement: Judgement,
-    /// Whether each further diagnosis, with another order of the catalogue and another seed, says the same.
+    /// For each additional diagnosis, with shuffled catalogue and another seed: true if it agrees with the first.
     pub agreeing: Vec<bool>,
 }
 
-/// Judges an answer.
+/// Compares an answer with the truth.
 pub(crate) fn judge(truth: &Truth, answer: &Answer) -> Judgement {
     let right = match truth.verdict {
         "none" => Verdict::None,
@@ -114,7 +115,7 @@ pub(crate) fn judge(truth: &Truth, answer: &Answer) -> Judgement {
 }
 
 impl Row {
-    /// A case with its answer.
+    /// Creates the row of a case from its answer.
     pub fn new(trial: &Trial, kind: Kind, size: f64, answer: Result<Answer, String>) -> Self {
         let nothing = Judgement {
             verdict: false,
@@ -168,17 +169,17 @@ mod tests {
     }
 
     #[test]
-    fn the_true_effect_at_its_place_is_right_and_its_strength_is_compared() {
+    fn the_true_effect_at_its_place_is_correct_and_its_parameters_are_compared() {
         let answer = answers::coulomb();
         let right = judge(&truth("coulomb-friction", "joint:phi", "effect"), &answer);
         assert!(right.verdict && right.decision && right.first && right.in_set && right.place);
-        assert_eq!((right.covered.len(), right.covered[0].holds()), (1, true));
+        assert_eq!((right.covered.len(), right.covered[0].covers()), (1, true));
         let elsewhere = judge(&truth("coulomb-friction", "joint:theta", "effect"), &answer);
         assert!(elsewhere.verdict && !elsewhere.decision && !elsewhere.place && elsewhere.covered.is_empty());
     }
 
     #[test]
-    fn what_the_data_cannot_tell_apart_is_in_the_set_and_not_first() {
+    fn an_indistinguishable_effect_is_in_the_set_and_not_first() {
         let answer = answers::coulomb();
         let close = judge(&truth("stribeck-friction", "joint:phi", "effect"), &answer);
         assert!(!close.first && !close.decision && close.in_set && close.place);
@@ -186,14 +187,14 @@ mod tests {
     }
 
     #[test]
-    fn an_effect_named_where_nothing_is_missing_is_a_false_alarm() {
+    fn an_effect_found_in_a_complete_model_is_a_false_alarm() {
         let none = truth("", "joint:phi", "none");
         assert!(!judge(&none, &answers::coulomb()).decision);
         assert!(judge(&none, &answers::nothing()).decision);
     }
 
     #[test]
-    fn what_no_catalogue_has_needs_the_verdict_and_the_place_is_judged_apart() {
+    fn an_effect_not_in_the_catalogue_needs_the_verdict_and_its_place_is_judged_separately() {
         let answer = answers::unexplained();
         let there = judge(&truth("unknown", "joint:x", "unexplained"), &answer);
         assert!(there.decision && there.place);

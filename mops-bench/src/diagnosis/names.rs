@@ -1,10 +1,10 @@
-//! What the test bed and the catalogue call the same things.
+//! Translation of names of the test bed to names of the catalogue.
 
 use mops::core::math;
 use mops::effects::effects;
 use mops_testbed::TrueEffect;
 
-/// Kinds of effect in the catalogue that are this effect of the test bed.
+/// Returns the effects of the catalogue that correspond to an effect of the test bed.
 pub(crate) fn names<'n>(class: &'n str, strengths: &[(String, f64)]) -> Vec<&'n str> {
     match class {
         "input-quadratic" => vec!["quadratic-input"],
@@ -13,9 +13,9 @@ pub(crate) fn names<'n>(class: &'n str, strengths: &[(String, f64)]) -> Vec<&'n 
         "cubic-damping" => vec!["cubic-drag"],
         "hidden-thermal-mass" => vec!["hidden-store"],
         "constant-heat-gain" => vec!["constant-force"],
-        "sensor-dead-zone" if told(strengths, "shifts") == 0.0 => vec!["sensor-gap"],
-        "overflow" if told(strengths, "share") > 0.0 => vec!["spill-over"],
-        // Here the test bed tells which form it is.
+        "sensor-dead-zone" if parameter(strengths, "shifts") == 0.0 => vec!["sensor-gap"],
+        "overflow" if parameter(strengths, "share") > 0.0 => vec!["spill-over"],
+        // For these effects the parameters determine the special case.
         "sensor-dead-zone" | "overflow" => vec![class],
         same => {
             let forms =
@@ -25,14 +25,14 @@ pub(crate) fn names<'n>(class: &'n str, strengths: &[(String, f64)]) -> Vec<&'n 
     }
 }
 
-/// A strength by its name in the test bed; not a number where it has none.
-fn told(strengths: &[(String, f64)], wanted: &str) -> f64 {
+/// Returns a parameter by its name in the test bed; NaN if it does not exist.
+fn parameter(strengths: &[(String, f64)], wanted: &str) -> f64 {
     strengths.iter().find(|(name, _)| name == wanted).map_or(f64::NAN, |(_, value)| *value)
 }
 
-/// True strengths under the names of the catalogue, where both have the same meaning.
+/// Returns the true parameters by their names in the catalogue, for those with the same meaning.
 pub(crate) fn strengths(effect: &TrueEffect) -> Vec<(&'static str, f64)> {
-    let of = |name: &str| told(&effect.strengths, name);
+    let of = |name: &str| parameter(&effect.strengths, name);
     match effect.class.as_str() {
         "coulomb-friction" => vec![("c", of("torque"))],
         "stribeck-friction" => {
@@ -52,7 +52,7 @@ pub(crate) fn strengths(effect: &TrueEffect) -> Vec<(&'static str, f64)> {
         "cogging" => vec![("a", of("torque")), ("n", of("waves"))],
         "flexible-mode" => vec![("m", of("mass")), ("w", of("frequency")), ("d", of("damping"))],
         "bouc-wen" => {
-            // Where z ends: (1/(beta + gamma))^(1/n).
+            // Saturation value of z: (1/(beta + gamma))^(1/n).
             let (sum, n) = (of("beta") + of("gamma"), of("power"));
             let end = math::powf(sum, -1.0 / n);
             vec![("c", of("stiffness") * end), ("y", end), ("n", n)]
@@ -93,14 +93,14 @@ pub(crate) fn strengths(effect: &TrueEffect) -> Vec<(&'static str, f64)> {
 mod tests {
     use super::*;
 
-    /// Names of strengths that the catalogue does not have would never be compared.
+    /// A parameter with a name that is not in the catalogue would never be compared.
     #[test]
-    fn every_effect_and_every_strength_of_the_test_bed_is_in_the_catalogue() {
+    fn every_effect_and_every_parameter_of_the_test_bed_is_in_the_catalogue() {
         let catalogue = effects();
         for effect in mops_testbed::effects() {
             for value in [0.0, 1.0] {
-                let told = ["shifts", "share"].map(|name| (name.to_owned(), value));
-                for name in names(effect.name, &told) {
+                let parameters = ["shifts", "share"].map(|name| (name.to_owned(), value));
+                for name in names(effect.name, &parameters) {
                     let known = catalogue.iter().find(|e| e.name() == name);
                     let known = known.unwrap_or_else(|| panic!("no effect `{name}`"));
                     let truth = TrueEffect {
@@ -108,7 +108,7 @@ mod tests {
                         formula: String::new(),
                         place: "actuator:u".into(),
                         accepted_places: Vec::new(),
-                        strengths: told.to_vec(),
+                        strengths: parameters.to_vec(),
                     };
                     for (strength, _) in strengths(&truth) {
                         assert!(known.strengths().iter().any(|s| s.name == strength), "{name} has no `{strength}`");

@@ -1,16 +1,16 @@
-//! The page of a benchmark: what the terminal says, and the reliability of stated probabilities as a picture.
+//! Page of the diagnosis benchmark: tables, and reliability plots of the stated probabilities.
 
 use super::statistics::{Bin, reliability};
 use mops::report::{Color, Curve, CurveStyle, Plot};
 
-/// The page, from the tables as text, and stated probabilities beside what came true, by what they are of.
+/// Returns the page from the tables as text, and from pairs of stated probability and outcome by subject.
 pub(crate) fn page(tables: &str, stated: &[(&str, Vec<(f64, bool)>)]) -> String {
-    let told = stated.iter().filter(|(_, pairs)| !pairs.is_empty());
-    let pictures: Vec<String> = told.map(|(of, pairs)| plot(of, &reliability(pairs)).svg()).collect();
+    let stated = stated.iter().filter(|(_, pairs)| !pairs.is_empty());
+    let pictures: Vec<String> = stated.map(|(of, pairs)| plot(of, &reliability(pairs)).svg()).collect();
     crate::page::page("Benchmark of the diagnosis", "Stated probabilities", &pictures, tables, "cases.csv")
 }
 
-/// What was stated, and what came true with its interval; where both agree, points lie on the diagonal.
+/// Plots the observed frequency, with its interval, over the stated probability; calibrated probabilities are on the diagonal.
 fn plot(of: &str, bins: &[Bin]) -> Plot {
     let points: Vec<(f64, f64)> = bins.iter().map(|bin| (bin.stated, bin.observed.share())).collect();
     let dots =

@@ -1,52 +1,52 @@
-//! Which simulated cases are asked for.
+//! Plan of the simulated cases.
 
 use mops::core::math;
 use mops_testbed::{Draw, Effect, Missing, Plant, Trial, effects, generate, outside, plants};
 
-/// Attempts to make a case: not every effect reaches every size in every plant.
+/// Number of attempts to generate a case, as not every effect reaches every size in every plant.
 const ATTEMPTS: u64 = 60;
 
-/// What is missing in the model of a case.
+/// Kind of a case: effects missing in its model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Kind {
     /// One effect of the catalogue.
     One,
-    /// Two of them.
+    /// Two effects of the catalogue.
     Two,
-    /// Nothing.
+    /// No effect.
     Nothing,
-    /// Something that no catalogue has.
+    /// An effect that is not in the catalogue.
     Outside,
 }
 
-/// What a benchmark is asked for.
+/// Plan of a benchmark.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     /// Names of the plants.
     pub plants: Vec<String>,
     /// Names of the effects.
     pub effects: Vec<String>,
-    /// Errors of the refitted base model, in units of the noise.
+    /// Errors of the refitted nominal model, in units of the noise.
     pub sizes: Vec<f64>,
     /// Number of cases of each kind.
     pub counts: [(Kind, usize); 4],
     /// Seed.
     pub seed: u64,
-    /// Names of the cases that are wanted; all where there is none.
+    /// Names of the selected cases; all if empty.
     pub only: Vec<String>,
 }
 
-/// A case that is asked for.
+/// Requested case.
 #[derive(Debug, Clone)]
 pub(crate) struct Wish {
-    /// Its kind.
+    /// Kind of the case.
     pub kind: Kind,
-    /// Its number among those of its kind.
+    /// Number of the case within its kind.
     pub number: usize,
 }
 
 impl Plan {
-    /// All cases, the kinds mixed in proportion: a benchmark that is interrupted has seen something of each.
+    /// Returns all cases, with the kinds mixed in proportion, so that an interrupted benchmark covers every kind.
     #[allow(clippy::cast_precision_loss)]
     pub fn wishes(&self) -> Vec<Wish> {
         let of_kind = |&(kind, count): &(Kind, usize)| {
@@ -59,7 +59,7 @@ impl Plan {
         all.into_iter().map(|(_, wish)| wish).collect()
     }
 
-    /// The cases that are wanted by name.
+    /// Returns the cases selected by name.
     pub fn named(&self) -> Vec<Trial> {
         if self.only.is_empty() {
             return Vec::new();
@@ -67,30 +67,32 @@ impl Plan {
         self.wishes().iter().filter_map(|wish| self.make(wish)).filter(|trial| self.wants(&trial.name)).collect()
     }
 
-    /// Whether a case of that name is wanted.
+    /// Returns true if a case with this name is selected.
     pub fn wants(&self, name: &str) -> bool {
         self.only.is_empty() || self.only.iter().any(|wanted| wanted == name)
     }
 
-    /// The seed of an attempt at a case.
+    /// Returns the seed of an attempt to generate a case.
     fn seed_of(&self, number: u64, attempt: u64) -> u64 {
         (self.seed << 32) + number * ATTEMPTS + attempt
     }
 
-    /// The number of a case, from its name, which ends with its seed.
+    /// Returns the number of a case from its name, which ends with its seed.
     fn number_in(&self, name: &str) -> Option<u64> {
         let seed: u64 = name.rsplit('-').next()?.parse().ok()?;
         Some(seed.checked_sub(self.seed_of(0, 0))? / ATTEMPTS)
     }
 
-    /// The size asked for that is nearest to one reached.
+    /// Returns the requested size that is nearest to a reached one.
     pub fn nearest(&self, reached: f64) -> f64 {
         let off = |size: &f64| math::ln(size / reached).abs();
         self.sizes.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(reached)
     }
 
-    /// The case; `None` where no plant reaches the size with a sensible strength. Effects, then sizes take turns, so that
-    /// every effect comes at every size; the plant is drawn among those that the effect fits.
+    /// Generates the case; returns `None` if no plant reaches the size with a plausible parameter.
+    ///
+    /// Cases cycle through the effects, then through the sizes, so that every effect occurs at every size. The plant is drawn
+    /// from those that the effect fits.
     pub fn make(&self, wish: &Wish) -> Option<Trial> {
         let Wish { kind, number } = *wish;
         let mut draw = Draw::new(self.seed, &format!("{kind:?} {number}"));
@@ -103,7 +105,7 @@ impl Plan {
             Kind::Outside => outside(),
             _ => effects().into_iter().filter(|e| self.effects.iter().any(|name| name == e.name)).collect(),
         };
-        // Only the first of a name: some effects have a form for joints and one for actuators.
+        // Names are unique here: some effects have variants for joints and for actuators.
         let mut names: Vec<&'static str> = known.iter().map(|e| e.name).collect();
         names.dedup();
         let places = |name: &str| -> Vec<&'static Plant> {
@@ -151,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn every_effect_comes_at_every_size_and_kinds_are_mixed() {
+    fn every_effect_occurs_at_every_size_and_kinds_are_mixed() {
         let plan = plan();
         let wishes = plan.wishes();
         assert_eq!(wishes.len(), 8);
@@ -169,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_case_is_made_again_by_its_name() {
+    fn a_case_can_be_generated_again_by_its_name() {
         let all = plan();
         let third = all.make(&Wish { kind: Kind::One, number: 3 }).expect("it can be made");
         let only = Plan { only: vec![third.name.clone(), "nothing-9".into()], ..all };

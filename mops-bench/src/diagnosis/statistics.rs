@@ -1,29 +1,29 @@
-//! Rates with their intervals, and whether stated probabilities are what they say.
+//! Rates with confidence intervals, and the reliability of stated probabilities.
 
 use mops::core::math;
 
-/// How often something was so.
+/// Observed rate of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Rate {
-    /// So many times.
+    /// Number of occurrences.
     pub hits: usize,
-    /// Of so many.
+    /// Number of trials.
     pub of: usize,
 }
 
 impl Rate {
-    /// Counts what is so.
+    /// Counts the true values.
     pub fn of(facts: impl IntoIterator<Item = bool>) -> Self {
         facts.into_iter().fold(Self::default(), |rate, so| Self { hits: rate.hits + usize::from(so), of: rate.of + 1 })
     }
 
-    /// The share; not a number of nothing.
+    /// Returns the relative frequency; NaN without trials.
     #[allow(clippy::cast_precision_loss)]
     pub fn share(self) -> f64 {
         self.hits as f64 / self.of as f64
     }
 
-    /// Interval that holds the true rate with probability 0.95 at least.
+    /// Returns an interval that contains the true rate with probability at least 0.95.
     ///
     /// Source: C. J. Clopper, E. S. Pearson, The use of confidence or fiducial limits illustrated in the case of the binomial,
     /// Biometrika 26 (1934).
@@ -35,7 +35,7 @@ impl Rate {
     }
 }
 
-/// Probability of at least `hits` of `of` at a rate.
+/// Returns the binomial probability of at least `hits` of `of` at a rate.
 #[allow(clippy::cast_precision_loss)]
 fn at_least(hits: usize, of: usize, rate: f64) -> f64 {
     let mut choose = 0.0; // logarithm of the number of ways
@@ -51,7 +51,7 @@ fn at_least(hits: usize, of: usize, rate: f64) -> f64 {
     sum
 }
 
-/// Where a growing function of a number from 0 to 1 changes its sign.
+/// Returns the root of an increasing function in [0, 1], by bisection.
 fn root(f: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..60 {
@@ -61,21 +61,21 @@ fn root(f: impl Fn(f64) -> f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Edges of the bins in which stated probabilities are compared with what came true.
+/// Edges of the bins of a reliability diagram.
 const EDGES: [f64; 9] = [0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 0.99, 1.0];
 
-/// A bin of stated probabilities.
+/// Bin of a reliability diagram.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bin {
-    /// From, to.
+    /// Lower and upper edge.
     pub edges: [f64; 2],
-    /// Mean of what was stated.
+    /// Mean of the stated probabilities.
     pub stated: f64,
-    /// What came true.
+    /// Observed rate.
     pub observed: Rate,
 }
 
-/// Stated probabilities in bins, beside what came true; bins without any are left out.
+/// Groups pairs of stated probability and outcome into bins; empty bins are omitted.
 #[allow(clippy::cast_precision_loss)]
 pub(crate) fn reliability(stated: &[(f64, bool)]) -> Vec<Bin> {
     let bins = EDGES.windows(2).map(|edges| {
@@ -88,16 +88,16 @@ pub(crate) fn reliability(stated: &[(f64, bool)]) -> Vec<Bin> {
     bins.filter(|bin| bin.observed.of > 0).collect()
 }
 
-/// Mean squared difference between stated probabilities and what came true. Source: G. W. Brier, Verification of forecasts
-/// expressed in terms of probability, Monthly Weather Review 78 (1950).
+/// Returns the Brier score: the mean squared difference between stated probability and outcome. Source: G. W. Brier,
+/// Verification of forecasts expressed in terms of probability, Monthly Weather Review 78 (1950).
 #[allow(clippy::cast_precision_loss)]
 pub(crate) fn brier(stated: &[(f64, bool)]) -> f64 {
     stated.iter().map(|(p, so)| math::powi(p - f64::from(u8::from(*so)), 2)).sum::<f64>() / stated.len() as f64
 }
 
-/// Largest distance between the distribution of the values and a uniform one from 0 to 1, and the distance that 5 % of
-/// uniform samples of this size exceed. Source: M. A. Stephens, EDF statistics for goodness of fit and some comparisons, JASA
-/// 69 (1974), table 1A.
+/// Returns the Kolmogorov-Smirnov distance between the values and the uniform distribution on [0, 1], and its 5 % critical value
+/// for this sample size. Source: M. A. Stephens, EDF statistics for goodness of fit and some comparisons, JASA 69 (1974),
+/// table 1A.
 #[allow(clippy::cast_precision_loss)]
 pub(crate) fn uniformity(values: &[f64]) -> (f64, f64) {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
@@ -107,7 +107,7 @@ pub(crate) fn uniformity(values: &[f64]) -> (f64, f64) {
     (gaps.fold(0.0, f64::max), 1.358 / (n.sqrt() + 0.12 + 0.11 / n.sqrt()))
 }
 
-/// The tenths of the range that the values fall into.
+/// Counts the values in each tenth of [0, 1].
 pub(crate) fn deciles(values: &[f64]) -> [usize; 10] {
     let mut counts = [0; 10];
     for value in values.iter().filter(|v| v.is_finite()) {
@@ -134,11 +134,11 @@ mod tests {
     }
 
     #[test]
-    fn probabilities_that_are_right_have_the_least_brier_score() {
-        let told = |p: f64| -> Vec<(f64, bool)> { (0..10).map(|i| (p, i < 7)).collect() };
-        assert!((brier(&told(0.7)) - 0.21).abs() < 1e-12);
-        assert!(brier(&told(0.9)) > brier(&told(0.7)) && brier(&told(0.5)) > brier(&told(0.7)));
-        let bins = reliability(&told(0.7));
+    fn correct_probabilities_have_the_smallest_brier_score() {
+        let stated = |p: f64| -> Vec<(f64, bool)> { (0..10).map(|i| (p, i < 7)).collect() };
+        assert!((brier(&stated(0.7)) - 0.21).abs() < 1e-12);
+        assert!(brier(&stated(0.9)) > brier(&stated(0.7)) && brier(&stated(0.5)) > brier(&stated(0.7)));
+        let bins = reliability(&stated(0.7));
         assert_eq!((bins.len(), bins[0].edges, bins[0].observed), (1, [0.6, 0.8], Rate { hits: 7, of: 10 }));
         assert_eq!(reliability(&[(1.0, true), (0.995, false)])[0].observed.of, 2);
     }

@@ -1,4 +1,4 @@
-//! Every case with its answer, and every strength beside its truth, as one line of a table.
+//! CSV tables of the cases, and of the estimated effect parameters with their true values.
 
 use super::judge::Row;
 use super::tool::spelt;
@@ -25,19 +25,18 @@ const HEADER: [&str; 19] = [
     "failure",
 ];
 
-/// The cases as CSV.
+/// Returns the cases as CSV.
 pub(crate) fn csv(rows: &[Row]) -> String {
     written(&HEADER, rows.iter().map(cells))
 }
 
-/// The strengths of true effects that were found as CSV: the case, its size, the strength, its truth, its value and the
-/// interval stated.
+/// Returns the parameters of true effects that were found as CSV: case, size, parameter, true value, estimate, interval.
 pub(crate) fn strengths(rows: &[Row]) -> String {
     let lines = rows.iter().flat_map(|row| {
         row.judgement.covered.iter().map(|c| {
             let numbers = [c.truth, c.value, c.interval[0], c.interval[1]].map(|number| number.to_string());
             let named = [row.name.clone(), row.size.to_string(), c.name.clone()];
-            named.into_iter().chain(numbers).chain([c.holds().to_string()]).collect()
+            named.into_iter().chain(numbers).chain([c.covers().to_string()]).collect()
         })
     });
     written(&["case", "size", "strength", "truth", "value", "from", "to", "truth inside"], lines)

@@ -1,4 +1,4 @@
-//! What is asked of a tool that looks for missing effects, and what it answers.
+//! Tools that search for missing effects, and their answers.
 
 use std::time::Instant;
 
@@ -9,18 +9,18 @@ use mops::{Catalogue, Study, Watch};
 
 use mops::{Options, solve};
 
-/// Where the tools find what they need.
+/// Common inputs of the tools.
 #[derive(Clone, Copy)]
 pub(crate) struct Tools<'a> {
-    /// Models, and the effects that are tried.
+    /// Models and candidate effects.
     pub catalogue: &'a Catalogue,
-    /// Who may end it.
+    /// Observer, which may request a stop.
     pub watch: &'a dyn Watch,
-    /// Seed of the tools' own random numbers.
+    /// Seed of the random numbers of the tools.
     pub seed: u64,
 }
 
-/// Data files that are already read.
+/// Data files in memory.
 pub(crate) struct InMemory<'a>(pub &'a [(String, String)]);
 
 impl Files for InMemory<'_> {
@@ -35,10 +35,10 @@ impl Files for InMemory<'_> {
 }
 
 impl Tools<'_> {
-    /// A study, read as every study is.
+    /// Reads a study.
     ///
     /// # Errors
-    /// The first mistake in it, as a sentence.
+    /// If the study has a mistake; the error is the first one as a sentence.
     pub fn study(&self, name: &str, text: &str, files: &dyn Files) -> Result<Study, String> {
         let file = file::read(self.catalogue, name, text, &[], files);
         let mut study = file.map_err(|mistake| mistake.to_string())?.study;
@@ -46,26 +46,26 @@ impl Tools<'_> {
         Ok(study)
     }
 
-    /// The diagnosis on one thread, and the seconds it took.
+    /// Runs the diagnosis on one thread; returns it with its time in s.
     ///
     /// # Errors
-    /// The study cannot be diagnosed: why.
+    /// If the study cannot be diagnosed; the error is the reason.
     pub fn diagnose(&self, study: Study) -> Result<(Diagnosis, f64), String> {
         let options = Options { effects: self.catalogue.effects.clone(), jobs: Some(1), ..Options::default() };
-        let begun = Instant::now();
+        let started = Instant::now();
         let solved = solve(study, &options, &Quiet(self.watch)).map_err(|why| why.to_string())?;
-        Ok((solved.diagnosis.expect("that was the task"), begun.elapsed().as_secs_f64()))
+        Ok((solved.diagnosis.expect("that was the task"), started.elapsed().as_secs_f64()))
     }
 }
 
 impl Tools<'_> {
-    /// What brute force says, on one thread: the model refitted with every effect in turn, and the least BIC believed.
+    /// Runs brute force on one thread: refits the model with each effect in turn and selects the smallest BIC.
     ///
     /// # Errors
-    /// The study cannot be treated: why.
+    /// If the study cannot be handled; the error is the reason.
     pub fn brute_force(&self, study: &Study) -> Result<Answer, String> {
         let threads = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");
-        let begun = Instant::now();
+        let started = Instant::now();
         let done = threads.install(|| brute_force(study, &self.catalogue.effects)).map_err(|why| why.message)?;
         let found: Vec<(Named, f64)> = done.best.into_iter().map(|best| (best, f64::NAN)).collect();
         Ok(Answer {
@@ -77,39 +77,39 @@ impl Tools<'_> {
             strengths: Vec::new(),
             unexplained_at: None,
             simulations: done.simulations,
-            seconds: begun.elapsed().as_secs_f64(),
+            seconds: started.elapsed().as_secs_f64(),
         })
     }
 }
 
-/// An effect or what counts as one, and its place.
+/// Effect and its place.
 pub(crate) type Named = (String, String);
 
-/// What a tool says.
+/// Answer of a tool.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Answer {
     /// Verdict.
     pub verdict: Verdict,
     /// Probability of the verdict.
     pub probability: f64,
-    /// Probability of such a residual where nothing is missing.
+    /// Probability of such a residual if nothing is missing.
     pub p_value: f64,
-    /// Effects that are missing, with their probabilities.
+    /// Missing effects, with their probabilities.
     pub found: Vec<(Named, f64)>,
-    /// All that the data cannot tell from the first, itself included.
+    /// Effects that the data cannot distinguish from the first one, itself included.
     pub set: Vec<Named>,
-    /// Strengths: which of the effects, name, value, interval.
+    /// Parameters of the effects: index of the effect, name, value, interval.
     pub strengths: Vec<(usize, String, f64, Option<[f64; 2]>)>,
-    /// Place of what nothing explains.
+    /// Place of an unexplained effect.
     pub unexplained_at: Option<String>,
-    /// Simulations.
+    /// Number of simulations.
     pub simulations: usize,
-    /// Seconds on one thread.
+    /// Time on one thread, in s.
     pub seconds: f64,
 }
 
 impl Answer {
-    /// What a diagnosis says.
+    /// Extracts the answer of a diagnosis.
     pub fn of(diagnosis: &Diagnosis, seconds: f64) -> Self {
         let found = &diagnosis.found;
         let first = found.first();
@@ -135,7 +135,7 @@ impl Answer {
         }
     }
 
-    /// Whether another answer has the same verdict and the same effects at the same places, in any order.
+    /// Returns true if another answer has the same verdict and the same effects at the same places, in any order.
     pub fn agrees(&self, other: &Self) -> bool {
         let named = |answer: &Self| {
             let mut all: Vec<Named> = answer.found.iter().map(|(named, _)| named.clone()).collect();
@@ -145,13 +145,13 @@ impl Answer {
         self.verdict == other.verdict && named(self) == named(other)
     }
 
-    /// The effect named first; none where the verdict is another.
+    /// Returns the first effect; `None` if the verdict is not `effect`.
     pub fn first(&self) -> Option<&Named> {
         self.found.first().map(|(named, _)| named).filter(|_| self.verdict == Verdict::Effect)
     }
 }
 
-/// A verdict as results spell it.
+/// Returns the name of a verdict in results.
 pub(crate) fn spelt(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Effect => "effect",

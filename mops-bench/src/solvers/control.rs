@@ -1,22 +1,22 @@
-//! Studies with known answers, to measure solvers with: the suite `control`.
+//! Suite `control`: studies with known optimum.
 
 use mops::Shipped;
 
-/// A study whose optimum is known.
+/// Study with known optimum.
 #[derive(Debug, Clone, Copy)]
 pub struct Known {
-    /// Its files.
+    /// Files of the study.
     pub study: Shipped,
-    /// The least objective.
+    /// Minimum of the objective.
     pub minimum: f64,
-    /// Values of the tuners there, in their order; empty where only the objective is known, or where the optimum lies on a
-    /// jump, which rounded values miss.
+    /// Tuners at the optimum, in order. Empty if only the objective is known, or if the optimum is at a discontinuity, which
+    /// rounded values miss.
     pub tuners: &'static [f64],
-    /// Where the answer comes from.
+    /// Source of the solution.
     pub source: &'static str,
 }
 
-/// The files of a study in `mops-bench/control/`, with its data.
+/// Includes the files of a study in `mops-bench/control/`, with its data.
 macro_rules! control {
     ($name:literal $(, $file:literal)*) => {
         Shipped {
@@ -29,8 +29,8 @@ macro_rules! control {
     };
 }
 
-/// Every study of the suite: design and calibration as the thesis has them, then problems with closed forms, published
-/// answers, or answers computed by other means.
+/// Returns the studies of the suite: designs and a calibration from the thesis, then problems with closed-form, published or
+/// independently computed solutions.
 pub fn control() -> Vec<Known> {
     let of_shipped = |name: &str| {
         mops::studies::shipped().into_iter().find(|study| study.name == name).expect("the study is shipped")
@@ -125,7 +125,7 @@ pub fn control() -> Vec<Known> {
         ),
         known(control!("mass-spring", "data/mass-spring.csv"), 0.0, &[4.0, 0.6, 1.0, 0.0], "exact data"),
         known(control!("tank", "data/tank.csv"), 0.0, &[0.006, 0.64], "exact data"),
-        // The certified sums of squares, over the number of data and the squared noise that the studies state.
+        // Certified sums of squares, divided by the number of data and by the squared noise level of the study.
         known(
             control!("misra1a", "data/misra1a.csv"),
             1.245_513_889_4e-1 / (14.0 * 0.01),

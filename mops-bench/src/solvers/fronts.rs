@@ -1,16 +1,16 @@
-//! Fronts over seeds: mean and deviation of hypervolume and distance for every problem.
+//! Pareto fronts over seeds: mean and standard deviation of hypervolume and distance for every problem.
 
 use super::results::{Results, Row};
 use mops::core::math;
 
-/// What a solver reaches on a problem over all seeds.
+/// Results of a solver on a problem over all seeds.
 pub(crate) struct Spread {
     pub problem: String,
     pub solver: String,
     pub seeds: usize,
     /// Mean and standard deviation of the hypervolume of the members.
     pub hypervolume: [f64; 2],
-    /// Mean of that of all points.
+    /// Mean hypervolume of all evaluated points.
     pub archive: f64,
     /// Mean and standard deviation of the inverted generational distance.
     pub distance: [f64; 2],
@@ -19,7 +19,7 @@ pub(crate) struct Spread {
     pub evaluations: usize,
 }
 
-/// Every solver and problem that has a front.
+/// Returns the results of every solver on every problem with a front.
 pub(crate) fn spreads(results: &Results) -> Vec<Spread> {
     let mut all: Vec<Spread> = Vec::new();
     for row in &results.rows {
@@ -46,7 +46,7 @@ fn of(results: &Results, first: &Row) -> Option<Spread> {
     })
 }
 
-/// Mean and standard deviation.
+/// Returns mean and standard deviation.
 #[allow(clippy::cast_precision_loss)]
 fn statistics(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     let count = values.clone().count();
@@ -55,8 +55,10 @@ fn statistics(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     [mean, square.sqrt()]
 }
 
-/// Mean hypervolume of pymoo 0.6.2 under the same conditions, and its distance where it was taken to as many points of the
-/// front: NSGA-II with 100 members over 250 generations for two objectives, NSGA-III with 92 members over 250 (DTLZ1: 400)
+/// Returns the mean hypervolume of pymoo 0.6.2 under the same conditions, and the inverted generational distance. The latter is
+/// `None` if it was not computed with equally many points of the true front.
+///
+/// Settings: NSGA-II with 100 members and 250 generations for two objectives; NSGA-III with 92 members and 250 (DTLZ1: 400)
 /// generations for three; 7 seeds.
 pub(crate) fn published(problem: &str) -> Option<(f64, Option<f64>)> {
     const TABLE: [(&str, f64, Option<f64>); 7] = [

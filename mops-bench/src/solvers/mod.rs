@@ -1,4 +1,4 @@
-//! How well solvers do on problems with known answers: how many they solve, with how many evaluations, in what time.
+//! Benchmark of solvers on problems with known solutions: number of solved problems, evaluations, time.
 
 mod control;
 mod fronts;
@@ -23,30 +23,30 @@ pub(crate) use results::{Front, Results, Row};
 pub(crate) use suite::{Subject, Suite, suites};
 use timed::Timed;
 
-/// What is run.
+/// Plan of a benchmark.
 pub(crate) struct Plan {
     pub suite: Suite,
     pub solvers: Vec<SolverChoice>,
     pub slope: Slope,
-    /// Seeds 1 to this.
+    /// Number of seeds, starting at 1.
     pub seeds: u64,
-    /// Evaluations a run may take, for every variable and one more; as the suite has it where absent.
+    /// Budget as a multiple of n + 1 evaluations for n variables; that of the suite if absent.
     pub budget: Option<usize>,
-    /// Relative noise that is added to all values.
+    /// Relative noise added to all values.
     pub noise: f64,
-    /// Problems by name; all where empty.
+    /// Names of the selected problems; all if empty.
     pub only: Vec<String>,
 }
 
 impl Plan {
-    /// The problems asked for.
+    /// Returns the selected problems.
     fn subjects(&self) -> Vec<Subject> {
         let mut subjects = self.suite.subjects();
         subjects.retain(|subject| self.only.is_empty() || self.only.iter().any(|name| name == subject.name()));
         subjects
     }
 
-    /// A solver that accepts none of the problems.
+    /// Returns a solver that accepts none of the problems, if there is one.
     pub fn idle(&self, catalogue: &Catalogue) -> Option<&SolverChoice> {
         let shapes: Vec<Shape> = self.subjects().iter().map(|subject| subject.shape(catalogue)).collect();
         let accepts = |solver: &SolverChoice| shapes.iter().any(|shape| solver.make().accepts(shape).is_ok());
@@ -61,13 +61,13 @@ impl Plan {
 /// Accuracy of the first count of evaluations.
 pub(crate) const ROUGH: f64 = 1e-3;
 
-/// A run, with what every point of it was worth.
+/// Finished run, with the merit of every point.
 struct Done {
     row: Row,
     history: Vec<Merit>,
 }
 
-/// Runs a plan on so many threads; every run has one to itself, so that times are comparable.
+/// Runs a plan on `jobs` threads; each run uses one thread, so that times are comparable.
 pub(crate) fn run(catalogue: &Catalogue, plan: &Plan, jobs: usize, watch: &dyn Watch) -> Results {
     let subjects = plan.subjects();
     let mut tasks: Vec<Task<'_>> = Vec::new();
@@ -90,7 +90,7 @@ pub(crate) fn run(catalogue: &Catalogue, plan: &Plan, jobs: usize, watch: &dyn W
     Results::new(plan, found.into_iter().map(|done| done.row).collect(), watch.wants_stop())
 }
 
-/// A run to be done.
+/// Run to be executed.
 #[derive(Clone, Copy)]
 struct Task<'a> {
     solver: &'a SolverChoice,
@@ -105,18 +105,24 @@ fn one(catalogue: &Catalogue, plan: &Plan, task: &Task<'_>) -> Option<Done> {
             let posed = Posed::new(problem, task.slope).with_noise(plan.noise).with_seed(task.seed);
             let clean = Posed::new(problem, task.slope);
             let truth = |tuners: &[f64]| clean.evaluate(&clean.point_of(tuners)).merit;
-            go(plan, task, &posed, &posed.start(), if plan.noise > 0.0 { Some(&truth) } else { None })
+            execute(plan, task, &posed, &posed.start(), if plan.noise > 0.0 { Some(&truth) } else { None })
         }
         Subject::Study(known) => {
             let posed = suite::posing(catalogue, known, task.seed);
             let start = posed.start();
-            go(plan, task, &posed, &start, None)
+            execute(plan, task, &posed, &start, None)
         }
     }
 }
 
-/// `None` where the solver does not accept the problem.
-fn go(plan: &Plan, task: &Task<'_>, posed: &impl Evaluator, start: &[f64], truth: Option<Truth<'_>>) -> Option<Done> {
+/// Executes a run; returns `None` if the solver does not accept the problem.
+fn execute(
+    plan: &Plan,
+    task: &Task<'_>,
+    posed: &impl Evaluator,
+    start: &[f64],
+    truth: Option<Truth<'_>>,
+) -> Option<Done> {
     let Task { solver: choice, subject, seed, .. } = *task;
     let mut solver = choice.make();
     solver.accepts(posed.shape()).ok()?;
@@ -124,9 +130,9 @@ fn go(plan: &Plan, task: &Task<'_>, posed: &impl Evaluator, start: &[f64], truth
     let thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");
     let (budget, answer) = (plan.evaluations(start.len()), subject.answer());
     let (measured, seconds) = thread.install(|| {
-        let begun = Instant::now();
+        let started = Instant::now();
         let measured = measure(&answer, &timed, start, solver.as_mut(), budget, truth);
-        (measured, begun.elapsed().as_secs_f64())
+        (measured, started.elapsed().as_secs_f64())
     });
     let fine = measured.evaluations_to(subject.accuracy(&plan.suite));
     let row = Row {

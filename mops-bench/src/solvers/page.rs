@@ -1,23 +1,23 @@
-//! The page of a benchmark of solvers: profiles, or hypervolumes of fronts, as pictures, and what the terminal says.
+//! Page of a solver benchmark: plots of profiles or hypervolumes, and the tables of the terminal.
 
 use super::results::{Results, Row};
 use super::{ROUGH, Score, data_profile, performance_profile};
 use mops::report::{Color, Curve, CurveStyle, ParallelAxis, Plot};
 
-/// Inks that differ.
+/// Number of different colours.
 const COLORS: usize = 6;
 
-/// The page, from the tables as text, and from the results with their names.
+/// Returns the page from the tables as text and from the named results.
 pub(crate) fn page(tables: &str, all: &[(String, &Results)]) -> String {
     let suite = all.first().map_or("", |(_, results)| results.suite.as_str());
     let accuracy = all.first().map_or(0.0, |(_, results)| results.accuracy);
     let rough = |row: &Row| row.to_rough;
     let fine = |row: &Row| row.to_fine;
-    // No point of a front is called solved.
+    // Fronts have hypervolumes instead of solved problems.
     let of_fronts = all.iter().any(|(_, results)| results.rows.iter().any(|row| row.front.is_some()));
     let profiles = || {
         let mut plots = vec![data(all, rough, ROUGH), performance(all, rough, ROUGH)];
-        // One accuracy is one pair of pictures.
+        // One pair of plots for each accuracy.
         if accuracy < ROUGH {
             plots.insert(1, data(all, fine, accuracy));
             plots.push(performance(all, fine, accuracy));
@@ -31,7 +31,7 @@ pub(crate) fn page(tables: &str, all: &[(String, &Results)]) -> String {
     crate::page::page(&title, heading, &pictures, tables, "results.json")
 }
 
-/// Hypervolume of every run in parts of that of the true front: an axis for every problem, a dot for every seed.
+/// Plots the hypervolume of every run relative to the true front: one axis per problem, one dot per seed.
 #[allow(clippy::cast_precision_loss)]
 fn volumes(all: &[(String, &Results)]) -> Option<Plot> {
     let mut problems: Vec<&str> = Vec::new();
@@ -44,7 +44,7 @@ fn volumes(all: &[(String, &Results)]) -> Option<Plot> {
             row.front.map(|front| front.hypervolume / front.known)
         })
         .collect();
-    // All axes begin at the same round share.
+    // All axes start at the same round value.
     let least = shares.iter().copied().fold(1.0, f64::min);
     let from = [0.99, 0.95, 0.9, 0.8, 0.5].into_iter().find(|from| *from <= least).unwrap_or(0.0);
     let height = |share: f64| (share - from) / (1.0 - from);
@@ -53,7 +53,7 @@ fn volumes(all: &[(String, &Results)]) -> Option<Plot> {
         .flat_map(|(name, results)| results.solvers().into_iter().map(move |solver| (name, *results, solver)));
     let names: Vec<_> = names.collect();
     let curve = |(index, (name, results, solver)): (usize, &(&String, &Results, &str))| {
-        // Solvers stand beside each other.
+        // Solvers are placed next to each other.
         let aside = 0.12 * (index as f64 - 0.5 * (names.len() as f64 - 1.0));
         let point = |row: &Row| {
             let at = problems.iter().position(|problem| *problem == row.problem)?;
@@ -72,21 +72,21 @@ fn volumes(all: &[(String, &Results)]) -> Option<Plot> {
     let rule = |y: f64| Curve { points: ends.map(|x| (x, y)).to_vec(), color: Color::Grid, ..Curve::default() };
     let upright = |name: &&str| ParallelAxis { name: (*name).to_owned(), ends: [from.to_string(), "1".to_owned()] };
     (!shares.is_empty()).then(|| Plot {
-        title: "Hypervolume in parts of that of the true front".into(),
+        title: "Hypervolume relative to the true front".into(),
         x_label: "problem".into(),
-        y_label: "one dot for every seed".into(),
+        y_label: "relative hypervolume (one dot per seed)".into(),
         parallel_axes: problems.iter().map(upright).collect(),
         curves: [0.0, 1.0].map(rule).into_iter().chain(names.iter().enumerate().map(curve)).collect(),
         ..Plot::default()
     })
 }
 
-/// A solver of the results of a name.
+/// Returns the label of a solver in named results.
 fn named(solver: &str, name: &str) -> String {
     if name.is_empty() { solver.to_owned() } else { format!("{solver}, {name}") }
 }
 
-/// The solvers of all results, with their names and scores.
+/// Returns the solvers of all results with their labels and scores.
 fn scored(all: &[(String, &Results)], count: impl Fn(&Row) -> Option<usize> + Copy) -> Vec<(String, Vec<Score>)> {
     let of = |(name, results): &(String, &Results)| -> Vec<(String, Vec<Score>)> {
         results.solvers().into_iter().map(|solver| (named(solver, name), Score::of(results, solver, count))).collect()
@@ -98,13 +98,13 @@ fn curves(profiles: Vec<(String, Vec<(f64, f64)>)>) -> Option<Vec<Curve>> {
     let ends = profiles.iter().flat_map(|(_, points)| points).map(|(x, _)| *x);
     let [first, last] = ends.fold([f64::INFINITY, 0.0], |[low, high], x| [x.min(low), x.max(high)]);
     let curve = |(index, (name, mut points)): (usize, (String, Vec<(f64, f64)>))| {
-        // Up to the end of the picture; at 0 throughout where nothing is solved.
+        // Extends the curve to the end of the plot; at 0 if nothing is solved.
         if points.is_empty() {
             points.push((first, 0.0));
         }
         let share = points.last().map_or(0.0, |&(_, share)| share);
         points.push((last, share));
-        // Where the inks begin anew, lines are dashed.
+        // Lines are dashed when the colours repeat.
         let style = if (index / COLORS).is_multiple_of(2) { CurveStyle::Line } else { CurveStyle::Dashed };
         Curve { name, points, style, color: Color::Series(index), ..Curve::default() }
     };

@@ -5,7 +5,7 @@
 
 use super::results::{Results, Row};
 
-/// What a run took to solve its problem: evaluations, and how many its problem takes for a simplex gradient.
+/// Score of a run: evaluations until solved, and evaluations of one simplex gradient.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Score {
     pub evaluations: Option<usize>,
@@ -13,20 +13,22 @@ pub(crate) struct Score {
 }
 
 impl Score {
-    /// The scores of a solver, run by run.
+    /// Returns the scores of a solver, one per run.
     pub fn of(results: &Results, solver: &str, count: impl Fn(&Row) -> Option<usize>) -> Vec<Self> {
         results.of(solver).map(|row| Self { evaluations: count(row), simplex: row.variables + 1 }).collect()
     }
 }
 
-/// Share of runs that are solved within so many simplex gradients (`n + 1` evaluations): corners of a staircase.
+/// Returns the data profile: share of runs solved within a number of simplex gradients (`n + 1` evaluations), as the corners of
+/// a step function.
 #[allow(clippy::cast_precision_loss)]
 pub(crate) fn data_profile(scores: &[Score]) -> Vec<(f64, f64)> {
     let spent = |score: &Score| score.evaluations.map(|count| count as f64 / score.simplex as f64);
     staircase(scores.iter().map(spent).collect())
 }
 
-/// Share of runs that a solver solves with at most so many times the evaluations of the best solver, for every solver.
+/// Returns the performance profile of every solver: share of runs solved within a multiple of the evaluations of the best
+/// solver.
 #[allow(clippy::cast_precision_loss)]
 pub(crate) fn performance_profile(solvers: &[Vec<Score>]) -> Vec<Vec<(f64, f64)>> {
     let runs = solvers.iter().map(Vec::len).min().unwrap_or(0);
@@ -36,7 +38,7 @@ pub(crate) fn performance_profile(solvers: &[Vec<Score>]) -> Vec<Vec<(f64, f64)>
     solvers.iter().map(|scores| staircase(scores.iter().zip(&best).map(ratio).collect())).collect()
 }
 
-/// The distribution of numbers, some of which are missing, from the first to the last of them.
+/// Returns the corners of the empirical distribution of numbers, some of which are missing.
 #[allow(clippy::cast_precision_loss)]
 fn staircase(numbers: Vec<Option<f64>>) -> Vec<(f64, f64)> {
     let all = numbers.len().max(1) as f64;

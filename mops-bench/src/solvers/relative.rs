@@ -1,7 +1,7 @@
-//! Problems of which nothing is known but what solvers find: each run is measured by the best of all.
+//! Problems without a known minimum: each run is compared with the best of all runs.
 //!
-//! Solved to `tau`: `f(x0) - f >= (1 - tau)(f(x0) - f_L)`, where `f_L` is the least value of any run of the benchmark and of
-//! five solvers beside it, under the same budget, slopes by differences included; or the published minimum, where that is less.
+//! Solved to `tau`: `f(x0) - f >= (1 - tau)(f(x0) - f_L)`. `f_L` is the smallest value of all runs of the benchmark and of five
+//! additional solvers, with the same budget and finite differences. If the published minimum is smaller, `f_L` is that minimum.
 //!
 //! Source: J. J. More, S. M. Wild, SIAM Journal on Optimization 20 (2009) 172-191, section 2.
 
@@ -10,14 +10,14 @@ use mops::{Catalogue, SolverKind};
 
 use super::{Done, ROUGH};
 
-/// The solvers beside those of the benchmark.
+/// Returns the additional solvers.
 pub(super) fn rivals(catalogue: &Catalogue) -> Vec<SolverChoice> {
     let wanted = ["sqp", "pattern-search", "l-bfgs", "cma-es", "nelder-mead"];
     let kinds = wanted.iter().filter_map(|name| catalogue.solvers.iter().find(|kind| kind.name == *name));
     kinds.map(SolverKind::default_choice).collect()
 }
 
-/// Fills in what is known, and the evaluations to it.
+/// Sets the known minimum of each run, and the evaluations until solved.
 pub(super) fn judge(found: &mut [Done], others: &[Done], fine: f64) {
     let published = |done: &Done| done.row.known.unwrap_or(f64::INFINITY);
     let least = |done: &Done| least_of(&done.row.problem, found, others).min(published(done));

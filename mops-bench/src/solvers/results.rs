@@ -1,11 +1,11 @@
-//! What a benchmark leaves behind, and what of it one line says.
+//! Results of a solver benchmark, and their summary.
 
 use mops_problems::{FrontFound, Slope};
 use serde::{Deserialize, Serialize};
 
 use super::Plan;
 
-/// All rows, and what they were measured with.
+/// Results of a benchmark, with its settings.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Results {
     /// Version of this layout.
@@ -17,18 +17,18 @@ pub(crate) struct Results {
     pub slopes: String,
     /// Accuracy that counts as solved.
     pub accuracy: f64,
-    /// Evaluations that a run may take, for every variable and one more; as the suite has it where absent.
+    /// Budget as a multiple of n + 1 evaluations for n variables; that of the suite if absent.
     #[serde(default)]
     pub budget: Option<usize>,
-    /// Relative noise that was added.
+    /// Relative noise added to all values.
     pub noise: f64,
-    /// Whether the user ended it before all runs were made.
+    /// True if the benchmark was interrupted before its last run.
     #[serde(default)]
     pub interrupted: bool,
     pub rows: Vec<Row>,
 }
 
-/// A run of a solver on a problem.
+/// Run of a solver on a problem.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Row {
     pub problem: String,
@@ -38,48 +38,48 @@ pub(crate) struct Row {
     pub variables: usize,
     /// Number of objectives and constraints.
     pub rows: usize,
-    /// The known minimum that is nearest.
+    /// Nearest known minimum.
     pub known: Option<f64>,
-    /// The best objective.
+    /// Objective of the best point.
     #[serde(deserialize_with = "infinite_where_null")]
     pub reached: f64,
-    /// Largest violation of a constraint there.
+    /// Largest constraint violation at the best point.
     #[serde(deserialize_with = "infinite_where_null")]
     pub violation: f64,
     pub evaluations: usize,
-    /// Exact slopes taken.
+    /// Number of exact linearisations.
     pub linearisations: usize,
-    /// Evaluations to 1e-3 of the known minimum.
+    /// Evaluations until within 1e-3 of the known minimum.
     pub to_rough: Option<usize>,
-    /// Evaluations to the accuracy that counts as solved.
+    /// Evaluations until solved.
     pub to_fine: Option<usize>,
     pub solved: bool,
-    /// Whether the solver says that it has an optimum.
+    /// True if the solver reports convergence.
     pub converged: bool,
-    /// Time of the whole run in s.
+    /// Time of the whole run, in s.
     pub seconds: f64,
-    /// Time that was not spent in the problem's functions, in s.
+    /// Time outside the functions of the problem, in s.
     pub solver_seconds: f64,
-    /// The front, where the problem has one.
+    /// Quality of the Pareto front, if the problem has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub front: Option<Front>,
 }
 
-/// How good a front is that was found.
+/// Quality of a computed Pareto front.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(crate) struct Front {
-    /// Hypervolume of the solver's members.
+    /// Hypervolume of the members of the last generation.
     pub hypervolume: f64,
-    /// Hypervolume of all points.
+    /// Hypervolume of all evaluated points.
     pub archive: f64,
-    /// Inverted generational distance of the members; infinite where there are none.
+    /// Inverted generational distance of the members; infinite without members.
     #[serde(deserialize_with = "infinite_where_null")]
     pub distance: f64,
     /// Hypervolume of the true front.
     pub known: f64,
 }
 
-/// JSON has no infinity: it stands as `null`.
+/// Reads a number; `null` means infinity, which JSON lacks.
 fn infinite_where_null<'d, D: serde::Deserializer<'d>>(value: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(value)?.unwrap_or(f64::INFINITY))
 }
@@ -91,21 +91,21 @@ impl From<FrontFound> for Front {
     }
 }
 
-/// A solver in one line.
+/// Summary of a solver.
 pub(crate) struct Summary {
     pub solver: String,
     pub runs: usize,
-    /// Runs on problems with a known minimum.
+    /// Number of runs on problems with a known minimum.
     pub judged: usize,
     pub solved: usize,
-    /// Runs that end with an optimum that violates a constraint.
+    /// Number of runs that converged to a point that violates a constraint.
     pub false_claims: usize,
-    /// Median evaluations to 1e-3, of the runs that got there.
+    /// Median evaluations to 1e-3, over successful runs.
     pub median_rough: Option<f64>,
-    /// Median evaluations to the accuracy that counts as solved, of the runs that got there.
+    /// Median evaluations until solved, over solved runs.
     pub median_fine: Option<f64>,
     pub seconds: f64,
-    /// Solver and engine, per evaluation, in ns.
+    /// Overhead of solver and engine per evaluation, in ns.
     pub nanoseconds: f64,
 }
 
@@ -124,7 +124,7 @@ impl Results {
         }
     }
 
-    /// The solvers in the order of their rows.
+    /// Returns the solvers in the order of their rows.
     pub fn solvers(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         for row in &self.rows {
@@ -140,7 +140,7 @@ impl Results {
         self.rows.iter().filter(move |row| row.solver == solver)
     }
 
-    /// The row of the same run in these results; of another solver where they have but one.
+    /// Returns the corresponding run in these results. If they have only one solver, its runs are used.
     pub fn same(&self, wanted: &Row) -> Option<&Row> {
         let solvers = self.solvers();
         let solver = if let [only] = solvers[..] { only } else { &wanted.solver };
@@ -166,7 +166,7 @@ impl Results {
     }
 }
 
-/// The median; between the two in the middle of an even number.
+/// Returns the median; the mean of the two middle values for an even count.
 #[allow(clippy::cast_precision_loss)]
 fn median(counts: impl Iterator<Item = usize>) -> Option<f64> {
     let mut counts: Vec<usize> = counts.collect();
@@ -181,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_median_of_an_even_number_lies_between() {
+    fn the_median_of_an_even_count_is_the_mean_of_the_middle_values() {
         assert_eq!(median([9, 3, 5].into_iter()), Some(5.0));
         assert_eq!(median([9, 3, 6, 5].into_iter()), Some(5.5));
         assert_eq!(median(std::iter::empty()), None);

@@ -1,23 +1,22 @@
-//! The suites: problems written as formulas, and studies.
+//! Suites of problems, which are formulas or studies.
 
 use super::control::Known;
 use mops::Catalogue;
 use mops::core::{Evaluator, Problem as Posing, Shape};
 use mops_problems::{Answer, Posed, Problem, Slope};
 
-/// Problems that belong together.
+/// Suite of problems.
 #[derive(Clone, Copy)]
 pub(crate) struct Suite {
     /// Name on the command line.
     pub name: &'static str,
-    /// What it holds, in one sentence.
+    /// Description in one sentence.
     pub about: &'static str,
-    /// Accuracy that counts as solved, relative to the larger of 1 and the size of the optimum; of studies relative to the
-    /// optimum.
+    /// Accuracy that counts as solved, relative to max(1, |optimum|); for studies relative to the optimum.
     pub accuracy: f64,
-    /// Points a run may evaluate, for so many variables.
+    /// Budget of a run in evaluations, as a function of the number of variables.
     pub budget: fn(usize) -> usize,
-    /// Whether nothing is known but what solvers find, so that each is measured by the best of all.
+    /// True if the minima are unknown, and each run is compared with the best of all runs.
     pub relative: bool,
     content: Content,
 }
@@ -28,13 +27,13 @@ enum Content {
     Studies(fn() -> Vec<Known>),
 }
 
-/// A problem of a suite.
+/// Problem of a suite.
 pub(crate) enum Subject {
     Formula(Problem),
     Study(Known),
 }
 
-/// Every suite.
+/// Returns all suites.
 pub(crate) fn suites() -> Vec<Suite> {
     let formulas = mops_problems::suites().into_iter().map(|suite| Suite {
         name: suite.name,
@@ -46,7 +45,7 @@ pub(crate) fn suites() -> Vec<Suite> {
     });
     let control = Suite {
         name: "control",
-        about: "20 studies of control design and calibration whose optimum is known; slopes as in `mops run`",
+        about: "20 studies of control design and calibration with known optimum; gradients as in `mops run`",
         accuracy: 1e-3,
         budget: |_| mops::DEFAULT_EVALUATIONS,
         relative: false,
@@ -72,7 +71,7 @@ impl Subject {
         }
     }
 
-    /// Tuners at the optimum; empty where they are not known.
+    /// Returns the tuners at the optimum; empty if unknown.
     pub fn tuners(&self) -> &'static [f64] {
         match self {
             Self::Formula(_) => &[],
@@ -80,7 +79,7 @@ impl Subject {
         }
     }
 
-    /// Source of its definition and of its answer.
+    /// Returns the source of the problem and of its solution.
     pub fn source(&self) -> &'static str {
         match self {
             Self::Formula(problem) => problem.source,
@@ -88,19 +87,19 @@ impl Subject {
         }
     }
 
-    /// Accuracy that counts as solved, relative to the larger of 1 and the size of the optimum.
+    /// Returns the accuracy that counts as solved, relative to max(1, |optimum|).
     pub fn accuracy(&self, suite: &Suite) -> f64 {
         match self {
             Self::Formula(problem) => problem.accuracy.unwrap_or(suite.accuracy),
             Self::Study(known) => {
-                // Of an optimum below 1, relative to itself; one of 0 is reached where scaled values are that small.
+                // Relative to an optimum below 1; for the optimum 0 the accuracy is absolute.
                 let size = known.minimum.abs();
                 if size > 0.0 { suite.accuracy * size.min(1.0) } else { suite.accuracy }
             }
         }
     }
 
-    /// What a solver is told of it.
+    /// Returns the problem dimensions, the input of a solver.
     pub fn shape(&self, catalogue: &Catalogue) -> Shape {
         match self {
             Self::Formula(problem) => Posed::new(problem, Slope::Differences).shape().clone(),
@@ -124,10 +123,10 @@ impl Subject {
     }
 }
 
-/// The problem of a study under a seed.
+/// Returns the problem of a study with a seed.
 ///
 /// # Panics
-/// If the study is written wrongly.
+/// If the study has a mistake.
 pub(super) fn posing(catalogue: &Catalogue, known: &Known, seed: u64) -> Posing {
     let file = known.study.open(catalogue, &[]);
     let mut study = file.unwrap_or_else(|why| panic!("{}: {why}", known.study.name)).study;
@@ -139,16 +138,16 @@ pub(super) fn posing(catalogue: &Catalogue, known: &Known, seed: u64) -> Posing 
 mod tests {
     use super::*;
 
-    /// A wrong number in a study, or in its answer, would show here: the answers come from elsewhere.
+    /// Detects wrong numbers in a study or its solution, as the solutions have independent sources.
     #[test]
-    fn studies_have_their_known_optimum_where_it_is_known_to_be() {
+    fn studies_have_their_known_optimum_at_the_known_tuners() {
         let catalogue = mops::catalogue();
         for known in super::super::control::control().iter().filter(|known| !known.tuners.is_empty()) {
             let problem = posing(&catalogue, known, 1);
             let merit = problem.evaluate_at(known.tuners).merit;
             let gap = (merit.objective - known.minimum).abs() / known.minimum.abs().max(1.0);
-            // The optima of the thesis's designs are where extrema touch their bands: times go there with the square root of
-            // the tuners' last digit.
+            // At the optima of the designs of the thesis, extrema touch their bands: times change there with the square root of
+            // the last digit of the tuners.
             let shipped = mops::studies::shipped().iter().any(|study| study.name == known.study.name);
             let tolerance = if shipped { 2e-4 } else { 1e-5 };
             assert!(gap < tolerance, "{}: {merit:?} {}", known.study.name, known.minimum);

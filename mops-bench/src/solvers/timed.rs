@@ -1,11 +1,11 @@
-//! A problem that knows how long it took.
+//! Timing of the evaluations of a problem.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use mops::core::{Evaluation, Evaluator, Shape, Slopes};
 
-/// An evaluator with the time spent in it; the rest of a run is the solver's and the engine's own.
+/// Evaluator that measures the time spent in it; the rest of a run is the overhead of solver and engine.
 pub(super) struct Timed<'a, E> {
     inner: &'a E,
     nanoseconds: AtomicU64,
@@ -16,7 +16,7 @@ impl<'a, E: Evaluator> Timed<'a, E> {
         Self { inner, nanoseconds: AtomicU64::new(0) }
     }
 
-    /// Time spent evaluating, in s.
+    /// Returns the time spent in evaluations, in s.
     #[allow(clippy::cast_precision_loss)]
     pub fn seconds(&self) -> f64 {
         self.nanoseconds.load(Ordering::Relaxed) as f64 * 1e-9
@@ -24,9 +24,9 @@ impl<'a, E: Evaluator> Timed<'a, E> {
 
     #[allow(clippy::cast_possible_truncation)]
     fn clocked<T>(&self, work: impl FnOnce() -> T) -> T {
-        let begun = Instant::now();
+        let started = Instant::now();
         let result = work();
-        self.nanoseconds.fetch_add(begun.elapsed().as_nanos() as u64, Ordering::Relaxed);
+        self.nanoseconds.fetch_add(started.elapsed().as_nanos() as u64, Ordering::Relaxed);
         result
     }
 }

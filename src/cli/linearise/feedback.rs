@@ -1,4 +1,4 @@
-//! The state feedback that `mops linearise` designs on request.
+//! Design of state feedback for `mops linearise`.
 
 use mops_core::linear::{Complex, Placement, eigenvalues, lqr, place};
 use mops_core::math::complex;
@@ -10,28 +10,28 @@ use super::text::{labels, named, poles_table, rounded_matrix};
 use super::{Arguments, complex, rows};
 use crate::terminal::number;
 
-/// A design that is asked for, as it was typed.
+/// Requested design of state feedback.
 pub(super) enum Wanted {
-    /// Poles, 1/s.
+    /// Closed-loop poles, in 1/s.
     Poles(Vec<Complex>),
     /// Weights of the states, then of the inputs.
     Weights(Vec<f64>),
 }
 
-/// Distance of the poles from those asked for, relative to the largest, that is worth a note.
+/// Smallest relative error of the placed poles that is reported; relative to the largest pole.
 const OFF: f64 = 1e-6;
 
 impl Wanted {
-    /// What the arguments ask for.
+    /// Reads the requested design from the arguments.
     ///
     /// # Errors
-    /// Numbers that cannot be read, or are not as many as the system takes.
+    /// If a number cannot be read, or the count does not match the system.
     pub(super) fn of(system: &StateSpace, arguments: &Arguments) -> Result<Option<Self>, Diagnostic> {
         let (n, m) = (system.order(), system.inputs.len());
         if let Some(text) = &arguments.place {
             let poles: Vec<Complex> = text.split(',').map(pole).collect::<Result<_, _>>()?;
             if poles.len() != n {
-                let fact = format!("`--place`: {} poles are asked for, but the system has {n} states", poles.len());
+                let fact = format!("`--place`: expected {n} poles, one per state, found {}", poles.len());
                 return Err(Diagnostic::new(fact));
             }
             return Ok(Some(Self::Poles(poles)));
@@ -40,17 +40,17 @@ impl Wanted {
         let weights: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
         if weights.len() != n + m || text.split(',').count() != n + m {
             return Err(Diagnostic::new(format!(
-                "`--lqr` takes {n} weights of states and {m} of inputs, not `{text}`"
+                "`--lqr`: expected {n} weights of states and {m} of inputs, found `{text}`"
             ))
-            .with_help(format!("in the order {}, {}", system.states.join(", "), system.inputs.join(", "))));
+            .with_help(format!("order: {}, {}", system.states.join(", "), system.inputs.join(", "))));
         }
         Ok(Some(Self::Weights(weights)))
     }
 
-    /// The feedback, as text and as JSON.
+    /// Designs the feedback; returns it as text and as JSON.
     ///
     /// # Errors
-    /// A system or numbers for which there is none.
+    /// If no such feedback exists for the system.
     pub(super) fn design(
         &self,
         system: &StateSpace,
@@ -83,7 +83,7 @@ impl Wanted {
 fn pole(text: &str) -> Result<Complex, Diagnostic> {
     let text: String = text.split_whitespace().collect();
     text.parse().map_err(|_| {
-        Diagnostic::new(format!("`--place`: `{text}` is no number"))
+        Diagnostic::new(format!("`--place`: expected a number, found `{text}`"))
             .with_help("write real poles as -5, pairs as -2+3i,-2-3i")
     })
 }
@@ -99,23 +99,23 @@ fn shown(
     format!("\n{heading}, u = -K x\n\n{matrix}{}", poles_table("closed-loop pole", closed))
 }
 
-/// How well the poles are placed.
+/// Formats the sensitivity and the error of the placed poles.
 fn notes(placed: &Placement, asked: &[Complex]) -> String {
     let mut text = format!(
-        "entries of A and B that change by one part in a million move a pole by up to {} 1/s\n",
+        "sensitivity: a relative change of A and B of 1e-6 moves a pole by up to {} 1/s\n",
         number(placed.sensitivity)
     );
     let largest = asked.iter().map(|pole| complex::norm(*pole)).fold(0.0, f64::max);
     if placed.error > OFF * largest {
         text += &format!(
-            "note: rounding alone moves a pole by up to {} 1/s from where it was asked for\n",
+            "note: poles deviate by up to {} 1/s from the requested ones because of rounding\n",
             number(placed.error)
         );
     }
     if let Some(indices) = &placed.defective {
         let indices: Vec<String> = indices.iter().map(usize::to_string).collect();
         text += &format!(
-            "note: with the controllability indices {} these repeated poles have Jordan blocks, which makes them sensitive\n",
+            "note: for controllability indices {} these repeated poles have Jordan blocks and are therefore sensitive\n",
             indices.join(", ")
         );
     }

@@ -1,4 +1,4 @@
-//! What `mops linearise --out` writes: linearised.json, and the plots that could be drawn.
+//! Output files of `mops linearise`: linearised.json and plots.
 
 use std::path::Path;
 
@@ -9,10 +9,10 @@ use crate::cli::linear_plots;
 use crate::numbers::FileNames;
 use crate::terminal::CommandError;
 
-/// Writes the files; returns a sentence on what is there, and notes on what is not.
+/// Writes the files; returns a summary with notes on missing plots.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// If a file cannot be written.
 pub(super) fn write(folder: &Path, system: &StateSpace, content: &Value) -> Result<String, CommandError> {
     std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
     let path = folder.join("linearised.json");
@@ -27,7 +27,7 @@ pub(super) fn write(folder: &Path, system: &StateSpace, content: &Value) -> Resu
                 let plot = match plot {
                     Ok(plot) => plot,
                     Err(why) => {
-                        notes += &format!("note: {kind} of {name} is not drawn: {why}\n");
+                        notes += &format!("note: no {kind} of {name}: {why}\n");
                         continue;
                     }
                 };
@@ -39,12 +39,12 @@ pub(super) fn write(folder: &Path, system: &StateSpace, content: &Value) -> Resu
             }
         }
     }
-    let there = match written {
+    let summary = match written {
         0 if system.inputs.is_empty() => "linearised.json is, without plots, as the system has no input,".to_owned(),
         0 if system.outputs.is_empty() => "linearised.json is, without plots, as the system has no output,".to_owned(),
         0 => "linearised.json is, without plots,".to_owned(),
         1 => "linearised.json and one plot are".to_owned(),
         _ => format!("linearised.json and {written} plots are"),
     };
-    Ok(format!("\n{notes}{there} in {}\n", folder.display()))
+    Ok(format!("\n{notes}{summary} in {}\n", folder.display()))
 }

@@ -1,4 +1,4 @@
-//! A linear system as text: operating point, matrices, poles, zeros and transfer functions.
+//! Text of a linear system: operating point, matrices, poles, zeros and transfer functions.
 
 use mops_core::linear::{Complex, TransferFunction, undecided};
 use mops_core::math::{self, complex};
@@ -9,10 +9,10 @@ use super::WHERE;
 use crate::cli::families::folded;
 use crate::terminal::{number, table};
 
-/// From how many states and channels on the terminal does not show all.
+/// Largest number of states and channels that are printed in full.
 pub(super) const MANY: usize = 12;
 
-/// Values and rates of the states, values of the inputs.
+/// Formats the operating point: values and rates of the states, values of the inputs.
 pub(super) fn operating_point(states: &[Variable], inputs: &[Variable], found: &Resting) -> String {
     let of_states = states.iter().zip(found.states.iter().zip(&found.rates));
     let of_states =
@@ -22,18 +22,18 @@ pub(super) fn operating_point(states: &[Variable], inputs: &[Variable], found: &
     let header = ["operating point", "value", "unit", "rate per s"];
     let mut text = table(&header, &[1, 3], folded(of_states.chain(of_inputs).collect(), 0));
     if found.rates.iter().any(|rate| rate.abs() > 1e-9) {
-        text += "note: the model does not rest there; --equilibrium searches where it does\n";
+        text += "note: not an equilibrium; find one with --equilibrium\n";
     }
     text
 }
 
-/// The unit of a name, as text; none for pure numbers.
+/// Returns the unit of a variable as text; empty if dimensionless.
 pub(super) fn unit_of(name: &str, states: &[Variable], inputs: &[Variable], signals: &[Variable]) -> String {
     let variable = states.iter().chain(inputs).chain(signals).find(|v| v.name == name);
     variable.map(|v| v.unit.to_string()).filter(|unit| unit != "1").unwrap_or_default()
 }
 
-/// Names with their units.
+/// Formats names with their units.
 pub(super) fn labels(names: &[String], unit: &dyn Fn(&str) -> String) -> Vec<String> {
     let label = |name: &String| match unit(name) {
         unit if unit.is_empty() => name.clone(),
@@ -42,7 +42,7 @@ pub(super) fn labels(names: &[String], unit: &dyn Fn(&str) -> String) -> Vec<Str
     names.iter().map(label).collect()
 }
 
-/// `A`, `B`, `C` and `D`, with names and units.
+/// Formats the matrices A, B, C and D with names and units.
 pub(super) fn matrices(system: &StateSpace, unit: &dyn Fn(&str) -> String) -> String {
     let rate = |name: &String| match unit(name) {
         unit if unit.is_empty() => format!("{name}' [1/s]"),
@@ -52,7 +52,7 @@ pub(super) fn matrices(system: &StateSpace, unit: &dyn Fn(&str) -> String) -> St
     let (inputs, outputs) = (labels(&system.inputs, unit), labels(&system.outputs, unit));
     let mut text = String::new();
     if system.order() > MANY {
-        text += &format!("\nA, B, C and D, with {} states, are in {WHERE}\n", system.order());
+        text += &format!("\nA, B, C and D ({} states) are in {WHERE}\n", system.order());
     }
     for (name, matrix, rows, columns) in [
         ("A", &system.a, &rates, &states),
@@ -66,12 +66,12 @@ pub(super) fn matrices(system: &StateSpace, unit: &dyn Fn(&str) -> String) -> St
         text += &format!("\n{}", named(name, matrix, rows, columns));
     }
     if system.delay != 0.0 {
-        text += &format!("\ninputs act with a delay of {} s\n", number(system.delay));
+        text += &format!("\ninput delay: {} s\n", number(system.delay));
     }
     text
 }
 
-/// A matrix with names of its rows and columns.
+/// Formats a matrix with the names of its rows and columns.
 pub(super) fn named(name: &str, matrix: &DMatrix<f64>, rows: &[String], columns: &[String]) -> String {
     let header: Vec<&str> = [name].into_iter().chain(columns.iter().map(String::as_str)).collect();
     let numeric: Vec<usize> = (1..=columns.len()).collect();
@@ -81,23 +81,22 @@ pub(super) fn named(name: &str, matrix: &DMatrix<f64>, rows: &[String], columns:
     table(&header, &numeric, rows.iter().enumerate().map(line).collect())
 }
 
-/// Numbers of which nothing is left that is rounding beside the largest of `all`.
+/// Sets parts of complex numbers to zero that are rounding errors relative to the largest number in `all`.
 fn rounded(numbers: &[Complex], all: &[Complex]) -> Vec<Complex> {
     let largest =
         all.iter().chain(numbers).map(|z| complex::norm(*z)).filter(|size| size.is_finite()).fold(0.0, f64::max);
-    // Poles of one system may well lie nine decades apart.
+    // The poles of a stiff system may be nine decades apart.
     let part = |part: f64, size: f64| if part.abs() < 1e-12 * largest || part.abs() < 1e-9 * size { 0.0 } else { part };
     numbers.iter().map(|z| Complex::new(part(z.re, complex::norm(*z)), part(z.im, complex::norm(*z)))).collect()
 }
 
-/// A matrix without what is rounding beside its largest entry.
+/// Sets entries of a matrix to zero that are rounding errors relative to the largest entry.
 pub(super) fn rounded_matrix(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let largest = matrix.amax();
     matrix.map(|x| if x.abs() < 1e-9 * largest { 0.0 } else { x })
 }
 
-/// A polynomial, its highest power first, without the terms that are rounding beside the others at every frequency of the
-/// poles.
+/// Sets terms of a polynomial (highest power first) to zero that are rounding errors at all frequencies of the poles.
 fn rounded_polynomial(coefficients: &[f64], poles: &[Complex]) -> Vec<f64> {
     let degree = coefficients.len().saturating_sub(1);
     let poles = rounded(poles, poles);
@@ -112,7 +111,7 @@ fn rounded_polynomial(coefficients: &[f64], poles: &[Complex]) -> Vec<f64> {
     coefficients.iter().enumerate().map(kept).collect()
 }
 
-/// A complex number as text.
+/// Formats a complex number.
 pub(super) fn spelled(z: Complex) -> String {
     match z.im {
         0.0 => number(z.re),
@@ -120,17 +119,20 @@ pub(super) fn spelled(z: Complex) -> String {
     }
 }
 
-/// Which poles rounding alone keeps on one side of the imaginary axis, as a note.
+/// Returns a note on poles whose distance to the imaginary axis is within the rounding error; else an empty text.
 pub(super) fn undecided_note(a: &DMatrix<f64>) -> String {
     let found = undecided(a).unwrap_or_default();
     if found.is_empty() {
         return String::new();
     }
     let names: Vec<String> = found.iter().map(|pole| spelled(*pole)).collect();
-    format!("note: rounding decides on which side of the imaginary axis these poles lie: {}\n", names.join(", "))
+    format!(
+        "note: stability undecided, as these poles are within rounding of the imaginary axis: {}\n",
+        names.join(", ")
+    )
 }
 
-/// Poles with their damping, frequency and time constant, the slowest to decay first.
+/// Formats poles with damping ratio, frequency and time constant, the slowest decay first.
 pub(super) fn poles_table(what: &str, poles: &[Complex]) -> String {
     let mut sorted = rounded(poles, poles);
     sorted.sort_by(|a, b| b.re.total_cmp(&a.re).then(b.im.total_cmp(&a.im)));
@@ -143,7 +145,7 @@ pub(super) fn poles_table(what: &str, poles: &[Complex]) -> String {
     format!("\n{}", table(&header, &[1, 2, 3], sorted.iter().map(row).collect()))
 }
 
-/// Zeros and transfer function of one channel.
+/// Formats the transfer function and the zeros of one channel.
 pub(super) fn channel(
     system: &StateSpace,
     zeros: &[Complex],
@@ -152,7 +154,7 @@ pub(super) fn channel(
 ) -> String {
     let spelled_zeros: Vec<String> = rounded(zeros, poles).iter().map(|z| spelled(*z)).collect();
     let spelled_zeros = match spelled_zeros.len() {
-        count if count > MANY => vec![format!("{count} of them, in {WHERE}")],
+        count if count > MANY => vec![format!("{count} zeros, see {WHERE}")],
         _ => spelled_zeros,
     };
     let is_zero = function.numerator.iter().all(|c| *c == 0.0);

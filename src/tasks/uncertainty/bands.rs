@@ -1,4 +1,4 @@
-//! Bands around the predictions of a calibrated model, to first order.
+//! Linearised prediction bands of a calibrated model.
 
 use mops_core::BandReport;
 use mops_core::identification::Spread;
@@ -6,12 +6,14 @@ use mops_core::math;
 
 use super::Calibrated;
 
-/// Times of a band, at most.
+/// Largest number of times of a band.
 const MOST_TIMES: usize = 400;
 
-/// Bands of every measured channel: `t` times the standard deviation of the prediction, `(g' C g)^(1/2)` with its slopes `g`
-/// along the tuners and their covariance `C`; with the noise, of a new measurement. Start values that are estimated on
-/// validation data count as known there.
+/// Returns the prediction band of every measured channel: `t` times the standard deviation `(g' C g)^(1/2)` of the prediction.
+/// `g` is the gradient of the prediction with respect to the tuners, `C` their covariance, `t` the quantile of the t
+/// distribution.
+///
+/// The band of a new measurement also includes the noise. Initial states estimated on validation data count as known there.
 ///
 /// Source: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), section 5.1 (linearised prediction intervals).
 pub(super) fn bands(calibrated: &Calibrated<'_>, tuners: &[f64]) -> Vec<BandReport> {

@@ -1,4 +1,4 @@
-//! The bootstrap of a calibration: residuals drawn anew in blocks, everything estimated again.
+//! Moving-block bootstrap of a calibration: residuals are resampled in blocks, and all tuners are estimated again.
 
 use mops_core::math;
 use mops_core::statistics::{Summary, moving_blocks, quantile};
@@ -6,32 +6,34 @@ use mops_core::{BootstrapParameter, BootstrapReport, Role, Stream, Study, Uncert
 
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 
-use super::{Calibrated, held_at, refit};
+use super::{Calibrated, fixed_at, refit};
 use crate::tasks::batches::{Stage, each};
 
-/// A measured channel of calibration data.
+/// Measured channel of calibration data.
 struct Measured {
     case: usize,
     channel: usize,
-    /// What the calibrated model says.
+    /// Response of the calibrated model.
     fitted: Vec<f64>,
-    /// Measured less fitted, from their mean, scaled to the noise that standard errors rest on.
+    /// Centred residuals (measured minus fitted), scaled to the noise level of the standard errors.
     residuals: Vec<f64>,
     /// Length of a block.
     block: usize,
 }
 
-/// Estimates over replicates, and the simulations that they took: `y* = fitted + e*`, with `e*` made of blocks of the
-/// residuals that begin anywhere. Residuals are smaller than the noise, because the model was fitted to them; they are scaled
-/// to the variance that the standard errors rest on. The channels of an experiment that have as many samples as its first draw the same blocks,
-/// so that what they have in common stays.
+/// Returns the estimates of all replicates and the number of simulations. A replicate is `y* = fitted + e*`, where `e*`
+/// consists of blocks of the residuals with arbitrary start.
+///
+/// Residuals of a fitted model are smaller than the noise; they are scaled to the variance used for the standard errors.
+/// Consecutive channels of an experiment with equal numbers of samples and equal block lengths use the same blocks, which
+/// preserves their correlation.
 ///
 /// Source: H. R. Kuensch, Annals of Statistics 17 (1989) 1217-1241 (moving blocks); B. Efron, R. J. Tibshirani, An
 /// Introduction to the Bootstrap (1993), sections 9.4 and 13.3 (residuals, percentile intervals); A. C. Davison, D. V. Hinkley,
 /// Bootstrap Methods and their Application (1997), section 6.2 (scaled residuals).
 ///
 /// # Errors
-/// What cannot be drawn anew, in a sentence.
+/// If the residuals cannot be resampled; the error is the reason as a sentence.
 pub(super) fn bootstrap(
     calibrated: &Calibrated<'_>,
     task: &UncertaintyTask,
@@ -44,15 +46,15 @@ pub(super) fn bootstrap(
     let stage = Stage { what: "bootstrap replicates", from: 0.0, to: 1.0 };
     let found = each(&numbers, stage, watch, |number| {
         let mut random = stream(study.seed(), &format!("bootstrap {number}"));
-        let mut replicate = held_at(problem, &calibrated.best.tuners, None);
-        draw_anew(&mut replicate, &measured, &mut random);
+        let mut replicate = fixed_at(problem, &calibrated.best.tuners, None);
+        resample(&mut replicate, &measured, &mut random);
         refit(replicate, LevenbergMarquardtOptions::default().local(), watch)
     });
     let simulations = found.iter().map(|(_, cost)| cost).sum();
     let estimates: Vec<&Vec<f64>> = found.iter().filter_map(|(found, _)| found.as_ref()).map(|e| &e.tuners).collect();
     if estimates.len() < 2 {
         return Err(
-            "the bootstrap has no result: its replicates could not be estimated, or it was interrupted".to_owned()
+            "the bootstrap has no result: the replicates could not be estimated, or it was interrupted".to_owned()
         );
     }
     let tail = 0.5 * (1.0 - calibrated.level);
@@ -91,7 +93,7 @@ fn measured(calibrated: &Calibrated<'_>, task: &UncertaintyTask) -> Result<Vec<M
         let Some(experiment) = case.experiment.as_ref().filter(|e| e.role == Role::Calibration) else { continue };
         if !experiment.responses.is_empty() {
             return Err(format!(
-                "no bootstrap: `{}` measures a frequency response, whose errors have no blocks",
+                "no bootstrap: `{}` is a frequency response, whose residuals cannot be resampled in blocks",
                 case.name
             ));
         }
@@ -113,15 +115,15 @@ fn measured(calibrated: &Calibrated<'_>, task: &UncertaintyTask) -> Result<Vec<M
     Ok(all)
 }
 
-/// Factor that gives residuals about their mean the standard deviation of the noise, where that is known.
+/// Returns the factor that scales centred residuals to the standard deviation of the noise; 1 if the noise is unknown.
 #[allow(clippy::cast_precision_loss)]
 fn scale(residuals: &[f64], mean: f64, noise: Option<f64>) -> f64 {
     let size = (residuals.iter().map(|e| math::powi(e - mean, 2)).sum::<f64>() / residuals.len() as f64).sqrt();
     noise.filter(|noise| noise.is_finite() && size > 0.0).map_or(1.0, |noise| noise / size)
 }
 
-/// Puts fitted values with residuals from elsewhere into the experiments.
-fn draw_anew(study: &mut Study, measured: &[Measured], random: &mut Stream) {
+/// Replaces the measurements of the experiments by fitted values plus resampled residuals.
+fn resample(study: &mut Study, measured: &[Measured], random: &mut Stream) {
     let mut order: Vec<usize> = Vec::new();
     let mut before: Option<(usize, usize, usize)> = None;
     for of in measured {

@@ -1,4 +1,4 @@
-//! What a calibration tells of the uncertainty of its estimates besides standard errors: `[uncertainty]`.
+//! Uncertainty of calibrated parameters beyond standard errors, `[uncertainty]`: profiles, bootstrap, prediction bands.
 
 mod bands;
 mod bootstrap;
@@ -13,7 +13,7 @@ use profile::Profiles;
 use crate::numbers::significant;
 use crate::search::Solved;
 
-/// What all three rest on.
+/// Calibrated problem, the common input of all three methods.
 struct Calibrated<'a> {
     problem: &'a Problem,
     best: &'a Evaluation,
@@ -22,7 +22,7 @@ struct Calibrated<'a> {
     level: f64,
 }
 
-/// Adds what the study asks for.
+/// Adds the uncertainty analyses that the study requests.
 pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
     let Some(task) = solved.problem.study().tasks().uncertainty.clone() else { return };
     if watch.wants_stop() {
@@ -39,8 +39,8 @@ pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
         return;
     }
     let Some(covariance) = covariance else {
-        let why = "the uncertainty of the estimates cannot be told: the objective is no sum of squares, a simulation \
-                   failed, or the samples are too few";
+        let why = "the uncertainty of the estimates cannot be computed: the objective is not a sum of squares, a simulation \
+                   failed, or there are too few samples";
         solved.outcome.warnings.push(why.to_owned());
         return;
     };
@@ -56,7 +56,7 @@ pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
     report.profiles = profiles;
     if let Some(better) = better {
         solved.outcome.warnings.push(format!(
-            "a better fit was met while profiling, with an objective of {} instead of {}: solve again with more starts",
+            "profiling found a better fit, with objective {} instead of {}: solve again with more starts",
             significant(better, 5),
             significant(best.merit.objective, 5)
         ));
@@ -81,7 +81,7 @@ pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
     solved.outcome.found.uncertainty = Some(report);
 }
 
-/// Estimates the active tuners of a study again, from their start values; with the number of simulations it took.
+/// Estimates the active tuners of a study again, from their start values; returns the fit and the number of simulations.
 fn refit(study: Study, mut solver: Box<dyn Solver>, watch: &dyn Watch) -> (Option<Evaluation>, usize) {
     let problem = Problem::new(std::sync::Arc::new(study));
     let start = problem.start();
@@ -96,19 +96,19 @@ fn refit(study: Study, mut solver: Box<dyn Solver>, watch: &dyn Watch) -> (Optio
     (run.best().filter(|best| best.scaled.is_some()).cloned(), simulations)
 }
 
-/// The study with its tuners at given values, and one of them held there.
-fn held_at(problem: &Problem, tuners: &[f64], held: Option<usize>) -> Study {
+/// Returns the study with its tuners at given values, and one of them fixed.
+fn fixed_at(problem: &Problem, tuners: &[f64], fixed: Option<usize>) -> Study {
     let mut study = Study::clone(problem.study());
     for (i, &value) in tuners.iter().enumerate() {
         study.set_start(i, value);
-        if Some(i) == held || !problem.active().contains(&i) {
+        if Some(i) == fixed || !problem.active().contains(&i) {
             study.fix(i);
         }
     }
     study
 }
 
-/// The findings in sentences.
+/// Formats the findings as sentences.
 fn words(report: &UncertaintyReport, calibrated: &Calibrated<'_>) -> Vec<String> {
     let mut words = Vec::new();
     let percent = format!("{} %", significant(100.0 * report.level, 4));
@@ -122,14 +122,14 @@ fn words(report: &UncertaintyReport, calibrated: &Calibrated<'_>) -> Vec<String>
             ["data", "data"] if skewed => ", which is asymmetric: prefer it to the standard error",
             ["data", "data"] => "",
             ends if ends.contains(&"open") => {
-                ": an end was not found, because simulations failed on the way to it or the run was interrupted"
+                "; an end was not found, because simulations failed or the run was interrupted"
             }
-            ["bound", "bound"] => ": bounds of the tuner end it, not the data",
-            ["bound", _] => ": a bound of the tuner ends it below, not the data",
-            _ => ": a bound of the tuner ends it above, not the data",
+            ["bound", "bound"] => "; both ends are bounds of the tuner, not determined by the data",
+            ["bound", _] => "; the lower end is a bound of the tuner, not determined by the data",
+            _ => "; the upper end is a bound of the tuner, not determined by the data",
         };
         words.push(format!(
-            "`{}`: the {percent} interval of the likelihood goes from {low} to {high}{}{remark}.",
+            "`{}`: {percent} profile likelihood interval from {low} to {high}{}{remark}.",
             found.parameter,
             unit(&found.unit)
         ));
@@ -141,7 +141,7 @@ fn words(report: &UncertaintyReport, calibrated: &Calibrated<'_>) -> Vec<String>
     }
     if calibrated.covariance.left_out > 0 && !report.bands.is_empty() {
         words.push(format!(
-            "The bands leave out {} directions of the tuners that nothing is known of: predictions far from these data may be worse.",
+            "The bands ignore {} unidentifiable directions of the tuners: predictions far from these data may be worse.",
             calibrated.covariance.left_out
         ));
     }

@@ -1,51 +1,52 @@
-//! Profiles of the likelihood: one parameter held, all others estimated again.
+//! Profile likelihood: one parameter is fixed, all others are estimated again.
 
 use mops_core::identification::Spread;
 use mops_core::statistics::t_quantile;
 use mops_core::{Chosen, Evaluation, ProfileReport, Solver, SolverOptions, Tuner, Watch};
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 
-use super::{Calibrated, held_at, refit};
+use super::{Calibrated, fixed_at, refit};
 use crate::tasks::batches::{Stage, each};
 
 /// First distance from the estimate of a parameter without a standard error, as a share of its range.
 const FIRST: f64 = 0.02;
 
-/// How much farther from the estimate a step goes than the last, at least and at most. The least leads from any standard error
-/// that double precision resolves to the bound in fewer than [`STEPS`].
-const FARTHER: [f64; 2] = [1.3, 2.5];
+/// Smallest and largest growth factor of the distance from the estimate. The smallest factor reaches the bound in fewer than
+/// [`STEPS`] steps from any standard error that double precision resolves.
+const GROWTH: [f64; 2] = [1.3, 2.5];
 
-/// Steps to each side, and within the bracket of an end, at most.
+/// Largest number of steps to each side, and within the bracket of an end.
 const STEPS: usize = 150;
 
-/// Searches for all ends, each against the best fit that the last has met, at most.
+/// Largest number of searches for all ends, each relative to the best fit found by the previous one.
 const PASSES: usize = 3;
 
-/// The root of the likelihood ratio meets its limit to this share.
+/// Relative tolerance of the root of the likelihood ratio at an end.
 const ACCURATE: f64 = 1e-3;
 
-/// Width of the bracket of an end that is not met more closely, as at a jump, as a share of its distance from the estimate.
+/// Smallest width of the bracket of an end, relative to its distance from the estimate; reached at a discontinuity.
 const NARROW: f64 = 1e-4;
 
-/// Root of the likelihood ratio of a fit better than the estimates from which on the interval belongs to that fit, and from which
-/// on it is worth a warning: there the estimates are off by a standard error.
+/// Root of the likelihood ratio of a better fit than the estimates above which the interval refers to that fit.
 const LOWER: f64 = 0.1;
+/// Root of the likelihood ratio of a better fit than the estimates above which a warning is given: the estimates are then
+/// off by a standard error.
 const BETTER: f64 = 1.0;
 
-/// What profiling brought.
+/// Result of profiling.
 pub(super) struct Profiles {
     pub profiles: Vec<ProfileReport>,
     pub simulations: usize,
-    /// An objective far below that of the estimates, if one was met: they are then not the best fit.
+    /// Objective far below that of the estimates, if found; the estimates are then not the best fit.
     pub better: Option<f64>,
 }
 
-/// Profiles of the tuners that are chosen.
+/// Computes the profiles of the chosen tuners.
 ///
-/// With `S(v)` the least sum of squares where the parameter is held at `v`, the interval holds where
-/// `S(v) - S_min <= t^2 s(v)^2`. The scale `s(v)^2` is the variance of the noise along the change of the residuals from the
-/// estimate to `v`. It makes the interval of a linear model that of the standard error, `estimate +- t error`, whatever the
-/// weights; of residuals of one variance it is that variance.
+/// With `S(v)` the minimum sum of squares for the parameter fixed at `v`, the interval is
+/// `{v : S(v) - S_min <= t^2 s(v)^2}`. The scale `s(v)^2` is the variance of the noise along the change of the residuals from
+/// the estimate to `v`. For a linear model, the interval is then that of the standard error, `estimate +- t error`, whatever
+/// the weights. For residuals of equal variance, `s(v)^2` is that variance.
 ///
 /// Sources: D. M. Bates, D. G. Watts, Nonlinear Regression Analysis and Its Applications (1988), section 6.1.2; J. T. Kent,
 /// Biometrika 69 (1982) 19-27 (likelihood ratios of weights that are not those of the noise).
@@ -66,7 +67,7 @@ pub(super) fn profiles(calibrated: &Calibrated<'_>, chosen: &Chosen, watch: &dyn
         match least.filter(|least| passes < PASSES && root(calibrated, least, &reference) > LOWER) {
             Some(least) => {
                 let local = LevenbergMarquardtOptions::default().local();
-                let (lower, cost) = refit(held_at(problem, &least.tuners, None), local, watch);
+                let (lower, cost) = refit(fixed_at(problem, &least.tuners, None), local, watch);
                 simulations += cost;
                 reference = lower.unwrap_or_else(|| least.clone());
             }
@@ -100,7 +101,8 @@ pub(super) fn profiles(calibrated: &Calibrated<'_>, chosen: &Chosen, watch: &dyn
     }
 }
 
-/// Root of the likelihood ratio of a fit and a better one, `((S - S_better) / s^2)^(1/2)`; 0 where the fit is no worse.
+/// Returns the root of the likelihood ratio of a fit and a better one, `((S - S_better) / s^2)^(1/2)`; 0 if the fit is no
+/// worse.
 fn root(calibrated: &Calibrated<'_>, better: &Evaluation, fit: &Evaluation) -> f64 {
     let excess = fit.merit.objective - better.merit.objective;
     let change: Vec<f64> = fit.residuals.iter().zip(&better.residuals).map(|(a, b)| a - b).collect();
@@ -112,7 +114,8 @@ fn root(calibrated: &Calibrated<'_>, better: &Evaluation, fit: &Evaluation) -> f
     excess.sqrt() / calibrated.covariance.noise().along(&direction).deviation
 }
 
-/// The t quantile of the estimate of a tuner; of all noise where the data do not determine the tuner.
+/// Returns the t quantile for the estimate of a tuner; for a tuner that the data do not determine, with the degrees of freedom
+/// of all residuals.
 fn limit(calibrated: &Calibrated<'_>, k: usize) -> f64 {
     let Spread { freedom, .. } = calibrated.covariance.of_tuner(k);
     let freedom = if freedom >= 1.0 { freedom } else { calibrated.covariance.noise().freedom() };
@@ -121,17 +124,17 @@ fn limit(calibrated: &Calibrated<'_>, k: usize) -> f64 {
 
 /// One side of a profile.
 struct Side {
-    /// Value and signed root of the likelihood ratio, away from the estimate.
+    /// Value and signed root of the likelihood ratio, in the order of the distance from the estimate.
     points: Vec<(f64, f64)>,
     end: f64,
     why: &'static str,
     simulations: usize,
-    /// The fit with the least objective that was met.
+    /// Fit with the smallest objective found.
     least: Evaluation,
 }
 
-/// A value of the parameter, all others estimated again.
-struct Held {
+/// Point of a profile: the parameter is fixed, all others are estimated again.
+struct ProfilePoint {
     /// Position of the value on the tuner's scale, 0 to 1.
     position: f64,
     /// Root of the likelihood ratio.
@@ -140,10 +143,10 @@ struct Held {
     tuners: Vec<f64>,
 }
 
-/// The search for the end of one side. Distances are those of the tuner's scale.
+/// Search for the end of one side. Distances are on the scale of the tuner.
 struct Search<'a> {
     calibrated: &'a Calibrated<'a>,
-    /// The best fit.
+    /// Best fit.
     reference: &'a Evaluation,
     watch: &'a dyn Watch,
     k: usize,
@@ -167,8 +170,8 @@ impl<'a> Search<'a> {
         Self { calibrated, reference, watch, k, sign, tuner, limit: limit(calibrated, k), side }
     }
 
-    /// Goes from the estimate to the bound in growing steps; an end lies between the last point within the limit and the first
-    /// beyond.
+    /// Steps from the estimate towards the bound with growing steps; an end is bracketed by the last point within the limit and
+    /// the first one beyond.
     fn side(mut self) -> Side {
         let best = self.calibrated.best;
         let value = best.tuners[self.calibrated.problem.active()[self.k]];
@@ -181,33 +184,38 @@ impl<'a> Search<'a> {
         let error = self.calibrated.covariance.of_tuner(self.k).deviation / self.tuner.slope_at(value).abs();
         let mut reach = if error > 0.0 { 0.5 * self.limit * error } else { FIRST };
         // The points within the limit, the farthest last.
-        let mut within = vec![Held { position: start, root: 0.0, tuners: best.tuners.clone() }];
+        let mut within = vec![ProfilePoint { position: start, root: 0.0, tuners: best.tuners.clone() }];
         for _ in 0..STEPS {
             let position = (start + self.sign * reach).clamp(0.0, 1.0);
-            let Some(mut held) = self.held(position, &within, &best.tuners) else { return self.side };
-            if held.root >= self.limit {
-                match self.end_between(start, &mut within, held) {
-                    Some(farther) => held = farther,
+            let Some(mut point) = self.refit_at(position, &within, &best.tuners) else { return self.side };
+            if point.root >= self.limit {
+                match self.end_between(start, &mut within, point) {
+                    Some(farther) => point = farther,
                     None => return self.side,
                 }
             }
-            if held.position == bound {
+            if point.position == bound {
                 (self.side.end, self.side.why) = (self.tuner.value_at(bound), "bound");
                 return self.side;
             }
-            // Along the slope so far, just beyond the limit.
-            let [least, most] = FARTHER;
-            let wanted = if held.root > 0.0 { 1.02 * self.limit / held.root } else { most };
-            reach = (held.position - start).abs() * wanted.clamp(least, most);
-            within.push(held);
+            // Extrapolates to just beyond the limit.
+            let [least, most] = GROWTH;
+            let wanted = if point.root > 0.0 { 1.02 * self.limit / point.root } else { most };
+            reach = (point.position - start).abs() * wanted.clamp(least, most);
+            within.push(point);
         }
         self.side
     }
 
-    /// Sets the end between the last point within the limit and one beyond, by the rule of false position and, wherever that does
-    /// not halve the bracket, by halving. `None` where it is found, or the search is over; else the point beyond, which is within
-    /// the limit after all.
-    fn end_between(&mut self, start: f64, within: &mut Vec<Held>, mut beyond: Held) -> Option<Held> {
+    /// Locates the end between the last point within the limit and one beyond, by regula falsi. A step that does not halve the
+    /// bracket is followed by a bisection. Returns `None` if the end is found or the search is over. Returns the point beyond
+    /// if a refit shows that it is within the limit.
+    fn end_between(
+        &mut self,
+        start: f64,
+        within: &mut Vec<ProfilePoint>,
+        mut beyond: ProfilePoint,
+    ) -> Option<ProfilePoint> {
         let mut halve = false;
         for _ in 0..STEPS {
             let last = within.last().expect("the estimate is within the limit");
@@ -217,7 +225,7 @@ impl<'a> Search<'a> {
                 return None;
             }
             if width.abs() <= NARROW * (beyond.position - start).abs() {
-                // A jump of the likelihood, or of the minimum that the estimates beyond have been led to.
+                // Discontinuity of the likelihood, or a change of the local minimum reached by the estimates beyond.
                 let elsewhere =
                     self.estimated(beyond.position, &beyond.tuners, LevenbergMarquardtOptions::default().build())?;
                 if elsewhere.root < self.limit {
@@ -229,30 +237,30 @@ impl<'a> Search<'a> {
             let straight = (self.limit - last.root) / (beyond.root - last.root);
             let share = if halve { 0.5 } else { straight.clamp(0.05, 0.95) };
             let position = last.position + share * width;
-            let held = self.held(position, within, &beyond.tuners)?;
-            if (held.root - self.limit).abs() <= ACCURATE * self.limit {
+            let point = self.refit_at(position, within, &beyond.tuners)?;
+            if (point.root - self.limit).abs() <= ACCURATE * self.limit {
                 (self.side.end, self.side.why) = (self.tuner.value_at(position), "data");
                 return None;
             }
-            let left = if held.root < self.limit {
+            let left = if point.root < self.limit {
                 (beyond.position - position).abs()
             } else {
                 (position - last.position).abs()
             };
             halve = left > 0.5 * width.abs();
-            if held.root < self.limit { within.push(held) } else { beyond = held }
+            if point.root < self.limit { within.push(point) } else { beyond = point }
         }
         None
     }
 
-    /// All other tuners estimated again with the parameter held: from where the last two points within the limit lead, and, where
-    /// that is beyond the limit, from the last of them and from another start. `None` where no simulation succeeds, or the user
-    /// wants an end.
-    fn held(&mut self, position: f64, within: &[Held], other: &[f64]) -> Option<Held> {
+    /// Estimates all other tuners with the parameter fixed. The initial guess is extrapolated from the last two points within
+    /// the limit. If the result is beyond the limit, the last point and `other` are tried as well. Returns `None` if no
+    /// simulation succeeds or a stop is requested.
+    fn refit_at(&mut self, position: f64, within: &[ProfilePoint], other: &[f64]) -> Option<ProfilePoint> {
         let last = within.last().expect("the estimate is within the limit");
-        let ahead = within.len().checked_sub(2).map(|i| self.ahead(&within[i], last, position));
-        let mut best: Option<Held> = None;
-        for start in ahead.iter().map(Vec::as_slice).chain([last.tuners.as_slice(), other]) {
+        let guess = within.len().checked_sub(2).map(|i| self.extrapolated(&within[i], last, position));
+        let mut best: Option<ProfilePoint> = None;
+        for start in guess.iter().map(Vec::as_slice).chain([last.tuners.as_slice(), other]) {
             if self.watch.wants_stop() {
                 return None;
             }
@@ -269,23 +277,23 @@ impl<'a> Search<'a> {
         best
     }
 
-    /// Values of all tuners on the straight line through two points, in the unit box.
-    fn ahead(&self, from: &Held, to: &Held, position: f64) -> Vec<f64> {
+    /// Returns the tuners on the straight line through two points in the unit box, where the parameter has `position`.
+    fn extrapolated(&self, from: &ProfilePoint, to: &ProfilePoint, position: f64) -> Vec<f64> {
         let problem = self.calibrated.problem;
         let share = (position - to.position) / (to.position - from.position);
-        let ends = [from, to].map(|held| problem.point_of(&held.tuners));
+        let ends = [from, to].map(|point| problem.point_of(&point.tuners));
         let point: Vec<f64> =
             ends[0].iter().zip(&ends[1]).map(|(a, b)| (b + share * (b - a)).clamp(0.0, 1.0)).collect();
         problem.tuners_at(&point)
     }
 
-    /// All other tuners estimated again with the parameter held, from a start.
-    fn estimated(&mut self, position: f64, start: &[f64], solver: Box<dyn Solver>) -> Option<Held> {
+    /// Estimates all other tuners with the parameter fixed, from an initial guess.
+    fn estimated(&mut self, position: f64, start: &[f64], solver: Box<dyn Solver>) -> Option<ProfilePoint> {
         let problem = self.calibrated.problem;
         let index = problem.active()[self.k];
         let mut tuners = start.to_vec();
         tuners[index] = self.tuner.value_at(position);
-        let (found, simulations) = refit(held_at(problem, &tuners, Some(index)), solver, self.watch);
+        let (found, simulations) = refit(fixed_at(problem, &tuners, Some(index)), solver, self.watch);
         self.side.simulations += simulations;
         let found = found?;
         let root = root(self.calibrated, self.reference, &found);
@@ -299,6 +307,6 @@ impl<'a> Search<'a> {
             Some(_) => {}
             None => self.side.points.insert(place, point),
         }
-        Some(Held { position, root, tuners: found.tuners })
+        Some(ProfilePoint { position, root, tuners: found.tuners })
     }
 }

@@ -1,4 +1,4 @@
-//! One search for the worst of one criterion: a solver at the usual seam, with the sign of the criterion reversed.
+//! Search for the worst case of one criterion: an ordinary solver, applied to the criterion with reversed sign.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use mops_solvers::sqp::SqpOptions;
 
 use crate::tasks::copies::Copies;
 
-/// What a search of a criterion in one direction is: upwards, or downwards for the other side of an equality.
+/// Problem of a search: the maximum of a criterion, or the minimum for the other side of an equality.
 pub(super) struct Goal {
     pub row: usize,
     pub problem: Problem,
@@ -20,7 +20,7 @@ pub(super) struct Goal {
 }
 
 impl Goal {
-    /// The row of a study over its uncertain parameters, upwards or downwards.
+    /// Creates the search for the maximum or minimum of a row of a study over its uncertain parameters.
     pub(super) fn new(study: &Study, row: usize, upwards: bool, store: Option<&Copies>) -> Self {
         let mut only = study.rows()[row].clone();
         (only.usage, only.weight) = (Usage::Minimise, 1.0);
@@ -33,7 +33,7 @@ impl Goal {
         Self { row, problem: Problem::new(Arc::new(study)), upwards, store }
     }
 
-    /// Searches for the worst of all rows: every one upwards, equalities downwards too.
+    /// Creates the searches of all rows: the maximum of every row, and the minimum of equalities.
     pub(super) fn all(study: &Study, store: Option<&Copies>) -> Vec<Self> {
         let rows = study.rows().iter().enumerate();
         rows.flat_map(|(i, row)| {
@@ -44,14 +44,14 @@ impl Goal {
     }
 }
 
-/// Where a search ended.
+/// Result of a search.
 pub(super) struct End {
     pub evaluation: Option<Evaluation>,
     pub simulations: usize,
     pub failed: Vec<(String, Vec<f64>)>,
 }
 
-/// From one start: along slopes, then without them, since the worst case may lie on a jump.
+/// Searches from one start: gradient-based, then derivative-free, as the worst case may be at a discontinuity.
 pub(super) fn local(goal: &Goal, start: &[f64], watch: &dyn Watch) -> End {
     let n = start.len();
     let steps: [(_, usize); 2] = [
@@ -66,7 +66,7 @@ pub(super) fn local(goal: &Goal, start: &[f64], watch: &dyn Watch) -> End {
     end
 }
 
-/// Over the whole box by CMA-ES, then locally.
+/// Searches the whole box by CMA-ES, then locally.
 pub(super) fn whole(goal: &Goal, start: &[f64], watch: &dyn Watch) -> End {
     let mut end = End { evaluation: None, simulations: 0, failed: Vec::new() };
     let mut solver = CmaEsOptions { restarts: 0, tolerance: 1e-6, ..CmaEsOptions::default() }.build();

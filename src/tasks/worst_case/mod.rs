@@ -1,4 +1,4 @@
-//! `task = "worst-case"`: the largest scaled value of every criterion over a box of uncertain parameters.
+//! `task = "worst-case"`: largest scaled value of every criterion over a box of uncertain parameters.
 
 mod climb;
 mod search;
@@ -7,19 +7,19 @@ use mops_core::{
     CoordinateReport, Problem, Row, Slice, Study, Usage, Watch, WorstCaseReport, WorstReport, uncertain_reports,
 };
 
-pub(super) use search::{Question, Region, Worst};
+pub(super) use search::{Effort, Region, Worst};
 
 use super::at;
 use super::batches::{Stage, each};
 use crate::numbers::significant;
 use crate::search::{Options, SolveError, Solved};
 
-/// Values along each parameter through a worst case.
+/// Number of values along each parameter through a worst case.
 const SLICE: usize = 61;
 
-/// Why no search can promise more.
+/// Caveat of every search for worst cases.
 pub(super) const NO_GUARANTEE: &str =
-    "These are the worst cases that were found, not a guarantee: nothing shows that the box holds no worse one.";
+    "These are the worst cases that were found, not a guarantee: the box may contain worse ones.";
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let task = study.tasks().worst_case.clone();
@@ -30,8 +30,8 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         Some(names) => names.contains(&row.name),
         None => none_counts || row.usage != Usage::Monitor,
     };
-    let question = Question { samples: task.samples, starts: task.starts };
-    let region = Region::new(study, &solved.best.tuners, wanted, question).keeping(options, study);
+    let effort = Effort { samples: task.samples, starts: task.starts };
+    let region = Region::new(study, &solved.best.tuners, wanted, effort).keeping(options, study);
     let stage = Stage { what: "searching the worst cases", from: 0.0, to: 0.9 };
     let (worst, simulations) = region.search(watch, stage);
     let mut criteria: Vec<WorstReport> = worst.iter().map(|worst| worst.report.clone()).collect();
@@ -49,7 +49,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     Ok(solved)
 }
 
-/// Every criterion along every parameter through its worst case.
+/// Evaluates every criterion along every parameter through its worst case.
 #[allow(clippy::cast_precision_loss)]
 fn slices(region: &Region, worst: &[Worst], watch: &dyn Watch) -> Vec<Vec<Slice>> {
     let study = region.study();
@@ -67,7 +67,7 @@ fn slices(region: &Region, worst: &[Worst], watch: &dyn Watch) -> Vec<Vec<Slice>
             }
         }
     }
-    let stage = Stage { what: "drawing the worst cases", from: 0.9, to: 1.0 };
+    let stage = Stage { what: "plotting the worst cases", from: 0.9, to: 1.0 };
     let values = each(&points, stage, watch, |(w, _, tuners)| {
         let row = &study.rows()[worst[*w].row];
         problem.value_at(row, tuners).unwrap_or(f64::NAN)
@@ -86,7 +86,7 @@ fn slices(region: &Region, worst: &[Worst], watch: &dyn Watch) -> Vec<Vec<Slice>
     slices
 }
 
-/// Where a worst case is, in words.
+/// Formats the parameters of a worst case.
 pub(super) fn place(at: &[CoordinateReport]) -> String {
     let one = |c: &CoordinateReport| {
         let unit = if c.unit == "1" { String::new() } else { format!(" {}", c.unit) };
@@ -96,10 +96,10 @@ pub(super) fn place(at: &[CoordinateReport]) -> String {
     at.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// The worst cases in sentences.
+/// Formats the worst cases as sentences.
 fn words(criteria: &[WorstReport]) -> Vec<String> {
     if criteria.is_empty() {
-        return vec!["The search was interrupted before it found anything.".to_owned()];
+        return vec!["The search was interrupted without a result.".to_owned()];
     }
     let mut words: Vec<String> = criteria.iter().map(sentence).collect();
     words.push(NO_GUARANTEE.to_owned());
@@ -118,10 +118,9 @@ pub(super) fn sentence(worst: &WorstReport) -> String {
     }
     let scaled =
         if worst.scaled.is_finite() { format!(", scaled {}", significant(worst.scaled, 4)) } else { String::new() };
-    let nominal =
-        if of.nominal.is_finite() { format!(" ({} without uncertainty)", amount(of.nominal)) } else { String::new() };
+    let nominal = if of.nominal.is_finite() { format!(" (nominal {})", amount(of.nominal)) } else { String::new() };
     let mut text = format!(
-        "`{}` in case `{}` is {}{scaled} at worst{nominal}, at {}; {} of {} searches ended there.",
+        "Worst case of `{}` in case `{}`: {}{scaled}{nominal}, at {}; found by {} of {} searches.",
         of.criterion,
         of.case,
         amount(worst.value),
@@ -132,10 +131,7 @@ pub(super) fn sentence(worst: &WorstReport) -> String {
     if worst.failed > 0 {
         let first =
             worst.failure.as_ref().map_or_else(String::new, |f| format!(", first at {}: {}", place(&f.at), f.why));
-        text += &format!(
-            " {} simulations in the box failed{first}. There the criterion has no value, which may be worse than any.",
-            worst.failed
-        );
+        text += &format!(" {} simulations in the box failed{first}. They may hide a worse case.", worst.failed);
     }
     text
 }

@@ -1,7 +1,7 @@
-//! The search of a box of uncertain parameters for the worst of every criterion.
+//! Search of a box of uncertain parameters for the worst case of every criterion.
 //!
-//! Nothing but solvers at the usual seam: the uncertain parameters are the tuners, and the only row is the criterion with
-//! its sign reversed.
+//! The search uses ordinary solvers: the uncertain parameters are the tuners, and the only row is the criterion with reversed
+//! sign.
 
 use std::sync::Arc;
 
@@ -16,56 +16,57 @@ use crate::search::Options;
 use crate::tasks::batches::{Stage, each};
 use crate::tasks::copies::{Copies, evaluate};
 
-/// Corners of the box are all looked at up to this dimension.
+/// Largest dimension of the box for which all corners are evaluated.
 const MOST_CORNERS: usize = 8;
 
-/// Starts lie at least this far apart in the unit box, where there are enough of them.
+/// Smallest distance between starts in the unit box, if there are enough starts.
 const APART: f64 = 0.2;
 
-/// Searches that end this close, in the unit box and in scaled values, ended at the same place.
+/// Largest distance in the unit box between ends of searches that count as the same point.
 const SAME_PLACE: f64 = 0.02;
+/// Largest relative difference in scaled value between ends of searches that count as the same point.
 const SAME_VALUE: f64 = 1e-3;
 
-/// How a box is searched.
+/// Effort of the search of a box.
 #[derive(Clone, Copy)]
-pub(in crate::tasks) struct Question {
-    /// Points at which all criteria are looked at first.
+pub(in crate::tasks) struct Effort {
+    /// Number of samples at which all criteria are evaluated first.
     pub samples: usize,
-    /// Local searches per criterion.
+    /// Number of local searches per criterion.
     pub starts: usize,
 }
 
-/// A design, and the box around it.
+/// Design, and the box of uncertain parameters around it.
 pub(in crate::tasks) struct Region {
-    /// The study over its uncertain parameters, with the rows that are searched.
+    /// Study over its uncertain parameters, with the rows that are searched.
     study: Study,
     store: Option<Copies>,
     /// Number of tuners that are not uncertain parameters.
     fixed: usize,
-    question: Question,
+    effort: Effort,
 }
 
-/// The worst of a row.
+/// Worst case of a row.
 #[derive(Debug, Clone)]
 pub(in crate::tasks) struct Worst {
-    /// The criterion, as the study has it.
+    /// Criterion of the study.
     pub subject: Subject,
-    /// Its row, by index into those of the study over its uncertain parameters.
+    /// Index of the row in the study over its uncertain parameters.
     pub row: usize,
-    /// The case, by index.
+    /// Index of the case.
     pub case: usize,
     /// Weight in the objective.
     pub weight: f64,
-    /// Its value by its demand.
+    /// Scaled value: value divided by demand.
     pub scaled: f64,
-    /// Values of the uncertain parameters; empty where every simulation failed.
+    /// Values of the uncertain parameters; empty if every simulation failed.
     pub at: Vec<f64>,
-    /// What the search tells of itself.
+    /// Report of the search.
     pub report: WorstReport,
 }
 
 impl Worst {
-    /// How bad it is: the scaled value, of an equality its distance from 1.
+    /// Returns the scaled value; for an equality, its distance from 1.
     pub fn severity(&self) -> f64 {
         severity(self.subject.usage, self.scaled)
     }
@@ -76,32 +77,32 @@ fn severity(usage: Usage, scaled: f64) -> f64 {
 }
 
 impl Region {
-    /// The box around a design, and the rows that `wanted` picks.
-    pub fn new(study: &Study, design: &[f64], wanted: impl Fn(&Row) -> bool, question: Question) -> Self {
+    /// Creates the box around a design, with the rows selected by `wanted`.
+    pub fn new(study: &Study, design: &[f64], wanted: impl Fn(&Row) -> bool, effort: Effort) -> Self {
         let over = study.over_uncertain(design);
         let counts = |row: &Row, study: &Study| study.case_of(row).role() == Role::Calibration;
         let rows = over.rows().iter().filter(|row| wanted(row) && counts(row, &over)).cloned().collect();
         let over = over.with_rows(rows);
-        Self { fixed: over.tuners().len() - over.tasks().uncertain.len(), study: over, store: None, question }
+        Self { fixed: over.tuners().len() - over.tasks().uncertain.len(), study: over, store: None, effort }
     }
 
-    /// The same, which keeps its points with those of the study that it was made from.
+    /// Adds the store of the study from which the region was derived.
     pub fn keeping(mut self, options: &Options, study: &Study) -> Self {
         self.store = Copies::of(options, study, &self.study, &[]);
         self
     }
 
-    /// The study over its uncertain parameters.
+    /// Returns the study over its uncertain parameters.
     pub fn study(&self) -> &Study {
         &self.study
     }
 
-    /// Values of the uncertain parameters among those of all tuners.
+    /// Returns the values of the uncertain parameters out of those of all tuners.
     fn uncertain<'v>(&self, tuners: &'v [f64]) -> &'v [f64] {
         &tuners[self.fixed..]
     }
 
-    /// Points that stand for the whole box: its nominal point, its corners, and a Sobol sequence.
+    /// Returns samples of the box: its nominal point, its corners, and a Sobol sequence.
     fn points(&self, problem: &Problem) -> Vec<Vec<f64>> {
         let n = problem.active().len();
         let mut points = vec![problem.start()];
@@ -109,11 +110,12 @@ impl Region {
             points.extend((0..1usize << n).map(|corner| (0..n).map(|j| f64::from((corner >> j & 1) as u8)).collect()));
         }
         let mut random = stream(self.study.seed(), "worst-case");
-        points.extend(draw(Sampling::Sobol, self.question.samples, n, &mut random));
+        points.extend(draw(Sampling::Sobol, self.effort.samples, n, &mut random));
         points
     }
 
-    /// The worst of every row, in their order; none where the user ends the search. Also the simulations it took.
+    /// Searches the worst case of every row. Returns them in the order of the rows, or an empty list after a stop request, and
+    /// the number of simulations.
     pub fn search(&self, watch: &dyn Watch, stage: Stage<'_>) -> (Vec<Worst>, usize) {
         let every = self.every();
         let points = self.points(&every);
@@ -125,7 +127,7 @@ impl Region {
             return (Vec::new(), shared);
         }
         let goals = Goal::all(&self.study, self.store.as_ref());
-        // The first search for each goal goes over the whole box, from the worst point seen.
+        // The first search of each goal covers the whole box, from the worst sample.
         let searches: Vec<(usize, bool, Vec<f64>)> = goals
             .iter()
             .enumerate()
@@ -149,7 +151,7 @@ impl Region {
         ((0..self.study.rows().len()).map(worst).collect(), simulations)
     }
 
-    /// The problem in which every row counts and has a scaled value.
+    /// Returns the problem in which every row is minimised and has a scaled value.
     fn every(&self) -> Problem {
         let mut rows = self.study.rows().to_vec();
         for row in &mut rows {
@@ -161,7 +163,7 @@ impl Region {
         Problem::new(Arc::new(self.study.clone().with_rows(rows)))
     }
 
-    /// The worst points that were seen, apart from each other where there are enough.
+    /// Returns the worst samples, at least [`APART`] from each other if there are enough.
     fn starts(&self, goal: &Goal, seen: &[Evaluation]) -> Vec<Vec<f64>> {
         let sign = if goal.upwards { 1.0 } else { -1.0 };
         let mut known: Vec<(f64, &Vec<f64>)> =
@@ -170,7 +172,7 @@ impl Region {
         let mut starts: Vec<&Vec<f64>> = Vec::new();
         for apart in [APART, 0.0] {
             for (_, point) in &known {
-                if starts.len() < self.question.starts && starts.iter().all(|start| distance(start, point) > apart) {
+                if starts.len() < self.effort.starts && starts.iter().all(|start| distance(start, point) > apart) {
                     starts.push(point);
                 }
             }
@@ -178,7 +180,7 @@ impl Region {
         starts.into_iter().cloned().collect()
     }
 
-    /// The worst of a row, of all that was seen and of the ends of its searches.
+    /// Returns the worst case of a row among the samples and the ends of its searches.
     fn worst(&self, index: usize, seen: &[Evaluation], ends: &[&End]) -> Worst {
         let row = &self.study.rows()[index];
         let nominal = seen[0].readings[index].map_or(f64::NAN, |r| r.value);
@@ -188,8 +190,8 @@ impl Region {
                 reached.push((reading.value, scale(row, reading), evaluation));
             }
         }
-        let looked = seen.iter().filter_map(|e| e.readings[index].map(|r| (r.value, scale(row, r), e)));
-        let worst = looked.chain(reached.iter().copied()).reduce(|worst, next| {
+        let sampled = seen.iter().filter_map(|e| e.readings[index].map(|r| (r.value, scale(row, r), e)));
+        let worst = sampled.chain(reached.iter().copied()).reduce(|worst, next| {
             if severity(row.usage, next.1) > severity(row.usage, worst.1) { next } else { worst }
         });
         let ended = |(_, scaled, place): (f64, f64, &Evaluation)| {
@@ -219,19 +221,19 @@ impl Region {
         Worst { subject, row: index, case: self.study.jobs()[row.job].case, weight: row.weight, scaled, at, report }
     }
 
-    /// Why simulations failed that would have given a row its value, and where.
+    /// Returns the reason and the point of each failed simulation of a row.
     fn failed(&self, index: usize, seen: &[Evaluation], ends: &[&End]) -> Vec<(String, Vec<f64>)> {
         let job = self.study.rows()[index].job;
         let why = |e: &Evaluation| {
             let of_job = e.failures.iter().find(|(of, _)| *of == job);
             of_job.map_or_else(String::new, |(_, failure)| failure.to_string())
         };
-        let looked = seen.iter().filter(|e| e.readings[index].is_none()).map(|e| (why(e), &e.tuners));
+        let sampled = seen.iter().filter(|e| e.readings[index].is_none()).map(|e| (why(e), &e.tuners));
         let searched = ends.iter().flat_map(|end| &end.failed).map(|(why, tuners)| (why.clone(), tuners));
-        looked.chain(searched).map(|(why, tuners)| (why, self.uncertain(tuners).to_vec())).collect()
+        sampled.chain(searched).map(|(why, tuners)| (why, self.uncertain(tuners).to_vec())).collect()
     }
 
-    /// Values of the uncertain parameters, with what a reader wants to know of each.
+    /// Returns the values of the uncertain parameters with name, unit and bound for a report.
     pub fn coordinates(&self, at: &[f64]) -> Vec<CoordinateReport> {
         let of = |(tuner, &value): (&mops_core::Tuner, &f64)| CoordinateReport {
             name: tuner.name.clone(),
@@ -243,10 +245,10 @@ impl Region {
     }
 }
 
-/// The scaled value, whichever way round the problem counted; the value itself where nothing is demanded.
+/// Returns the scaled value, independent of the sign in the problem; without a demand, the value itself.
 fn scale(row: &Row, reading: Reading) -> f64 {
     match reading.value {
-        // What was never reached counts above 1.
+        // A target that was never reached has a scaled value above 1.
         value if value.is_nan() => reading.scaled.abs(),
         value if row.demand == Demand::None => value,
         value => row.demand.scale(value),

@@ -1,4 +1,4 @@
-//! The answer of a case: verdict, effects in order, errors; and the outputs that the repaired model predicts.
+//! Answer to a case: verdict, ranked effects, errors, and the outputs predicted by the repaired model.
 
 use std::fmt::Write;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 use super::super::tool::spelt;
 use super::declared::{Declared, stem};
 
-/// The answer as a JSON text; effects are named in their wider sense.
+/// Returns the answer as JSON; a special case of an effect is named by the wider effect.
 pub(super) fn answer(
     case: &str,
     declared: &Declared,
@@ -59,7 +59,7 @@ fn errors(errors: &[ExperimentError]) -> Value {
     errors.iter().map(|e| (e.name.clone(), json!(e.normalised))).collect::<Map<_, _>>().into()
 }
 
-/// The place as the case spells it: an equation has several names.
+/// Returns the place as spelt in the case, as an equation can have several names.
 pub(super) fn located(place: &str, locations: &[String]) -> String {
     let known = |place: &str| locations.iter().any(|l| l == place);
     let (kind, name) = place.split_once(':').unwrap_or(("", place));
@@ -72,8 +72,8 @@ pub(super) fn located(place: &str, locations: &[String]) -> String {
     place.to_owned()
 }
 
-/// For every file, the outputs predicted at its rows, as CSV. Where a row has no prediction, because its sample was left out
-/// as faulty, it is interpolated.
+/// Returns the outputs predicted at the rows of every file, as CSV. Rows without a prediction, whose sample was discarded as
+/// faulty, are interpolated.
 pub(super) fn predictions(
     declared: &Declared,
     diagnosis: &Diagnosis,
@@ -98,7 +98,7 @@ pub(super) fn predictions(
     declared.files.iter().filter_map(of_file).collect()
 }
 
-/// The prediction at a time.
+/// Interpolates a prediction at a time.
 fn at(prediction: &Prediction, t: f64) -> f64 {
     let (times, values) = (&prediction.times, &prediction.after);
     let next = times.partition_point(|&s| s < t).min(times.len() - 1);

@@ -1,4 +1,4 @@
-//! A case as its `case.json` declares it, and the study it becomes.
+//! Declaration of a case in `case.json`, and its conversion to a study.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -13,7 +13,7 @@ use super::matching::matched;
 /// Version of the format of `case.json`.
 const FORMAT: u32 = 1;
 
-/// A case of a folder, `case.json`: equations of a plant with unknown parameters, and the data files measured on it.
+/// Case of a folder, `case.json`: equations of a plant with unknown parameters, and the data files measured on it.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[schemars(title = "mops-bench case, format 1")]
 pub(crate) struct Declared {
@@ -27,7 +27,7 @@ pub(crate) struct Declared {
     inputs: Vec<Named>,
     /// Measured outputs.
     pub(super) outputs: Vec<Output>,
-    /// One equation for each state, `m*v' = u - b*v`, in any order; a prime marks the time derivative.
+    /// Equations, one for each state, in any order: `m*v' = u - b*v`. A prime marks the time derivative.
     equations: Vec<String>,
     /// Unknown parameters, which the diagnosis calibrates.
     parameters: Vec<Parameter>,
@@ -37,8 +37,8 @@ pub(crate) struct Declared {
     /// Course of the inputs between samples, by its first word: `zero` (or `zoh`; the default), `first` (or `foh`, or any text
     /// with `linear`), `band-limited`.
     input_hold: Option<String>,
-    /// Places at which an effect may be missing, `kind:name` with the kinds `process`, `joint`, `sensor`, `actuator`: the
-    /// answer spells places as they stand here.
+    /// Places at which an effect may be missing, `kind:name` with the kinds `process`, `joint`, `sensor`, `actuator`. The
+    /// answer uses the same spelling.
     #[serde(default)]
     pub(super) locations: Vec<String>,
     /// Meaning of a place, for equations that cannot be assigned to states by their form: `... (3rd equation)`.
@@ -53,7 +53,7 @@ fn format() -> u32 {
     FORMAT
 }
 
-/// A state or an input.
+/// State or input.
 #[derive(Debug, Deserialize, JsonSchema)]
 struct Named {
     /// Name in the equations.
@@ -65,7 +65,7 @@ struct Named {
     column: Option<String>,
 }
 
-/// A measured output.
+/// Measured output.
 #[derive(Debug, Deserialize, JsonSchema)]
 pub(super) struct Output {
     /// Name.
@@ -86,7 +86,7 @@ pub(super) struct Output {
     noise_std_total: Option<f64>,
 }
 
-/// An unknown parameter.
+/// Unknown parameter.
 #[derive(Debug, Deserialize, JsonSchema)]
 struct Parameter {
     /// Name in the equations.
@@ -102,30 +102,30 @@ struct Parameter {
     upper: f64,
 }
 
-/// The JSON schema of `case.json`.
+/// Returns the JSON schema of `case.json`.
 pub(crate) fn schema() -> String {
     let schema = schemars::schema_for!(Declared);
     serde_json::to_string_pretty(&schema).expect("a schema is JSON") + "\n"
 }
 
-/// A text as TOML writes it.
+/// Returns a text as a TOML string.
 fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-/// `{ name = value, .. }`.
+/// Returns the inline table `{ name = value, .. }`.
 fn table(entries: impl Iterator<Item = (String, String)>) -> String {
     let entries: Vec<String> = entries.map(|(name, value)| format!("{} = {value}", quoted(&name))).collect();
     format!("{{ {} }}", entries.join(", "))
 }
 
-/// The unit, if it is one.
+/// Returns the unit as a TOML string; `"1"` if unknown.
 fn unit(text: &str) -> String {
     quoted(if Unit::parse(text).is_ok() { text } else { "1" })
 }
 
 impl Output {
-    /// The signal that it is, where it is no more than that.
+    /// Returns the state that is measured, if the output is a state.
     fn state(&self) -> Option<&str> {
         self.equals_state.as_deref().or_else(|| self.expression.is_none().then_some(self.name.as_str()))
     }
@@ -135,9 +135,9 @@ impl Declared {
     /// Reads a `case.json`.
     ///
     /// # Errors
-    /// It is none.
+    /// If the text is not a valid `case.json`.
     pub fn read(text: &str) -> Result<Self, String> {
-        // N.B.: both forms of the noise stand in the same file; the total is meant.
+        // N.B.: a file may contain both forms of the noise; the total is used.
         let mut value: Value = serde_json::from_str(text).map_err(|error| format!("case.json: {error}"))?;
         for output in value["outputs"].as_array_mut().into_iter().flatten().filter_map(Value::as_object_mut) {
             if output.contains_key("noise_std_total") {
@@ -151,10 +151,10 @@ impl Declared {
         Ok(declared)
     }
 
-    /// The study file of the case, whose data are in the folder.
+    /// Returns the study file of the case, with data in the folder.
     ///
     /// # Errors
-    /// The equations do not give every state a derivative; nobody knows how the inputs are held.
+    /// If a state has no equation, or the input hold is unknown.
     pub fn study(&self, name: &str, folder: &Path) -> Result<String, String> {
         let mut text = format!("[study]\nname = {}\ntask = \"diagnosis\"\n\n[models.plant.equations]\n", quoted(name));
         let mut line = |key: &str, value: String| writeln!(text, "{key} = {value}").expect("a text takes everything");
@@ -195,18 +195,18 @@ impl Declared {
         Ok(text)
     }
 
-    /// What the inputs do from sample to sample, as a study says it.
+    /// Returns the hold of the inputs between samples, as spelt in a study.
     fn hold(&self) -> Result<&'static str, String> {
-        let said = self.input_hold.as_deref().unwrap_or("zero");
-        let begins = |words: &[&str]| words.iter().any(|word| said.starts_with(word));
-        if self.inputs.is_empty() || begins(&["zoh", "zero"]) {
+        let hold = self.input_hold.as_deref().unwrap_or("zero");
+        let starts = |words: &[&str]| words.iter().any(|word| hold.starts_with(word));
+        if self.inputs.is_empty() || starts(&["zoh", "zero"]) {
             Ok("zero")
-        } else if begins(&["foh", "first"]) || said.contains("linear") {
+        } else if starts(&["foh", "first"]) || hold.contains("linear") {
             Ok("first")
-        } else if begins(&["band-limited"]) {
+        } else if starts(&["band-limited"]) {
             Ok("band-limited")
         } else {
-            Err(format!("case.json: `input_hold` is none of zero, first and band-limited: `{said}`"))
+            Err(format!("case.json: expected `input_hold` zero, first or band-limited, found `{hold}`"))
         }
     }
 
@@ -236,8 +236,8 @@ impl Declared {
         )
     }
 
-    /// Which equation is meant for which state, by what the places mean: `equation of the angle th (3rd equation)`. Where
-    /// the place is a position, that is the equation of its speed.
+    /// Returns pairs of state and equation (indices) from the meanings of places: `equation of the angle th (3rd equation)`. If
+    /// the place is a position, this is the equation of its speed.
     fn meant(&self) -> Vec<(usize, usize)> {
         let state = |name: &str| self.states.iter().position(|s| s.name == name);
         let meanings = self.location_meaning.iter().filter_map(|(name, meaning)| {
@@ -252,13 +252,13 @@ impl Declared {
     }
 }
 
-/// A constant: a number, or a table with a value.
+/// Returns a constant: a number, or the `value` of an object.
 fn number(value: &Value) -> String {
     let value = value.get("value").unwrap_or(value);
     value.as_f64().map_or_else(|| "nan".to_owned(), |number| format!("{number:?}"))
 }
 
-/// The name of a file without its ending.
+/// Returns a file name without its extension.
 pub(super) fn stem(file: &str) -> &str {
     file.rsplit_once('.').map_or(file, |(stem, _)| stem)
 }

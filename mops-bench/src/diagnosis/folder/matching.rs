@@ -1,30 +1,30 @@
-//! Which equation gives the derivative of which state.
+//! Assignment of equations to states.
 
-/// The states whose derivatives stand in an equation: `w'` or `der(w)`.
+/// Returns the states whose derivatives occur in an equation, as `w'` or `der(w)`.
 fn derivatives(equation: &str, states: &[String]) -> Vec<usize> {
     let name = |c: char| c.is_alphanumeric() || c == '_';
-    let stands = |state: &str| {
+    let occurs = |state: &str| {
         equation.match_indices(state).any(|(at, _)| {
             let (before, after) = (&equation[..at], equation[at + state.len()..].trim_start());
             let whole = !before.ends_with(name) && !equation[at + state.len()..].starts_with(name);
             whole && (after.starts_with('\'') || before.trim_end().ends_with("der(") && after.starts_with(')'))
         })
     };
-    (0..states.len()).filter(|&i| stands(&states[i])).collect()
+    (0..states.len()).filter(|&i| occurs(&states[i])).collect()
 }
 
-/// Gives every state one of the equations with its derivative. Where several are possible, `meant` says which equation (by
-/// index) is that of a state; then the order decides.
+/// Assigns to every state an equation that contains its derivative. Among several possible assignments, the pairs of state and
+/// equation in `meant` (indices) have priority, then the order.
 ///
 /// # Errors
-/// The numbers differ, or there is no such choice.
+/// If the numbers of states and equations differ, or no assignment exists.
 pub(super) fn matched<'e>(
     states: &[String],
     equations: &'e [String],
     meant: &[(usize, usize)],
 ) -> Result<Vec<&'e str>, String> {
     if states.len() != equations.len() {
-        return Err(format!("{} states have {} equations", states.len(), equations.len()));
+        return Err(format!("expected {} equations, one per state, found {}", states.len(), equations.len()));
     }
     let mut choices: Vec<Vec<usize>> = equations.iter().map(|e| derivatives(e, states)).collect();
     for (equation, choice) in choices.iter_mut().enumerate() {
@@ -32,12 +32,12 @@ pub(super) fn matched<'e>(
     }
     let mut owner = vec![None; states.len()];
     if !assign(0, &choices, &mut owner) {
-        return Err("the equations do not give every state a derivative of its own".to_owned());
+        return Err("the equations cannot be assigned to the states, one each".to_owned());
     }
     Ok(owner.into_iter().map(|e| equations[e.expect("all are assigned")].as_str()).collect())
 }
 
-/// Assigns equations from one on, going back where that ends.
+/// Assigns the equations from index `equation` on, with backtracking.
 fn assign(equation: usize, choices: &[Vec<usize>], owner: &mut [Option<usize>]) -> bool {
     let Some(possible) = choices.get(equation) else { return true };
     for &state in possible {
@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn coupled_equations_are_matched_by_what_is_meant_and_else_in_order() {
+    fn coupled_equations_are_matched_by_meaning_and_otherwise_in_order() {
         let states = texts(&["th", "thd", "ph", "phd"]);
         let equations = texts(&["th' = thd", "ph' = phd", "a*thd' + c*phd' = 0", "c*thd' + b*phd' = u"]);
         let in_order = ["th' = thd", "a*thd' + c*phd' = 0", "ph' = phd", "c*thd' + b*phd' = u"];
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn an_equation_that_only_one_state_can_have_is_left_to_it() {
+    fn an_equation_is_reserved_for_the_only_state_that_it_fits() {
         let states = texts(&["x", "y"]);
         let equations = texts(&["der(x) + der( y ) = 1", "x' = y"]);
         assert_eq!(matched(&states, &equations, &[]).unwrap(), ["x' = y", "der(x) + der( y ) = 1"]);

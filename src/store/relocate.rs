@@ -1,4 +1,4 @@
-//! Where a database is: made beside its place and moved there, moved aside as one file, written again where it was removed.
+//! File of a database: creation under a temporary name, merging into one file, restoration after removal.
 
 use std::fs;
 use std::io;
@@ -8,18 +8,18 @@ use std::time::{Duration, Instant};
 
 use rusqlite::{Connection, OpenFlags};
 
-use super::database::{Database, WAITS, is_passing, prepare};
-use super::runs::{RunRow, begin};
-use crate::files::{beside, is_at};
+use super::database::{Database, WAITS, is_temporary, prepare};
+use super::runs::{RunRow, insert_run};
+use crate::files::{is_at, temporary_path};
 
-/// A new database that is not yet at its place.
+/// New database under its temporary name.
 pub(super) struct StudyBuilder {
-    beside: PathBuf,
+    temporary: PathBuf,
     path: PathBuf,
     run: i64,
 }
 
-/// A database with the files that SQLite keeps beside it.
+/// Returns the paths of a database and of the companion files of SQLite.
 pub(super) fn with_companions(path: &Path) -> [PathBuf; 4] {
     ["", "-wal", "-shm", "-journal"].map(|end| {
         let mut name = path.as_os_str().to_owned();
@@ -29,30 +29,31 @@ pub(super) fn with_companions(path: &Path) -> [PathBuf; 4] {
 }
 
 impl Database {
-    /// Removes what a run left that was killed while it made its database.
+    /// Removes the leftover of a run that was killed while it created its database.
     pub(super) fn clear_draft(path: &Path) {
-        for left in with_companions(&beside(path)) {
+        for left in with_companions(&temporary_path(path)) {
             let _ = fs::remove_file(left);
         }
     }
 
-    /// Makes a new one that holds this run and nothing else. Nobody sees a half of it: it is made beside its place, in one
-    /// transaction, and moved by [`StudyBuilder::settle`].
+    /// Creates a new database that contains only this run, under a temporary name and in one transaction. [`StudyBuilder::commit`]
+    /// renames it, so that no incomplete database is ever visible.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// If the file cannot be written.
     pub(super) fn draft(path: &Path, run: &RunRow) -> rusqlite::Result<StudyBuilder> {
-        let beside = beside(path);
-        let mut connection = Connection::open(&beside)?;
+        let temporary = temporary_path(path);
+        let mut connection = Connection::open(&temporary)?;
         let transaction = connection.transaction()?;
         prepare(&transaction)?;
-        let run = begin(&transaction, run)?;
+        let run = insert_run(&transaction, run)?;
         transaction.commit()?;
         connection.close().map_err(|(_, error)| error)?;
-        Ok(StudyBuilder { beside, path: path.to_owned(), run })
+        Ok(StudyBuilder { temporary, path: path.to_owned(), run })
     }
 
-    /// Whether no run was ever entered there: a run was killed while it began, in a version that made its database in parts.
+    /// Returns true if the database contains no run. Earlier versions created the database in several steps and left such a
+    /// file when killed at the start.
     pub(super) fn is_blank(path: &Path) -> bool {
         let count = |connection: &Connection, sql: &str| connection.query_row(sql, [], |row| row.get::<_, i64>(0));
         let Ok(connection) = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE) else { return false };
@@ -63,36 +64,36 @@ impl Database {
         }
     }
 
-    /// Whether its file is still the one that has its name.
+    /// Returns true if the path still names the open database.
     pub(super) fn is_in_place(&self) -> bool {
         self.place.as_ref().is_none_or(|(path, file)| is_at(path, file))
     }
 
-    /// Writes all of it again where its file was removed. `false` where another file has its place.
+    /// Writes the whole database again if its file was removed; returns `false` if another file has its name.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// If the file cannot be written.
     pub(super) fn restore(&mut self) -> io::Result<bool> {
         let Some((path, _)) = self.place.as_ref().filter(|(path, file)| !is_at(path, file)) else { return Ok(true) };
         if fs::symlink_metadata(path).is_ok() {
             return Ok(false);
         }
         let path = path.clone();
-        let beside = beside(&path);
-        let _ = fs::remove_file(&beside);
-        let copied = beside.to_str().ok_or_else(|| io::Error::other("its path is no text"));
+        let temporary = temporary_path(&path);
+        let _ = fs::remove_file(&temporary);
+        let copied = temporary.to_str().ok_or_else(|| io::Error::other("its path is not valid UTF-8"));
         self.connection.execute("VACUUM INTO ?", [copied?]).map_err(io::Error::other)?;
-        fs::rename(&beside, &path)?;
+        fs::rename(&temporary, &path)?;
         if let Some(again) = Self::open(&path, true).map_err(io::Error::other)? {
             *self = again;
         }
         Ok(true)
     }
 
-    /// Brings all of it into one file, which can be moved. `false` where somebody else has it open.
+    /// Merges the database into one file, which can be moved; returns `false` if another program has it open.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// If the file cannot be written.
     pub(super) fn gather(&self) -> rusqlite::Result<bool> {
         let until = Instant::now() + WAITS;
         loop {
@@ -100,7 +101,7 @@ impl Database {
                 self.connection.pragma_update_and_check(None, "journal_mode", "DELETE", |row| row.get(0));
             match mode {
                 Ok(mode) if mode == "delete" => return Ok(true),
-                Err(error) if !is_passing(&error) => return Err(error),
+                Err(error) if !is_temporary(&error) => return Err(error),
                 _ if Instant::now() > until => return Ok(false),
                 _ => thread::sleep(Duration::from_millis(50)),
             }
@@ -115,13 +116,13 @@ impl Drop for StudyBuilder {
 }
 
 impl StudyBuilder {
-    /// Moves the database to its place and opens it there; with the number of its run.
+    /// Renames the database to its final name and opens it; returns it with the id of its run.
     ///
     /// # Errors
-    /// It cannot be moved, or opened.
-    pub(super) fn settle(self) -> io::Result<(Database, i64)> {
-        fs::rename(&self.beside, &self.path)?;
+    /// If the database cannot be renamed or opened.
+    pub(super) fn commit(self) -> io::Result<(Database, i64)> {
+        fs::rename(&self.temporary, &self.path)?;
         let database = Database::open(&self.path, true).map_err(io::Error::other)?;
-        Ok((database.ok_or_else(|| io::Error::other("it was replaced at once"))?, self.run))
+        Ok((database.ok_or_else(|| io::Error::other("it was replaced immediately"))?, self.run))
     }
 }

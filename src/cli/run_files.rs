@@ -1,5 +1,5 @@
-//! Output files of a run: result, evaluations, report and plots; predictions, the repaired study and its source by a
-//! diagnosis, the study by a front.
+//! Output files of a run: result, evaluations, report and plots. A diagnosis adds predictions, the repaired study and its
+//! source; a Pareto front adds the study.
 
 use std::fs;
 use std::io::{self, ErrorKind, Write};
@@ -13,44 +13,46 @@ use mops_discrepancy::Diagnosis;
 
 use super::study::Home;
 use crate::diagnosis::{Original, predictions, repaired, source};
-use crate::files::{self, Beside};
+use crate::files::{self, AtomicFile};
 use crate::report::Report;
 use crate::search::Solved;
 use crate::terminal::CommandError;
 use crate::toml_text::settled;
 
-/// How long a full disk is waited for.
-pub(super) const PATIENCE: Duration = Duration::from_secs(10);
+/// Time to wait for space on a full disk.
+pub(super) const DISK_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Output files of a run.
-pub(super) struct Remains<'a> {
+pub(super) struct RunFiles<'a> {
     pub folder: &'a Path,
     pub solved: &'a Solved,
-    /// The text of the study with all settings, and without any.
+    /// Text of the study with all settings.
     pub text: &'a str,
+    /// Text of the study without settings.
     pub plain: &'a str,
-    /// Settings of the command line, and with them those that the command itself makes.
+    /// Settings of the command line.
     pub own: &'a [String],
+    /// Settings of the command line, and those made by the command itself.
     pub settings: &'a [String],
     pub home: &'a Home,
     pub effects: &'a [Arc<dyn Effect>],
-    /// Whether the repaired model is written as source too.
+    /// True if the repaired model is also written as source code.
     pub export: bool,
 }
 
-impl Remains<'_> {
-    /// Writes result.json; what was there before stays until all of it is on the disk. A full disk is waited for as long as
-    /// `patience` says.
-    pub(super) fn write_result(&self, patience: Duration) -> Result<(), CommandError> {
+impl RunFiles<'_> {
+    /// Writes result.json; an earlier file stays until the new one is on the disk. Waits at most `timeout` for space on a full
+    /// disk.
+    pub(super) fn write_result(&self, timeout: Duration) -> Result<(), CommandError> {
         fs::create_dir_all(self.folder).map_err(CommandError::cannot_write(self.folder))?;
         let path = self.folder.join("result.json");
         let json = serde_json::to_string_pretty(&self.solved.outcome).expect("a result is JSON") + "\n";
-        let until = Instant::now() + patience;
+        let until = Instant::now() + timeout;
         let is_full = |error: &io::Error| matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded);
         loop {
-            let written = Beside::create(&path).and_then(|mut file| {
+            let written = AtomicFile::create(&path).and_then(|mut file| {
                 file.write_all(json.as_bytes())?;
-                file.settle_on_disk()
+                file.commit_synced()
             });
             match written {
                 Err(error) if is_full(&error) && Instant::now() < until => thread::sleep(Duration::from_millis(100)),
@@ -59,7 +61,7 @@ impl Remains<'_> {
         }
     }
 
-    /// Writes what stands beside the result: evaluations, samples, report and plots, and what the task adds.
+    /// Writes the other files: evaluations, samples, report and plots, and those of the task.
     pub(super) fn write_others(&self) -> Result<(), CommandError> {
         let (folder, solved) = (self.folder, self.solved);
         let evaluations = folder.join("evaluations.csv");
@@ -75,16 +77,16 @@ impl Remains<'_> {
         if let Some(diagnosis) = diagnosis {
             let (text, settings, study) = (self.plain, self.own, problem.study());
             let original = Original { text, settings, study, effects: self.effects };
-            leave(folder, diagnosis, &original, self.home, self.export)?;
+            write_diagnosis(folder, diagnosis, &original, self.home, self.export)?;
         }
         if outcome.task == Task::Pareto {
-            leave_study(folder, self.plain, self.settings, self.home)?;
+            write_study(folder, self.plain, self.settings, self.home)?;
         }
         Ok(())
     }
 }
 
-/// One line per sample: uncertain parameters, criteria.
+/// Writes one line per sample: uncertain parameters, criteria.
 fn write_samples(path: &Path, found: &MonteCarloReport) -> io::Result<()> {
     files::write_csv(path, |writer| {
         let parameters = found.parameters.iter().map(|p| format!("{}[{}]", p.name, p.unit));
@@ -97,7 +99,7 @@ fn write_samples(path: &Path, found: &MonteCarloReport) -> io::Result<()> {
     })
 }
 
-/// One line per point: tuners, criteria, objective, violation.
+/// Writes one line per point: tuners, criteria, objective, violation.
 fn write_evaluations(path: &Path, solved: &Solved) -> io::Result<()> {
     let study = solved.problem.study();
     files::write_csv(path, |writer| {
@@ -112,8 +114,8 @@ fn write_evaluations(path: &Path, solved: &Solved) -> io::Result<()> {
     })
 }
 
-/// Writes `predictions/<experiment>.csv`, and where something was found `repaired.toml` and, where asked for, `repaired.rs`.
-fn leave(
+/// Writes `predictions/<experiment>.csv`; if the model was changed, also `repaired.toml` and, with `export`, `repaired.rs`.
+fn write_diagnosis(
     folder: &Path,
     diagnosis: &Diagnosis,
     original: &Original<'_>,
@@ -129,12 +131,12 @@ fn leave(
         return Ok(());
     }
     let text = match home {
-        Home::File(study) => repaired(original, diagnosis, &|path| seen_from(folder, study, path)),
+        Home::File(study) => repaired(original, diagnosis, &|path| relative_path(folder, study, path)),
         Home::Shipped(shipped) => {
             copy_data(folder, shipped)?;
             repaired(original, diagnosis, &str::to_owned)
         }
-        // No text of the study exists that could be repaired.
+        // A study built in Rust has no text to be repaired.
         Home::Built(_) => return Ok(()),
     };
     write(&folder.join("repaired.toml"), text.as_bytes())?;
@@ -144,10 +146,10 @@ fn leave(
     Ok(())
 }
 
-/// Writes `study.toml`: the study of a front, with its settings, so that a point can be picked from it later.
-fn leave_study(folder: &Path, text: &str, settings: &[String], home: &Home) -> Result<(), CommandError> {
+/// Writes `study.toml`, the study of a Pareto front with its settings, for `mops pick`.
+fn write_study(folder: &Path, text: &str, settings: &[String], home: &Home) -> Result<(), CommandError> {
     let text = match home {
-        Home::File(study) => settled(text, settings, &|path| seen_from(folder, study, path)),
+        Home::File(study) => settled(text, settings, &|path| relative_path(folder, study, path)),
         Home::Shipped(shipped) => {
             copy_data(folder, shipped)?;
             settled(text, settings, &str::to_owned)
@@ -161,7 +163,7 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), CommandError> {
     files::write(path, bytes).map_err(CommandError::cannot_write(path))
 }
 
-/// The data of a shipped study: the repaired one needs them in its own folder.
+/// Copies the data of a shipped study into the folder of the repaired study, which reads them there.
 fn copy_data(folder: &Path, shipped: &Shipped) -> Result<(), CommandError> {
     let is_data = |name: &str| ["csv", "mat"].iter().any(|end| Path::new(name).extension().is_some_and(|e| e == *end));
     for (name, bytes) in shipped.files.iter().filter(|(name, _)| is_data(name)) {
@@ -173,23 +175,23 @@ fn copy_data(folder: &Path, shipped: &Shipped) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// The path of a data file, which counts from the folder of the study, as it counts from another folder.
-fn seen_from(folder: &Path, study: &Path, path: &str) -> String {
+/// Converts the path of a data file from relative to the study to relative to `folder`.
+fn relative_path(folder: &Path, study: &Path, path: &str) -> String {
     if Path::new(path).is_absolute() {
         return path.to_owned();
     }
     let file = study.parent().unwrap_or(Path::new("")).join(path);
     match (folder.canonicalize(), file.canonicalize()) {
-        (Ok(folder), Ok(file)) => from(&folder, &file).display().to_string(),
+        (Ok(folder), Ok(file)) => relative(&folder, &file).display().to_string(),
         _ => std::path::absolute(&file).unwrap_or(file).display().to_string(),
     }
 }
 
-/// The way from a folder to a file, both absolute.
-fn from(folder: &Path, file: &Path) -> PathBuf {
+/// Returns the relative path from a folder to a file, both absolute.
+fn relative(folder: &Path, file: &Path) -> PathBuf {
     let [folder, file] = [folder, file].map(|path| path.components().collect::<Vec<_>>());
     let common = folder.iter().zip(&file).take_while(|(a, b)| a == b).count();
-    // On another drive there is no way.
+    // No relative path leads to another drive.
     if common == 0 {
         return file.iter().collect();
     }
@@ -206,7 +208,7 @@ mod tests {
     use crate::diagnosis::made_up;
 
     #[test]
-    fn what_a_diagnosis_of_a_shipped_study_leaves_can_be_run_where_it_stands() {
+    fn the_repaired_study_of_a_shipped_study_can_be_run_in_its_folder() {
         let catalogue = crate::catalogue();
         let folder = tempfile::tempdir().unwrap();
         let arguments = |study: &str| StudyArguments { study: study.into(), settings: Vec::new() };
@@ -216,24 +218,24 @@ mod tests {
         let file = open(&catalogue, &shipped).unwrap();
         let (text, study, effects) = (file.source.text.as_str(), &file.study, catalogue.effects.as_slice());
         let original = Original { text, settings: &[], study, effects };
-        let result = leave(folder.path(), &diagnosis, &original, &home(&catalogue, &shipped), true);
+        let result = write_diagnosis(folder.path(), &diagnosis, &original, &home(&catalogue, &shipped), true);
         assert!(result.is_ok());
         for name in ["predictions/swing.csv", "predictions/push.csv", "repaired.rs", "data/upright.csv"] {
             assert!(folder.path().join(name).is_file(), "{name}");
         }
         let again = open(&catalogue, &arguments(folder.path().join("repaired.toml").to_str().unwrap())).unwrap();
         assert_eq!((again.study.cases().len(), again.study.tuners().len()), (2, file.study.tuners().len() - 1));
-        // The effect of a study in a file: its data stay where they are.
+        // The data of a study in a file are not copied.
         let below = folder.path().join("below");
         fs::create_dir(&below).unwrap();
         let own = arguments(folder.path().join("repaired.toml").to_str().unwrap());
-        assert!(leave(&below, &diagnosis, &original, &home(&catalogue, &own), false).is_ok());
+        assert!(write_diagnosis(&below, &diagnosis, &original, &home(&catalogue, &own), false).is_ok());
         assert!(!below.join("data").exists() && !below.join("repaired.rs").exists());
         assert!(open(&catalogue, &arguments(below.join("repaired.toml").to_str().unwrap())).is_ok());
     }
 
     #[test]
-    fn data_are_found_from_the_folder_of_the_result_as_from_that_of_the_study() {
+    fn data_paths_are_converted_to_the_folder_of_the_result() {
         let root = tempfile::tempdir().unwrap();
         let at = |path: &str| root.path().join(path);
         fs::create_dir_all(at("studies/data")).unwrap();
@@ -244,16 +246,16 @@ mod tests {
             ("studies", "studies/study.toml", "data/a.csv"),
             ("studies/data", "studies/data/study.toml", "./a.csv"),
         ] {
-            let seen = seen_from(&at(folder), &at(study), path);
+            let seen = relative_path(&at(folder), &at(study), path);
             assert!(!Path::new(&seen).is_absolute() && at(folder).join(&seen).is_file(), "{seen}");
         }
         assert_eq!(
-            seen_from(&at("results/swing"), &at("studies/study.toml"), "data/a.csv"),
+            relative_path(&at("results/swing"), &at("studies/study.toml"), "data/a.csv"),
             "../../studies/data/a.csv"
         );
         let absolute = at("studies/data/a.csv").display().to_string();
-        assert_eq!(seen_from(&at("results"), &at("studies/study.toml"), &absolute), absolute);
-        let gone = seen_from(&at("results"), &at("studies/study.toml"), "gone.csv");
+        assert_eq!(relative_path(&at("results"), &at("studies/study.toml"), &absolute), absolute);
+        let gone = relative_path(&at("results"), &at("studies/study.toml"), "gone.csv");
         assert!(Path::new(&gone).is_absolute(), "{gone}");
     }
 }

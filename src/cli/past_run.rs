@@ -1,4 +1,4 @@
-//! Runs that are over: what they left in their folders.
+//! Earlier runs, as read from their folders.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,25 +12,25 @@ use super::study::{read_at, without_settings};
 use crate::files;
 use crate::store::{self, RunRow, RunState};
 
-/// What a run left in its folder.
-pub(super) struct Past {
+/// Run in a folder.
+pub(super) struct PastRun {
     pub folder: PathBuf,
-    /// The content of result.json, if it is that of the run in the database, or there is none.
+    /// Content of result.json, if it belongs to the run in the database or there is no database.
     pub result: Option<Value>,
-    /// The run, as its database has it, and whether it goes on.
+    /// Row of the run in the database, and true if the run is in progress.
     pub run: Option<(RunRow, bool)>,
-    /// When it began or, where nobody noted that, when its result was written: seconds since 1970-01-01 UTC.
+    /// Start of the run or, if unknown, modification time of its result, in seconds since 1970-01-01 UTC.
     pub date: i64,
 }
 
-impl Past {
-    /// Reads a folder; `None` where no run left anything.
+impl PastRun {
+    /// Reads the run in a folder; returns `None` if there is none.
     pub fn read(folder: &Path) -> Option<Self> {
         let path = folder.join("result.json");
         let result = files::read(&path).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
         let result = result.filter(|result| result["format"].is_u64() && result["study"].is_string());
         let run = store::last_run(folder);
-        // A run that was killed leaves the result of an earlier one where it was.
+        // After a killed run the result may be that of an earlier run.
         let belongs = |result: &Value| match (&run, result["run"].as_str()) {
             (Some((run, _)), Some(id)) => run.id() == id,
             (Some((run, _)), None) => result["study"].as_str() == Some(&run.name),
@@ -41,23 +41,23 @@ impl Past {
             let since = fs::metadata(&path).ok()?.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
             i64::try_from(since.as_secs()).ok()
         };
-        let date = run.as_ref().map(|(run, _)| run.begun).or_else(written).unwrap_or(0);
+        let date = run.as_ref().map(|(run, _)| run.started).or_else(written).unwrap_or(0);
         (result.is_some() || run.is_some()).then(|| Self { folder: folder.to_owned(), result, run, date })
     }
 
-    /// Reads a folder that must be one of a run.
+    /// Reads the run in a folder.
     ///
     /// # Errors
-    /// No run left anything there.
-    pub fn of(folder: &Path) -> Result<Self, Diagnostic> {
+    /// If there is no run in the folder.
+    pub fn open(folder: &Path) -> Result<Self, Diagnostic> {
         Self::read(folder).ok_or_else(|| {
-            let what = if folder.is_dir() { "is not the folder of a run" } else { "is no folder" };
+            let what = if folder.is_dir() { "is not the folder of a run" } else { "is not a folder" };
             Diagnostic::new(format!("{} {what}", folder.display()))
-                .with_help("name a folder as --out had it; `mops history` lists them")
+                .with_help("name the output folder (--out) of a run; `mops history` lists them")
         })
     }
 
-    /// How the run stands in one word.
+    /// Returns the state of the run in one word.
     pub fn state(&self) -> &str {
         match &self.run {
             Some((_, true)) => "running",
@@ -67,23 +67,23 @@ impl Past {
         }
     }
 
-    /// The result, where the run came to its end.
-    pub fn ended(&self) -> Option<&Value> {
+    /// Returns the result if the run has ended.
+    pub fn finished_result(&self) -> Option<&Value> {
         self.result.as_ref().filter(|_| self.run.as_ref().is_none_or(|(run, _)| run.state != RunState::Running))
     }
 
-    /// The study of the run, as it was; its data are read from where they are.
+    /// Reads the study of the run from its stored text; data are read from their files.
     ///
     /// # Errors
-    /// The run kept no study, or its data are gone.
+    /// If the study is not stored or its data cannot be read.
     pub fn study(&self, catalogue: &Catalogue) -> Result<StudyFile, Diagnostic> {
         let Some((run, _)) = &self.run else {
             let path = self.folder.join(store::FILE);
             return Err(match path.exists() {
-                true => Diagnostic::new(format!("{} holds no run that can be read", path.display()))
-                    .with_help("it is damaged, or of another program; the result is in result.json"),
+                true => Diagnostic::new(format!("{} has no readable run", path.display()))
+                    .with_help("the file is damaged or from another program; the result is in result.json"),
                 false => Diagnostic::new(format!("{} has no {}", self.folder.display(), store::FILE))
-                    .with_help("a run of this version of mops writes it"),
+                    .with_help("run the study with this version of mops, which writes it"),
             });
         };
         let text = without_settings(&run.text, &run.settings);
@@ -91,7 +91,7 @@ impl Past {
     }
 }
 
-/// The date and time of seconds since 1970-01-01, UTC: `2026-11-21 14:05`.
+/// Formats seconds since 1970-01-01 UTC as date and time, `2026-11-21 14:05`.
 ///
 /// Source: H. Hinnant, chrono-Compatible Low-Level Date Algorithms (2013), `civil_from_days`.
 pub(super) fn date(seconds: i64) -> String {
@@ -111,7 +111,7 @@ pub(super) fn date(seconds: i64) -> String {
 mod tests {
     use super::date;
 
-    /// As `date -u -d @SECONDS` of GNU coreutils says.
+    /// Reference: `date -u -d @SECONDS` of GNU coreutils.
     #[test]
     fn dates_are_those_of_the_calendar() {
         assert_eq!(date(0), "1970-01-01 00:00");

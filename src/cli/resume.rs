@@ -1,0 +1,134 @@
+//! Stored evaluations of a run: `--resume` and `--reuse`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use mops_core::file::StudyFile;
+use mops_core::{Diagnostic, SensitivityMethod, Stop, Study, Task, Watch};
+
+use super::study::{Home, StudyArguments};
+use crate::search::{EvaluationStore, Options, SolveError, Solved, solves};
+use crate::solve::solve;
+use crate::store::{FinishedRun, Identity, OpenError, Recorder, RunRow, RunState, Start, row};
+use crate::terminal::CommandError;
+
+/// Options for the use of stored evaluations.
+#[derive(Args)]
+pub(super) struct StartOptions {
+    /// Continue the interrupted or killed run of this study in the output folder, to the result of an uninterrupted run.
+    ///
+    /// The search is repeated, but points stored in evaluations.sqlite are not simulated again. A larger --max-evaluations
+    /// extends a finished run. If the folder has no run yet, a new run is started.
+    #[arg(long, conflicts_with = "reuse")]
+    resume: bool,
+    /// Reuse the evaluations stored in DIR. Demands, usages, weights, bounds, start values and the solver of that run may
+    /// differ.
+    ///
+    /// The search starts at the stored point that is best under the demands of this study, and simulates no stored point
+    /// again. `reused` in result.json is the number of stored points that the run used.
+    #[arg(long, value_name = "DIR")]
+    reuse: Option<PathBuf>,
+}
+
+impl StartOptions {
+    pub fn start(&self) -> Start {
+        match &self.reuse {
+            Some(folder) => Start::Reuse(folder.clone()),
+            None if self.resume => Start::Resume,
+            None => Start::Fresh,
+        }
+    }
+}
+
+impl From<OpenError> for CommandError {
+    fn from(refusal: OpenError) -> Self {
+        match refusal {
+            OpenError::Mistake(diagnostic) => diagnostic.into(),
+            OpenError::Failure(message) => Self::Failure(message),
+        }
+    }
+}
+
+/// Returns true if the task of a study evaluates points that can be stored: a search, a sweep, or samples of uncertain
+/// parameters.
+pub(super) fn stores_points(study: &Study) -> bool {
+    solves(study) || study.task() == Task::Sweep || samples_uncertain(study)
+}
+
+/// Returns true if the task evaluates points at other values of the uncertain parameters.
+pub(super) fn samples_uncertain(study: &Study) -> bool {
+    match study.task() {
+        Task::Design => study.tasks().robust.is_some(),
+        Task::Sensitivity => study.tasks().sensitivity.method != SensitivityMethod::Local,
+        task => matches!(task, Task::WorstCase | Task::MonteCarlo),
+    }
+}
+
+/// Locks the folder of a new run and opens its database. A task that evaluates no points only adds a row to the table of runs.
+pub(super) fn open(
+    (folder, start): (&Path, &Start),
+    (file, study): (&StudyFile, &StudyArguments),
+    home: &Home,
+    options: &Options,
+) -> Result<Recorder, CommandError> {
+    if !stores_points(&file.study) && *start != Start::Fresh {
+        return Err(Diagnostic::new("this task stores no evaluations that a later run could reuse")
+            .with_help("remove --resume or --reuse; the same seed gives the same result")
+            .into());
+    }
+    let identity = Identity::of(file, &file.study, options.solver.kind);
+    let home = match home {
+        Home::Shipped(shipped) => PathBuf::from(shipped.name),
+        Home::Built(built) => PathBuf::from(built.name()),
+        Home::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
+    };
+    let task = serde_json::to_value(file.study.task()).expect("a task is a word");
+    let run = RunRow {
+        home,
+        settings: study.settings.clone(),
+        name: file.study.name().to_owned(),
+        task: task.as_str().unwrap_or_default().to_owned(),
+        text: file.source.text.clone(),
+        seed: file.study.seed(),
+        solver: options.solver.kind.to_owned(),
+        max_evaluations: options.max_evaluations,
+        ..row(&identity)
+    };
+    Ok(Recorder::open(folder, start, &file.study, &identity, &run)?)
+}
+
+/// Solved study, and the database of its points.
+pub(super) type RecordedSolution = (Result<Solved, SolveError>, FinishedRun);
+
+/// Solves the study and stores its points.
+pub(super) fn solve_recorded(
+    study: &Study,
+    options: &Options,
+    recorder: Recorder,
+    watch: &dyn Watch,
+) -> RecordedSolution {
+    let start_point = recorder.start_point.clone();
+    let keeping = Some(EvaluationStore { study: study.clone(), store: recorder.store(), begin: start_point });
+    let options = Options { keeping, ..options.clone() };
+    recorder.run(watch, |watch| solve(study.clone(), &options, watch))
+}
+
+/// Returns the state of a finished run in the table of runs.
+pub(super) fn state(stop: Stop) -> RunState {
+    match stop {
+        Stop::Converged => RunState::Converged,
+        Stop::Budget => RunState::Budget,
+        Stop::Stalled => RunState::Stalled,
+        Stop::Interrupted => RunState::Interrupted,
+    }
+}
+
+/// Formats the numbers of stored, reused and simulated points; empty for a fresh run.
+pub(super) fn cache_summary(start: &Start, known: usize, opened: &FinishedRun) -> String {
+    match start {
+        Start::Fresh => String::new(),
+        Start::Resume | Start::Reuse(_) => {
+            format!("\ncache: {known} points, {} hits, {} simulated\n", opened.reused, opened.simulated)
+        }
+    }
+}
