@@ -50,6 +50,7 @@ fn found(diagnosis: &Diagnosis) -> Vec<(&str, &str)> {
 }
 
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn a_missing_effect_is_found_at_its_place_and_its_strength_with_it() {
     for (plant, effect, [name, told]) in [
         ("servo", "coulomb-friction", ["c", "torque"]),
@@ -73,6 +74,7 @@ fn a_missing_effect_is_found_at_its_place_and_its_strength_with_it() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn a_simple_friction_is_fitted_from_where_one_with_more_shapes_ended() {
     // The pendulum stops: the fit of the Coulomb friction alone stays where the sum of squares is 25 times as large.
     let missing = Missing::Effects(&["coulomb-friction"]);
@@ -83,6 +85,7 @@ fn a_simple_friction_is_fitted_from_where_one_with_more_shapes_ended() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn a_constant_beside_a_declared_loss_is_not_told_as_a_loss_to_elsewhere() {
     // `k (around - T)` explains the data as well, with the declared loss at zero.
     let missing = Missing::Effects(&["constant-heat-gain"]);
@@ -93,6 +96,7 @@ fn a_constant_beside_a_declared_loss_is_not_told_as_a_loss_to_elsewhere() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn a_friction_whose_fit_sticks_on_its_way_from_nothing_is_fitted_anew() {
     // In windows the base leaves 10 times the noise; from nothing the fit ended at a quarter of the friction, with 9 left.
     let missing = Missing::Effects(&["coulomb-friction"]);
@@ -106,6 +110,7 @@ fn a_friction_whose_fit_sticks_on_its_way_from_nothing_is_fitted_anew() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn a_break_away_force_that_no_slope_tells_is_found() {
     // The mass sticks and slips: by slopes alone the fit stayed where it left 2.1 times the noise, with a third too much.
     let case = generate("spring", Missing::Effects(&["stiction"]), 5.0, 3_337_189_589_112).expect("it can be made");
@@ -122,6 +127,7 @@ fn a_break_away_force_that_no_slope_tells_is_found() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn where_nothing_is_missing_nothing_is_found() {
     for plant in ["pendulum", "servo"] {
         let case = case(plant, Missing::Nothing, 0.0);
@@ -132,6 +138,7 @@ fn where_nothing_is_missing_nothing_is_found() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn neither_the_order_of_the_catalogue_nor_the_seed_changes_the_verdict() {
     let friction = case("servo", Missing::Effects(&["coulomb-friction"]), 5.0);
     assert_eq!(found(&diagnosis(&friction, true)), [("coulomb-friction", "joint:q")]);

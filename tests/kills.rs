@@ -88,7 +88,12 @@ fn killed(arguments: &[&str], root: &Path, [prepare, keeps]: [&dyn Fn(&Path); 2]
     let places: Vec<(&str, usize)> = (counted(arguments, root, prepare).into_iter())
         .flat_map(|(call, count)| (1..=count).map(move |k| (call, k)))
         .collect();
-    let every = if mops_tiers::is_full() { 1 } else { places.len().div_ceil(some) };
+    let all = std::env::var("MOPS_KILLS").is_ok_and(|kills| kills == "all");
+    let every = match mops_tiers::is_full() {
+        _ if all => 1,
+        true => 10,
+        false => places.len().div_ceil(some),
+    };
     let (mut kills, mut wrong) = (0, Vec::new());
     for (call, k) in places.into_iter().skip(every / 2).step_by(every) {
         let out = root.join("out");

@@ -112,6 +112,7 @@ fn mistakes_in_the_linearisation_of_a_study_have_their_place() {
 
 /// Found by two solvers; the margins and peaks at the optimum agree with NumPy on a grid of 4e6 frequencies.
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn one_set_of_tuners_serves_a_simulation_and_its_margins() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");

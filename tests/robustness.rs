@@ -478,6 +478,7 @@ impl mops::core::file::Files for NoFiles {
 /// The three cases of `pid-design-multi-case` are found without being named, with their optimum 3.8955098; they leave a place
 /// where the settling time is 16.9 s. The design that is reported holds at every point of a grid that the search never saw.
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn the_pid_design_for_the_box_holds_on_an_independent_grid() {
     let folder = tempfile::tempdir().unwrap();
     let result = run("pid-robust", folder.path(), &[]);

@@ -10,7 +10,7 @@ use crate::common::{Channel, LinearCriterion, Values};
 /// H2 norm `sqrt(1/(2 pi) integral |G(j w)|^2 dw)`: root mean square of the output for white noise of unit intensity at
 /// the input.
 ///
-/// It also is the square root of the integrated square of the impulse response. The unit is that of the output divided
+/// Equals the square root of the integrated square of the impulse response. The unit is that of the output divided
 /// by that of the input, times s^(-1/2), which is omitted.
 ///
 /// The norm is computed from both Gramians, which must agree. Less is better. Range: from 0 up. There is no value if

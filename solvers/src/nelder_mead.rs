@@ -11,7 +11,7 @@ use crate::start::usable_start;
 
 /// Nelder-Mead simplex method (argmin), restarted at its result until a restart brings no improvement.
 ///
-/// It minimises one number per point, the penalised objective, and may stall at a kink (non-differentiable point). For
+/// Minimises one number per point, the penalised objective, and may stall at a kink (non-differentiable point). For
 /// comparison, and for rough criteria with two or three tuners.
 ///
 /// Source: J. A. Nelder, R. Mead, Computer Journal 7 (1965) 308-313.

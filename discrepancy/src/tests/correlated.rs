@@ -85,6 +85,7 @@ fn a_fall_of_the_sum_of_squares_is_worth_less_where_residuals_are_alike() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn noise_that_is_correlated_is_not_taken_for_an_effect() {
     for label in ["alike 1", "alike 2", "alike 3"] {
         let study = study(&decay(0.9, label));
@@ -96,6 +97,7 @@ fn noise_that_is_correlated_is_not_taken_for_an_effect() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn where_noise_is_correlated_the_simpler_of_two_effects_is_found() {
     const STEP: f64 = 0.01;
     const NOISE: f64 = 0.01;

@@ -80,6 +80,7 @@ fn what_calibration_data_leave_open_selection_data_decide() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn validation_data_change_no_bit_of_what_is_found() {
     let [one, other] = [0.0, 0.5].map(|shift| diagnosis(&block(Role::Selection, shift)));
     assert_eq!(one.found, other.found);
@@ -140,6 +141,7 @@ fn with_friction_and_bias<T>(
 }
 
 #[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn what_helps_the_fit_and_hurts_the_forecast_is_left_out() {
     let left_out_of = |biases: [f64; 3], selection: usize| {
         with_friction_and_bias(biases, selection, |search, with_bias, _| {

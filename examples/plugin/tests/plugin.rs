@@ -47,8 +47,9 @@ fn a_study_built_in_rust_is_run_resumed_reported_and_changed_by_settings() {
     assert_eq!(longer["tuners"], whole["tuners"]);
     assert!(text(&["report", out.to_str().unwrap()]).contains("report.html"));
     // Settings replace start, bounds, seed and task.
-    let other =
-        run(&folder.path().join("other"), &["suspension", "--max-evaluations", "40", "--set", "tuners.k.min=3e4"]);
+    let settings = ["--set", "tuners.k.min=3e4", "--set", "tuners.k.start=4e4"];
+    let changed = [&["suspension", "--max-evaluations", "40"], &settings[..]].concat();
+    let other = run(&folder.path().join("other"), &changed);
     assert!(other["tuners"][0]["value"].as_f64().unwrap() >= 3e4, "{other}");
     let wrong = plugin(&["check", "suspension", "--set", "tuners.q.min=3"]).output().unwrap();
     assert_eq!(wrong.status.code(), Some(2));

@@ -102,7 +102,7 @@ pub fn place(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[Complex]) -> Result<Pl
 
 /// Returns candidate feedbacks from all methods.
 ///
-/// Those with independent eigenvectors come first, computed in the given units and in scaled ones.
+/// Gains with independent eigenvectors come first, computed in the given units and in scaled ones.
 fn feedbacks(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,

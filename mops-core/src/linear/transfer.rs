@@ -1,4 +1,4 @@
-//! Transfer functions, and their conversion to and from state space.
+//! Transfer functions, and their conversion to state space and back.
 
 use nalgebra::DMatrix;
 

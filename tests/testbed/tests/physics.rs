@@ -8,7 +8,7 @@ fn plant(name: &str) -> &'static Plant {
     plants().iter().find(|plant| plant.name == name).expect("the plant exists")
 }
 
-/// Returns an experiment of about 1 s with one held input.
+/// Returns an experiment of about 1 s with one constant input.
 fn setup(dt: f64, samples: usize, start: &[f64], input: impl Fn(usize) -> f64) -> Setup {
     Setup { dt, samples, start: start.to_vec(), inputs: vec![(0..samples).map(input).collect()] }
 }

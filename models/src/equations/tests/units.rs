@@ -291,7 +291,7 @@ fn a_bare_number_is_read_in_si_units_or_is_an_error_next_to_others() {
         let parameters =
             if rest.contains("parameters") { String::new() } else { format!("parameters = {{ r = '{rate}' }}\n") };
         let (mistake, help) = wrong(&format!("states = {{ x = '{unit}' }}\n{parameters}{rest}"));
-        assert!(mistake.contains(&format!("beside {name}")) && help.contains(write), "{rest}\n{mistake}\n{help}");
+        assert!(mistake.contains(&format!("next to {name}")) && help.contains(write), "{rest}\n{mistake}\n{help}");
     }
     // 0 is the same in all units except temperatures; numbers in products are pure numbers.
     read_ok(
@@ -369,25 +369,29 @@ fn differences_ratios_and_angles_combine_with_numbers() {
     for (rest, fact, help) in [
         (
             "states = { T = 'degC' }\nparameters = { k = '1/s', a = '1' }\nder = { T = 'if(a*T > 20, -k*(T - 1 [K]), 0)' }",
-            "beside `T`",
+            "next to `T`",
             "20 [degC]",
         ),
         ("states = { x = 'm' }\nparameters = { k = '1/s' }\nder = { x = '2^(k*time)' }", "found a pure number", ""),
         (
             "states = { x = 'm' }\nparameters = { k = 'm/s' }\nder = { x = 'if(max(5 [cm], 3) > x, k, 0)' }",
-            "beside a number, which is in cm",
+            "next to a number, which is in cm",
             "3 [cm]",
         ),
         (
             "states = { x = 'cm' }\nparameters = { c = '', k = 'm/s' }\nder = { x = 'if(x > 2*abs(c), k, 0)' }",
-            "beside `x`, which is in cm",
+            "next to `x`, which is in cm",
             "declare",
         ),
-        ("states = { x = 'cm' }\nparameters = { k = '1/s' }\nder = { x = '-k*x + 5' }", "beside `x`", "5 [m/s]"),
-        ("states = { x = '%' }\nparameters = { k = '1/s' }\nder = { x = 'k*(1 - x)' }", "beside `x`", "1 [%] or 1 [1]"),
+        ("states = { x = 'cm' }\nparameters = { k = '1/s' }\nder = { x = '-k*x + 5' }", "next to `x`", "5 [m/s]"),
+        (
+            "states = { x = '%' }\nparameters = { k = '1/s' }\nder = { x = 'k*(1 - x)' }",
+            "next to `x`",
+            "1 [%] or 1 [1]",
+        ),
         (
             "states = { th = 'deg' }\nparameters = { w = 'rpm' }\nder = { th = 'w*sin(th - 1)' }",
-            "beside `th`",
+            "next to `th`",
             "1 [deg] or 1 [rad]",
         ),
         (

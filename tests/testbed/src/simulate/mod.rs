@@ -1,6 +1,6 @@
 //! Integrator: classical Runge-Kutta method of order 4 with fixed steps.
 //!
-//! Inputs are held (zero-order hold); a step ends where a delayed input changes. Dry friction: see [`friction`].
+//! Inputs have a zero-order hold; a step ends where a delayed input changes. Dry friction: see [`friction`].
 
 mod friction;
 mod world;
