@@ -8,8 +8,6 @@ use mops_core::{
     Record, Run, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task, Watch, conclude,
 };
 
-use mops_discrepancy::Diagnosis;
-
 /// Options of [`crate::solve()`].
 #[derive(Clone)]
 pub struct Options {
@@ -83,8 +81,6 @@ pub struct Solved {
     pub archive: Vec<Record>,
     /// Points of the Pareto front, in the order of the result; empty for other tasks.
     pub front: Vec<Evaluation>,
-    /// Result of a diagnosis; `None` for other tasks.
-    pub diagnosis: Option<Diagnosis>,
 }
 
 /// Reason why the solver or the task cannot handle the study, with a remedy and, if known, the key path in the study file.
@@ -154,7 +150,7 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     outcome.reused = begin.map(|_| run.reused());
     let archive = run.archive().to_vec();
     drop(run);
-    Ok(Solved { outcome, problem, best, archive, front: Vec::new(), diagnosis: None })
+    Ok(Solved { outcome, problem, best, archive, front: Vec::new() })
 }
 
 /// Evaluates the start values only and returns the outcome.
@@ -176,7 +172,7 @@ pub(crate) fn evaluate_start(study: Study, options: &Options, watch: &dyn Watch)
     outcome.seconds = started.elapsed().as_secs_f64();
     let archive = run.archive().to_vec();
     drop(run);
-    Solved { outcome, problem, best, archive, front: Vec::new(), diagnosis: None }
+    Solved { outcome, problem, best, archive, front: Vec::new() }
 }
 
 /// Difference step of the derivatives at the reported point, in the unit box. Equal to that of the Pareto certificate, whose

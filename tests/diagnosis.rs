@@ -41,7 +41,7 @@ fn diagnosis_among(case: &Trial, catalogue: Catalogue, seed: u64) -> Diagnosis {
     study.set_seed(seed);
     let options = Options { effects: catalogue.effects, ..Options::default() };
     let solved = mops::solve(study, &options, &()).unwrap_or_else(|why| panic!("{}: {why}", case.name));
-    solved.diagnosis.expect("that was the task")
+    solved.outcome.found.diagnosis.expect("that was the task")
 }
 
 /// Effects and places found.

@@ -82,6 +82,21 @@ fn a_report_is_written_again_as_it_was_without_the_study_file() {
 }
 
 #[test]
+fn a_report_of_a_diagnosis_is_written_again_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let few = "diagnosis.effects=['coulomb-friction','viscous-friction']";
+    said(&["diagnose", "furuta-discrepancy", "--quiet", "--out", out, "--set", few]);
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains("coulomb-friction"));
+    std::fs::remove_file(folder.path().join("report.html")).unwrap();
+    assert!(said(&["report", out]).contains("from the diagnosis"));
+    assert!(std::fs::read_to_string(folder.path().join("report.html")).unwrap() == page, "the page is the same");
+    std::fs::remove_file(folder.path().join("diagnosis.toml")).unwrap();
+    assert!(refusal(&["report", out]).contains("diagnosis.toml cannot be read"));
+}
+
+#[test]
 fn a_comparison_has_differences_in_percent_and_the_responses() {
     let folder = tempfile::tempdir().unwrap();
     let [a, b] = ["a", "b"].map(|name| folder.path().join(name));

@@ -7,7 +7,6 @@ use mops_core::Role;
 use mops_core::math;
 
 use crate::candidate::Candidate;
-use crate::diagnosis::{Found, HeldBack, Noticeable, ParameterMove, Prediction, Ranked, StrengthValue};
 use crate::plan::separating;
 use crate::repaired::Calibrated;
 use crate::round::Round;
@@ -17,6 +16,7 @@ use crate::stability::stability;
 use crate::standing::{Standing, gained};
 use crate::subject::Subject;
 use crate::weigh::{Dispersion, criterion, needed_gain, probabilities};
+use mops_core::diagnosis::{Found, HeldBack, Noticeable, ParameterMove, Prediction, Ranked, StrengthValue};
 
 /// Candidates by probability: those found first, in their order, then what else was tried in their places; where nothing was
 /// found, what was tried first.

@@ -9,7 +9,6 @@ use crate::account::{
     at_bounds, found, held_back, moves, next_experiment, noticeable, predictions, ranking, starts, widen,
 };
 use crate::base;
-use crate::diagnosis::{Diagnosis, Found, Verdict};
 use crate::drawn::draw;
 use crate::judge::{Judgement, agreed, judge, within_limits};
 use crate::locate::locate;
@@ -19,6 +18,7 @@ use crate::search::{Limits, Search};
 use crate::standing::Standing;
 use crate::stopgap::is_table;
 use crate::subject::Subject;
+use mops_core::diagnosis::{Diagnosis, Found, Verdict};
 
 /// What a diagnosis is asked.
 #[derive(Debug, Clone, Copy, PartialEq)]

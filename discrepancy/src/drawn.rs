@@ -8,13 +8,13 @@
 use mops_core::Port;
 
 use crate::candidate::Candidate;
-use crate::diagnosis::Evidence;
 use crate::locate::{Located, located, thinning};
 use crate::screen::Scene;
 use crate::search::Trial;
 use crate::stopgap::is_table;
 use crate::trace_of::{Spot, View, spot};
 use crate::unknown::respond;
+use mops_core::diagnosis::Evidence;
 
 /// Draws what was found into the evidence of the places where effects were added.
 pub fn draw(places: &mut [Located], last: &Trial<'_>) {

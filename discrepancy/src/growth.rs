@@ -9,12 +9,12 @@ use mops_core::math;
 use rayon::prelude::*;
 
 use crate::diagnose::{Options, UNEXPLAINED};
-use crate::diagnosis::Step;
 use crate::round::{Round, best_first, best_in};
 use crate::screen::Screened;
 use crate::search::{Search, Trial};
 use crate::variant::Added;
 use crate::weigh::{CLEARLY, Dispersion, by_chance, criterion};
+use mops_core::diagnosis::{Change, Step};
 
 /// How often effects are held against their rivals at most while a model grows.
 const EXCHANGES: usize = 4;
@@ -56,7 +56,7 @@ impl<'a> Growth<'a> {
     }
 
     /// Goes on to another model.
-    fn step(&mut self, did: &'static str, to: Trial<'a>) {
+    fn step(&mut self, did: Change, to: Trial<'a>) {
         let name = |a: &Added| format!("{} at {}", a.candidate.effect.name(), a.candidate.place());
         let effects = to.added.iter().map(name).collect();
         self.steps.push(Step { did, effects, windows: to.windows, normalised: to.fitted.normalised() });
@@ -92,7 +92,7 @@ impl<'a> Search<'a> {
         }
         let way = least(&further, &Dispersion::WHITE).filter(|way| is_clearly_better(way, best.as_ref()));
         let Some(way) = way else { return growth };
-        growth.step("begun otherwise", way.clone());
+        growth.step(Change::Restarted, way.clone());
         let other = self.onward(Growth::begun(way.clone()), options, watch);
         if is_clearly_better(&other.last, Some(way)) {
             growth.steps.extend(other.steps);
@@ -158,10 +158,10 @@ impl<'a> Search<'a> {
             };
             let next = self.unstuck(next);
             growth.rounds.push(round.with(&next));
-            growth.step("added", next);
+            growth.step(Change::Added, next);
             // What one effect stood in for may have its place once the next is in.
             while let Some(better) = self.exchange(&growth.last, &mut exchanges, watch) {
-                growth.step("exchanged", better);
+                growth.step(Change::Swapped, better);
             }
         }
         growth
@@ -192,14 +192,14 @@ impl<'a> Search<'a> {
         for settling in 0..=SETTLINGS {
             watch.stage(&growth.stage("what can be left out"), 0.8 + 0.03 * f64::from(settling));
             if let Some(pruned) = self.pruned(&growth.last, self.limits.level) {
-                growth.step("left out", pruned);
+                growth.step(Change::Eliminated, pruned);
             }
             while let Some(better) = self.forecasting_better(&growth.last) {
-                growth.step("left out", better);
+                growth.step(Change::Eliminated, better);
             }
             while growth.last.added.len() > 1 && growth.last.windows == 1 {
                 let Some((one, round)) = self.merged(&growth.last) else { break };
-                growth.step("one for two", one);
+                growth.step(Change::Substituted, one);
                 growth.rounds.insert(0, round);
             }
             let is_settled = match growth.last.added.len() {
@@ -217,7 +217,7 @@ impl<'a> Search<'a> {
             // The last look is for the rivals of what is there.
             let Some(better) = exchanged.filter(|_| settling < SETTLINGS) else { break };
             // Beside another effect, what was needed may be superfluous.
-            growth.step("exchanged", better);
+            growth.step(Change::Swapped, better);
         }
         watch.stage("other shapes of what was found", 0.88);
         self.reshape(growth)
@@ -229,7 +229,7 @@ impl<'a> Search<'a> {
         (reshaped, growth.allowed) = self.shapes(growth.last.clone());
         if reshaped.fitted.chi2 < growth.last.fitted.chi2 {
             growth.rounds = self.held_against_rivals(&reshaped);
-            growth.step("reshaped", reshaped);
+            growth.step(Change::Reshaped, reshaped);
         }
         growth
     }
@@ -261,7 +261,7 @@ impl<'a> Search<'a> {
         let (reduced, held) = self.without_declared(growth.last.clone());
         let Some(simpler) = self.restated(&growth, &reduced, &held) else { return (growth, reduced, held) };
         growth.rounds = self.held_against_rivals(&simpler);
-        growth.step("exchanged", simpler);
+        growth.step(Change::Swapped, simpler);
         growth = self.reshape(growth);
         let (reduced, held) = self.without_declared(growth.last.clone());
         (growth, reduced, held)

@@ -4,7 +4,6 @@ use mops_core::Role;
 use mops_core::statistics::chi_squared_sf;
 
 use crate::diagnose::UNEXPLAINED;
-use crate::diagnosis::{Unexplained, Verdict};
 use crate::fit::dot;
 use crate::held_out::predictive_gain;
 use crate::locate::{Located, locate};
@@ -14,6 +13,7 @@ use crate::search::{Search, Trial};
 use crate::stopgap::{is_table, stopgap, unexplained};
 use crate::subject::Measurement;
 use crate::variant::Added;
+use mops_core::diagnosis::{Unexplained, Verdict};
 
 /// Probability, were the model right, of what counts as calibration data that contradict all data together.
 const CONTRADICTED: f64 = 1e-4;

@@ -6,7 +6,6 @@ mod base;
 mod brute_force;
 mod candidate;
 mod diagnose;
-mod diagnosis;
 mod drawn;
 mod family;
 mod fit;
@@ -51,8 +50,7 @@ mod windows;
 
 pub use brute_force::{BruteForce, brute_force};
 pub use diagnose::{Options, diagnose};
-pub use diagnosis::{
-    Curve, Diagnosis, Evidence, ExperimentError, Found, HeldBack, Noticeable, ParameterMove, Prediction, Ranked,
-    Removed, Rival, Step, StrengthValue, Unexplained, Verdict, WindowErrors, together,
+pub use mops_core::diagnosis::{
+    Curve, Diagnosis, Evidence, ExperimentError, Found, HangsOn, HeldBack, Noticeable, ParameterMove, Prediction,
+    Ranked, Removed, Rival, Stability, Step, StrengthValue, Unexplained, Verdict, WindowErrors, together,
 };
-pub use stability::{HangsOn, Stability};

@@ -15,11 +15,11 @@ use mops_models::WithEffects;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::diagnosis::{Curve, Evidence, Unexplained};
 use crate::family::{Over, thinned};
 use crate::fit::Fit;
 use crate::screen::Scene;
 use crate::unknown::{Term, Unknown};
+use mops_core::diagnosis::{Curve, Evidence, Unexplained};
 
 /// A place with the signal that is likeliest there.
 pub struct Located {

@@ -3,7 +3,6 @@
 use mops_core::math;
 use mops_core::{Hold, Input};
 
-use crate::diagnosis::Evidence;
 use crate::held_out::predictive_gain;
 use crate::locate::{Located, locate};
 use crate::meter::Meter;
@@ -12,6 +11,7 @@ use crate::search::{Limits, Search};
 use crate::stopgap::{stopgap, unexplained};
 use crate::subject::Subject;
 use crate::testing::{Record, fitted, integrated, subject, white};
+use mops_core::diagnosis::Evidence;
 
 const PLANT: &str = r#"
 states     = { x = "m", v = "m/s", f = "N" }

@@ -2,11 +2,11 @@
 //! changes the outputs as it does.
 
 use crate::candidate::Candidate;
-use crate::diagnosis::Removed;
 use crate::fit::dot;
 use crate::screen::Scene;
 use crate::search::{Search, Trial};
 use crate::trace_of::{View, sizes};
+use mops_core::diagnosis::Removed;
 
 /// Likeness from which on a term counts as acting at the place of an effect.
 const ALIKE: f64 = 0.999;

@@ -5,7 +5,6 @@ use mops_core::{Port, Role};
 use nalgebra::DMatrix;
 
 use crate::base;
-use crate::diagnosis::{ExperimentError, StrengthValue, together};
 use crate::fit::{Fit, Fitted, Point};
 use crate::profile::{QUANTILE, interval95};
 use crate::search::{ASTRAY, Search, Trial};
@@ -13,6 +12,7 @@ use crate::subject::{Measurement, Subject};
 use crate::variant::{Added, Variant, problem};
 use crate::weigh::Dispersion;
 use crate::windows::whole;
+use mops_core::diagnosis::{ExperimentError, StrengthValue, together};
 
 /// A model that was fitted to calibration data alone, and its predictions everywhere.
 pub struct Calibrated<'a> {

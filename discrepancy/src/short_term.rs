@@ -3,12 +3,12 @@
 
 use rayon::prelude::*;
 
-use crate::diagnosis::{ExperimentError, WindowErrors};
 use crate::fit::Piece;
 use crate::repaired::{Calibrated, Prognosis};
 use crate::search::{ASTRAY, Search};
 use crate::subject::{Measurement, Series};
 use crate::windows::cut;
+use mops_core::diagnosis::{ExperimentError, WindowErrors};
 
 /// Periods in a window.
 ///

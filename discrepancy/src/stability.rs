@@ -1,9 +1,9 @@
 //! Stability: whether the choice of an effect hangs on a few stretches of the data, or on one experiment.
 
+use mops_core::diagnosis::{HangsOn, Stability};
 use mops_core::stream;
 use rand::Rng;
 use rayon::prelude::*;
-use serde::Serialize;
 
 use crate::growth::least;
 use crate::round::Round;
@@ -15,30 +15,6 @@ const DRAWS: usize = 1000;
 
 /// Effects, the best first, that are fitted again without an experiment.
 const REFITTED: usize = 5;
-
-/// How the choice of an effect holds where the data change.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Stability {
-    /// Share of data sets, drawn anew in blocks from the data, in which the same effect does best.
-    ///
-    /// The fits are not repeated, their residuals are drawn. Source: H. Kishino, T. Miyata, M. Hasegawa, Maximum likelihood
-    /// inference of protein phylogeny, Journal of Molecular Evolution 31 (1990) 151, for estimated likelihoods; E. Carlstein, The
-    /// use of subseries values for estimating the variance of a general statistic, Annals of Statistics 14 (1986) 1171, for blocks.
-    pub share: f64,
-    /// Experiments without which another effect would do best, fitted again without them.
-    pub hangs_on: Vec<HangsOn>,
-}
-
-/// An experiment that an effect's choice hangs on.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct HangsOn {
-    /// The experiment.
-    pub experiment: String,
-    /// The effect that would do best without it.
-    pub effect: String,
-    /// The place of that, as `kind:name`.
-    pub place: String,
-}
 
 /// The stability of the effect of one of the models of a round; `None` where it has no rival over the same data.
 pub fn stability(round: &Round<'_>, own: usize) -> Option<Stability> {

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use crate::base;
-use crate::diagnosis::Rival;
 use crate::fit::dot;
 use crate::round::{Round, best_in};
 use crate::screen::Screened;
 use crate::search::{Search, Trial};
 use crate::weigh::{CLEARLY, Dispersion, criterion, probabilities, weighed};
+use mops_core::diagnosis::Rival;
 
 /// An effect found beside what was tried in its place.
 pub struct Standing<'r, 'a> {

@@ -7,12 +7,12 @@ use mops_core::{
 };
 
 use crate::candidate::Candidate;
-use crate::diagnosis::Unexplained;
 use crate::family::Over;
 use crate::locate::{Located, Table};
 use crate::search::{Search, Trial};
 use crate::trace_of::sizes;
 use crate::variant::Added;
+use mops_core::diagnosis::Unexplained;
 
 /// What it is called.
 const NAME: &str = "table";

@@ -12,6 +12,7 @@ mod conclude;
 mod criterion;
 pub mod data;
 mod demand;
+pub mod diagnosis;
 mod diagnostic;
 mod differences;
 mod effect;

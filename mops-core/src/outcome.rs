@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 
 use crate::criterion::Usage;
 use crate::demand::Demand;
+use crate::diagnosis::Diagnosis;
 use crate::evaluation::Evaluation;
 use crate::experiment::Role;
 use crate::identification::{ExcitationReport, RegressionReport, SensitivityReport, Whiteness};
@@ -95,9 +96,9 @@ pub struct Findings {
     /// Trade-offs along the Pareto front.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trade_offs: Option<TradeOffs>,
-    /// Missing effect of the model, as written by the diagnosis.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub diagnosis: Option<Value>,
+    /// Missing effects of the model.
+    #[serde(serialize_with = "crate::diagnosis::serialize", skip_serializing_if = "Option::is_none")]
+    pub diagnosis: Option<Diagnosis>,
     /// Worst cases over a box of uncertain parameters.
     #[serde(rename = "worst-case", skip_serializing_if = "Option::is_none")]
     pub worst_case: Option<WorstCaseReport>,

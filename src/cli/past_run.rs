@@ -72,6 +72,11 @@ impl PastRun {
         self.result.as_ref().filter(|_| self.run.as_ref().is_none_or(|(run, _)| run.state != RunState::Running))
     }
 
+    /// Returns the wall-clock time of the run, s, if it has ended.
+    pub fn seconds(&self) -> Option<f64> {
+        self.finished_result()?["seconds"].as_f64()
+    }
+
     /// Reads the study of the run from its stored text; data are read from their files.
     ///
     /// # Errors

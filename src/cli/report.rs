@@ -4,13 +4,15 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Diagnostic, Stop, suggestion};
+use mops_core::{Catalogue, Diagnostic, Stop, Task, suggestion};
 
 use super::past_run::PastRun;
 use super::resume;
+use super::run_files::read_diagnosis;
 use crate::report::Report;
 use crate::search::{Options, Solved};
 use crate::store::{self, Identity, Recorder, RunRow, RunState};
+use crate::tasks::diagnosis;
 use crate::terminal::{CommandError, print};
 
 /// Arguments of `mops report`.
@@ -32,10 +34,13 @@ pub(super) fn report(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exi
     let Restored { solved, text } = replay(catalogue, &past)?;
     let _lock = store::lock_folder(folder)?;
     let Solved { outcome, problem, best, archive, front, .. } = &solved;
-    let report = Report { outcome, problem, best, archive, front, diagnosis: None, text: &text };
+    let report = Report { outcome, problem, best, archive, front, text: &text };
     report.write(folder).map_err(CommandError::cannot_write(folder))?;
-    let count = outcome.evaluations;
-    print(&format!("report.html and plots from {count} evaluations are in {}\n", folder.display()))?;
+    let from = match outcome.found.diagnosis {
+        Some(_) => "the diagnosis".to_owned(),
+        None => format!("{} evaluations", outcome.evaluations),
+    };
+    print(&format!("report.html and plots from {from} are in {}\n", folder.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -48,6 +53,13 @@ fn replay(catalogue: &Catalogue, past: &PastRun) -> Result<Restored, CommandErro
         return Err(Diagnostic::new(format!("the run in {} is still in progress", folder.display()))
             .with_help("it writes its report at the end; `mops run --watch` shows a run in progress")
             .into());
+    }
+    if file.study.task() == Task::Diagnosis {
+        file.study.set_seed(run.seed);
+        let options = options(catalogue, &file.solver, run)?;
+        let mut solved = diagnosis::of(file.study.clone(), &options, read_diagnosis(folder)?);
+        (solved.outcome.stop, solved.outcome.seconds) = (stop(run.state), past.seconds().unwrap_or(0.0));
+        return Ok(Restored { solved, text: file.source.text.clone() });
     }
     if !resume::stores_points(&file.study) {
         let task = &run.task;
@@ -88,16 +100,19 @@ fn replay(catalogue: &Catalogue, past: &PastRun) -> Result<Restored, CommandErro
         ))
         .into());
     }
-    outcome.stop = match run.state {
+    outcome.stop = stop(run.state);
+    outcome.seconds = past.seconds().unwrap_or(outcome.seconds);
+    Ok(Restored { solved, text: file.source.text.clone() })
+}
+
+/// Returns why a run stopped.
+fn stop(state: RunState) -> Stop {
+    match state {
         RunState::Converged => Stop::Converged,
         RunState::Budget => Stop::Budget,
         RunState::Stalled => Stop::Stalled,
         RunState::Interrupted | RunState::Running => Stop::Interrupted,
-    };
-    if let Some(seconds) = result.and_then(|result| result["seconds"].as_f64()) {
-        outcome.seconds = seconds;
     }
-    Ok(Restored { solved, text: file.source.text.clone() })
 }
 
 /// Returns the command line of a run without `--resume`.

@@ -287,7 +287,7 @@ impl FirstError {
 
 /// Formats a result as tables and sentences.
 fn result_text(solved: &Solved) -> String {
-    let tables = match &solved.diagnosis {
+    let tables = match &solved.outcome.found.diagnosis {
         Some(found) => diagnosis::text(found, solved.outcome.seconds),
         // No criteria exist without a verdict or for an analysis of inputs.
         None if matches!(solved.outcome.task, Task::Diagnosis | Task::Excitation) => {

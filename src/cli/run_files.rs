@@ -8,8 +8,8 @@ use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use mops_core::{Effect, MonteCarloReport, Shipped, Task};
-use mops_discrepancy::Diagnosis;
+use mops_core::diagnosis::Diagnosis;
+use mops_core::{Diagnostic, Effect, MonteCarloReport, Shipped, Task};
 
 use super::study::Home;
 use crate::diagnosis::{Original, predictions, repaired, source};
@@ -70,11 +70,11 @@ impl RunFiles<'_> {
             let samples = folder.join("samples.csv");
             write_samples(&samples, found).map_err(CommandError::cannot_write(&samples))?;
         }
-        let Solved { outcome, problem, best, archive, front, diagnosis } = solved;
-        Report { outcome, problem, best, archive, front, diagnosis: diagnosis.as_ref(), text: self.text }
+        let Solved { outcome, problem, best, archive, front } = solved;
+        Report { outcome, problem, best, archive, front, text: self.text }
             .write(folder)
             .map_err(CommandError::cannot_write(folder))?;
-        if let Some(diagnosis) = diagnosis {
+        if let Some(diagnosis) = &outcome.found.diagnosis {
             let (text, settings, study) = (self.plain, self.own, problem.study());
             let original = Original { text, settings, study, effects: self.effects };
             write_diagnosis(folder, diagnosis, &original, self.home, self.export)?;
@@ -114,6 +114,29 @@ fn write_evaluations(path: &Path, solved: &Solved) -> io::Result<()> {
     })
 }
 
+/// File with everything that a diagnosis found, from which `mops report` writes its page again.
+const DIAGNOSIS: &str = "diagnosis.toml";
+
+/// Returns the text of [`DIAGNOSIS`]: TOML has numbers that are not finite, JSON has not.
+fn diagnosis_toml(diagnosis: &Diagnosis) -> String {
+    toml::to_string(diagnosis).expect("a diagnosis is a table")
+}
+
+/// Reads the diagnosis that a run left in its folder.
+///
+/// # Errors
+/// The run left none, or it cannot be read.
+pub(super) fn read_diagnosis(folder: &Path) -> Result<Diagnosis, Diagnostic> {
+    let path = folder.join(DIAGNOSIS);
+    let refused = |why: String| {
+        Diagnostic::new(format!("{} cannot be read: {why}", path.display()))
+            .with_help("a diagnosis that reached a verdict writes it; `mops diagnose` runs one")
+    };
+    let text = files::read(&path).map_err(|error| refused(error.to_string()))?;
+    let text = String::from_utf8(text).map_err(|error| refused(error.to_string()))?;
+    toml::from_str(&text).map_err(|error| refused(error.message().to_owned()))
+}
+
 /// Writes `predictions/<experiment>.csv`; if the model was changed, also `repaired.toml` and, with `export`, `repaired.rs`.
 fn write_diagnosis(
     folder: &Path,
@@ -122,6 +145,7 @@ fn write_diagnosis(
     home: &Home,
     export: bool,
 ) -> Result<(), CommandError> {
+    write(&folder.join(DIAGNOSIS), diagnosis_toml(diagnosis).as_bytes())?;
     let predicted = folder.join("predictions");
     fs::create_dir_all(&predicted).map_err(CommandError::cannot_write(&predicted))?;
     for (name, table) in predictions(diagnosis) {
@@ -201,11 +225,24 @@ fn relative(folder: &Path, file: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use mops_discrepancy::Removed;
+    use mops_core::diagnosis::Removed;
 
     use super::super::study::{StudyArguments, home, open};
     use super::*;
     use crate::diagnosis::made_up;
+
+    #[test]
+    fn a_diagnosis_is_read_back_as_it_was_written() {
+        let folder = tempfile::tempdir().unwrap();
+        for mut diagnosis in [made_up::coulomb(), made_up::nothing(), made_up::unexplained()] {
+            diagnosis.p_value = f64::NAN;
+            fs::write(folder.path().join(DIAGNOSIS), diagnosis_toml(&diagnosis)).unwrap();
+            let read = read_diagnosis(folder.path()).unwrap();
+            assert_eq!(format!("{read:?}"), format!("{diagnosis:?}"));
+        }
+        fs::write(folder.path().join(DIAGNOSIS), "verdict = 3").unwrap();
+        assert!(read_diagnosis(folder.path()).unwrap_err().message.contains("diagnosis.toml cannot be read"));
+    }
 
     #[test]
     fn the_repaired_study_of_a_shipped_study_can_be_run_in_its_folder() {

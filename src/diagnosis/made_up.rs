@@ -1,11 +1,11 @@
 //! Made-up diagnoses for tests of the output.
 
 use mops_core::Role;
-use mops_core::math;
-use mops_discrepancy::{
-    Curve, Diagnosis, Evidence, ExperimentError, Found, HangsOn, Noticeable, ParameterMove, Prediction, Ranked, Rival,
-    Stability, Step, StrengthValue, Unexplained, Verdict,
+use mops_core::diagnosis::{
+    Change, Curve, Diagnosis, Evidence, ExperimentError, Found, HangsOn, Noticeable, ParameterMove, Prediction, Ranked,
+    Rival, Stability, Step, StrengthValue, Unexplained, Verdict,
 };
+use mops_core::math;
 
 /// Returns a pseudorandom value between -1 and 1.
 fn chance(i: usize) -> f64 {
@@ -129,7 +129,7 @@ pub(crate) fn coulomb() -> Diagnosis {
         }],
         removed: Vec::new(),
         steps: vec![Step {
-            did: "added",
+            did: Change::Added,
             effects: vec!["coulomb-friction at joint:phi".into()],
             windows: 1,
             normalised: 1.0,

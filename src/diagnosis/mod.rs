@@ -1,6 +1,5 @@
 //! Output files of a diagnosis besides its report: block of `result.json`, predictions, recalibrated study.
 
-mod block;
 pub(crate) mod errors;
 #[cfg(test)]
 pub(crate) mod made_up;
@@ -12,10 +11,12 @@ mod repaired;
 mod source;
 pub(crate) mod words;
 
-pub(crate) use block::block;
 #[cfg(feature = "cli")]
 pub(crate) use predictions::predictions;
 #[cfg(feature = "cli")]
 pub(crate) use repaired::{Original, repaired};
 #[cfg(feature = "cli")]
 pub(crate) use source::source;
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,6 @@
 //! Outputs predicted by the recalibrated model, one table per experiment.
 
-use mops_discrepancy::{Diagnosis, Prediction};
+use mops_core::diagnosis::{Diagnosis, Prediction};
 
 use crate::numbers::{FileNames, significant};
 

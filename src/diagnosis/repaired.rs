@@ -3,9 +3,9 @@
 use std::fmt::Write;
 use std::sync::Arc;
 
+use mops_core::diagnosis::{Diagnosis, Found, StrengthValue};
 use mops_core::math;
 use mops_core::{AnalysisKind, Effect, EffectParameter, Scope, Study};
-use mops_discrepancy::{Diagnosis, Found, StrengthValue};
 
 use super::words;
 use crate::toml_text::{TomlText, key, number, quoted, settled};
@@ -208,8 +208,8 @@ fn range(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
+    use mops_core::diagnosis::Removed;
     use mops_core::file::{Files, StudyFile};
-    use mops_discrepancy::Removed;
 
     use super::super::made_up;
     use super::*;

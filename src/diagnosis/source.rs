@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use mops_discrepancy::Diagnosis;
+use mops_core::diagnosis::Diagnosis;
 use toml::{Table, Value};
 
 use super::words;
@@ -203,7 +203,7 @@ fn tuner(tuner: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use mops_core::CatalogueStudy;
-    use mops_discrepancy::Removed;
+    use mops_core::diagnosis::Removed;
 
     use super::super::made_up;
     use super::super::repaired::{Original, repaired};

@@ -1,7 +1,7 @@
 //! Sentences on a diagnosis, for the terminal and the report; names are between backticks.
 
 use mops_core::Role;
-use mops_discrepancy::{Diagnosis, Found, HeldBack, Removed, Rival, StrengthValue, Unexplained, Verdict, together};
+use mops_core::diagnosis::{Diagnosis, Found, HeldBack, Removed, Rival, StrengthValue, Unexplained, Verdict, together};
 
 use crate::numbers::significant;
 

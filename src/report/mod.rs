@@ -41,7 +41,6 @@ use std::io;
 use std::path::Path;
 
 use mops_core::{Evaluation, Outcome, Problem, Record, Stop, Task};
-use mops_discrepancy::Diagnosis;
 
 use crate::files;
 use crate::numbers::FileNames;
@@ -69,8 +68,6 @@ pub struct Report<'a> {
     pub archive: &'a [Record],
     /// Points of the Pareto front, in the order of the result; empty for other tasks.
     pub front: &'a [Evaluation],
-    /// Diagnosis, for the task `diagnosis`.
-    pub diagnosis: Option<&'a Diagnosis>,
     /// Text of the study file, with its settings.
     pub text: &'a str,
 }
@@ -92,7 +89,7 @@ impl Report<'_> {
             None => self.outcome.calibration.as_ref().map(|calibration| &calibration.excitation),
         };
         let excitation = inputs.filter(|inputs| !inputs.is_empty()).map(|inputs| excitation::group(inputs));
-        let diagnosis = self.diagnosis.map(diagnosis::Plots::of);
+        let diagnosis = self.outcome.found.diagnosis.as_ref().map(diagnosis::Plots::of);
         let robustness = robustness::sections(self);
         let uncertainty = self.outcome.found.uncertainty.as_ref().map(uncertainty::group);
         let sections = page::Plots {

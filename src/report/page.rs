@@ -62,7 +62,7 @@ pub(super) fn of(report: &Report<'_>, plots: &Plots) -> Markup {
             @if !warnings.is_empty() {
                 (section("Warnings", html! { ul class="warnings" { @for text in &warnings { li { (rich(text)) } } } }))
             }
-            @if let (Some(found), Some(plots)) = (report.diagnosis, &plots.diagnosis) {
+            @if let (Some(found), Some(plots)) = (report.outcome.found.diagnosis.as_ref(), &plots.diagnosis) {
                 (diagnosis::sections(found, plots))
             }
             @for one in &plots.robustness {
@@ -83,7 +83,7 @@ pub(super) fn of(report: &Report<'_>, plots: &Plots) -> Markup {
             }
             @if let Some(table) = matrix::section(outcome) { (section("Criteria by case", table)) }
             @if !outcome.criteria.is_empty() { (section("Criteria", criteria::table(report))) }
-            @if !outcome.tuners.is_empty() && report.diagnosis.is_none() { (section("Tuners", tuners::table(report))) }
+            @if !outcome.tuners.is_empty() && report.outcome.found.diagnosis.as_ref().is_none() { (section("Tuners", tuners::table(report))) }
             @if let Some(found) = &outcome.found.slopes {
                 @let one_case = report.problem.study().cases().len() == 1;
                 (section("Sensitivities", slopes::section(found, report.best_name(), one_case)))
@@ -159,7 +159,7 @@ fn header(report: &Report<'_>) -> Markup {
             h1 { (outcome.study) }
             p class=(class) { (rich(&sentence)) }
             dl {
-                @if let Some(found) = report.diagnosis {
+                @if let Some(found) = report.outcome.found.diagnosis.as_ref() {
                     @for (name, value) in diagnosis::facts(found) { (fact(&name, &value)) }
                 } @else {
                     (fact("Solver", &verdict::solver(outcome)))
@@ -170,7 +170,7 @@ fn header(report: &Report<'_>) -> Markup {
                 (fact("Time", &format!("{} s", significant(outcome.seconds, 3))))
                 (fact("Seed", &outcome.seed.to_string()))
             }
-            @if report.diagnosis.is_none() { dl class="long" {
+            @if report.outcome.found.diagnosis.as_ref().is_none() { dl class="long" {
                 (fact("Stopped", verdict::stop(outcome)))
                 @if outcome.task == Task::Design && outcome.feasible { (fact("Pareto", verdict::pareto(outcome.pareto))) }
             } }

@@ -187,7 +187,7 @@ fn page_of(
     text: &str,
 ) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
-    let report = Report { outcome, problem, best, archive, front: &[], diagnosis: None, text };
+    let report = Report { outcome, problem, best, archive, front: &[], text };
     report.write(folder.path()).unwrap();
     let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     (folder, page)

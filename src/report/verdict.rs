@@ -16,7 +16,7 @@ pub(super) enum Tone {
 /// Returns the verdict in words, with its tone.
 pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
     let outcome = report.outcome;
-    if let Some(found) = report.diagnosis {
+    if let Some(found) = report.outcome.found.diagnosis.as_ref() {
         return super::diagnosis::verdict(found);
     }
     if outcome.task == Task::Excitation {

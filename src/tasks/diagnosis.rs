@@ -3,10 +3,9 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use mops_core::diagnosis::Diagnosis;
 use mops_core::{DiagnosisTask, Effect, Study, StudyError, Watch, suggestion};
-use mops_discrepancy::Diagnosis;
 
-use crate::diagnosis::block;
 use crate::search::{Options, SolveError, Solved, evaluate_start};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
@@ -78,8 +77,7 @@ pub(crate) fn of(study: Study, options: &Options, diagnosis: Diagnosis) -> Solve
     (outcome.solver, outcome.evaluations) = ("discrepancy".to_owned(), 0);
     (outcome.simulations, outcome.calibration) = (diagnosis.simulations, None);
     outcome.front.clear();
-    outcome.found.diagnosis = Some(block(&diagnosis));
-    solved.diagnosis = Some(diagnosis);
+    outcome.found.diagnosis = Some(diagnosis);
     solved
 }
 

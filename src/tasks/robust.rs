@@ -250,7 +250,7 @@ impl Rounds {
         };
         report.words = words(&report, stop);
         outcome.found.robust = Some(report);
-        Solved { outcome, problem, best, archive: Vec::new(), front: Vec::new(), diagnosis: None }
+        Solved { outcome, problem, best, archive: Vec::new(), front: Vec::new() }
     }
 }
 

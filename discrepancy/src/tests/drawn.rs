@@ -1,8 +1,8 @@
 //! What was found is drawn through the signal that the data show at its place without any formula.
 
-use crate::diagnosis::{Curve, Evidence};
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
+use mops_core::diagnosis::{Curve, Evidence};
 use mops_core::math;
 
 /// A block on a spring: `v' = -k x - d v`.

@@ -6,7 +6,6 @@ use mops_core::math;
 use mops_core::{Effect, Hold, Input, Role};
 
 use crate::base;
-use crate::diagnosis::StrengthValue;
 use crate::growth::Growth;
 use crate::meter::Meter;
 use crate::round::Round;
@@ -16,6 +15,7 @@ use crate::subject::Subject;
 use crate::testing::{Record, catalogue, integrated, study, subject, white};
 use crate::weigh::{Dispersion, criterion, probabilities};
 use crate::{Diagnosis, Options, Verdict, diagnose};
+use mops_core::diagnosis::StrengthValue;
 
 /// A block that slides on without friction, of which the data have some of the air: `v' = -k v |v|`.
 const BLOCK: &str = r#"

@@ -2,7 +2,9 @@
 
 use crate::meter::Meter;
 use crate::search::{Limits, Search};
-use crate::stability::{Stability, stability};
+use mops_core::diagnosis::Stability;
+
+use crate::stability::stability;
 use crate::testing::{Record, catalogue, integrated, subject};
 
 const OSCILLATOR: &str = r#"

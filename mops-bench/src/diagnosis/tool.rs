@@ -54,7 +54,7 @@ impl Tools<'_> {
         let options = Options { effects: self.catalogue.effects.clone(), jobs: Some(1), ..Options::default() };
         let started = Instant::now();
         let solved = solve(study, &options, &Quiet(self.watch)).map_err(|why| why.to_string())?;
-        Ok((solved.diagnosis.expect("that was the task"), started.elapsed().as_secs_f64()))
+        Ok((solved.outcome.found.diagnosis.expect("that was the task"), started.elapsed().as_secs_f64()))
     }
 }
 

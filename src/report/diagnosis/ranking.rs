@@ -1,7 +1,7 @@
 //! Tables of candidate effects, steps of the search, parameter shifts and detection limits.
 
 use maud::{Markup, html};
-use mops_discrepancy::{Diagnosis, Ranked};
+use mops_core::diagnosis::{Diagnosis, Ranked};
 
 use super::super::page::scrolling;
 use super::places::{bar, located};
@@ -94,7 +94,7 @@ pub(super) fn steps(diagnosis: &Diagnosis) -> Markup {
             tbody {
                 @for step in &diagnosis.steps {
                     tr {
-                        th scope="row" { (step.did) }
+                        th scope="row" { (step.did.name()) }
                         td { (step.effects.join(", ")) }
                         td class="number" { (words::times(step.normalised)) @if step.windows > 1 { " in " (step.windows) " windows" } }
                     }

@@ -1,7 +1,7 @@
 //! Tests of the whole report, with made-up diagnoses.
 
+use mops_core::diagnosis::Diagnosis;
 use mops_core::{CaseBuilder, ChannelBuilder, Measured, StudyBuilder, Task, TunerBuilder};
-use mops_discrepancy::Diagnosis;
 
 use super::super::Report;
 use super::super::tests::Lag;
@@ -30,7 +30,6 @@ fn written(diagnosis: Diagnosis) -> (tempfile::TempDir, String) {
         best: &solved.best,
         archive: &solved.archive,
         front: &[],
-        diagnosis: solved.diagnosis.as_ref(),
         text: "",
     };
     report.write(folder.path()).unwrap();

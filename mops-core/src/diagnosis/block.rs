@@ -1,10 +1,11 @@
 //! Block `diagnosis` of `result.json`. Numbers are in the units of the study; non-finite numbers are null.
 
-use mops_discrepancy::{Diagnosis, ExperimentError, Found, Noticeable, Ranked, StrengthValue};
+use super::{Diagnosis, ExperimentError, Found, Noticeable, Ranked, StrengthValue};
+use serde::{Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 /// Returns the block of a diagnosis.
-pub(crate) fn block(diagnosis: &Diagnosis) -> Value {
+fn block(diagnosis: &Diagnosis) -> Value {
     let moved = diagnosis.parameters.iter().map(
         |p| json!({ "name": p.name, "unit": p.unit, "before": p.before, "after": p.after, "std_error": p.std_error }),
     );
@@ -114,44 +115,7 @@ fn noise(diagnosis: &Diagnosis) -> Value {
     noise
 }
 
-#[cfg(test)]
-mod tests {
-    use super::super::made_up;
-    use super::*;
-
-    /// Guards the names of keys, which other programs read.
-    #[test]
-    fn the_block_has_the_documented_keys_and_values() {
-        let block = block(&made_up::coulomb());
-        assert_eq!((&block["verdict"], &block["probability"]), (&json!("effect"), &json!(0.9997)));
-        let found = &block["found"][0];
-        assert_eq!((&found["effect"], &found["place"]), (&json!("coulomb-friction"), &json!("joint:phi")));
-        assert_eq!((&found["strengths"], &found["probability"]), (&json!({ "c": 0.0124 }), &json!(0.97)));
-        assert_eq!((&found["bic_gain"], found["indistinguishable"].as_array().unwrap().len()), (&json!(2400.0), 2));
-        assert_eq!((&block["removed"], &block["unexplained"]), (&json!([]), &Value::Null));
-        assert_eq!(&block["ranked"][1]["effect"], "stribeck-friction");
-        assert_eq!(
-            block["before"]["push"],
-            json!({ "role": "validation", "channels": { "phi": 0.046, "theta": 0.047 }, "normalised": 15.4 })
-        );
-        assert_eq!(block["after"]["swing"]["normalised"], 1.0);
-        let unexplained = super::block(&made_up::unexplained());
-        assert_eq!(
-            (&unexplained["verdict"], &unexplained["unexplained"]["share"]),
-            (&json!("unexplained"), &json!(0.8))
-        );
-        assert_eq!(super::block(&made_up::nothing())["verdict"], "none");
-    }
-
-    #[test]
-    fn numbers_that_are_not_finite_are_null() {
-        let mut diagnosis = made_up::coulomb();
-        (diagnosis.p_value, diagnosis.after[0].normalised) = (f64::NAN, f64::INFINITY);
-        diagnosis.found[0].strengths[0].interval95 = Some([f64::NEG_INFINITY, 1.0]);
-        let block = block(&diagnosis);
-        assert_eq!((&block["p_value"], &block["after"]["swing"]["normalised"]), (&Value::Null, &Value::Null));
-        assert_eq!(block["found"][0]["details"][0]["interval95"], json!([null, 1.0]));
-        assert_eq!(block["ranked"][4]["bic_gain"], Value::Null);
-        assert!(!serde_json::to_string(&block).unwrap().contains("NaN"));
-    }
+/// Serialises the block of `result.json`; the derived form of [`Diagnosis`] has more, and is read back.
+pub(crate) fn serialize<S: Serializer>(diagnosis: &Option<Diagnosis>, serializer: S) -> Result<S::Ok, S::Error> {
+    diagnosis.as_ref().map(block).serialize(serializer)
 }

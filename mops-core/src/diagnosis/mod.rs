@@ -1,13 +1,16 @@
 //! What a diagnosis gives: the block `diagnosis` of `result.json`, and what its report shows.
 
-use mops_core::Role;
-use mops_core::math;
-use serde::Serialize;
+mod block;
 
-use crate::stability::Stability;
+use mops_math as math;
+use serde::{Deserialize, Serialize};
+
+pub(crate) use block::serialize;
+
+use crate::experiment::Role;
 
 /// Whether the model lacks something.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// It lacks effects of the catalogue, and they were found.
@@ -19,7 +22,7 @@ pub enum Verdict {
 }
 
 /// A strength of an effect with what the data say of it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StrengthValue {
     /// Name, such as `torque`.
     pub name: String,
@@ -35,7 +38,7 @@ pub struct StrengthValue {
 }
 
 /// Another effect that explains the data about as well, or better.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rival {
     /// The effect.
     pub effect: String,
@@ -51,7 +54,7 @@ pub struct Rival {
 }
 
 /// An effect that the model lacked and that was added.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Found {
     /// The effect.
     pub effect: String,
@@ -83,7 +86,7 @@ pub struct Found {
 }
 
 /// Error on data that were held back from the fit, with an effect and without it: all else is fitted anew to calibration data.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldBack {
     /// Whose data: selection or validation.
     pub role: Role,
@@ -93,8 +96,32 @@ pub struct HeldBack {
     pub with: f64,
 }
 
+/// How the choice of an effect holds where the data change.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Stability {
+    /// Share of data sets, drawn anew in blocks from the data, in which the same effect does best.
+    ///
+    /// The fits are not repeated, their residuals are drawn. Source: H. Kishino, T. Miyata, M. Hasegawa, Maximum likelihood
+    /// inference of protein phylogeny, Journal of Molecular Evolution 31 (1990) 151, for estimated likelihoods; E. Carlstein, The
+    /// use of subseries values for estimating the variance of a general statistic, Annals of Statistics 14 (1986) 1171, for blocks.
+    pub share: f64,
+    /// Experiments without which another effect would do best, fitted again without them.
+    pub hangs_on: Vec<HangsOn>,
+}
+
+/// An experiment that an effect's choice hangs on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HangsOn {
+    /// The experiment.
+    pub experiment: String,
+    /// The effect that would do best without it.
+    pub effect: String,
+    /// The place of that, as `kind:name`.
+    pub place: String,
+}
+
 /// A declared term that was found to be the wrong one.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Removed {
     /// The parameter that is its strength.
     pub term: String,
@@ -103,7 +130,7 @@ pub struct Removed {
 }
 
 /// An effect that was tried, beside those that were in by then.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ranked {
     /// The effect.
     pub effect: String,
@@ -124,7 +151,7 @@ pub struct Ranked {
 }
 
 /// What no effect explains.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unexplained {
     /// Where it acts best, as `kind:name`.
     pub place: String,
@@ -137,10 +164,9 @@ pub struct Unexplained {
 }
 
 /// Error of a model on an experiment.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExperimentError {
     /// The experiment.
-    #[serde(skip)]
     pub name: String,
     /// Its role.
     pub role: Role,
@@ -160,7 +186,7 @@ pub fn together(errors: &[ExperimentError], role: Role) -> Option<f64> {
 }
 
 /// Errors over windows of a record, each with start values of its own and the parameters held.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WindowErrors {
     /// Number of windows.
     pub count: usize,
@@ -173,7 +199,7 @@ pub struct WindowErrors {
 }
 
 /// How a parameter moved: what it had absorbed.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterMove {
     /// The tuner.
     pub name: String,
@@ -188,7 +214,7 @@ pub struct ParameterMove {
 }
 
 /// The smallest strength of an effect that would have been noticed.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Noticeable {
     /// The effect.
     pub effect: String,
@@ -199,7 +225,7 @@ pub struct Noticeable {
 }
 
 /// A measured output beside what the models predict.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
     /// The experiment.
     pub experiment: String,
@@ -222,7 +248,7 @@ pub struct Prediction {
 }
 
 /// A signal over something, as points.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Curve {
     /// Abscissae.
     pub x: Vec<f64>,
@@ -234,7 +260,7 @@ pub struct Curve {
 
 /// The unknown signal at a place that would explain the residual: how likely of the declared model; over what it is drawn, where
 /// effects were found there whose formula can be drawn, of the repaired one without them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// The place, as `kind:name`.
     pub place: String,
@@ -252,11 +278,49 @@ pub struct Evidence {
     pub over: Vec<(String, String, Curve)>,
 }
 
+/// Change of one model of the search into the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Change {
+    /// An effect was added.
+    #[serde(rename = "added")]
+    Added,
+    /// An effect was swapped for another.
+    #[serde(rename = "exchanged")]
+    Swapped,
+    /// The search was restarted with another first effect.
+    #[serde(rename = "begun otherwise")]
+    Restarted,
+    /// An effect was eliminated.
+    #[serde(rename = "left out")]
+    Eliminated,
+    /// One effect was substituted for two.
+    #[serde(rename = "one for two")]
+    Substituted,
+    /// A discrete shape of an effect was changed.
+    #[serde(rename = "reshaped")]
+    Reshaped,
+}
+
+impl Change {
+    /// Returns the name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Added => "effect added",
+            Self::Swapped => "effect swapped",
+            Self::Restarted => "restarted with another effect",
+            Self::Eliminated => "effect eliminated",
+            Self::Substituted => "one effect substituted for two",
+            Self::Reshaped => "shape changed",
+        }
+    }
+}
+
 /// A model that the search passed through.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Step {
-    /// What made it of the one before: `added`, `exchanged`, `begun otherwise`, `left out`, `one for two`, `reshaped`.
-    pub did: &'static str,
+    /// Change from the model before.
+    pub did: Change,
     /// Its effects, each as `effect at kind:name`.
     pub effects: Vec<String>,
     /// Windows that records were cut into; 1: none.
@@ -266,7 +330,7 @@ pub struct Step {
 }
 
 /// A diagnosis.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Whether something is missing.
     pub verdict: Verdict,
