@@ -70,6 +70,7 @@ impl Default for Options {
 }
 
 /// Result of [`crate::solve()`].
+#[non_exhaustive]
 pub struct Solved {
     /// Content of `result.json`.
     pub outcome: Outcome,

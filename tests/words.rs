@@ -59,7 +59,8 @@ const OPENINGS: [&str; 5] = ["The same", "It ", "That ", "Those ", "Such "];
 
 /// Lines with a key, an option or a file name that stays, or where a word has its other meaning: end of the path, part of the
 /// line.
-const ALLOWED: [(&str, &str); 11] = [
+const ALLOWED: [(&str, &str); 12] = [
+    ("src/diagnosis/mod.rs", "rename = \"begun otherwise\""),
     ("", "held-out"),
     ("", "held out"),
     ("", "held_out"),

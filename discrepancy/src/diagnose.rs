@@ -140,24 +140,24 @@ fn explain(
     let full =
         format!("the search ended at {} effects, `max-effects`; more may explain what is left", options.max_effects);
     let full = (is_full && verdict == Verdict::Unexplained).then_some(full);
-    Ok(Diagnosis {
-        verdict,
-        probability,
-        p_value: growth.p_value,
-        next_experiment: if found.is_empty() { None } else { next_experiment(&standings) },
-        found,
-        removed: search.removed(&base, &held),
-        steps,
-        ranked,
-        unexplained,
-        before: search.errors(&before),
-        after: search.errors(&after),
-        parameters: moves(&subject, &before, &after),
-        noticeable: if verdict == Verdict::None { noticeable(&rounds, &subject, options.level) } else { Vec::new() },
-        evidence: located.into_iter().map(|l| l.evidence).collect(),
-        predictions: predictions(&subject, &before, &after),
-        notes: subject.notes.iter().cloned().chain(at_bounds).chain(note).chain(full).collect(),
-        starts,
-        simulations: simulations.count(),
-    })
+    let mut made = Diagnosis::default();
+    made.verdict = verdict;
+    made.probability = probability;
+    made.p_value = growth.p_value;
+    made.next_experiment = if found.is_empty() { None } else { next_experiment(&standings) };
+    made.found = found;
+    made.removed = search.removed(&base, &held);
+    made.steps = steps;
+    made.ranked = ranked;
+    made.unexplained = unexplained;
+    made.before = search.errors(&before);
+    made.after = search.errors(&after);
+    made.parameters = moves(&subject, &before, &after);
+    made.noticeable = if verdict == Verdict::None { noticeable(&rounds, &subject, options.level) } else { Vec::new() };
+    made.evidence = located.into_iter().map(|l| l.evidence).collect();
+    made.predictions = predictions(&subject, &before, &after);
+    made.notes = subject.notes.iter().cloned().chain(at_bounds).chain(note).chain(full).collect();
+    made.starts = starts;
+    made.simulations = simulations.count();
+    Ok(made)
 }

@@ -224,7 +224,7 @@ fn invalid_systems_are_an_error_with_a_remedy() {
     };
     let rest = "b = [[0], [1]]\nc = [[1, 0]]";
     assert!(refused(&format!("a = [[0, 1], [2]]\n{rest}")).starts_with("a: expected 2 rows of 2 entries"));
-    assert!(refused(&format!("a = [[0, 1], [2, 3]]\nstates = ['x']\n{rest}")).starts_with("states: 1 names"));
+    assert!(refused(&format!("a = [[0, 1], [2, 3]]\nstates = ['x']\n{rest}")).starts_with("states: expected 2 names"));
     assert!(refused(&format!("a = [[0, 1], [2, 'k']]\nunits = {{ q = 'm' }}\n{rest}")).contains("`q`"));
     let order = toml::from_str::<TransferFunctionOptions>("numerator = [1, 2]\ndenominator = [3]").unwrap().build();
     assert!(order.err().unwrap().to_string().contains("order 1"));

@@ -329,7 +329,7 @@ pub struct PortState<'a, S> {
     /// The inputs as they reach the plant.
     pub u: &'a [S],
     /// True if the contact of the effect is closed, fixed by the simulation for a whole step. `None` without a contact, or
-    /// if the sign of [`Acting::gap`] decides.
+    /// if the sign of [`BoundEffect::gap`] decides.
     pub closed: Option<bool>,
 }
 
@@ -359,14 +359,14 @@ pub trait BoundEffect<S: Scalar> {
         S::from(0.0)
     }
 
-    /// Returns the dry friction at a joint, in addition to [`Acting::value`].
+    /// Returns the dry friction at a joint, in addition to [`BoundEffect::value`].
     fn friction(&self, _at: &PortState<'_, S>, _z: &[S]) -> Option<DryFriction<S>> {
         None
     }
 
     /// Returns the opening of a contact at a joint, negative while the contact is closed. The gap depends on positions and
     /// speeds alone; an effect has one throughout a simulation or never. A simulation ends a step at its zero crossing, and
-    /// tangents account for the event time. Within a step [`At::closed`] selects the law, also slightly beyond the crossing.
+    /// tangents account for the event time. Within a step [`PortState::closed`] selects the law, also slightly beyond the crossing.
     fn gap(&self, _at: &PortState<'_, S>) -> Option<S> {
         None
     }
@@ -396,7 +396,7 @@ pub trait BoundEffect<S: Scalar> {
     /// and after each jump of the command or of its derivative, at a sensor along the simulation.
     fn remember(&self, _at: &PortState<'_, S>, _memory: &mut [S]) {}
 
-    /// Returns the output, as [`Acting::value`], for an effect with a hysteresis state.
+    /// Returns the output, as [`BoundEffect::value`], for an effect with a hysteresis state.
     fn recall(&self, at: &PortState<'_, S>, _memory: &[S]) -> S {
         self.value(at, &[])
     }

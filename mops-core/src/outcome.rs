@@ -18,6 +18,7 @@ use crate::uncertainty::UncertaintyReport;
 
 /// The result of a run.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Version of this format.
     pub format: u32,
@@ -160,6 +161,7 @@ pub struct SweepAxis {
 
 /// Tuner values in a result.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct TunerReport {
     /// Name.
     pub name: String,
@@ -179,6 +181,7 @@ pub struct TunerReport {
 
 /// Criterion values in a result, for one case.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct CriterionReport {
     /// Name.
     pub name: String,
@@ -221,6 +224,7 @@ pub struct CriterionReport {
 
 /// Result at the initial guess.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct StartReport {
     /// True if all constraints are satisfied.
     pub feasible: bool,
@@ -233,7 +237,8 @@ pub struct StartReport {
 }
 
 /// Results of a calibration in addition to the tuners.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
 pub struct CalibrationReport {
     /// Estimates and their uncertainty.
     pub parameters: Vec<ParameterReport>,
@@ -248,6 +253,7 @@ pub struct CalibrationReport {
 
 /// An estimated parameter.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct ParameterReport {
     /// Name.
     pub name: String,
@@ -264,6 +270,7 @@ pub struct ParameterReport {
 
 /// Fit of an experiment.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct ExperimentReport {
     /// Name.
     pub name: String,
@@ -275,6 +282,7 @@ pub struct ExperimentReport {
 
 /// Fit of a channel.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct ChannelReport {
     /// Name of the measured signal.
     pub name: String,
@@ -293,6 +301,7 @@ pub struct ChannelReport {
 
 /// Failed simulations of one kind.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct FailureReport {
     /// Name of the model.
     pub model: String,

@@ -250,7 +250,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let arguments = |study: &str| StudyArguments { study: study.into(), settings: Vec::new() };
         let removed = vec![Removed { term: "bp".into(), place: "joint:theta".into() }];
-        let diagnosis = Diagnosis { found: Vec::new(), removed, ..made_up::coulomb() };
+        let mut diagnosis = made_up::coulomb();
+        diagnosis.found = Vec::new();
+        diagnosis.removed = removed;
         let shipped = arguments("furuta-swing");
         let file = open(&catalogue, &shipped).unwrap();
         let (text, study, effects) = (file.source.text.as_str(), &file.study, catalogue.effects.as_slice());

@@ -101,73 +101,73 @@ pub(crate) fn coulomb() -> Diagnosis {
         bic_behind,
         likeness: 0.995,
     };
-    Diagnosis {
-        verdict: Verdict::Effect,
-        probability: 0.9997,
-        p_value: 1e-9,
-        found: vec![Found {
-            effect: "coulomb-friction".into(),
-            place: "joint:phi".into(),
-            name: "phi-coulomb-friction".into(),
-            companion: None,
-            only: None,
-            class: "dissipative".into(),
-            formula: "-torque sgn(speed), with a stuck mode".into(),
-            strengths: vec![strength("c", 0.0124, "N m")],
-            probability: 0.97,
-            bic_gain: 2400.0,
-            indistinguishable: vec![rival("stribeck-friction", 0.7), rival("quadratic-drag", 4.1)],
-            stability: Some(Stability {
-                share: 0.83,
-                hangs_on: vec![HangsOn {
-                    experiment: "swing".into(),
-                    effect: "stribeck-friction".into(),
-                    place: "joint:phi".into(),
-                }],
-            }),
-            held_back: Vec::new(),
-        }],
-        removed: Vec::new(),
-        steps: vec![Step {
-            did: Change::Added,
-            effects: vec!["coulomb-friction at joint:phi".into()],
-            windows: 1,
-            normalised: 1.0,
-        }],
-        ranked: vec![
-            ranked("coulomb-friction", "joint:phi", 0.97, 2400.0),
-            ranked("stribeck-friction", "joint:phi", 0.02, 2399.3),
-            ranked("quadratic-drag", "joint:phi", 0.01, 2395.9),
-            ranked("quadratic-drag", "joint:theta", 1e-12, 310.0),
-            ranked("delay", "actuator:u", f64::NAN, f64::NAN),
-        ],
-        unexplained: None,
-        next_experiment: Some("Swing slowly, below 0.5 rad/s in the joint `phi`.".into()),
-        before: vec![
-            error("swing", Role::Calibration, [0.0126, 0.0125, 4.2]),
-            error("push", Role::Validation, [0.046, 0.047, 15.4]),
-        ],
-        after: vec![
-            error("swing", Role::Calibration, [0.003, 0.003, 1.0]),
-            error("push", Role::Validation, [0.0031, 0.003, 1.02]),
-        ],
-        parameters: vec![moved("b", 2.1e-3, 1.133e-3), moved("d", 2.6e-2, 2.5267e-2)],
-        noticeable: Vec::new(),
-        evidence: vec![
-            evidence("joint:phi", 812.0, 0.97, true),
-            evidence("joint:theta", 260.0, 0.41, false),
-            evidence("sensor:phi", 90.0, 0.22, false),
-        ],
-        predictions: vec![
-            prediction("swing", Role::Calibration, "phi", 0.0),
-            prediction("swing", Role::Calibration, "theta", 1.0),
-            prediction("push", Role::Validation, "phi", 0.3),
-            prediction("push", Role::Validation, "theta", 1.3),
-        ],
-        notes: vec!["The noise of `phi` was estimated from the data: 0.003 rad.".into()],
-        starts: vec![("swing".into(), "phi0".into(), 0.98), ("swing".into(), "theta0".into(), 0.51)],
-        simulations: 731,
-    }
+    let mut made = Diagnosis::default();
+    made.verdict = Verdict::Effect;
+    made.probability = 0.9997;
+    made.p_value = 1e-9;
+    made.found = vec![Found {
+        effect: "coulomb-friction".into(),
+        place: "joint:phi".into(),
+        name: "phi-coulomb-friction".into(),
+        companion: None,
+        only: None,
+        class: "dissipative".into(),
+        formula: "-torque sgn(speed), with a stuck mode".into(),
+        strengths: vec![strength("c", 0.0124, "N m")],
+        probability: 0.97,
+        bic_gain: 2400.0,
+        indistinguishable: vec![rival("stribeck-friction", 0.7), rival("quadratic-drag", 4.1)],
+        stability: Some(Stability {
+            share: 0.83,
+            hangs_on: vec![HangsOn {
+                experiment: "swing".into(),
+                effect: "stribeck-friction".into(),
+                place: "joint:phi".into(),
+            }],
+        }),
+        held_back: Vec::new(),
+    }];
+    made.removed = Vec::new();
+    made.steps = vec![Step {
+        did: Change::Added,
+        effects: vec!["coulomb-friction at joint:phi".into()],
+        windows: 1,
+        normalised: 1.0,
+    }];
+    made.ranked = vec![
+        ranked("coulomb-friction", "joint:phi", 0.97, 2400.0),
+        ranked("stribeck-friction", "joint:phi", 0.02, 2399.3),
+        ranked("quadratic-drag", "joint:phi", 0.01, 2395.9),
+        ranked("quadratic-drag", "joint:theta", 1e-12, 310.0),
+        ranked("delay", "actuator:u", f64::NAN, f64::NAN),
+    ];
+    made.unexplained = None;
+    made.next_experiment = Some("Swing slowly, below 0.5 rad/s in the joint `phi`.".into());
+    made.before = vec![
+        error("swing", Role::Calibration, [0.0126, 0.0125, 4.2]),
+        error("push", Role::Validation, [0.046, 0.047, 15.4]),
+    ];
+    made.after = vec![
+        error("swing", Role::Calibration, [0.003, 0.003, 1.0]),
+        error("push", Role::Validation, [0.0031, 0.003, 1.02]),
+    ];
+    made.parameters = vec![moved("b", 2.1e-3, 1.133e-3), moved("d", 2.6e-2, 2.5267e-2)];
+    made.noticeable = Vec::new();
+    made.evidence = vec![
+        evidence("joint:phi", 812.0, 0.97, true),
+        evidence("joint:theta", 260.0, 0.41, false),
+        evidence("sensor:phi", 90.0, 0.22, false),
+    ];
+    made.predictions = vec![
+        prediction("swing", Role::Calibration, "phi", 0.0),
+        prediction("swing", Role::Calibration, "theta", 1.0),
+        prediction("push", Role::Validation, "phi", 0.3),
+        prediction("push", Role::Validation, "theta", 1.3),
+    ];
+    made.notes = vec!["The noise of `phi` was estimated from the data: 0.003 rad.".into()];
+    made.starts = vec![("swing".into(), "phi0".into(), 0.98), ("swing".into(), "theta0".into(), 0.51)];
+    made.simulations = 731;
+    made
 }
 
 /// Returns a diagnosis with the verdict `none`.
@@ -181,16 +181,15 @@ pub(crate) fn nothing() -> Diagnosis {
         place: "joint:phi".into(),
         strength: strength("c", value, "N m"),
     };
-    Diagnosis {
-        verdict: Verdict::None,
-        probability: 0.93,
-        p_value: 0.43,
-        found: Vec::new(),
-        before: diagnosis.after.clone(),
-        noticeable: vec![noticeable("coulomb-friction", 4e-4), noticeable("stribeck-friction", 6e-4)],
-        next_experiment: None,
-        ..diagnosis
-    }
+    let mut made = diagnosis.clone();
+    made.verdict = Verdict::None;
+    made.probability = 0.93;
+    made.p_value = 0.43;
+    made.found = Vec::new();
+    made.before = diagnosis.after.clone();
+    made.noticeable = vec![noticeable("coulomb-friction", 4e-4), noticeable("stribeck-friction", 6e-4)];
+    made.next_experiment = None;
+    made
 }
 
 /// Returns a diagnosis with the verdict `unexplained`, with a table for `process:x`.
@@ -198,12 +197,11 @@ pub(crate) fn unexplained() -> Diagnosis {
     let diagnosis = coulomb();
     let table = (0..9).map(|i| [f64::from(i), math::sin(0.7 * f64::from(i))]).collect();
     let unexplained = Unexplained { place: "process:x".into(), share: 0.8, over: "position".into(), table };
-    Diagnosis {
-        verdict: Verdict::Unexplained,
-        probability: 0.91,
-        found: Vec::new(),
-        unexplained: Some(unexplained),
-        after: diagnosis.before.clone(),
-        ..diagnosis
-    }
+    let mut made = diagnosis.clone();
+    made.verdict = Verdict::Unexplained;
+    made.probability = 0.91;
+    made.found = Vec::new();
+    made.unexplained = Some(unexplained);
+    made.after = diagnosis.before.clone();
+    made
 }

@@ -274,7 +274,8 @@ free     = [\"phi\", \"theta\"]
     #[test]
     fn the_repaired_study_is_read_as_a_calibration_without_criteria_of_the_user() {
         // Without the effect, which this test does not need.
-        let diagnosis = Diagnosis { found: Vec::new(), ..made_up::coulomb() };
+        let mut diagnosis = made_up::coulomb();
+        diagnosis.found = Vec::new();
         let study = read(&made(&diagnosis, &[])).study;
         assert_eq!((study.name(), study.task()), ("swing-repaired", mops_core::Task::Calibration));
         let start = |name: &str| study.tuners().iter().find(|t| t.name == name).unwrap().start;

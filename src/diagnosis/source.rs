@@ -221,7 +221,9 @@ mod tests {
         let study = mops_core::file::read(&catalogue, "study.toml", text, &settings, shipped).unwrap().study;
         // Without the effect: the model of the pendulum contains it as a term.
         let removed = vec![Removed { term: "bp".into(), place: "joint:theta".into() }];
-        let diagnosis = Diagnosis { found: Vec::new(), removed, ..made_up::coulomb() };
+        let mut diagnosis = made_up::coulomb();
+        diagnosis.found = Vec::new();
+        diagnosis.removed = removed;
         let original = Original { text, settings: &settings, study: &study, effects: &catalogue.effects };
         let program = source(&repaired(&original, &diagnosis, &str::to_owned), &diagnosis, "studies/furuta-swing");
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/repaired.rs");

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use mops_core::math;
 use mops_core::{
-    Analysis, CalibrationReport, Case, CaseBuilder, ChannelBuilder, Criterion, CriterionBuilder, CriterionReport,
-    CriterionSlopes, CriterionSpec, Evaluation, Failure, Findings, Interface, Job, Measured, Model, Outcome, Parameter,
-    Pareto, Problem, Record, Response, Role, SlopesReport, StartReport, Stop, StudyBuilder, StudyError, Task, Trace,
-    TunerBuilder, TunerReport, Unit, Usage, Value, Variable,
+    Analysis, Budget, CalibrationReport, Case, CaseBuilder, ChannelBuilder, Criterion, CriterionBuilder,
+    CriterionSlopes, CriterionSpec, Ending, Evaluation, Failure, Interface, Job, Measured, Model, Oracle, Outcome,
+    Parameter, Pareto, Problem, Record, Response, Role, Run, SlopesReport, Stop, StudyBuilder, StudyError, Trace,
+    TunerBuilder, Unit, Usage, Value, Variable, conclude, criterion_reports,
 };
 
 use super::plot::{Curve, CurveStyle, Plot, ZAxis};
@@ -91,85 +91,23 @@ fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome,
     };
     let problem = Problem::new(Arc::new(draft.build().unwrap()));
     let best = problem.evaluate_at(&[2.0]);
-    let first = problem.evaluate_at(&[start]);
-    let record = |e: &Evaluation| Record {
-        tuners: e.tuners.clone(),
-        values: Vec::new(),
-        objectives: Vec::new(),
-        merit: e.merit,
-    };
-    let archive = vec![record(&first), record(&best)];
-    let criteria = |e: &Evaluation| criteria(&problem, e);
-    let outcome = Outcome {
-        format: 1,
-        mops: "0.1.0",
-        study: name.into(),
-        task: Task::Design,
-        seed: 1,
-        run: None,
-        solver: "by-hand".into(),
-        methods: vec!["sqp", "pattern-search"],
-        stop: Stop::Converged,
-        evaluations: 2,
-        reused: None,
-        simulations: 4,
-        seconds: 0.1,
-        feasible: best.merit.is_feasible(),
-        worst_scaled: best.merit.objective,
-        objective: best.merit.objective,
-        violation: best.merit.violation,
-        pareto: Pareto::NotShown,
-        tuners: vec![TunerReport {
-            name: "T".into(),
-            value: 2.0,
-            start,
-            bounds: [0.1, 20.0],
-            unit: "s".into(),
-            at_bound: None,
-            active: true,
-        }],
-        criteria: criteria(&best),
-        start: StartReport {
-            feasible: true,
-            worst_scaled: first.merit.objective,
-            objective: first.merit.objective,
-            criteria: criteria(&first),
-        },
-        front: Vec::new(),
-        calibration: Some(CalibrationReport {
-            parameters: Vec::new(),
-            experiments: Vec::new(),
-            sensitivity: None,
-            excitation: Vec::new(),
-        }),
-        found: Findings::default(),
-        failures: Vec::new(),
-        warnings: vec!["mind the `gap`".into()],
-    };
+    let points = [problem.start(), best.point.clone()];
+    let mut run = Run::new(&problem, Budget { evaluations: 2 }, &());
+    run.evaluate(&points).unwrap();
+    let solver = mops_solvers::kinds()[0].default_choice();
+    let (mut outcome, _) =
+        conclude(&run, &solver, Ending { stop: Stop::Converged, pareto: Pareto::NotShown, seconds: 0.1 });
+    (outcome.solver, outcome.methods) = ("by-hand".into(), vec!["sqp", "pattern-search"]);
+    outcome.criteria = criterion_reports(problem.study(), &best);
+    (outcome.worst_scaled, outcome.objective) = (best.merit.objective, best.merit.objective);
+    (outcome.feasible, outcome.violation) = (best.merit.is_feasible(), best.merit.violation);
+    outcome.tuners[0].value = 2.0;
+    outcome.calibration = Some(CalibrationReport::default());
+    outcome.warnings = vec!["mind the `gap`".into()];
+    outcome.failures = Vec::new();
+    let archive = run.archive().to_vec();
+    drop(run);
     (problem, best, outcome, archive)
-}
-
-fn criteria(problem: &Problem, at: &Evaluation) -> Vec<CriterionReport> {
-    let study = problem.study();
-    let report = |(row, reading): (&mops_core::Row, &Option<mops_core::Reading>)| {
-        let scaled = reading.map_or(f64::NAN, |r| r.scaled);
-        CriterionReport {
-            name: row.name.clone(),
-            model: "lag".into(),
-            case: study.case_of(row).name.clone(),
-            usage: row.usage,
-            demand: row.demand.limit(),
-            at_least: row.demand.asks_for_more(),
-            good: None,
-            bad: None,
-            value: reading.map_or(f64::NAN, |r| r.value),
-            scaled,
-            unit: row.unit.to_string(),
-            met: scaled <= 1.0,
-            note: reading.and_then(|r| r.note),
-        }
-    };
-    study.rows().iter().zip(&at.readings).map(report).collect()
 }
 
 /// Writes the report of a study; returns its temporary folder and the page.
@@ -229,7 +167,7 @@ fn a_run_without_a_single_value_still_has_a_page() {
     archive.truncate(1);
     let best = problem.evaluate_at(&[15.0]);
     (outcome.objective, outcome.violation, outcome.feasible) = (f64::INFINITY, f64::INFINITY, false);
-    outcome.criteria = criteria(&problem, &best);
+    outcome.criteria = criterion_reports(problem.study(), &best);
     let (_folder, page) = page_of(&problem, &best, &outcome, &archive, "");
     assert!(page.contains("Failed: no point could be evaluated") && page.contains(">no data<"));
 }

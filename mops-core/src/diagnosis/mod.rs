@@ -1,4 +1,4 @@
-//! What a diagnosis gives: the block `diagnosis` of `result.json`, and what its report shows.
+//! Result of a diagnosis: the block `diagnosis` of `result.json`, and the data of its report.
 
 mod block;
 
@@ -9,183 +9,185 @@ pub(crate) use block::serialize;
 
 use crate::experiment::Role;
 
-/// Whether the model lacks something.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// Verdict on the model.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// It lacks effects of the catalogue, and they were found.
+    /// The model lacks effects of the catalogue, which were found.
     Effect,
-    /// Nothing that the data could show is missing.
+    /// No missing effect detected.
+    #[default]
     None,
     /// Something is missing that no effect of the catalogue explains.
     Unexplained,
 }
 
-/// A strength of an effect with what the data say of it.
+/// Estimate of a parameter of an effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StrengthValue {
     /// Name, such as `torque`.
     pub name: String,
-    /// Its value, in `unit`.
+    /// Estimate, in `unit`.
     pub value: f64,
-    /// Unit; empty where the model's equations do not tell.
+    /// Unit; empty if the model's equations do not determine it.
     pub unit: String,
-    /// Standard error of the value, selection of the effect not included; `None` where it cannot be told.
+    /// Standard error, without the selection of the effect; `None` if the data do not determine it.
     pub std_error: Option<f64>,
-    /// An interval that holds the value with probability 0.95, other values of shapes that no fit moves included where the data
-    /// allow them; of such a shape the range of these values, if there are several.
+    /// 95 % confidence interval. For a discrete shape parameter: the range of the values that the data allow, if there are
+    /// several.
     pub interval95: Option<[f64; 2]>,
 }
 
-/// Another effect that explains the data about as well, or better.
+/// Alternative effect that explains the data about as well, or better.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rival {
-    /// The effect.
+    /// Effect.
     pub effect: String,
-    /// The place, as `kind:name`.
+    /// Place, as `kind:name`.
     pub place: String,
-    /// Its probability.
+    /// Probability.
     pub probability: f64,
-    /// How far its BIC, without the price of strengths that the data tell nothing of, lies above that of the effect found: within
-    /// 2 the data cannot tell them apart, below -2 they prefer it.
+    /// BIC minus that of the effect found, without the penalty of parameters that the data do not constrain. Between -2 and 2
+    /// the data do not distinguish the two; below -2 they prefer the alternative.
     pub bic_behind: f64,
-    /// Cosine between the traces of the two in the outputs, what the parameters absorb taken out; 1: the same.
+    /// Cosine similarity of the responses of the outputs to both effects, without the part that the parameters absorb; 1 if
+    /// equal.
     pub likeness: f64,
 }
 
-/// An effect that the model lacked and that was added.
+/// Missing effect that was added to the model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Found {
     /// The effect.
     pub effect: String,
     /// The place, as `kind:name`.
     pub place: String,
-    /// Its name in the repaired model, such as `phi-coulomb-friction`: its strengths are the parameters `name.strength`.
+    /// Name in the augmented model, such as `phi-coulomb-friction`; its parameters are called `name.parameter`.
     pub name: String,
-    /// The second place of an effect that needs one, such as where cross-talk comes from, as `kind:name`.
+    /// Second place, as `kind:name`, for an effect that needs one, such as the source of cross-talk.
     pub companion: Option<String>,
-    /// The only experiment in which it acts, of what happens once.
+    /// The only experiment in which the effect acts, for an effect that happens once.
     pub only: Option<String>,
-    /// Its class, such as `dissipative`.
+    /// Class, such as `dissipative`.
     pub class: String,
-    /// Its formula, for people.
+    /// Formula, for readers.
     pub formula: String,
-    /// Its strengths.
+    /// Estimates of its parameters.
     pub strengths: Vec<StrengthValue>,
-    /// Probability that it is this effect, rather than another.
+    /// Probability that this effect, rather than another, is missing.
     pub probability: f64,
-    /// How much the BIC falls by adding it.
+    /// Decrease of the BIC when the effect is added.
     pub bic_gain: f64,
-    /// Other effects in its place whose BIC is less than 6 above its own, or below it.
+    /// Alternatives at the same place whose BIC is at most 6 higher.
     pub indistinguishable: Vec<Rival>,
-    /// How its choice holds where the data change; `None` where nothing was tried beside it.
+    /// Stability of the choice when the data change; `None` without an alternative.
     pub stability: Option<Stability>,
-    /// What it does for data that no parameter was fitted to, only start values. Empty where it is the only effect, as the errors
-    /// before and after tell that, and where the model without it cannot be followed over whole records.
+    /// Errors on held-out data with and without the effect, initial states fitted. Empty for a single effect, whose errors before
+    /// and after show the same, and if the model without the effect cannot be simulated over whole records.
     pub held_back: Vec<HeldBack>,
 }
 
-/// Error on data that were held back from the fit, with an effect and without it: all else is fitted anew to calibration data.
+/// Error on held-out data with and without an effect, all other parameters fitted to calibration data.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldBack {
-    /// Whose data: selection or validation.
+    /// Role of the data: selection or validation.
     pub role: Role,
-    /// Without the effect, in units of the noise.
+    /// Error without the effect, in units of the noise.
     pub without: f64,
-    /// With it.
+    /// Error with the effect, in units of the noise.
     pub with: f64,
 }
 
-/// How the choice of an effect holds where the data change.
+/// Stability of the choice of an effect when the data change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Stability {
-    /// Share of data sets, drawn anew in blocks from the data, in which the same effect does best.
+    /// Share of resampled data sets (blocks of the data) in which the same effect is best.
     ///
-    /// The fits are not repeated, their residuals are drawn. Source: H. Kishino, T. Miyata, M. Hasegawa, Maximum likelihood
+    /// The fits are not repeated; their residuals are resampled. Source: H. Kishino, T. Miyata, M. Hasegawa, Maximum likelihood
     /// inference of protein phylogeny, Journal of Molecular Evolution 31 (1990) 151, for estimated likelihoods; E. Carlstein, The
     /// use of subseries values for estimating the variance of a general statistic, Annals of Statistics 14 (1986) 1171, for blocks.
     pub share: f64,
-    /// Experiments without which another effect would do best, fitted again without them.
+    /// Experiments without which another effect would be best; fitted again without them.
     pub hangs_on: Vec<HangsOn>,
 }
 
-/// An experiment that an effect's choice hangs on.
+/// Experiment on which the choice of an effect depends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HangsOn {
     /// The experiment.
     pub experiment: String,
-    /// The effect that would do best without it.
+    /// Effect that would be best without the experiment.
     pub effect: String,
-    /// The place of that, as `kind:name`.
+    /// Place of that effect, as `kind:name`.
     pub place: String,
 }
 
-/// A declared term that was found to be the wrong one.
+/// Term of the nominal model that the data contradict.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Removed {
-    /// The parameter that is its strength.
+    /// Parameter of the term.
     pub term: String,
-    /// The place, as `kind:name`, where it is known.
+    /// Place, as `kind:name`, if known.
     pub place: String,
 }
 
-/// An effect that was tried, beside those that were in by then.
+/// Candidate effect, fitted together with the effects already accepted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ranked {
     /// The effect.
     pub effect: String,
     /// The place, as `kind:name`.
     pub place: String,
-    /// Its class.
+    /// Class.
     pub class: String,
-    /// Its probability.
+    /// Probability.
     pub probability: f64,
-    /// How much the BIC falls by adding it.
+    /// Decrease of the BIC when the effect is added.
     pub bic_gain: f64,
     /// Its strengths.
     pub strengths: Vec<StrengthValue>,
-    /// Share of its trace in the outputs that the parameters and start values absorb.
+    /// Share of the effect's output signature that parameters and initial states absorb.
     pub absorbed: f64,
-    /// Normalised error with it, on calibration and selection data together.
+    /// Error with the effect on calibration and selection data, in units of the noise.
     pub normalised: f64,
 }
 
-/// What no effect explains.
+/// Residual that no effect explains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unexplained {
-    /// Where it acts best, as `kind:name`.
+    /// Most likely place, as `kind:name`.
     pub place: String,
     /// Share of the residual above the noise that a free signal there explains.
     pub share: f64,
-    /// What it depends on: `position`, `speed`, `input` or `time`.
+    /// Variable that the missing signal depends on: `position`, `speed`, `input` or `time`.
     pub over: String,
-    /// The stopgap: a table, linear between its points.
+    /// Lookup table of the missing signal, linear between its points.
     pub table: Vec<[f64; 2]>,
 }
 
 /// Error of a model on an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExperimentError {
-    /// The experiment.
+    /// Experiment.
     pub name: String,
-    /// Its role.
+    /// Role of the experiment.
     pub role: Role,
     /// Root mean square error per channel, in its unit.
     pub channels: Vec<(String, f64)>,
-    /// Over all channels and samples, in units of the noise: 1 is the noise itself.
+    /// Root mean square error over all channels and samples, in units of the noise; 1 is the noise level.
     pub normalised: f64,
-    /// The same in windows of a few periods; `None` where the record is too short for two.
+    /// Errors in windows of a few periods; `None` if the record is too short for two.
     pub in_windows: Option<WindowErrors>,
 }
 
-/// Error on the experiments of a role together, the root of their mean square, in units of the noise; `None` where there are none.
+/// Returns the root mean square of the errors over the experiments of a role, in units of the noise; `None` without experiments.
 #[allow(clippy::cast_precision_loss)]
 pub fn together(errors: &[ExperimentError], role: Role) -> Option<f64> {
     let squares: Vec<f64> = errors.iter().filter(|e| e.role == role).map(|e| math::powi(e.normalised, 2)).collect();
     (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }
 
-/// Errors over windows of a record, each with start values of its own and the parameters held.
+/// Errors over windows of a record, each with its own initial states and the parameters fixed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WindowErrors {
     /// Number of windows.
@@ -194,87 +196,87 @@ pub struct WindowErrors {
     pub length: f64,
     /// Root mean square error per channel, in its unit.
     pub channels: Vec<(String, f64)>,
-    /// Over all channels and samples, in units of the noise.
+    /// Root mean square error over all channels and samples, in units of the noise.
     pub normalised: f64,
 }
 
-/// How a parameter moved: what it had absorbed.
+/// Shift of a parameter: the bias that the missing effect had caused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterMove {
-    /// The tuner.
+    /// Tuner.
     pub name: String,
-    /// Its unit.
+    /// Unit.
     pub unit: String,
-    /// Its value in the model as declared.
+    /// Estimate in the nominal model.
     pub before: f64,
-    /// Its value in the repaired model.
+    /// Estimate in the augmented model.
     pub after: f64,
-    /// Its standard error in the repaired model.
+    /// Standard error in the augmented model.
     pub std_error: Option<f64>,
 }
 
-/// The smallest strength of an effect that would have been noticed.
+/// Detection limit: the smallest parameter of an effect that would have been detected.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Noticeable {
     /// The effect.
     pub effect: String,
     /// The place, as `kind:name`.
     pub place: String,
-    /// The strength.
+    /// Parameter at the detection limit.
     pub strength: StrengthValue,
 }
 
-/// A measured output beside what the models predict.
+/// Measured output and its predictions by the nominal and the augmented model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
     /// The experiment.
     pub experiment: String,
-    /// Its role.
+    /// Role of the experiment.
     pub role: Role,
-    /// The signal, and its unit.
+    /// Signal.
     pub signal: String,
     /// Unit of the signal.
     pub unit: String,
-    /// Standard deviation of the noise.
+    /// Standard deviation of the noise, in the unit of the signal.
     pub noise: f64,
     /// Times of the samples, s.
     pub times: Vec<f64>,
-    /// The samples.
+    /// Measured samples.
     pub measured: Vec<f64>,
-    /// The model as declared.
+    /// Prediction of the nominal model.
     pub before: Vec<f64>,
-    /// The repaired model; as `before` where nothing was found.
+    /// Prediction of the augmented model; equal to `before` if no effect was found.
     pub after: Vec<f64>,
 }
 
-/// A signal over something, as points.
+/// Signal over a variable, as points.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Curve {
     /// Abscissae.
     pub x: Vec<f64>,
-    /// The signal as it is estimated, without any formula.
+    /// Estimated signal, without any formula.
     pub estimated: Vec<f64>,
-    /// What the effects found there make of it by their formulas; empty where none was found.
+    /// Signal of the effects found there, by their formulas; empty if none was found.
     pub found: Vec<f64>,
 }
 
-/// The unknown signal at a place that would explain the residual: how likely of the declared model; over what it is drawn, where
-/// effects were found there whose formula can be drawn, of the repaired one without them.
+/// Unknown input at a place that would explain the residual. The evidence refers to the nominal model. The curves refer to the
+/// augmented model without the effects at this place, if their formula can be drawn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// The place, as `kind:name`.
     pub place: String,
     /// Unit of the signal; empty where the model's equations do not tell.
     pub unit: String,
-    /// Logarithm of the marginal likelihood over that of the model without it.
+    /// Log ratio of the marginal likelihoods with and without the unknown input.
     pub evidence: f64,
-    /// Share of the residual above the noise that it explains.
+    /// Share of the residual above the noise that the unknown input explains.
     pub share: f64,
-    /// Effective degrees of freedom it takes.
+    /// Effective degrees of freedom of the unknown input.
     pub freedom: f64,
-    /// The signal over time: samples one after the other, per experiment.
+    /// Signal over time, by experiment.
     pub over_time: Vec<(String, Curve)>,
-    /// The signal over what it may depend on (`position`, `speed`, `input`), with the unit of that.
+    /// Signal over variables that it may depend on (`position`, `speed`, `input`), with their units.
     pub over: Vec<(String, String, Curve)>,
 }
 
@@ -316,56 +318,57 @@ impl Change {
     }
 }
 
-/// A model that the search passed through.
+/// Model visited by the search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Step {
     /// Change from the model before.
     pub did: Change,
-    /// Its effects, each as `effect at kind:name`.
+    /// Effects, each as `effect at kind:name`.
     pub effects: Vec<String>,
-    /// Windows that records were cut into; 1: none.
+    /// Number of windows per record; 1 for whole records.
     pub windows: usize,
-    /// Its error on calibration and selection data, in units of the noise.
+    /// Error on calibration and selection data, in units of the noise.
     pub normalised: f64,
 }
 
-/// A diagnosis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// Result of a diagnosis.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Diagnosis {
-    /// Whether something is missing.
+    /// Verdict.
     pub verdict: Verdict,
     /// Probability of the verdict.
     pub probability: f64,
-    /// Probability of a residual as structured as this one if nothing were missing, the search over the catalogue included.
+    /// p-value of the residual's structure without a missing effect, corrected for the search over the catalogue.
     pub p_value: f64,
-    /// The effects added.
+    /// Effects added.
     pub found: Vec<Found>,
-    /// Declared terms found to be wrong.
+    /// Terms of the nominal model that the data contradict.
     pub removed: Vec<Removed>,
-    /// The way of the search.
+    /// Models visited by the search, in order.
     pub steps: Vec<Step>,
-    /// Effects that were tried, best first.
+    /// Candidate effects, best first.
     pub ranked: Vec<Ranked>,
-    /// What no effect explains.
+    /// Residual that no effect explains.
     pub unexplained: Option<Unexplained>,
-    /// The experiment that would separate what the data cannot tell apart.
+    /// Experiment that would distinguish the alternatives.
     pub next_experiment: Option<String>,
-    /// Errors of the model as declared.
+    /// Errors of the nominal model.
     pub before: Vec<ExperimentError>,
-    /// Errors of the repaired model.
+    /// Errors of the augmented model.
     pub after: Vec<ExperimentError>,
-    /// How the parameters moved.
+    /// Shifts of the parameters.
     pub parameters: Vec<ParameterMove>,
-    /// What would have been noticed, where nothing is missing.
+    /// Detection limits, for the verdict `none`.
     pub noticeable: Vec<Noticeable>,
-    /// Where the residual comes from, best place first.
+    /// Unknown inputs that would explain the residual, best place first.
     pub evidence: Vec<Evidence>,
-    /// Measured outputs beside what the models predict.
+    /// Measured outputs and their predictions.
     pub predictions: Vec<Prediction>,
-    /// Facts about data and fit that a reader should know.
+    /// Remarks on data and fit.
     pub notes: Vec<String>,
-    /// Start values of every experiment in the repaired model: experiment, parameter, value.
+    /// Initial states of every experiment in the augmented model: experiment, parameter, value.
     pub starts: Vec<(String, String, f64)>,
-    /// Simulations that it took.
+    /// Number of simulations.
     pub simulations: usize,
 }

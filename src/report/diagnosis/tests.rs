@@ -110,7 +110,8 @@ fn what_no_effect_explains_has_a_place_and_a_table() {
 
 #[test]
 fn an_unexplained_residual_with_an_effect_refers_to_the_place_in_the_nominal_model() {
-    let diagnosis = Diagnosis { found: made_up::coulomb().found, ..made_up::unexplained() };
+    let mut diagnosis = made_up::unexplained();
+    diagnosis.found = made_up::coulomb().found;
     let (_, page) = written(diagnosis);
     assert!(page.contains(
         "Even with <code>coulomb-friction</code>, the model lacks something that no tested effect explains: "
