@@ -10,7 +10,8 @@ use mops::core::{Budget, Evaluation, Evaluator, Run, Shape};
 use mops::solvers::genetic::GeneticOptions;
 use mops::solvers::pattern_search::PatternSearchOptions;
 use mops::solvers::sqp::SqpOptions;
-use mops::{Solver, SolverOptions, Usage};
+use mops::Usage;
+use mops::core::{Solver, SolverOptions};
 use mops_core::math;
 
 /// Duration of an evaluation.

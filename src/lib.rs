@@ -70,9 +70,8 @@ pub use mops_core as core;
 pub use mops_core::{
     Analysis, BuiltStudy, Cancellation, Case, CaseBuilder, Catalogue, Criterion, CriterionBuilder, CriterionKind,
     CriterionOptions, CriterionSpec, Diagnostic, EffectBuilder, Failure, Input, Instant, Interface, Model,
-    ModelBuilder, ModelKind, ModelOptions, Objective, Outcome, Parameter, Plant, Quantity, Scalar, Shipped, Solver,
-    SolverKind, SolverOptions, Study, StudyBuilder, StudyError, Task, Trace, TunerBuilder, Unit, Usage, Value,
-    Variable, Watch,
+    ModelBuilder, ModelKind, ModelOptions, Objective, Outcome, Parameter, Plant, Quantity, Scalar, Shipped, SolverKind,
+    Study, StudyBuilder, StudyError, Task, Trace, TunerBuilder, Unit, Usage, Value, Variable, Watch,
 };
 pub use mops_criteria as criteria;
 pub use mops_discrepancy as discrepancy;

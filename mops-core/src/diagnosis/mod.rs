@@ -266,7 +266,7 @@ pub struct Curve {
 pub struct Evidence {
     /// The place, as `kind:name`.
     pub place: String,
-    /// Unit of the signal; empty where the model's equations do not tell.
+    /// Unit of the signal; empty if the model's equations do not determine it.
     pub unit: String,
     /// Log ratio of the marginal likelihoods with and without the unknown input.
     pub evidence: f64,
