@@ -6,12 +6,12 @@
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use mops::Usage;
 use mops::core::{Budget, Evaluation, Evaluator, Run, Shape};
+use mops::core::{Solver, SolverOptions};
 use mops::solvers::genetic::GeneticOptions;
 use mops::solvers::pattern_search::PatternSearchOptions;
 use mops::solvers::sqp::SqpOptions;
-use mops::Usage;
-use mops::core::{Solver, SolverOptions};
 use mops_core::math;
 
 /// Duration of an evaluation.

@@ -5,8 +5,8 @@
 use std::process::ExitCode;
 
 use mops::core::{Halt, Oracle, Progress, Shape, Stream};
-use mops::{Catalogue, Objective, SolverKind};
 use mops::core::{Solver, SolverOptions};
+use mops::{Catalogue, Objective, SolverKind};
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;

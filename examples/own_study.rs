@@ -5,7 +5,10 @@
 
 use mops::criteria::settling_time::SettlingTime;
 use mops::models::kernel::{PlantModel, Simulated};
-use mops::{Analysis, Case, Criterion, CriterionBuilder, CriterionSpec, Failure, Instant, Interface, Options, Parameter, Plant, Scalar, Study, StudyBuilder, StudyError, TunerBuilder, Unit, Value, Variable};
+use mops::{
+    Analysis, Case, Criterion, CriterionBuilder, CriterionSpec, Failure, Instant, Interface, Options, Parameter, Plant,
+    Scalar, Study, StudyBuilder, StudyError, TunerBuilder, Unit, Value, Variable,
+};
 
 /// Interface of the model: its signals and parameters.
 struct Suspension(Interface);

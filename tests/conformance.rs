@@ -6,7 +6,10 @@ mod function;
 use std::sync::Arc;
 
 use mops::core::{Budget, Oracle, Problem, Run, Stop};
-use mops::{Analysis, Case, Criterion, CriterionBuilder, CriterionSpec, Interface, Objective, SolverKind, Study, StudyBuilder, StudyError, TunerBuilder, Unit, Usage, Value, Watch};
+use mops::{
+    Analysis, Case, Criterion, CriterionBuilder, CriterionSpec, Interface, Objective, SolverKind, Study, StudyBuilder,
+    StudyError, TunerBuilder, Unit, Usage, Value, Watch,
+};
 
 use function::{End, Function};
 use mops_core::math;

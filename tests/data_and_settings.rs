@@ -117,3 +117,15 @@ fn a_start_value_is_not_read_off_samples_that_come_later() {
     let tuner = |k: usize| result["tuners"][k]["value"].as_f64().unwrap();
     assert!((tuner(0) - 2.0).abs() < 1e-4 && (tuner(1) - 0.5).abs() < 1e-3, "{json}");
 }
+
+/// Both the command for data and the check of a study name the source of a file that is not included.
+#[test]
+fn a_missing_recording_of_others_has_its_source_and_its_digest() {
+    let study = "examples/recordings/furuta-lund.toml";
+    for arguments in [["data", "examples/recordings/FurutaData.mat"], ["check", study]] {
+        let done = cargo_bin_cmd!("mops").args(arguments).output().unwrap();
+        let text = String::from_utf8(done.stderr).unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(done.status.code(), Some(2), "{text}");
+        assert!(text.contains("github.com/JModelica/JModelica") && text.contains("06d8c63565851187"), "{text}");
+    }
+}

@@ -12,7 +12,10 @@ use mops::core::{
     statistics::Sampling,
 };
 use mops::criteria::normalised_error::NormalisedError;
-use mops::{Analysis, CaseBuilder, CriterionBuilder, Failure, Interface, Model, Options, Outcome, Parameter, StudyBuilder, Task, Trace, TunerBuilder, Usage, Variable};
+use mops::{
+    Analysis, CaseBuilder, CriterionBuilder, Failure, Interface, Model, Options, Outcome, Parameter, StudyBuilder,
+    Task, Trace, TunerBuilder, Usage, Variable,
+};
 use serde_json::Value as Json;
 
 use function::{End, Function};

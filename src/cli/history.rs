@@ -8,8 +8,8 @@ use clap::Args;
 use mops_core::{Catalogue, Diagnostic};
 use serde_json::{Value, json};
 
-use super::past_run::{PastRun, date};
-use crate::terminal::{CommandError, number, print, print_json, table};
+use super::past_run::PastRun;
+use crate::terminal::{CommandError, date, number, print, print_json, table};
 
 /// Largest depth of searched folders.
 const DEPTH: usize = 8;

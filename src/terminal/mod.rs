@@ -1,5 +1,6 @@
 //! Shared parts of the command-line programs: error messages, tables, progress, Ctrl-C.
 
+mod date;
 mod limits;
 mod mistake;
 mod progress;
@@ -12,6 +13,7 @@ use std::process::ExitCode;
 
 use mops_core::Diagnostic;
 
+pub use date::date;
 pub(crate) use limits::{Limit, cancel_after, cancel_on_signal, exit_after};
 pub use progress::Progress;
 pub use table::{number, table};

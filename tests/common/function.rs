@@ -1,7 +1,10 @@
 //! A function dressed as a model, and the criterion that reads its values.
 
 use mops::core::{Job, Response};
-use mops::{Analysis, Case, Criterion, CriterionSpec, Failure, Interface, Model, Parameter, StudyError, Trace, Unit, Value, Variable};
+use mops::{
+    Analysis, Case, Criterion, CriterionSpec, Failure, Interface, Model, Parameter, StudyError, Trace, Unit, Value,
+    Variable,
+};
 
 /// A function of its parameters: signal `fi` stays at `f(x)[i]`; where there is no value the simulation diverges.
 pub struct Function {

@@ -5,7 +5,10 @@ use mops::core::{
 };
 use mops::criteria::fit::Fit;
 use mops::criteria::normalised_error::NormalisedError;
-use mops::{Analysis, CaseBuilder, CriterionBuilder, Failure, Interface, Model, ModelBuilder, Options, Outcome, Parameter, StudyBuilder, Task, Trace, TunerBuilder, Variable};
+use mops::{
+    Analysis, CaseBuilder, CriterionBuilder, Failure, Interface, Model, ModelBuilder, Options, Outcome, Parameter,
+    StudyBuilder, Task, Trace, TunerBuilder, Variable,
+};
 use mops_core::math;
 use rand::Rng;
 

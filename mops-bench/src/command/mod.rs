@@ -5,7 +5,7 @@ mod folder;
 mod suite;
 mod tables;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -42,6 +42,11 @@ enum Benchmark {
     Diagnosis(diagnosis::Arguments),
     /// Print the JSON schema of case.json, the format of the cases of `diagnosis --folder`.
     Schema,
+    /// Print the Markdown table of figures stored with `--csv`.
+    Table {
+        /// CSV file.
+        file: PathBuf,
+    },
     #[command(flatten)]
     Suite(suite::Chosen),
 }
@@ -51,6 +56,7 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
     let done = match Arguments::parse().benchmark {
         Benchmark::Diagnosis(arguments) => diagnosis::bench(catalogue, &arguments),
         Benchmark::Schema => print(&crate::diagnosis::schema()).map(|()| ExitCode::SUCCESS),
+        Benchmark::Table { file } => suite::markdown(&file),
         Benchmark::Suite(chosen) => suite::bench(catalogue, &chosen),
     };
     done.unwrap_or_else(|error| error.report())

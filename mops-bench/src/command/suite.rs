@@ -11,6 +11,7 @@ use mops_problems::{Answer, Slope};
 use mops::terminal::{CommandError, Progress, number, print, table};
 
 use super::write;
+use crate::solvers::figures::{self, Figure};
 use crate::solvers::{self, Plan, Results, Row, Score, Suite, data_profile, published, spreads, suites};
 
 /// Options of the benchmark of a suite.
@@ -43,6 +44,9 @@ pub(super) struct Arguments {
     /// Compare with the results.json of an earlier benchmark.
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
+    /// Add the figures of each solver to a CSV file, or replace those of the same suite, solver, gradients and noise.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
     /// List the problems with known solutions and sources, without running them.
     #[arg(long)]
     list: bool,
@@ -122,6 +126,13 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
     progress.finish();
     let text = text(&results, before.as_ref());
     print(&text)?;
+    if let Some(path) = &arguments.csv {
+        let gradients =
+            if suite.subjects().iter().any(solvers::Subject::is_study) { "own" } else { results.slopes.as_str() };
+        let new = figures::figures(&results, gradients, &figures::today());
+        let all = figures::updated(known_figures(path)?, new);
+        std::fs::write(path, figures::write(&all)).map_err(CommandError::cannot_write(path))?;
+    }
     if let Some(folder) = &arguments.out {
         let json = serde_json::to_string_pretty(&results).expect("numbers and names can be written");
         write(folder, "results.json", &(json + "\n"))?;
@@ -143,6 +154,26 @@ fn solution(subject: &solvers::Subject) -> String {
             tuners => format!("{} at {}", list(&minima), list(tuners)),
         },
     }
+}
+
+/// Reads a CSV file of figures; one that does not exist has none.
+fn known_figures(path: &Path) -> Result<Vec<Figure>, Diagnostic> {
+    match std::fs::read_to_string(path) {
+        Ok(text) => figures::read(&text).map_err(|error| Diagnostic::new(format!("{}: {error}", path.display()))),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
+        Err(error) => Err(Diagnostic::new(format!("{} cannot be read: {error}", path.display()))),
+    }
+}
+
+/// Prints the Markdown table of a CSV file of figures.
+pub(super) fn markdown(path: &Path) -> Result<ExitCode, CommandError> {
+    if !path.exists() {
+        return Err(Diagnostic::new(format!("there is no file {}", path.display()))
+            .with_help("`mops-bench SUITE --csv FILE` writes one")
+            .into());
+    }
+    print(&figures::markdown(&known_figures(path)?))?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn solver(catalogue: &Catalogue, name: &str) -> Result<SolverChoice, Diagnostic> {

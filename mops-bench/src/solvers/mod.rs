@@ -1,6 +1,7 @@
 //! Benchmark of solvers on problems with known solutions: number of solved problems, evaluations, time.
 
 mod control;
+pub(crate) mod figures;
 mod fronts;
 mod page;
 mod profiles;

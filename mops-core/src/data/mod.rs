@@ -4,6 +4,7 @@ mod csv;
 mod mat4;
 mod mat5;
 mod matlab;
+mod sources;
 #[cfg(test)]
 mod tests;
 
@@ -17,6 +18,8 @@ use std::sync::Arc;
 
 use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::unit::Unit;
+
+pub(crate) use sources::{FILE as SOURCES, source_of};
 
 /// File format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,6 +99,10 @@ impl DataFile {
             Ok(bytes) => Self::parse(&name, bytes),
             Err(error) => {
                 let source = Arc::new(Source { name, text: String::new() });
+                let listed = || source_of(path, &read_regular(&path.with_file_name(SOURCES)).ok()?);
+                if let Some(way_out) = (error.kind() == ErrorKind::NotFound).then(listed).flatten() {
+                    return Err(Diagnostic::new("the file does not exist").with_help(way_out).at(&source, 0..0));
+                }
                 let (fact, way_out) = match error.kind() {
                     ErrorKind::NotFound => ("the file does not exist".to_owned(), "check the path"),
                     ErrorKind::IsADirectory => ("the path is a folder".to_owned(), "name a file in it"),

@@ -2,12 +2,13 @@
 
 use std::io::ErrorKind;
 use std::ops::Range;
+use std::path::Path;
 use std::sync::Arc;
 
 use super::sections::{ChannelTable, ExperimentSection, InputTable};
 use super::tree::Node;
 use super::{Files, UNIT_HELP, at_key, frequency, read_seconds, read_unit};
-use crate::data::{Column, DataFile};
+use crate::data::{Column, DataFile, SOURCES, source_of};
 use crate::diagnostic::{Diagnostic, Source};
 use crate::experiment::Input;
 use crate::study::{CaseBuilder, ChannelBuilder, Free, Measured};
@@ -69,7 +70,12 @@ fn open(node: &Node<'_>, path: &str, files: &dyn Files) -> Result<DataFile, Diag
             _ => format!("the data file `{shown}` cannot be read: {error}"),
         };
         let place = node.child("file").expect("it was just read");
-        place.diagnostic(why).with_help("paths are relative to the folder of the study file")
+        let sources = Path::new(path).with_file_name(SOURCES);
+        let listed = || source_of(Path::new(path), &files.read(sources.to_str()?).ok()?);
+        let way_out = (error.kind() == ErrorKind::NotFound).then(listed).flatten();
+        place
+            .diagnostic(why)
+            .with_help(way_out.as_deref().unwrap_or("paths are relative to the folder of the study file"))
     })?;
     DataFile::parse(&files.show(path), bytes)
 }
