@@ -43,7 +43,7 @@ pub(crate) fn figures(results: &Results, gradients: &str, date: &str) -> Vec<Fig
             gradients: gradients.to_owned(),
             noise: results.noise,
             seeds: results.of(solver).map(|row| row.seed).max().unwrap_or(0),
-            solved: if volumes.is_empty() { summary.solved as f64 } else { mean },
+            solved: if volumes.is_empty() { summary.solved as f64 } else { (1e6 * mean).round() / 1e6 },
             runs: if volumes.is_empty() { summary.judged } else { volumes.len() },
             median_evaluations: summary.median_fine,
             evaluations: results.of(solver).map(|row| row.evaluations).sum(),
