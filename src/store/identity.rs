@@ -113,6 +113,9 @@ impl Difference {
         let path: Vec<&str> = self.path.iter().map(String::as_str).collect();
         let name = match path.as_slice() {
             ["study", rest @ ..] => rest.join("."),
+            ["data", ..] if self.before.contains("program") => {
+                return "the program that builds the study was rebuilt".to_owned();
+            }
             ["data", ..] => return "a data file has changed".to_owned(),
             ["tuners", ..] => return "the tuners have changed".to_owned(),
             ["rows", ..] => return "the criteria have changed".to_owned(),

@@ -73,7 +73,14 @@ fn read(catalogue: &Catalogue, built: &BuiltStudy, text: &Arc<Text>, program: &s
         draft.tasks = tasks::read(&root, catalogue)?;
     }
     let (solver, max_evaluations) = read_solver(catalogue, &root)?;
-    let study = draft.build().map_err(|mistake| root.locate(&mistake))?;
+    let study = draft.build().map_err(|mistake| {
+        let located = root.locate(&mistake);
+        match &located.place {
+            Some((_, span)) if *span != (0..0) => located,
+            // An error of the program has no position in the settings: its keys name the entry.
+            _ => Diagnostic { message: format!("{}: {}", mistake.path.join("."), mistake.message), ..located },
+        }
+    })?;
     Ok(StudyFile {
         content: content(&study),
         study,

@@ -29,6 +29,10 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
         return Err(StudyError::new("models", "the study has no model")
             .with_help("add a table such as [models.loop.pid-loop]; `mops list` shows the kinds"));
     }
+    distinct("models", draft.models.iter().map(|(name, _)| name))?;
+    distinct("tuners", draft.tuners.iter().map(|(name, _)| name))?;
+    distinct("cases", draft.cases.iter().map(|case| &case.name))?;
+    distinct("criteria", draft.criteria.iter().map(|(name, _)| name))?;
     let mut models: Vec<(String, Arc<dyn Model>)> = Vec::new();
     let mut fixed = Vec::new();
     for (name, draft) in draft.models {
@@ -154,4 +158,35 @@ fn temperatures_of_nothing(study: &Study) -> Vec<String> {
         }
     }
     found.into_iter().map(|(fact, cases)| format!("{fact}, in {}", cases.join(", "))).collect()
+}
+
+/// Checks that names are given and differ; those of a study file always differ.
+fn distinct<'n>(table: &str, names: impl Iterator<Item = &'n String>) -> Result<(), StudyError> {
+    let mut known = Vec::new();
+    for name in names {
+        if name.is_empty() {
+            return Err(StudyError::here("a name is empty").within(table).with_help("name every entry"));
+        }
+        if known.contains(&name) {
+            return Err(StudyError::new(name, format!("duplicate name `{name}`"))
+                .within(table)
+                .with_help("rename one of them: results are listed by these names"));
+        }
+        known.push(name);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn empty_and_duplicate_names_are_refused_with_their_table() {
+        let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+        assert!(distinct("tuners", names(&["k", "Ti"]).iter()).is_ok());
+        let twice = distinct("tuners", names(&["k", "k"]).iter()).unwrap_err();
+        assert!(twice.to_string().starts_with("tuners.k: duplicate name `k`"), "{twice}");
+        assert!(distinct("cases", names(&[""]).iter()).unwrap_err().to_string().contains("empty"));
+    }
 }
