@@ -94,8 +94,8 @@ pub fn catalogue() -> Catalogue {
     }
 }
 
-#[cfg(feature = "cli")]
 /// Runs the command line with a catalogue; a crate that adds its own kinds calls this function from its `main`.
+#[cfg(feature = "cli")]
 pub fn main(catalogue: Catalogue) -> std::process::ExitCode {
     cli::main(catalogue)
 }

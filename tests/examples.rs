@@ -38,13 +38,12 @@ fn the_slopes_at_the_optimum_are_those_of_the_criteria() {
     }
 }
 
-#[path = "../examples/own_solver.rs"]
-mod own_solver;
+#[path = "../examples/plugin/src/shrinking_box.rs"]
+mod shrinking_box;
 
 #[test]
 fn a_solver_of_ones_own_finds_what_the_default_one_finds_whatever_the_number_of_threads() {
-    let kinds = own_solver::catalogue().solvers;
-    let kind = kinds.iter().find(|kind| kind.name == "shrinking-box").expect("it is in the catalogue");
+    let kind = mops::SolverKind::of::<shrinking_box::ShrinkingBoxOptions>();
     let solved = |jobs| {
         let options = mops::Options { solver: kind.default_choice(), jobs: Some(jobs), ..mops::Options::default() };
         mops::solve(own_study::study().unwrap(), &options, &()).unwrap().outcome

@@ -50,23 +50,27 @@ pub fn from_fn<const N: usize>(
     FnModel(Simulated::new(Equations { interface, initial_states, rates: Arc::new(rates) }))
 }
 
-struct Bound<'a, S> {
+struct Bound<'a> {
     of: &'a Equations,
-    parameters: &'a [S],
+    parameters: Vec<f64>,
 }
 
-impl<S: Scalar> Plant<S> for Bound<'_, S> {
+/// Plain numbers of scalars.
+fn plain<S: Scalar>(values: &[S]) -> Vec<f64> {
+    values.iter().map(|value| value.value()).collect()
+}
+
+impl<S: Scalar> Plant<S> for Bound<'_> {
     fn start(&self) -> Vec<S> {
         self.of.initial_states.iter().map(|&x| S::from(x)).collect()
     }
 
     // N.B.: the scalar is a plain number here, as `FnModel` asks for no derivatives.
     fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
-        let plain = |values: &[S]| values.iter().map(|&value| value.value()).collect::<Vec<f64>>();
-        let (x, u, w, parameters) = (plain(at.x), plain(at.u), plain(at.w), plain(self.parameters));
+        let (x, u, w) = (plain(at.x), plain(at.u), plain(at.w));
         let at = Instant { t: at.t, x: &x, u: &u, w: &w };
         let mut derivatives = vec![0.0; dx.len()];
-        (self.of.rates)(&at, &parameters, &mut derivatives);
+        (self.of.rates)(&at, &self.parameters, &mut derivatives);
         for (dx, derivative) in dx.iter_mut().zip(derivatives) {
             *dx = S::from(derivative);
         }
@@ -83,7 +87,7 @@ impl PlantModel for Equations {
     }
 
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
-        Ok(Bound { of: self, parameters })
+        Ok(Bound { of: self, parameters: plain(parameters) })
     }
 }
 

@@ -42,7 +42,7 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Reason why a database cannot be opened.
 pub(crate) enum OpenError {
-    /// StudyError of the user.
+    /// Mistake of the user.
     Mistake(Diagnostic),
     /// Failure of the machine.
     Failure(String),

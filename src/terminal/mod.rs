@@ -24,7 +24,7 @@ pub(crate) use write::{eprint_line, print_json};
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum CommandError {
-    /// StudyError of the user, in a file or on the command line: exit status 2.
+    /// Mistake of the user, in a file or on the command line: exit status 2.
     Mistake(Box<Diagnostic>),
     /// Failure of the run or of the machine, as one sentence: exit status 3.
     Failure(String),

@@ -20,7 +20,7 @@ impl CriterionOptions for RideComfort {
 
 impl CriterionSpec for RideComfort {
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        let unit = model.signal(&self.signal).map_err(|error| error.within("signal"))?.unit.clone();
+        let unit = model.signal(&self.signal)?.unit.clone();
         Ok(Box::new(Bound { signal: self.signal.clone(), unit }))
     }
 }

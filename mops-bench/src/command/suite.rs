@@ -103,6 +103,7 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
         return Ok(ExitCode::SUCCESS);
     }
     let before = arguments.against.as_deref().map(|path| read(path, suite)).transpose()?;
+    let known = arguments.csv.as_deref().map(known_figures).transpose()?;
     check_options(suite, arguments)?;
     let plan = Plan {
         suite: *suite,
@@ -126,11 +127,11 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
     progress.finish();
     let text = text(&results, before.as_ref());
     print(&text)?;
-    if let Some(path) = &arguments.csv {
+    if let (Some(path), Some(known)) = (&arguments.csv, known) {
         let gradients =
             if suite.subjects().iter().any(solvers::Subject::is_study) { "own" } else { results.slopes.as_str() };
         let new = figures::figures(&results, gradients, &figures::today());
-        let all = figures::updated(known_figures(path)?, new);
+        let all = figures::updated(known, new);
         std::fs::write(path, figures::write(&all)).map_err(CommandError::cannot_write(path))?;
     }
     if let Some(folder) = &arguments.out {

@@ -5,9 +5,7 @@ use std::time::Instant;
 use mops::core::Quiet;
 use mops::core::file::{self, Files};
 use mops::discrepancy::{Diagnosis, Verdict, brute_force};
-use mops::{Catalogue, Study, Watch};
-
-use mops::{Options, solve};
+use mops::{Catalogue, Options, Study, Watch, solve};
 
 /// Common inputs of the tools.
 #[derive(Clone, Copy)]

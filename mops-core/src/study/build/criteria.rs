@@ -31,7 +31,6 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -
     let interface = study.models[model].1.interface();
     check_sort(draft.criterion.reads(), interface.analysis, &study.models, model)?;
     let criterion: Arc<dyn Criterion> = Arc::from(draft.criterion.bind(interface)?);
-    let signals = interface.signals.clone();
     let unit = criterion.unit();
     let demand = demand(&draft, &unit, criterion.as_ref())?;
     if let Some(assumption) = criterion.assumption() {
@@ -43,7 +42,7 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -
     }
     for case in cases_of(study, &draft)? {
         criterion.suits(&study.cases[case])?;
-        let job = job(study, model, case, &criterion.signals(), &signals)?;
+        let job = job(study, model, case, &criterion.signals())?;
         study.rows.push(Row {
             name: name.to_owned(),
             job,

@@ -1,27 +1,14 @@
 //! Jobs (model-case pairs) and the sources of their parameters.
 
-use super::values::signal_names;
-use crate::diagnostic::suggestion;
-use crate::model::{AnalysisKind, Interface, Variable};
+use crate::model::{AnalysisKind, Interface};
 use crate::study::{JobPlan, ParameterSource, Study};
 use crate::study_error::StudyError;
 use crate::unit::Unit;
 
 /// Returns the job of a model in a case, created on first use and completed later. Adds the signals to those it computes.
-pub(super) fn job(
-    study: &mut Study,
-    model: usize,
-    case: usize,
-    wanted: &[String],
-    signals: &[Variable],
-) -> Result<usize, StudyError> {
-    let wanted = wanted.iter().map(|name| {
-        signals.iter().position(|s| s.name == *name).ok_or_else(|| {
-            StudyError::new("signal", format!("the model has no signal `{name}`"))
-                .with_help(suggestion(name, signal_names(signals)))
-        })
-    });
-    let wanted: Vec<usize> = wanted.collect::<Result<_, _>>()?;
+pub(super) fn job(study: &mut Study, model: usize, case: usize, wanted: &[String]) -> Result<usize, StudyError> {
+    let interface = study.models[model].1.interface();
+    let wanted = wanted.iter().map(|name| interface.signal_index(name)).collect::<Result<Vec<_>, _>>()?;
     let index = match study.jobs.iter().position(|j| j.model == model && j.case == case) {
         Some(index) => index,
         None => {

@@ -105,8 +105,7 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
     }
     if study.task == Task::Diagnosis {
         for (model, case, measured) in diagnosis::measured(&study) {
-            let signals = study.models[model].1.interface().signals.clone();
-            job(&mut study, model, case, &measured, &signals)?;
+            job(&mut study, model, case, &measured)?;
         }
     }
     for index in 0..study.jobs.len() {
