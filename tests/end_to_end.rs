@@ -1,5 +1,8 @@
 //! What a user sees of the command line: commands, files, exit statuses.
 
+#[path = "common/result.rs"]
+mod result;
+
 use std::path::Path;
 
 use assert_cmd::Command;
@@ -18,8 +21,8 @@ fn run(study: &str, folder: &Path, more: &[&str]) -> Value {
     let mut arguments = vec!["run", study, "--json", "--out", out.to_str().unwrap()];
     arguments.extend(more);
     let output = mops(&arguments).output().unwrap();
-    let result: Value = serde_json::from_slice(&output.stdout)
-        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)));
+    let result: Value =
+        result::read(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)));
     assert_eq!(std::fs::read(out.join("result.json")).unwrap(), output.stdout, "what is printed is what is written");
     result
 }

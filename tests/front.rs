@@ -1,5 +1,8 @@
 //! The front of a study, against one computed without mops.
 
+#[path = "common/result.rs"]
+mod result;
+
 use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
@@ -35,8 +38,7 @@ fn pareto(folder: &Path, arguments: &[&str]) -> Value {
         .args(arguments)
         .output()
         .unwrap();
-    serde_json::from_slice(&output.stdout)
-        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
+    result::read(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
 }
 
 /// Settling time and overshoot of the points.

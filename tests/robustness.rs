@@ -2,6 +2,8 @@
 
 #[path = "common/function.rs"]
 mod function;
+#[path = "common/result.rs"]
+mod result;
 
 use std::path::Path;
 
@@ -388,8 +390,7 @@ fn run(study: &str, folder: &Path, settings: &[&str]) -> Json {
     let mut arguments = vec!["run", study, "--json", "--out", out.to_str().unwrap()];
     arguments.extend(settings.iter().flat_map(|setting| ["--set", *setting]));
     let output = cargo_bin_cmd!("mops").args(arguments).output().unwrap();
-    serde_json::from_slice(&output.stdout)
-        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
+    result::read(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
 }
 
 /// Published as 39.46 % and 23.37 s (thesis, section 5.1.3); by an independent program 0.3946113297 and 23.3761334 s.

@@ -1,5 +1,8 @@
 //! Theory as tools: what inputs excite, what data and criteria determine, and surfaces, as a user sees them.
 
+#[path = "common/result.rs"]
+mod result;
+
 use std::path::Path;
 
 use assert_cmd::Command;
@@ -19,8 +22,7 @@ fn run(study: &str, folder: &Path, settings: &[&str]) -> Value {
     let mut arguments = vec!["run", study, "--json", "--out", out.to_str().unwrap()];
     arguments.extend(settings.iter().flat_map(|setting| ["--set", *setting]));
     let output = mops(&arguments).output().unwrap();
-    serde_json::from_slice(&output.stdout)
-        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
+    result::read(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
 }
 
 /// The study of a free swing that lies beside the tests.

@@ -82,8 +82,9 @@ pub use model::{
 };
 pub use mops_math as math;
 pub use outcome::{
-    CalibrationReport, ChannelReport, CriterionReport, ExcitationFindings, ExperimentReport, FailureReport, Findings,
-    Outcome, ParameterReport, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
+    CalibrationReport, ChannelReport, CriterionReport, Design, ExcitationFindings, ExperimentReport, FailureReport,
+    Findings, Outcome, ParameterReport, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
+    result_schema,
 };
 pub use placement::EffectBuilder;
 pub use plant::{EventInstant, Instant, Open, Opening, Plant, Span};

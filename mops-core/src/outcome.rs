@@ -1,5 +1,10 @@
 //! Result of a run: the content of `result.json`. Non-finite numbers are written as null.
 
+use std::collections::BTreeMap;
+
+use schemars::generate::SchemaSettings;
+use schemars::transform::RecursiveTransform;
+use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -17,7 +22,7 @@ use crate::trade_offs::{Pareto, TradeOffs};
 use crate::uncertainty::UncertaintyReport;
 
 /// The result of a run.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 #[non_exhaustive]
 pub struct Outcome {
     /// Version of this format.
@@ -66,7 +71,7 @@ pub struct Outcome {
     /// Criteria and objective at the initial guess.
     pub start: StartReport,
     /// Points of the Pareto front; for a single design, the design itself.
-    pub front: Vec<Value>,
+    pub front: Vec<Design>,
     /// Estimates and errors of a calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationReport>,
@@ -80,7 +85,7 @@ pub struct Outcome {
 }
 
 /// Results of tasks other than design and calibration.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct Findings {
     /// Order of persistent excitation of the inputs.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -99,6 +104,7 @@ pub struct Findings {
     pub trade_offs: Option<TradeOffs>,
     /// Missing effects of the model.
     #[serde(serialize_with = "crate::diagnosis::serialize", skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<crate::diagnosis::Block>")]
     pub diagnosis: Option<Diagnosis>,
     /// Worst cases over a box of uncertain parameters.
     #[serde(rename = "worst-case", skip_serializing_if = "Option::is_none")]
@@ -118,7 +124,7 @@ pub struct Findings {
 }
 
 /// Order of persistent excitation of the inputs, and regressions on them.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ExcitationFindings {
     /// All inputs of all cases.
     pub inputs: Vec<ExcitationReport>,
@@ -127,7 +133,7 @@ pub struct ExcitationFindings {
 }
 
 /// Objective over one or two tuners.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SweepReport {
     /// Findings as sentences; names are in backticks.
     pub words: Vec<String>,
@@ -147,7 +153,7 @@ pub struct SweepReport {
 }
 
 /// A swept tuner.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SweepAxis {
     /// Name.
     pub tuner: String,
@@ -160,7 +166,7 @@ pub struct SweepAxis {
 }
 
 /// Tuner values in a result.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 #[non_exhaustive]
 pub struct TunerReport {
     /// Name.
@@ -179,8 +185,20 @@ pub struct TunerReport {
     pub active: bool,
 }
 
+/// Values of the tuners and the criteria at a point of a Pareto front.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[non_exhaustive]
+pub struct Design {
+    /// Values of all tuners, by name.
+    #[schemars(with = "BTreeMap<String, f64>")]
+    pub tuners: Map<String, Value>,
+    /// Values of all criteria, by `case/criterion`.
+    #[schemars(with = "BTreeMap<String, f64>")]
+    pub criteria: Map<String, Value>,
+}
+
 /// Criterion values in a result, for one case.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 #[non_exhaustive]
 pub struct CriterionReport {
     /// Name.
@@ -223,7 +241,7 @@ pub struct CriterionReport {
 }
 
 /// Result at the initial guess.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 #[non_exhaustive]
 pub struct StartReport {
     /// True if all constraints are satisfied.
@@ -237,7 +255,7 @@ pub struct StartReport {
 }
 
 /// Results of a calibration in addition to the tuners.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 #[non_exhaustive]
 pub struct CalibrationReport {
     /// Estimates and their uncertainty.
@@ -252,7 +270,7 @@ pub struct CalibrationReport {
 }
 
 /// An estimated parameter.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 #[non_exhaustive]
 pub struct ParameterReport {
     /// Name.
@@ -269,7 +287,7 @@ pub struct ParameterReport {
 }
 
 /// Fit of an experiment.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 #[non_exhaustive]
 pub struct ExperimentReport {
     /// Name.
@@ -281,7 +299,7 @@ pub struct ExperimentReport {
 }
 
 /// Fit of a channel.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 #[non_exhaustive]
 pub struct ChannelReport {
     /// Name of the measured signal.
@@ -300,7 +318,7 @@ pub struct ChannelReport {
 }
 
 /// Failed simulations of one kind.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 #[non_exhaustive]
 pub struct FailureReport {
     /// Name of the model.
@@ -370,14 +388,26 @@ pub(crate) fn worst_scaled(study: &Study, at: &Evaluation) -> f64 {
 }
 
 /// Returns the tuners and criteria at a point of a Pareto front.
-pub(crate) fn front_point(study: &Study, at: &Evaluation) -> Value {
-    let tuners: Map<String, Value> =
-        study.tuners.iter().zip(&at.tuners).map(|(t, &v)| (t.name.clone(), json!(v))).collect();
-    let criteria: Map<String, Value> = study
-        .rows
-        .iter()
-        .zip(&at.readings)
-        .map(|(row, reading)| (study.key(row), json!(reading.map(|r| r.value))))
-        .collect();
-    json!({ "tuners": tuners, "criteria": criteria })
+pub(crate) fn design(study: &Study, at: &Evaluation) -> Design {
+    let value = |reading: &Option<crate::evaluation::Reading>| json!(reading.map(|r| r.value));
+    Design {
+        tuners: study.tuners.iter().zip(&at.tuners).map(|(t, &v)| (t.name.clone(), json!(v))).collect(),
+        criteria: study.rows.iter().zip(&at.readings).map(|(row, reading)| (study.key(row), value(reading))).collect(),
+    }
+}
+
+/// Returns the JSON schema of `result.json`.
+pub fn result_schema() -> Value {
+    let mut settings = SchemaSettings::draft07().for_serialize();
+    settings.transforms.push(Box::new(RecursiveTransform(numbers_may_be_null)));
+    let mut schema = settings.into_generator().into_root_schema_for::<Outcome>().to_value();
+    schema["title"] = json!("mops result");
+    schema
+}
+
+/// Allows null for every number, the form of a non-finite one.
+fn numbers_may_be_null(schema: &mut Schema) {
+    if schema.get("type").is_some_and(|of| of == "number") {
+        schema.insert("type".to_owned(), json!(["number", "null"]));
+    }
 }

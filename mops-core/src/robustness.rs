@@ -1,5 +1,6 @@
 //! Results with uncertain parameters in `result.json`: worst cases, distributions, effects.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::criterion::Usage;
@@ -7,7 +8,7 @@ use crate::statistics::Sampling;
 use crate::study::{Distribution, Row, Study};
 
 /// Uncertain parameter in a result.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct UncertainReport {
     /// Name of the parameter.
     pub name: String,
@@ -22,7 +23,7 @@ pub struct UncertainReport {
 }
 
 /// Criterion that a result refers to.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Subject {
     /// Name of the criterion.
     pub criterion: String,
@@ -41,7 +42,7 @@ pub struct Subject {
 }
 
 /// Worst cases over a box.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct WorstCaseReport {
     /// Findings in sentences; names are between backticks.
     pub words: Vec<String>,
@@ -56,7 +57,7 @@ pub struct WorstCaseReport {
 }
 
 /// Worst case found for a criterion.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct WorstReport {
     /// Criterion of the worst case.
     #[serde(flatten)]
@@ -86,7 +87,7 @@ pub struct WorstReport {
 }
 
 /// Failed simulation.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct FailedAt {
     /// Reason for the failure.
     pub why: String,
@@ -95,7 +96,7 @@ pub struct FailedAt {
 }
 
 /// Value of an uncertain parameter at a point.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct CoordinateReport {
     /// Name of the parameter.
     pub name: String,
@@ -108,7 +109,7 @@ pub struct CoordinateReport {
 }
 
 /// Criterion along one parameter, with the others fixed.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Slice {
     /// Name of the parameter.
     pub parameter: String,
@@ -121,7 +122,7 @@ pub struct Slice {
 }
 
 /// Distributions of criteria for uncertain parameters.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct MonteCarloReport {
     /// Findings in sentences; names are between backticks.
     pub words: Vec<String>,
@@ -145,7 +146,7 @@ pub struct MonteCarloReport {
 }
 
 /// Distribution of a criterion.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct DistributionReport {
     /// Criterion of the distribution.
     #[serde(flatten)]
@@ -167,7 +168,7 @@ pub struct DistributionReport {
 }
 
 /// Quantile with its distribution-free confidence interval.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct QuantileReport {
     /// Share of the values that do not exceed the quantile.
     pub share: f64,
@@ -178,7 +179,7 @@ pub struct QuantileReport {
 }
 
 /// Share of samples with its confidence interval (Clopper-Pearson).
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct ShareReport {
     /// Number of samples that count.
     pub count: usize,
@@ -191,7 +192,7 @@ pub struct ShareReport {
 }
 
 /// Robust design against worst cases.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct RobustReport {
     /// Findings in sentences; names are between backticks.
     pub words: Vec<String>,
@@ -212,7 +213,7 @@ pub struct RobustReport {
 }
 
 /// Round of a robust design.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct RoundReport {
     /// Number of cases of the design problem.
     pub cases: usize,
@@ -235,7 +236,7 @@ pub struct RoundReport {
 }
 
 /// Added case.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct AddedReport {
     /// Name of the case.
     pub name: String,
@@ -248,7 +249,7 @@ pub struct AddedReport {
 }
 
 /// Effects of the uncertain parameters over their whole ranges.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct GlobalSensitivityReport {
     /// Findings in sentences; names are between backticks.
     pub words: Vec<String>,
@@ -269,7 +270,7 @@ pub struct GlobalSensitivityReport {
 }
 
 /// Effects of the uncertain parameters on a criterion.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct EffectsReport {
     /// Criterion of the effects.
     #[serde(flatten)]
@@ -279,7 +280,7 @@ pub struct EffectsReport {
 }
 
 /// Effect of an uncertain parameter: `morris` sets the first three numbers, `sobol` the others.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct EffectReport {
     /// Name of the parameter.
     pub parameter: String,
@@ -302,7 +303,7 @@ pub struct EffectReport {
 }
 
 /// Estimate with its interval.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Estimated {
     /// Value of the estimate.
     pub value: f64,

@@ -1,5 +1,6 @@
 //! Derivatives of the criteria of a design with respect to its tuners, at the reported point.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::criterion::Usage;
@@ -7,7 +8,7 @@ use crate::problem::Problem;
 use crate::solver::Oracle;
 
 /// The block `slopes` of a result.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SlopesReport {
     /// Names of the tuners that the solver could change.
     pub tuners: Vec<String>,
@@ -16,7 +17,7 @@ pub struct SlopesReport {
 }
 
 /// Derivatives of a criterion in a case.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct CriterionSlopes {
     /// Key, `case/criterion`.
     pub key: String,

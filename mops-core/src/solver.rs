@@ -1,5 +1,6 @@
 //! Interface between problem and solver: problem dimensions and the oracle for evaluations.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cancellation::Halt;
@@ -112,7 +113,7 @@ pub trait Oracle {
 }
 
 /// Why a run stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Stop {
     /// Solver tolerance reached.

@@ -1,5 +1,6 @@
 //! Trade-offs along a Pareto front: prices of one criterion in units of another, knee and nearest point.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::criterion::Usage;
@@ -8,7 +9,7 @@ use crate::front;
 use crate::problem::Problem;
 
 /// Pareto optimality of a result: certified, not shown or refuted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pareto {
     /// Locally Pareto-optimal to first order: no direction improves one criterion without worsening another.
@@ -20,7 +21,7 @@ pub enum Pareto {
 }
 
 /// Block `trade_offs` of a result, in addition to its `front`; points have the same order.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct TradeOffs {
     /// Findings as sentences; names are in backticks.
     pub words: Vec<String>,
@@ -41,7 +42,7 @@ pub struct TradeOffs {
 }
 
 /// A criterion of a front.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct FrontCriterion {
     /// Key in the points of the front, `case/criterion`.
     pub key: String,
@@ -54,7 +55,7 @@ pub struct FrontCriterion {
 }
 
 /// Properties of a point of a front.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct FrontPoint {
     /// Largest weighted scaled value.
     pub worst_scaled: f64,
@@ -67,7 +68,7 @@ pub struct FrontPoint {
 }
 
 /// Trade-off between two neighbours of a front.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Exchange {
     /// Indices of the two points.
     pub between: [usize; 2],

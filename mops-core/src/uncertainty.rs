@@ -1,9 +1,10 @@
 //! Uncertainty of a calibration's estimates in `result.json`: profiles, bootstrap and prediction bands.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Profiles, bootstrap and bands of a calibration.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct UncertaintyReport {
     /// Findings in sentences; names are between backticks.
     pub words: Vec<String>,
@@ -21,7 +22,7 @@ pub struct UncertaintyReport {
 }
 
 /// Likelihood profile of an estimate: the sum of squares with this parameter fixed and all others re-estimated.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ProfileReport {
     /// Name of the parameter.
     pub parameter: String,
@@ -47,7 +48,7 @@ pub struct ProfileReport {
 }
 
 /// Estimates over bootstrap replicates.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct BootstrapReport {
     /// Number of replicates that were estimated.
     pub replicates: usize,
@@ -60,7 +61,7 @@ pub struct BootstrapReport {
 }
 
 /// Estimate over bootstrap replicates.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct BootstrapParameter {
     /// Name of the parameter.
     pub parameter: String,
@@ -80,7 +81,7 @@ pub struct BootstrapParameter {
 }
 
 /// Bands around the prediction of a measured channel, at some of its times.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct BandReport {
     /// Name of the experiment.
     pub experiment: String,

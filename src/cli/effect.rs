@@ -5,28 +5,33 @@ use mops_core::{Dimension, Effect, EffectParameter, PortKind, Scope};
 
 /// Formats the page of an effect: definition, formula, places, parameters and source.
 pub(super) fn page(effect: &dyn Effect) -> String {
-    let places: Vec<&str> = effect.ports().iter().copied().map(place).collect();
     let mut page = format!("{}\n\n{}\n\n    {}\n\n", effect.name(), effect.about(), effect.formula());
-    page += &format!("Class: {}. Acts at: {}", effect.class().name(), places.join("; "));
-    if let Some(companion) = effect.companion() {
-        page += &format!(". Second port: {}", place(companion));
+    for fact in facts(effect) {
+        page += &format!("{fact}.\n");
     }
-    page += ".\n";
+    page += "\nParameters:\n";
+    for parameter in effect.strengths() {
+        page += &format!("  {} ({})\n      {}\n", parameter.name, parameter_facts(parameter), parameter.about);
+    }
+    page + &format!("\nSource: {}.\n", effect.source())
+}
+
+/// Returns the class of an effect, its places, and its states.
+pub(super) fn facts(effect: &dyn Effect) -> Vec<String> {
+    let places: Vec<&str> = effect.ports().iter().copied().map(place).collect();
+    let second = effect.companion().map_or_else(String::new, |kind| format!(". Second port: {}", place(kind)));
+    let mut facts = vec![format!("Class: {}. Acts at: {}{second}", effect.class().name(), places.join("; "))];
     if let Some(wider) = effect.form_of() {
-        page += &format!("Special case of: {wider}.\n");
+        facts.push(format!("Special case of: {wider}"));
     }
     if effect.states() > 0 {
         let free = if effect.free_starts().is_empty() { "" } else { ", with a free initial state in each experiment" };
-        page += &format!("Additional states: {}{free}.\n", effect.states());
+        facts.push(format!("Additional states: {}{free}", effect.states()));
     }
     if effect.memory() > 0 && !effect.free_starts().is_empty() {
-        page += "Its initial output is free in each experiment.\n";
+        facts.push("Its initial output is free in each experiment".to_owned());
     }
-    page += "\nParameters:\n";
-    for strength in effect.strengths() {
-        page += &format!("  {} ({})\n      {}\n", strength.name, facts(strength), strength.about);
-    }
-    page + &format!("\nSource: {}.\n", effect.source())
+    facts
 }
 
 fn place(kind: PortKind) -> &'static str {
@@ -38,24 +43,25 @@ fn place(kind: PortKind) -> &'static str {
     }
 }
 
-fn facts(strength: &EffectParameter) -> String {
-    let mut facts = vec![unit(strength.dimension)];
-    match strength.bounds {
+/// Returns the unit, range and null value of a parameter.
+pub(super) fn parameter_facts(parameter: &EffectParameter) -> String {
+    let mut facts = vec![unit(parameter.dimension)];
+    match parameter.bounds {
         [low, high] if low.is_finite() && high.is_finite() => {
             facts.push(format!("from {} to {}", number(low), number(high)));
         }
         [low, _] if low.is_finite() => facts.push(format!("at least {}", number(low))),
         _ => facts.push("of either sign".into()),
     }
-    match strength.neutral {
+    match parameter.neutral {
         Some(neutral) if neutral.is_finite() => facts.push(format!("null value {}", number(neutral))),
         Some(_) => facts.push("null value infinity".into()),
         None => {}
     }
-    if strength.fixed {
+    if parameter.fixed {
         facts.push("fixed at its grid value".into());
     }
-    if strength.scope == Scope::Experiment {
+    if parameter.scope == Scope::Experiment {
         facts.push("one per experiment".into());
     }
     facts.join(", ")

@@ -2,6 +2,7 @@
 
 use mops_core::identification::{ExcitationReport, RegressionReport, SensitivityReport};
 use mops_core::{Outcome, Pareto, SweepReport, TradeOffs};
+use serde_json::{Map, Value};
 
 use super::robustness;
 use crate::numbers::significant;
@@ -46,10 +47,10 @@ fn front(outcome: &Outcome, found: &TradeOffs) -> String {
     header.extend(active.iter().map(|name| with_unit(name, units(name))));
     header.extend(["worst scaled", "pareto", ""].map(str::to_owned));
     let rows = outcome.front.iter().zip(&found.points).enumerate().map(|(i, (point, known))| {
-        let value = |group: &str, name: &str| point[group][name].as_f64().map_or_else(String::new, number);
+        let value = |of: &Map<String, Value>, name: &str| of[name].as_f64().map_or_else(String::new, number);
         let mut row = vec![(i + 1).to_string()];
-        row.extend(found.criteria.iter().map(|c| value("criteria", &c.key)));
-        row.extend(active.iter().map(|name| value("tuners", name)));
+        row.extend(found.criteria.iter().map(|c| value(&point.criteria, &c.key)));
+        row.extend(active.iter().map(|name| value(&point.tuners, name)));
         row.push(number(known.worst_scaled));
         row.push(match known.pareto {
             Pareto::CertifiedLocal => "yes, to first order".to_owned(),

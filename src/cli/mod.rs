@@ -18,6 +18,8 @@ mod pareto;
 mod past_run;
 mod pick;
 mod places;
+#[cfg(test)]
+mod reference;
 mod report;
 mod resume;
 mod robustness;
@@ -93,8 +95,8 @@ enum Command {
     Linearise(linearise::Arguments),
     /// Summarise a data file: columns, units, ranges, gaps, sample time, noise level.
     Data(data::Arguments),
-    /// Print the JSON schema of study files, for completion in an editor.
-    Schema,
+    /// Print the JSON schema of study files, for completion in an editor, or of result.json.
+    Schema(schema::Arguments),
     /// Print a completion script for a shell.
     Completions {
         /// Shell.
@@ -129,7 +131,7 @@ fn perform(catalogue: &Catalogue, command: Command) -> ExitCode {
         Command::Simulate(arguments) => simulate::simulate(catalogue, &arguments),
         Command::Linearise(arguments) => linearise::linearise(catalogue, &arguments),
         Command::Data(arguments) => data::data(&arguments),
-        Command::Schema => schema::schema(catalogue),
+        Command::Schema(arguments) => schema::schema(catalogue, &arguments),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "mops", &mut script);

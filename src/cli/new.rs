@@ -56,7 +56,7 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
             vec![("study.toml", TEMPLATE.replace("{name}", &called).into_bytes())]
         }
     };
-    let schema = ("study.schema.json", schema::text(catalogue).into_bytes());
+    let schema = ("study.schema.json", schema::text(schema::File::Study, catalogue).into_bytes());
     for (path, bytes) in files.into_iter().chain([schema]) {
         let path = folder.join(path);
         let parent = path.parent().expect("it lies in the folder");

@@ -1,16 +1,39 @@
-//! `mops schema`: prints the JSON schema of study files.
+//! `mops schema`: prints the JSON schema of study files or of results.
 
 use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
 
 use crate::terminal::{CommandError, print};
 use mops_core::Catalogue;
 
-/// Returns the schema as text.
-pub(super) fn text(catalogue: &Catalogue) -> String {
-    serde_json::to_string_pretty(&mops_core::file::study_schema(catalogue)).expect("a schema is JSON") + "\n"
+/// Arguments of `mops schema`.
+#[derive(Args)]
+pub(super) struct Arguments {
+    /// File whose schema is printed.
+    #[arg(value_enum, default_value = "study")]
+    of: File,
 }
 
-pub(super) fn schema(catalogue: &Catalogue) -> Result<ExitCode, CommandError> {
-    print(&text(catalogue))?;
+/// File with a schema.
+#[derive(Clone, Copy, ValueEnum)]
+pub(super) enum File {
+    /// Study file, with all kinds of models, criteria, solvers and effects.
+    Study,
+    /// result.json.
+    Result,
+}
+
+/// Returns the schema as text.
+pub(super) fn text(of: File, catalogue: &Catalogue) -> String {
+    let schema = match of {
+        File::Study => mops_core::file::study_schema(catalogue),
+        File::Result => mops_core::result_schema(),
+    };
+    serde_json::to_string_pretty(&schema).expect("a schema is JSON") + "\n"
+}
+
+pub(super) fn schema(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
+    print(&text(arguments.of, catalogue))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -34,6 +34,24 @@ fn the_block_has_the_documented_keys_and_values() {
 }
 
 #[test]
+fn the_block_agrees_with_the_schema_of_results() {
+    let mut schema = mops_core::result_schema();
+    // Without the rest of the result.
+    schema["required"] = json!([]);
+    let validator = jsonschema::validator_for(&schema).unwrap();
+    for diagnosis in [made_up::coulomb(), made_up::unexplained(), made_up::nothing()] {
+        let mut block = block(&diagnosis);
+        let wrong = |block: &Value| {
+            let result = json!({ "diagnosis": block });
+            validator.iter_errors(&result).map(|e| format!("{}: {e}", e.instance_path)).collect::<Vec<_>>()
+        };
+        assert_eq!(wrong(&block), [""; 0]);
+        block["verdict"] = json!("perhaps");
+        assert!(!wrong(&block).is_empty());
+    }
+}
+
+#[test]
 fn numbers_that_are_not_finite_are_null() {
     let mut diagnosis = made_up::coulomb();
     (diagnosis.p_value, diagnosis.after[0].normalised) = (f64::NAN, f64::INFINITY);

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use mops_core::math;
-use mops_core::{Budget, Certified, FrontPoint, Pareto, Problem, Quiet, Run, Study, TradeOffs, Watch};
+use mops_core::{Budget, Certified, Design, FrontPoint, Pareto, Problem, Quiet, Run, Study, TradeOffs, Watch};
 use mops_solvers::certificate;
 
 use crate::numbers::significant;
@@ -17,7 +17,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let quiet = Quiet(watch);
     let mut run = Run::new(problem, Budget { evaluations: usize::MAX }, &quiet);
     let concluding = problem.concluding();
-    let certified = |point: &serde_json::Value| {
+    let certified = |point: &Design| {
         let at = concluding.evaluate_at(&tuners(problem, point));
         let (pareto, weights) = match watch.wants_stop() {
             true => (Pareto::NotShown, None),
@@ -47,8 +47,8 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 }
 
 /// Returns the values of all tuners of a point in the result.
-fn tuners(problem: &Problem, point: &serde_json::Value) -> Vec<f64> {
-    let value = |tuner: &mops_core::Tuner| point["tuners"][&tuner.name].as_f64().expect("every tuner has a value");
+fn tuners(problem: &Problem, point: &Design) -> Vec<f64> {
+    let value = |tuner: &mops_core::Tuner| point.tuners[&tuner.name].as_f64().expect("every tuner has a value");
     problem.study().tuners().iter().map(value).collect()
 }
 

@@ -1,109 +1,296 @@
 //! Block `diagnosis` of `result.json`. Numbers are in the units of the study; non-finite numbers are null.
 
-use super::{Diagnosis, ExperimentError, Found, Noticeable, Ranked, StrengthValue};
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
-/// Returns the block of a diagnosis.
-fn block(diagnosis: &Diagnosis) -> Value {
-    let moved = diagnosis.parameters.iter().map(
-        |p| json!({ "name": p.name, "unit": p.unit, "before": p.before, "after": p.after, "std_error": p.std_error }),
-    );
-    let unexplained = diagnosis
-        .unexplained
-        .as_ref()
-        .map(|u| json!({ "place": u.place, "share": u.share, "over": u.over, "table": u.table }));
-    let evidence = diagnosis.evidence.iter().map(
-        |e| json!({ "place": e.place, "evidence": e.evidence, "share": e.share, "freedom": e.freedom, "unit": e.unit }),
-    );
-    let starts = diagnosis.starts.iter().map(
-        |(experiment, parameter, value)| json!({ "experiment": experiment, "parameter": parameter, "value": value }),
-    );
-    json!({
-        "verdict": diagnosis.verdict,
-        "probability": diagnosis.probability,
-        "p_value": diagnosis.p_value,
-        "found": diagnosis.found.iter().map(found).collect::<Value>(),
-        "removed": diagnosis.removed,
-        "steps": diagnosis.steps,
-        "ranked": diagnosis.ranked.iter().map(ranked).collect::<Value>(),
-        "unexplained": unexplained,
-        "next_experiment": diagnosis.next_experiment,
-        "before": errors(&diagnosis.before),
-        "after": errors(&diagnosis.after),
-        "noise": noise(diagnosis),
-        "parameters": moved.collect::<Value>(),
-        "starts": starts.collect::<Value>(),
-        "noticeable": diagnosis.noticeable.iter().map(noticeable).collect::<Value>(),
-        "evidence": evidence.collect::<Value>(),
-        "notes": diagnosis.notes,
-        "simulations": diagnosis.simulations,
-    })
+use super::{
+    Diagnosis, Evidence, ExperimentError, Found, HeldBack, Noticeable, ParameterMove, Ranked, Removed, Rival,
+    Stability, Step, StrengthValue, Unexplained, Verdict,
+};
+use crate::experiment::Role;
+
+/// Result of a diagnosis.
+#[derive(Serialize, JsonSchema)]
+#[schemars(rename = "Diagnosis")]
+pub(crate) struct Block {
+    /// Verdict on the model.
+    verdict: Verdict,
+    /// Probability of the verdict.
+    probability: f64,
+    /// p-value of the residual's structure without a missing effect, corrected for the search over the catalogue.
+    p_value: f64,
+    /// Effects added to the model.
+    found: Vec<FoundEffect>,
+    /// Terms of the nominal model that the data contradict.
+    removed: Vec<Removed>,
+    /// Models visited by the search, in order.
+    steps: Vec<Step>,
+    /// Candidate effects, best first.
+    ranked: Vec<Candidate>,
+    /// Residual that no effect explains; null if there is none.
+    unexplained: Option<Unexplained>,
+    /// Experiment that would distinguish the alternatives; null without alternatives.
+    next_experiment: Option<String>,
+    /// Errors of the nominal model, by experiment.
+    #[schemars(with = "BTreeMap<String, ModelError>")]
+    before: Map<String, Value>,
+    /// Errors of the augmented model, by experiment.
+    #[schemars(with = "BTreeMap<String, ModelError>")]
+    after: Map<String, Value>,
+    /// Standard deviation of the noise, by experiment and channel.
+    #[schemars(with = "BTreeMap<String, BTreeMap<String, f64>>")]
+    noise: Value,
+    /// Shifts of the parameters.
+    parameters: Vec<ParameterMove>,
+    /// Initial states of every experiment in the augmented model.
+    starts: Vec<InitialState>,
+    /// Detection limits, for the verdict `none`.
+    noticeable: Vec<DetectionLimit>,
+    /// Unknown inputs that would explain the residual, best place first.
+    evidence: Vec<PlaceEvidence>,
+    /// Remarks on data and fit.
+    notes: Vec<String>,
+    /// Number of simulations.
+    simulations: usize,
 }
 
-fn found(found: &Found) -> Value {
-    let mut value = json!({
-        "effect": found.effect,
-        "place": found.place,
-        "name": found.name,
-        "class": found.class,
-        "formula": found.formula,
-        "strengths": strengths(&found.strengths),
-        "details": found.strengths,
-        "probability": found.probability,
-        "bic_gain": found.bic_gain,
-        "indistinguishable": found.indistinguishable,
-        "stability": found.stability,
-        "held_back": found.held_back,
-    });
-    if let Some(companion) = &found.companion {
-        value["companion"] = json!(companion);
+/// Effect added to the model.
+#[derive(Serialize, JsonSchema)]
+struct FoundEffect {
+    /// The effect.
+    effect: String,
+    /// The place, as `kind:name`.
+    place: String,
+    /// Name in the augmented model, such as `phi-coulomb-friction`; its parameters are called `name.parameter`.
+    name: String,
+    /// Class, such as `dissipative`.
+    class: String,
+    /// Formula, for readers.
+    formula: String,
+    /// Estimates of its parameters, by name.
+    #[schemars(with = "BTreeMap<String, f64>")]
+    strengths: Map<String, Value>,
+    /// Estimates of its parameters, with their errors.
+    details: Vec<StrengthValue>,
+    /// Probability that this effect, rather than another, is missing.
+    probability: f64,
+    /// Decrease of the BIC when the effect is added.
+    bic_gain: f64,
+    /// Alternatives at the same place whose BIC is at most 6 higher.
+    indistinguishable: Vec<Rival>,
+    /// Stability of the choice when the data change; null without an alternative.
+    stability: Option<Stability>,
+    /// Errors on held-out data with and without the effect, initial states fitted. Empty for a single effect, whose errors before
+    /// and after show the same, and if the model without the effect cannot be simulated over whole records.
+    held_back: Vec<HeldBack>,
+    /// Second place, as `kind:name`, of an effect that needs one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    companion: Option<String>,
+    /// The only experiment in which the effect acts, for an effect that happens once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    experiment: Option<String>,
+}
+
+/// Candidate effect, fitted together with the effects already accepted.
+#[derive(Serialize, JsonSchema)]
+struct Candidate {
+    /// The effect.
+    effect: String,
+    /// The place, as `kind:name`.
+    place: String,
+    /// Class.
+    class: String,
+    /// Probability.
+    probability: f64,
+    /// Decrease of the BIC when the effect is added.
+    bic_gain: f64,
+    /// Estimates of its parameters, by name.
+    #[schemars(with = "BTreeMap<String, f64>")]
+    strengths: Map<String, Value>,
+    /// Share of the effect's output signature that parameters and initial states absorb.
+    absorbed: f64,
+    /// Error with the effect on calibration and selection data, in units of the noise.
+    normalised: f64,
+}
+
+/// Error of a model on an experiment.
+#[derive(Serialize, JsonSchema)]
+struct ModelError {
+    /// Role of the experiment.
+    role: Role,
+    /// Root mean square error, by channel, in the unit of the channel.
+    #[schemars(with = "BTreeMap<String, f64>")]
+    channels: Map<String, Value>,
+    /// Root mean square error over all channels and samples, in units of the noise; 1 is the noise level.
+    normalised: f64,
+    /// Errors in windows of a few periods; absent if the record is too short for two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    windows: Option<WindowError>,
+}
+
+/// Error over windows of a record, each with its own initial states and the parameters fixed.
+#[derive(Serialize, JsonSchema)]
+struct WindowError {
+    /// Number of windows.
+    count: usize,
+    /// Length of a window, s.
+    length: f64,
+    /// Root mean square error, by channel, in the unit of the channel.
+    #[schemars(with = "BTreeMap<String, f64>")]
+    channels: Map<String, Value>,
+    /// Root mean square error over all channels and samples, in units of the noise.
+    normalised: f64,
+}
+
+/// Initial state of an experiment in the augmented model.
+#[derive(Serialize, JsonSchema)]
+struct InitialState {
+    /// Experiment.
+    experiment: String,
+    /// Parameter that is the initial state.
+    parameter: String,
+    /// Its value.
+    value: f64,
+}
+
+/// Detection limit: the smallest parameter of an effect that would have been detected.
+#[derive(Serialize, JsonSchema)]
+struct DetectionLimit {
+    /// The effect.
+    effect: String,
+    /// The place, as `kind:name`.
+    place: String,
+    /// Name of the parameter.
+    strength: String,
+    /// Its value at the detection limit.
+    value: f64,
+    /// Unit of the value.
+    unit: String,
+}
+
+/// Unknown input at a place that would explain the residual of the nominal model.
+#[derive(Serialize, JsonSchema)]
+struct PlaceEvidence {
+    /// The place, as `kind:name`.
+    place: String,
+    /// Log ratio of the marginal likelihoods with and without the unknown input.
+    evidence: f64,
+    /// Share of the residual above the noise that the unknown input explains.
+    share: f64,
+    /// Effective degrees of freedom of the unknown input.
+    freedom: f64,
+    /// Unit of the signal; empty if the model's equations do not determine it.
+    unit: String,
+}
+
+impl Block {
+    fn of(diagnosis: &Diagnosis) -> Self {
+        let Diagnosis { found, ranked, before, after, starts, noticeable, evidence, .. } = diagnosis;
+        let start = |(experiment, parameter, value): &(String, String, f64)| InitialState {
+            experiment: experiment.clone(),
+            parameter: parameter.clone(),
+            value: *value,
+        };
+        Self {
+            verdict: diagnosis.verdict,
+            probability: diagnosis.probability,
+            p_value: diagnosis.p_value,
+            found: found.iter().map(FoundEffect::of).collect(),
+            removed: diagnosis.removed.clone(),
+            steps: diagnosis.steps.clone(),
+            ranked: ranked.iter().map(Candidate::of).collect(),
+            unexplained: diagnosis.unexplained.clone(),
+            next_experiment: diagnosis.next_experiment.clone(),
+            before: errors(before),
+            after: errors(after),
+            noise: noise(diagnosis),
+            parameters: diagnosis.parameters.clone(),
+            starts: starts.iter().map(start).collect(),
+            noticeable: noticeable.iter().map(DetectionLimit::of).collect(),
+            evidence: evidence.iter().map(PlaceEvidence::of).collect(),
+            notes: diagnosis.notes.clone(),
+            simulations: diagnosis.simulations,
+        }
     }
-    if let Some(only) = &found.only {
-        value["experiment"] = json!(only);
+}
+
+impl FoundEffect {
+    fn of(found: &Found) -> Self {
+        Self {
+            effect: found.effect.clone(),
+            place: found.place.clone(),
+            name: found.name.clone(),
+            class: found.class.clone(),
+            formula: found.formula.clone(),
+            strengths: strengths(&found.strengths),
+            details: found.strengths.clone(),
+            probability: found.probability,
+            bic_gain: found.bic_gain,
+            indistinguishable: found.indistinguishable.clone(),
+            stability: found.stability.clone(),
+            held_back: found.held_back.clone(),
+            companion: found.companion.clone(),
+            experiment: found.only.clone(),
+        }
     }
-    value
 }
 
-fn ranked(ranked: &Ranked) -> Value {
-    json!({
-        "effect": ranked.effect,
-        "place": ranked.place,
-        "class": ranked.class,
-        "probability": ranked.probability,
-        "bic_gain": ranked.bic_gain,
-        "strengths": strengths(&ranked.strengths),
-        "absorbed": ranked.absorbed,
-        "normalised": ranked.normalised,
-    })
+impl Candidate {
+    fn of(ranked: &Ranked) -> Self {
+        Self {
+            effect: ranked.effect.clone(),
+            place: ranked.place.clone(),
+            class: ranked.class.clone(),
+            probability: ranked.probability,
+            bic_gain: ranked.bic_gain,
+            strengths: strengths(&ranked.strengths),
+            absorbed: ranked.absorbed,
+            normalised: ranked.normalised,
+        }
+    }
 }
 
-fn noticeable(noticeable: &Noticeable) -> Value {
-    let StrengthValue { name, value, unit, .. } = &noticeable.strength;
-    json!({ "effect": noticeable.effect, "place": noticeable.place, "strength": name, "value": value, "unit": unit })
+impl DetectionLimit {
+    fn of(noticeable: &Noticeable) -> Self {
+        let StrengthValue { name, value, unit, .. } = noticeable.strength.clone();
+        Self { effect: noticeable.effect.clone(), place: noticeable.place.clone(), strength: name, value, unit }
+    }
+}
+
+impl PlaceEvidence {
+    fn of(evidence: &Evidence) -> Self {
+        let Evidence { place, unit, evidence, share, freedom, .. } = evidence;
+        let (evidence, share, freedom) = (*evidence, *share, *freedom);
+        Self { place: place.clone(), evidence, share, freedom, unit: unit.clone() }
+    }
 }
 
 /// Returns the values of an effect's parameters by name.
-fn strengths(strengths: &[StrengthValue]) -> Value {
-    strengths.iter().map(|s| (s.name.clone(), json!(s.value))).collect::<Map<_, _>>().into()
+fn strengths(strengths: &[StrengthValue]) -> Map<String, Value> {
+    strengths.iter().map(|s| (s.name.clone(), json!(s.value))).collect()
 }
 
 /// Returns the errors by experiment, and by channel within each.
-fn errors(errors: &[ExperimentError]) -> Value {
-    let by_channel = |channels: &[(String, f64)]| -> Map<String, Value> {
-        channels.iter().map(|(name, rms)| (name.clone(), json!(rms))).collect()
-    };
+fn errors(errors: &[ExperimentError]) -> Map<String, Value> {
     let error = |error: &ExperimentError| {
+        let windows = error.in_windows.as_ref().map(|w| WindowError {
+            count: w.count,
+            length: w.length,
+            channels: by_channel(&w.channels),
+            normalised: w.normalised,
+        });
         let channels = by_channel(&error.channels);
-        let mut value = json!({ "role": error.role, "channels": channels, "normalised": error.normalised });
-        if let Some(w) = &error.in_windows {
-            let channels = by_channel(&w.channels);
-            value["windows"] =
-                json!({ "count": w.count, "length": w.length, "channels": channels, "normalised": w.normalised });
-        }
-        (error.name.clone(), value)
+        let value = ModelError { role: error.role, channels, normalised: error.normalised, windows };
+        (error.name.clone(), serde_json::to_value(value).expect("errors are JSON"))
     };
-    errors.iter().map(error).collect::<Map<_, _>>().into()
+    errors.iter().map(error).collect()
+}
+
+fn by_channel(channels: &[(String, f64)]) -> Map<String, Value> {
+    channels.iter().map(|(name, rms)| (name.clone(), json!(rms))).collect()
 }
 
 /// Returns the standard deviation of the noise by experiment, and by channel within each.
@@ -117,5 +304,5 @@ fn noise(diagnosis: &Diagnosis) -> Value {
 
 /// Serialises the block of `result.json`; the derived form of [`Diagnosis`] has more, and is read back.
 pub(crate) fn serialize<S: Serializer>(diagnosis: &Option<Diagnosis>, serializer: S) -> Result<S::Ok, S::Error> {
-    diagnosis.as_ref().map(block).serialize(serializer)
+    diagnosis.as_ref().map(Block::of).serialize(serializer)
 }

@@ -3,14 +3,15 @@
 mod block;
 
 use mops_math as math;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use block::serialize;
+pub(crate) use block::{Block, serialize};
 
 use crate::experiment::Role;
 
 /// Verdict on the model.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// The model lacks effects of the catalogue, which were found.
@@ -23,7 +24,7 @@ pub enum Verdict {
 }
 
 /// Estimate of a parameter of an effect.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StrengthValue {
     /// Name, such as `torque`.
     pub name: String,
@@ -31,7 +32,7 @@ pub struct StrengthValue {
     pub value: f64,
     /// Unit; empty if the model's equations do not determine it.
     pub unit: String,
-    /// Standard error, without the selection of the effect; `None` if the data do not determine it.
+    /// Standard error, without the selection of the effect; null if the data do not determine it.
     pub std_error: Option<f64>,
     /// 95 % confidence interval. For a discrete shape parameter: the range of the values that the data allow, if there are
     /// several.
@@ -39,7 +40,7 @@ pub struct StrengthValue {
 }
 
 /// Alternative effect that explains the data about as well, or better.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Rival {
     /// Effect.
     pub effect: String,
@@ -80,7 +81,7 @@ pub struct Found {
     pub bic_gain: f64,
     /// Alternatives at the same place whose BIC is at most 6 higher.
     pub indistinguishable: Vec<Rival>,
-    /// Stability of the choice when the data change; `None` without an alternative.
+    /// Stability of the choice when the data change; null without an alternative.
     pub stability: Option<Stability>,
     /// Errors on held-out data with and without the effect, initial states fitted. Empty for a single effect, whose errors before
     /// and after show the same, and if the model without the effect cannot be simulated over whole records.
@@ -88,7 +89,7 @@ pub struct Found {
 }
 
 /// Error on held-out data with and without an effect, all other parameters fitted to calibration data.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldBack {
     /// Role of the data: selection or validation.
     pub role: Role,
@@ -99,7 +100,7 @@ pub struct HeldBack {
 }
 
 /// Stability of the choice of an effect when the data change.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Stability {
     /// Share of resampled data sets (blocks of the data) in which the same effect is best.
     ///
@@ -112,7 +113,7 @@ pub struct Stability {
 }
 
 /// Experiment on which the choice of an effect depends.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HangsOn {
     /// The experiment.
     pub experiment: String,
@@ -123,7 +124,7 @@ pub struct HangsOn {
 }
 
 /// Term of the nominal model that the data contradict.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Removed {
     /// Parameter of the term.
     pub term: String,
@@ -153,7 +154,7 @@ pub struct Ranked {
 }
 
 /// Residual that no effect explains.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unexplained {
     /// Most likely place, as `kind:name`.
     pub place: String,
@@ -176,7 +177,7 @@ pub struct ExperimentError {
     pub channels: Vec<(String, f64)>,
     /// Root mean square error over all channels and samples, in units of the noise; 1 is the noise level.
     pub normalised: f64,
-    /// Errors in windows of a few periods; `None` if the record is too short for two.
+    /// Errors in windows of a few periods; null if the record is too short for two.
     pub in_windows: Option<WindowErrors>,
 }
 
@@ -201,7 +202,7 @@ pub struct WindowErrors {
 }
 
 /// Shift of a parameter: the bias that the missing effect had caused.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ParameterMove {
     /// Tuner.
     pub name: String,
@@ -281,7 +282,7 @@ pub struct Evidence {
 }
 
 /// Change of one model of the search into the next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[non_exhaustive]
 pub enum Change {
     /// An effect was added.
@@ -319,7 +320,7 @@ impl Change {
 }
 
 /// Model visited by the search.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Step {
     /// Change from the model before.
     pub did: Change,

@@ -7,6 +7,7 @@ mod effects;
 mod entries;
 mod experiment;
 mod frequency;
+mod manual;
 mod parts;
 mod robustness;
 mod schema;
@@ -23,8 +24,9 @@ use std::sync::Arc;
 pub use built::built;
 pub use content::digest;
 pub use entries::{Entries, Short};
+pub use manual::{Entry, about, describe, entries};
 pub use parts::{case, criterion, experiment, model};
-pub use schema::{describe, study_schema, tables, tables_with};
+pub use schema::{study_schema, tables, tables_with};
 
 use crate::catalogue::{Catalogue, SolverChoice};
 use crate::catalogue_study::Shipped;

@@ -1,4 +1,4 @@
-//! JSON schema of study files, derived from the types that read them, and the manual pages derived from it.
+//! JSON schema of study files, derived from the types that read them.
 
 use std::sync::Arc;
 
@@ -174,94 +174,5 @@ fn has_key(schema: &Value, key: &str) -> bool {
         Some(Keys::Known(known)) => known.iter().any(|(name, below)| *name == key || has_key(below, key)),
         Some(Keys::Any(each)) => has_key(each, key),
         None => false,
-    }
-}
-
-/// Returns the manual page of a kind, from its schema: description and options.
-pub fn describe(name: &str, schema: &Schema) -> String {
-    let schema = schema.as_value();
-    let mut page = format!("{name}\n\n");
-    if let Some(about) = schema.get("description").and_then(Value::as_str) {
-        page += &without_fences(about);
-        page += "\n\n";
-    }
-    page += "Options:\n";
-    let count = options(&mut page, schema, 1);
-    if count == 0 {
-        page += "  none\n";
-    }
-    page
-}
-
-/// Indents the fenced formulas of a documentation, for the terminal.
-fn without_fences(text: &str) -> String {
-    let mut inside = false;
-    let mut lines = Vec::new();
-    for line in text.lines() {
-        if line.trim_start().starts_with("```") {
-            inside = !inside;
-        } else {
-            lines.push(if inside { format!("    {line}") } else { line.to_owned() });
-        }
-    }
-    lines.join("\n")
-}
-
-fn options(page: &mut String, schema: &Value, depth: usize) -> usize {
-    let Some(Keys::Known(known)) = keys_of(schema) else { return 0 };
-    let required: Vec<&str> =
-        schema.get("required").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str).collect();
-    for (key, option) in &known {
-        let indent = "  ".repeat(depth);
-        let default = option.get("default").filter(|d| !d.is_null()).map(|d| format!(", default {d}"));
-        let need = if required.contains(&key.as_str()) { ", required".to_owned() } else { default.unwrap_or_default() };
-        // A count is obviously not negative.
-        let range = super::shape::range_in_words(option).filter(|range| range != "at least 0");
-        let range = range.map_or_else(String::new, |range| format!(", {range}"));
-        *page += &format!("{indent}{key} ({}{range}{need})\n", type_name(option));
-        let about = option.get("description").and_then(Value::as_str).unwrap_or_default();
-        for line in about.lines() {
-            *page += &format!("{indent}    {line}\n");
-        }
-        // A table with arbitrary names: the options under each name.
-        match keys_of(option) {
-            Some(Keys::Any(each)) if matches!(keys_of(each), Some(Keys::Known(_))) => {
-                *page += &format!("{indent}    NAME ({})\n", type_name(each));
-                options(page, each, depth + 4);
-            }
-            _ => {
-                options(page, option, depth + 2);
-            }
-        }
-    }
-    known.len()
-}
-
-fn type_name(schema: &Value) -> String {
-    if let Some(values) = schema.get("enum").and_then(Value::as_array) {
-        return values.iter().filter_map(Value::as_str).collect::<Vec<_>>().join(" | ");
-    }
-    if let Some(value) = schema.get("const").and_then(Value::as_str) {
-        return value.to_owned();
-    }
-    for choice in ["anyOf", "oneOf"] {
-        if let Some(alternatives) = schema.get(choice).and_then(Value::as_array) {
-            let mut names: Vec<String> = alternatives.iter().map(type_name).filter(|n| n != "null").collect();
-            names.dedup();
-            return names.join(" | ");
-        }
-    }
-    match schema.get("type") {
-        Some(Value::String(name)) if name == "array" => {
-            format!("list of {}", schema.get("items").map_or_else(|| "anything".into(), type_name))
-        }
-        Some(Value::String(name)) if name == "object" => "table".to_owned(),
-        Some(Value::String(name)) => name.clone(),
-        Some(Value::Array(names)) => {
-            let names: Vec<&str> = names.iter().filter_map(Value::as_str).filter(|n| *n != "null").collect();
-            // A quantity is a number, or a string with a unit.
-            if names == ["number", "string"] { "quantity".to_owned() } else { names.join(" | ") }
-        }
-        _ => "table".to_owned(),
     }
 }

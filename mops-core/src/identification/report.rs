@@ -1,9 +1,10 @@
 //! Identification results in `result.json`. Non-finite numbers are written as null.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Identifiability of the tuners at a point.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SensitivityReport {
     /// Findings in sentences; names are between backticks.
     pub words: Vec<String>,
@@ -34,7 +35,7 @@ pub struct SensitivityReport {
 }
 
 /// Eigenvalues and eigenvectors for relative changes of the tuners.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct RelativeReport {
     /// Scale of a relative change: the value, or the range of a tuner that is 0.
     pub scales: Vec<f64>,
@@ -45,7 +46,7 @@ pub struct RelativeReport {
 }
 
 /// Sensitivity and accuracy of one tuner.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct TunerSensitivity {
     /// Name of the tuner.
     pub name: String,
@@ -71,7 +72,7 @@ pub struct TunerSensitivity {
 }
 
 /// Direction that is not determined.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct DirectionReport {
     /// Clause that states what can be estimated, and what cannot.
     pub words: String,
@@ -82,7 +83,7 @@ pub struct DirectionReport {
 }
 
 /// Persistent excitation of an input.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ExcitationReport {
     /// Finding in a sentence or two.
     pub words: String,
@@ -119,7 +120,7 @@ pub struct ExcitationReport {
 }
 
 /// FIR or ARX model estimated by least squares.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct RegressionReport {
     /// Name of the model.
     pub name: String,

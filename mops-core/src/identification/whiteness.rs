@@ -1,5 +1,6 @@
 //! Whiteness test of residuals, an assumption of standard errors.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::words::{coefficient, percent};
@@ -9,11 +10,11 @@ use crate::math;
 const UNLIKELY: f64 = 0.01;
 
 /// Autocorrelation of residuals.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Whiteness {
     /// Lag-1 autocorrelation, between -1 and 1; 0 for white residuals.
     pub lag1: f64,
-    /// Ljung-Box statistic `Q = n (n + 2) sum_k r_k^2 / (n - k)` over the lags 1 to [`Whiteness::lags`].
+    /// Ljung-Box statistic `Q = n (n + 2) sum_k r_k^2 / (n - k)` over the lags 1 to `lags`.
     pub ljung_box: f64,
     /// Number of lags, in samples.
     pub lags: usize,
