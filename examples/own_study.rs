@@ -1,16 +1,16 @@
-//! Defines a study in Rust: a new model, a new criterion, the run and its result.
+//! A complete study in one file: a model with exact gradients, a criterion from a closure, the solution.
 //!
-//! A pothole gives a wheel suspension `m x'' = -k x - d x'` an initial speed of 1 m/s. Spring and damper are chosen for a short
+//! A pothole gives a wheel suspension `m x'' = -k x - d x'` an initial speed of 1 m/s. Spring and damper are tuned for a short
 //! settling time and a small acceleration of the load.
 
 use mops::criteria::settling_time::SettlingTime;
 use mops::models::kernel::{PlantModel, Simulated};
-use mops::{
-    Analysis, Case, Criterion, CriterionBuilder, CriterionSpec, Failure, Instant, Interface, Options, Parameter, Plant,
-    Scalar, Study, StudyBuilder, StudyError, TunerBuilder, Unit, Value, Variable,
-};
+use mops::prelude::*;
 
-/// Interface of the model: its signals and parameters.
+/// Mass, kg.
+const MASS: f64 = 250.0;
+
+/// Model of the suspension: its signals and parameters.
 struct Suspension(Interface);
 
 impl Suspension {
@@ -24,10 +24,7 @@ impl Suspension {
     }
 }
 
-/// Mass, kg.
-const MASS: f64 = 250.0;
-
-/// Plant, written once for values and derivatives.
+/// Equations at given parameters, written once for values and derivatives.
 struct Wheel<S> {
     k: S,
     d: S,
@@ -63,31 +60,6 @@ impl PlantModel for Suspension {
     }
 }
 
-/// Root mean square of the acceleration, m/s2.
-#[derive(Clone)]
-struct Shaking;
-
-impl CriterionSpec for Shaking {
-    fn bind(&self, _: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        Ok(Box::new(self.clone()))
-    }
-}
-
-impl Criterion for Shaking {
-    fn unit(&self) -> Unit {
-        Unit::known("m/s2")
-    }
-
-    fn signals(&self) -> Vec<String> {
-        vec!["a".into()]
-    }
-
-    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
-        let a = analysis.trace("a");
-        Ok((a.integral(|_, a| a * a) / (a.end() - a.start())).sqrt().into())
-    }
-}
-
 /// Builds the study.
 pub fn study() -> Result<Study, StudyError> {
     let settling = SettlingTime {
@@ -96,6 +68,11 @@ pub fn study() -> Result<Study, StudyError> {
         band: Some(1e-3.into()),
         ..SettlingTime::default()
     };
+    // Root mean square of the acceleration.
+    let shaking = mops::criteria::from_fn(["a"], Unit::known("m/s2"), |traces| {
+        let a = traces[0];
+        (a.integral(|_, a| a * a) / (a.end() - a.start())).sqrt()
+    });
     StudyBuilder {
         name: "suspension".into(),
         models: vec![("wheel".into(), Simulated::new(Suspension::new()).into())],
@@ -105,7 +82,7 @@ pub fn study() -> Result<Study, StudyError> {
         ],
         criteria: vec![
             ("settling".into(), CriterionBuilder::minimise(settling, 1.0)),
-            ("shaking".into(), CriterionBuilder::minimise(Shaking, 2.0)),
+            ("shaking".into(), CriterionBuilder::minimise(shaking, 2.0)),
         ],
         ..StudyBuilder::default()
     }
@@ -114,7 +91,7 @@ pub fn study() -> Result<Study, StudyError> {
 
 #[allow(dead_code)]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let outcome = mops::solve(study()?, &Options::default(), &())?.outcome;
+    let outcome = solve(study()?, &Options::default(), &())?.outcome;
     for tuner in &outcome.tuners {
         println!("{} = {:.1} {}", tuner.name, tuner.value, tuner.unit);
     }

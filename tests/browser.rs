@@ -1,5 +1,5 @@
-//! Reports in a browser: what is chosen in one place of a front is chosen in all, a box turns, tables sort; by pointer and by
-//! keys, and without a word on the console.
+//! Reports in a browser: linked selection of front points, rotation, sorting of tables, by pointer and by keyboard, without
+//! errors on the console.
 
 #[path = "common/headless.rs"]
 mod headless;
@@ -9,7 +9,7 @@ use std::path::Path;
 use assert_cmd::cargo::cargo_bin_cmd;
 use serde_json::Value;
 
-/// What the page answers to the script, which ends with `tell(...)`.
+/// Runs a script, which ends with `tell(...)`, in the page; returns its answer.
 fn answer(browser: &Path, folder: &Path, page: &str, script: &str) -> Value {
     let tell = "const tell = (value) => { const pre = document.createElement('pre'); pre.id = 'told'; \
                 pre.textContent = JSON.stringify(value); document.body.append(pre); };";
@@ -72,7 +72,7 @@ tell(told);
 "#;
 
 #[test]
-fn what_is_chosen_in_one_picture_is_chosen_in_all_and_in_the_table() {
+fn a_point_selected_in_one_plot_is_selected_in_all_plots_and_in_the_table() {
     let Some(browser) = headless::browser() else {
         eprintln!("{}", headless::SKIPPED);
         return;
@@ -91,17 +91,17 @@ fn what_is_chosen_in_one_picture_is_chosen_in_all_and_in_the_table() {
     assert!(told["responses"].as_u64() >= told["rows"].as_u64(), "{told}");
     let everywhere = |point: &str| serde_json::json!({ "points": [point], "pictures": pictures, "rows": 1 });
     let nowhere = serde_json::json!({ "points": [], "pictures": 0, "rows": 0 });
-    assert_eq!(told["keys"], everywhere("1"), "two steps to the right lead to the second row");
+    assert_eq!(told["keys"], everywhere("1"), "two steps to the right select the second row");
     assert_eq!(told["escaped"], nowhere);
     assert_eq!(told["hovered"], everywhere("3"));
-    assert_eq!(told["left"], nowhere, "what is hovered over is not kept");
-    assert_eq!(told["clicked"], everywhere("1"), "what is clicked is kept");
+    assert_eq!(told["left"], nowhere, "hovering selects only temporarily");
+    assert_eq!(told["clicked"], everywhere("1"), "a click selects permanently");
     let numbers = |key: &str| told[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect::<Vec<_>>();
     assert!(numbers("ascending").is_sorted(), "{told}");
     assert!(numbers("descending").iter().rev().is_sorted(), "{told}");
     assert_eq!(told["sort"], "descending");
-    assert_eq!(told["still"], everywhere("1"), "sorting keeps the choice");
-    assert_eq!(told["line"], everywhere("2"), "a line is chosen by touching it");
+    assert_eq!(told["still"], everywhere("1"), "sorting keeps the selection");
+    assert_eq!(told["line"], everywhere("2"), "touching a line selects it");
     assert_eq!(told["problems"], serde_json::json!([]));
 }
 
@@ -129,7 +129,7 @@ told.dragged = { moved: place(0)[0] !== before[0], kept: document.querySelectorA
 key(svg, "Escape", false);
 key(svg, "ArrowRight", false);
 told.stepped = { chosen: chosen(), dots: svg.querySelectorAll("g.dot.chosen").length > 0 };
-// Another table of the page, by keys alone: its heads are buttons.
+// Another table of the page, by keyboard alone: its headers are buttons.
 const criteria = [...document.querySelectorAll("table")].find((table) => table.tHead.textContent.startsWith("criterion"));
 const names = () => [...criteria.tBodies[0].rows].map((row) => row.cells[0].textContent);
 const head = criteria.querySelector("thead button");
@@ -142,7 +142,7 @@ tell(told);
 "#;
 
 #[test]
-fn the_box_of_three_criteria_turns_by_keys_and_by_dragging_and_other_tables_sort_too() {
+fn a_three_dimensional_front_rotates_by_keys_and_by_dragging_and_other_tables_sort_too() {
     let Some(browser) = headless::browser() else {
         eprintln!("{}", headless::SKIPPED);
         return;
@@ -155,13 +155,13 @@ fn the_box_of_three_criteria_turns_by_keys_and_by_dragging_and_other_tables_sort
     run.args(["--out", out.to_str().unwrap()]).assert().success();
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     let told = answer(&browser, folder.path(), &page, TURNED);
-    // A dot for every point, and one of another colour on the point nearest to the demands.
+    // One dot per point, and one of another colour on the point nearest to the demands.
     assert!(told["rows"].as_u64().unwrap() >= 3 && told["dots"].as_u64() > told["rows"].as_u64(), "{told}");
     assert_eq!(told["turned"]["moved"], true, "{told}");
-    assert!(told["turned"]["shapes"].as_u64().unwrap() > 20, "edges, numbers and names turn as well: {told}");
-    assert_eq!(told["turned"]["chosen"], serde_json::json!([]), "turning chooses nothing");
+    assert!(told["turned"]["shapes"].as_u64().unwrap() > 20, "edges, numbers and names rotate as well: {told}");
+    assert_eq!(told["turned"]["chosen"], serde_json::json!([]), "rotation selects nothing");
     assert!(told["back"].as_f64().unwrap() < 0.15, "{told}");
-    assert_eq!(told["dragged"], serde_json::json!({ "moved": true, "kept": 0 }), "the end of a drag is no click");
+    assert_eq!(told["dragged"], serde_json::json!({ "moved": true, "kept": 0 }), "the end of a drag is not a click");
     assert_eq!(told["stepped"], serde_json::json!({ "chosen": ["0"], "dots": true }));
     assert_eq!(told["focused"], true);
     assert_eq!(told["names"], serde_json::json!(["error", "overshoot", "settling"]));

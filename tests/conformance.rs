@@ -1,4 +1,4 @@
-//! What every solver of the catalogue must do, whatever its method.
+//! Properties that every solver of the catalogue must have.
 
 #[path = "common/function.rs"]
 mod function;
@@ -14,12 +14,12 @@ use mops::{
 use function::{End, Function};
 use mops_core::math;
 
-/// A study of `f` over the box [-2, 2]^n, starting at 1.5, with a usage for every value.
+/// Study of `f` over the box [-2, 2]^n with the initial guess 1.5 and one usage per value.
 fn study(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> Study {
     study_of(Objective::Max, n, usages, f)
 }
 
-/// The same twice: for one number, and for a front. Solvers for fronts take the second alone.
+/// The problem with a scalar objective, and as a multi-objective one. Solvers for fronts accept only the second.
 fn problems(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> [Problem; 2] {
     [Objective::Max, Objective::Each].map(|objective| Problem::new(Arc::new(study_of(objective, n, usages, f))))
 }
@@ -44,7 +44,7 @@ fn study_of(objective: Objective, n: usize, usages: &[Usage], f: fn(&[f64]) -> O
     .unwrap()
 }
 
-/// A sum of squares with its residuals: the distance of `(x0, x1)` from the line of the data `2 t + 0.5`.
+/// Sum of squares with its residuals: line `x0 t + x1` against the data `2 t + 0.5`.
 #[derive(Clone)]
 struct Line;
 
@@ -71,7 +71,7 @@ impl Criterion for Line {
     }
 }
 
-/// A least-squares problem in two tuners, whose simulations fail where `f` says.
+/// Least-squares problem in two tuners; simulations fail where `f` has no value.
 fn line(f: fn(&[f64]) -> Option<Vec<f64>>) -> Problem {
     let study = StudyBuilder {
         name: "line".into(),
@@ -84,24 +84,24 @@ fn line(f: fn(&[f64]) -> Option<Vec<f64>>) -> Problem {
     Problem::new(Arc::new(study.build().unwrap()))
 }
 
-/// Every problem with every kind of solver that accepts it; those for fronts alone with the second.
+/// Pairs each problem with the solvers that accept it; solvers for fronts get the second problem only.
 fn both(problems: [Problem; 2]) -> Vec<(Arc<Problem>, SolverKind)> {
     let [one, front] = problems.map(Arc::new);
     let ordinary = solvers(&one);
     let mut for_fronts = solvers(&front);
     for_fronts.retain(|kind| kind.name == "auto" || ordinary.iter().all(|known| known.name != kind.name));
-    assert!(for_fronts.len() >= 3, "auto and two more look for fronts");
+    assert!(for_fronts.len() >= 3, "auto and two others compute fronts");
     let with = |problem: &Arc<Problem>, kinds: Vec<SolverKind>| -> Vec<(Arc<Problem>, SolverKind)> {
         kinds.into_iter().map(|kind| (Arc::clone(problem), kind)).collect()
     };
     [with(&one, ordinary), with(&front, for_fronts)].concat()
 }
 
-/// Every kind of solver that accepts the study.
+/// Returns every kind of solver that accepts the problem.
 fn solvers(problem: &Problem) -> Vec<SolverKind> {
     let mut kinds = mops::catalogue().solvers;
     kinds.retain(|kind| kind.default_choice().make().accepts(problem.shape()).is_ok());
-    assert!(kinds.len() >= 4, "most solvers take an ordinary problem");
+    assert!(kinds.len() >= 4, "most solvers accept an ordinary problem");
     kinds
 }
 
@@ -120,31 +120,31 @@ fn solve(problem: &Problem, kind: &SolverKind, evaluations: usize, watch: &dyn W
 
 const MINIMISE: &[Usage] = &[Usage::Minimise, Usage::Minimise];
 
-/// Two parabolas that meet at a kink: max is least at (0.5, 0), where it is 1.25.
+/// Two parabolas that meet at a kink: the minimum of their maximum is 1.25 at (0.5, 0).
 fn kink(x: &[f64]) -> Option<Vec<f64>> {
     let rest: f64 = x[1..].iter().map(|x| x * x).sum();
     Some(vec![math::powi(x[0], 2) + rest + 1.0, math::powi(x[0] - 1.0, 2) + rest + 1.0])
 }
 
-/// A smooth criterion that is least where [`kink`] is, and has the same value there.
+/// Smooth criterion with the minimum and the minimiser of [`kink`].
 fn bowl(x: &[f64]) -> Option<Vec<f64>> {
     let rest: f64 = x[1..].iter().map(|x| x * x).sum();
     Some(vec![math::powi(x[0] - 0.5, 2) + rest + 1.25])
 }
 
-/// One criterion alone, with every kind of solver that accepts it.
+/// Pairs a problem with one criterion with every solver that accepts it.
 fn alone(n: usize, f: fn(&[f64]) -> Option<Vec<f64>>) -> Vec<(Arc<Problem>, SolverKind)> {
     let problem = Arc::new(Problem::new(Arc::new(study(n, &[Usage::Minimise], f))));
     solvers(&problem).into_iter().map(|kind| (Arc::clone(&problem), kind)).collect()
 }
 
-/// Two criteria that meet at a kink, and one that is smooth; both are least at (0.5, 0), where they are 1.25.
+/// Problem with two criteria that meet at a kink, and one with a smooth criterion; both have the minimum 1.25 at (0.5, 0).
 fn ordinary(n: usize) -> Vec<(Arc<Problem>, SolverKind)> {
     [both(problems(n, MINIMISE, kink)), alone(n, bowl)].concat()
 }
 
 #[test]
-fn every_solver_keeps_its_budget_to_the_evaluation_and_stays_in_the_box() {
+fn no_solver_exceeds_its_budget_or_leaves_the_bounds() {
     for budget in [1, 2, 7, 50] {
         for (problem, kind) in ordinary(3) {
             let solved = solve(&problem, &kind, budget, &());
@@ -156,7 +156,7 @@ fn every_solver_keeps_its_budget_to_the_evaluation_and_stays_in_the_box() {
 }
 
 #[test]
-fn every_solver_comes_near_the_least_value_of_two_criteria_and_of_one() {
+fn every_solver_approaches_the_minimum_of_two_criteria_and_of_one() {
     for (problem, kind) in ordinary(2) {
         let found = solve(&problem, &kind, 5000, &()).best.merit.objective;
         assert!((1.25 - 1e-9..1.26).contains(&found), "{}: {found}", kind.name);
@@ -175,8 +175,8 @@ fn same_seed_same_bits_for_any_number_of_threads() {
 }
 
 #[test]
-fn a_problem_that_fails_in_half_the_box_is_still_optimised() {
-    // The start (1.5, ...) lies in the half that fails.
+fn a_problem_with_failures_in_half_of_the_box_is_still_optimised() {
+    // The initial guess (1.5, ...) is in the half that fails.
     let two = both(problems(2, MINIMISE, |x| if x[0] + x[1] > 0.9 { None } else { kink(x) }));
     let one = alone(2, |x| if x[0] + x[1] > 0.9 { None } else { bowl(x) });
     for (problem, kind) in [two, one].concat() {
@@ -187,7 +187,7 @@ fn a_problem_that_fails_in_half_the_box_is_still_optimised() {
 }
 
 #[test]
-fn a_problem_that_always_fails_ends_without_a_point_and_without_a_hang() {
+fn a_problem_that_always_fails_terminates_without_a_point() {
     for (problem, kind) in [both(problems(2, MINIMISE, |_| None)), alone(2, |_| None)].concat() {
         let solved = solve(&problem, &kind, 300, &());
         assert!(solved.best.scaled.is_none(), "{}", kind.name);
@@ -195,7 +195,7 @@ fn a_problem_that_always_fails_ends_without_a_point_and_without_a_hang() {
 }
 
 #[test]
-fn a_constant_objective_ends() {
+fn a_constant_objective_terminates() {
     let two = both(problems(2, MINIMISE, |_| Some(vec![1.0, 1.0])));
     for (problem, kind) in [two, alone(2, |_| Some(vec![1.0]))].concat() {
         assert_eq!(solve(&problem, &kind, 50_000, &()).best.merit.objective, 1.0, "{}", kind.name);
@@ -203,7 +203,7 @@ fn a_constant_objective_ends() {
 }
 
 #[test]
-fn one_tuner_is_enough() {
+fn every_solver_solves_a_problem_with_one_tuner() {
     for (problem, kind) in ordinary(1) {
         let found = solve(&problem, &kind, 5000, &()).best.merit.objective;
         assert!((found - 1.25).abs() < 1e-3, "{}: {found}", kind.name);
@@ -211,7 +211,7 @@ fn one_tuner_is_enough() {
 }
 
 #[test]
-fn no_active_tuner_leaves_the_start() {
+fn without_active_tuners_only_the_initial_guess_is_evaluated() {
     let fixed = [Objective::Max, Objective::Each].map(|objective| {
         let mut fixed = study_of(objective, 1, MINIMISE, kink);
         fixed.fix(0);
@@ -224,8 +224,8 @@ fn no_active_tuner_leaves_the_start() {
 }
 
 #[test]
-fn constraints_are_met_where_they_can_be() {
-    // Least |x|^2 with x0 >= 0.8, written as 1.8 - x0 <= 1.
+fn feasible_constraints_are_satisfied() {
+    // Minimum of |x|^2 with x0 >= 0.8, written as 1.8 - x0 <= 1.
     let usages = [Usage::Minimise, Usage::Inequality];
     let f = |x: &[f64]| Some(vec![x.iter().map(|x| x * x).sum(), 1.8 - x[0]]);
     for (problem, kind) in both(problems(2, &usages, f)) {
@@ -236,8 +236,8 @@ fn constraints_are_met_where_they_can_be() {
 }
 
 #[test]
-fn an_infeasible_problem_ends_at_a_small_violation() {
-    // x0 >= 1.5 and x0 <= 0.5: the least violation is 0.5, at 1.
+fn an_infeasible_problem_ends_near_the_smallest_violation() {
+    // x0 >= 1.5 and x0 <= 0.5: the smallest violation is 0.5, at x0 = 1.
     let usages = [Usage::Minimise, Usage::Inequality, Usage::Inequality];
     let f = |x: &[f64]| Some(vec![x[1] * x[1], 2.5 - x[0], 0.5 + x[0]]);
     for (problem, kind) in both(problems(2, &usages, f)) {
@@ -247,12 +247,13 @@ fn an_infeasible_problem_ends_at_a_small_violation() {
 }
 
 #[test]
-fn a_criterion_that_jumps_ends_near_its_least_value() {
+fn a_discontinuous_criterion_ends_near_its_minimum() {
     let f = |x: &[f64]| {
         let jump = if x[0] < 0.3 { 1.0 } else { 0.0 };
         Some(vec![x[0] * x[0] + x[1] * x[1] + jump, 0.0])
     };
-    // Alone, the same has a minimum of its own beyond the jump, in which a local solver may well end: here none is there.
+    // As a single criterion this function has a local minimum beyond the discontinuity, in which a local solver may end; here
+    // it has none.
     let leads_back = |x: &[f64]| Some(vec![x[1] * x[1] + if x[0] < 0.3 { 2.3 - x[0] } else { x[0] * x[0] }]);
     for (problem, kind) in [both(problems(2, MINIMISE, f)), alone(2, leads_back)].concat() {
         let found = solve(&problem, &kind, 5000, &()).best.merit.objective;
@@ -277,7 +278,7 @@ fn scales_of_1e_minus_12_and_1e12_are_no_obstacle() {
 }
 
 #[test]
-fn an_interrupt_ends_every_solver_with_the_best_so_far() {
+fn an_interrupted_solver_returns_the_best_point_so_far() {
     struct Impatient;
     impl Watch for Impatient {
         fn wants_stop(&self) -> bool {
@@ -312,7 +313,7 @@ fn every_kind_of_solver_takes_part() {
 }
 
 #[test]
-fn every_solver_fits_a_line_as_the_normal_equations_do() {
+fn every_solver_finds_the_least_squares_line_of_the_normal_equations() {
     let problem = line(|x| Some(x.to_vec()));
     // The normal equations of the 30 points, solved by hand.
     let points: Vec<(f64, f64)> = (0..30).map(|i| f64::from(i) / 10.0).map(|t| (t, 2.0 * t.min(1.5) + 0.5)).collect();
@@ -329,7 +330,7 @@ fn every_solver_fits_a_line_as_the_normal_equations_do() {
 }
 
 #[test]
-fn least_squares_keep_budget_box_and_bits_and_survive_failures() {
+fn least_squares_problems_respect_budget_and_bounds_reproduce_bits_and_survive_failures() {
     let problem = line(|x| if x[0] < -1.0 && x[1] < 0.0 { None } else { Some(x.to_vec()) });
     for kind in solvers(&problem) {
         for budget in [1, 3, 40] {
@@ -346,8 +347,8 @@ fn least_squares_keep_budget_box_and_bits_and_survive_failures() {
 }
 
 #[test]
-fn a_watched_criterion_without_a_value_takes_nothing_from_the_others() {
-    // The second value is NaN wherever x0 < 1: no value there, but it is only watched.
+fn a_monitored_criterion_without_a_value_does_not_affect_the_objective() {
+    // The second criterion, a monitor, has no value (NaN) for x0 < 1.
     let f = |x: &[f64]| Some(vec![x[0] * x[0], if x[0] < 1.0 { f64::NAN } else { 0.0 }]);
     let problem = Problem::new(Arc::new(study(1, &[Usage::Minimise, Usage::Monitor], f)));
     let evaluation = problem.evaluate(&[0.5]);
@@ -356,8 +357,8 @@ fn a_watched_criterion_without_a_value_takes_nothing_from_the_others() {
 }
 
 #[test]
-fn whole_numbers_and_few_of_them_end_at_the_best() {
-    // The least of (x - 1.3)^2 over -2, -1, 0, 1, 2 is at 1.
+fn an_integer_tuner_with_five_values_ends_at_the_best_without_repeated_evaluations() {
+    // The minimum of (x - 1.3)^2 over -2, -1, 0, 1, 2 is at 1.
     let whole = [Objective::Max, Objective::Each].map(|objective| {
         let whole = study_of(objective, 1, &[Usage::Minimise], |x| Some(vec![math::powi(x[0] - 1.3, 2)]));
         let mut parts = whole.into_parts();
@@ -373,7 +374,7 @@ fn whole_numbers_and_few_of_them_end_at_the_best() {
 }
 
 #[test]
-fn the_front_of_a_run_has_no_point_that_another_is_better_than() {
+fn the_front_of_a_run_has_no_dominated_point() {
     // Two parabolas along x0: the front is 0 <= x0 <= 1 with the rest 0; x0 >= 0.4 cuts off a part.
     let usages = [Usage::Minimise, Usage::Minimise, Usage::Inequality];
     let f = |x: &[f64]| kink(x).map(|f| vec![f[0], f[1], 1.4 - x[0]]);
@@ -391,6 +392,6 @@ fn the_front_of_a_run_has_no_point_that_another_is_better_than() {
         let off = |f: &&[f64]| f[1] - math::powi((f[0] - 1.0).max(0.0).sqrt() - 1.0, 2) - 1.0;
         let mean = front.iter().map(off).sum::<f64>() / front.len() as f64;
         assert!(mean < 0.01, "{}: {mean}", kind.name);
-        assert!(front.iter().all(|f| f[0] >= 1.16 - 1e-5), "{}: the constraint holds", kind.name);
+        assert!(front.iter().all(|f| f[0] >= 1.16 - 1e-5), "{}: the constraint is satisfied", kind.name);
     }
 }

@@ -1,4 +1,4 @@
-//! Bare numbers of channels, and settings of the command line that are no TOML.
+//! Numbers without units in channels, and settings of the command line that are not TOML.
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use mops_core::math;
@@ -22,7 +22,7 @@ const STUDY: &str = r#"
     th = { normalised-error = { signal = "th" } }
 "#;
 
-/// The result of a run with these settings, of a recording in degrees.
+/// Runs a calibration from a recording in degrees with these settings; returns the result.
 fn run(noise: &str, settings: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let row = |i: i32| {
@@ -42,17 +42,17 @@ fn run(noise: &str, settings: &[&str]) -> Value {
 }
 
 #[test]
-fn a_bare_noise_counts_in_the_unit_of_its_column() {
+fn a_noise_without_a_unit_is_in_the_unit_of_its_column() {
     let error = |noise: &str| run(noise, &[])["criteria"][0]["value"].as_f64().unwrap();
     let bare = error("noise = 0.2");
     assert!((bare - 1.0).abs() < 0.1, "{bare}");
     assert_eq!(bare, error("noise = \"0.2 deg\""));
-    // As `offset` does.
+    // The same holds for `offset`.
     assert_eq!(error("noise = 0.2, offset = 1"), error("noise = 0.2, offset = \"1 deg\""));
 }
 
 #[test]
-fn a_setting_that_is_no_toml_is_a_text() {
+fn a_setting_that_is_not_toml_is_a_string() {
     let sensitivity = run("noise = 0.2", &["study.task=sensitivity"]);
     assert_eq!(sensitivity["task"], "sensitivity");
     for (setting, start) in [
@@ -68,7 +68,7 @@ fn a_setting_that_is_no_toml_is_a_text() {
 }
 
 #[test]
-fn a_setting_that_is_wrong_in_any_reading_is_refused_with_its_place() {
+fn an_invalid_setting_is_refused_with_the_reason() {
     let refused = |setting: &str| {
         let output = cargo_bin_cmd!("mops").args(["check", "pid-design", "--set", setting]).output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{setting}");
@@ -86,7 +86,7 @@ fn a_setting_that_is_wrong_in_any_reading_is_refused_with_its_place() {
 }
 
 #[test]
-fn a_start_value_is_not_read_off_samples_that_come_later() {
+fn initial_states_are_not_taken_from_later_samples() {
     let text = |free: &str| {
         format!(
             "[study]\nname = 'late'\ntask = 'calibration'\n[models.m.equations]\nstates = {{ x = '1' }}\nparameters = {{ k = '1/s' }}\n\
@@ -118,9 +118,9 @@ fn a_start_value_is_not_read_off_samples_that_come_later() {
     assert!((tuner(0) - 2.0).abs() < 1e-4 && (tuner(1) - 0.5).abs() < 1e-3, "{json}");
 }
 
-/// Both the command for data and the check of a study name the source of a file that is not included.
+/// `mops data` and `mops check` both give the source of a file that is not included.
 #[test]
-fn a_missing_recording_of_others_has_its_source_and_its_digest() {
+fn the_message_on_a_missing_third_party_recording_gives_source_and_digest() {
     let study = "examples/recordings/furuta-lund.toml";
     for arguments in [["data", "examples/recordings/FurutaData.mat"], ["check", study]] {
         let done = cargo_bin_cmd!("mops").args(arguments).output().unwrap();

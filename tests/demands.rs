@@ -1,4 +1,4 @@
-//! Demands in the sense of their kinds: what is asked for is met, refused, or reported as missed.
+//! Demands follow the sense of their criterion: each is met, reported as missed, or refused.
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ const LOOP: &str = r#"
     [criteria]
 "#;
 
-/// `y = k exp(a t)/2`: nothing that settles at 1 where `a` is positive.
+/// `y = k exp(a t)/2`, which does not settle at 1 if `a` is positive.
 const GROWTH: &str = r#"
     [study]
     name = "growth"
@@ -49,12 +49,12 @@ fn run(text: &str) -> Value {
         .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
 }
 
-/// What `check` says of a study that it refuses.
+/// Returns the message of `mops check` for a study that it refuses.
 fn refusal(text: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let output = cargo_bin_cmd!("mops").args(["check", &write(folder.path(), text)]).output().unwrap();
     assert!(!output.status.success(), "{text}");
-    // Lines are broken where the terminal ends.
+    // Lines are wrapped at the width of the terminal.
     String::from_utf8(output.stderr).unwrap().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
@@ -63,8 +63,8 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn a_demand_on_a_kind_of_which_more_is_better_means_at_least() {
-    // Kind, demand, the same in the unit of the value.
+fn a_demand_on_a_criterion_to_be_maximised_means_at_least() {
+    // Criterion, demand, demand in the unit of the value.
     for (kind, demand, least) in [
         ("phase-margin", "45 deg", std::f64::consts::FRAC_PI_4),
         ("phase-margin", "70 deg", 70_f64.to_radians()),
@@ -74,7 +74,7 @@ fn a_demand_on_a_kind_of_which_more_is_better_means_at_least() {
     ] {
         let kind = if kind.contains('=') { kind.to_owned() } else { format!("{kind} = {{}}") };
         for usage in ["minimise", "inequality"] {
-            // Beside a constraint something else is minimised.
+            // A constraint needs another criterion to be minimised.
             let other = if usage == "inequality" { "s = { maximum-sensitivity = {}, demand = 2 }" } else { "" };
             let result = run(&format!("{LOOP} c = {{ {kind}, demand = '{demand}', usage = '{usage}' }}\n{other}"));
             let c = &result["criteria"][0];
@@ -87,7 +87,7 @@ fn a_demand_on_a_kind_of_which_more_is_better_means_at_least() {
 
 #[test]
 fn a_margin_below_its_demand_is_missed() {
-    // k is held at 5: phase margin 25.2 deg.
+    // k is fixed at 5: phase margin 25.2 deg.
     let text = LOOP.replace("start = 1.0, min = 0.05", "start = 5.0, min = 4.999");
     let result = run(&format!("{text} pm = {{ phase-margin = {{}}, demand = '60 deg' }}"));
     let pm = &result["criteria"][0];
@@ -95,7 +95,7 @@ fn a_margin_below_its_demand_is_missed() {
 }
 
 #[test]
-fn demands_against_the_sense_or_out_of_range_are_refused_with_the_right_lines() {
+fn demands_against_the_sense_or_out_of_range_are_refused_with_a_corrected_line() {
     let swapped = refusal(&format!("{LOOP} pm = {{ phase-margin = {{}}, good = '45 deg', bad = '90 deg' }}"));
     assert!(swapped.contains("more is better for this criterion"), "{swapped}");
     for kind in ["gain-margin", "delay-margin", "bandwidth", "damping-ratio"] {
@@ -127,14 +127,14 @@ fn a_target_is_met_as_an_equality() {
 }
 
 #[test]
-fn what_is_never_reached_meets_no_demand_whatever_the_horizon() {
+fn a_level_that_is_never_reached_meets_no_demand_for_any_horizon() {
     for horizon in [0.5_f64, 2.0, 5.0] {
         for demand in [1.0, 5.0, 50.0] {
             for (kind, usage) in
                 [("settling-time", "minimise"), ("rise-time", "inequality"), ("delay-time", "minimise")]
             {
                 let text = GROWTH.replace("HORIZON", &format!("{horizon} s"));
-                // Towards -1 from 0: the response goes the other way.
+                // From 0 towards -1: the response moves away from the target.
                 let options = "{ signal = 'y', target = -1, from = 0 }";
                 let result = run(&format!(
                     "{text} c = {{ {kind} = {options}, demand = '{demand} s', usage = '{usage}' }}\n\
@@ -150,8 +150,8 @@ fn what_is_never_reached_meets_no_demand_whatever_the_horizon() {
 }
 
 #[test]
-fn a_solver_leads_a_response_to_where_it_settles() {
-    // A lag that must be fast enough to be within 2 % after 5 s; at the start it is far from that.
+fn a_solver_finds_a_design_that_settles_from_one_that_does_not() {
+    // A lag that must be within 2 % after 5 s; the initial guess is far from that.
     let result = run("[study]\nname = 'lag'\n[models.m.equations]\nstates = { y = '1' }\nparameters = { a = '1/s' }\n\
          der = { y = 'a*(1 - y)' }\nhorizon = '5 s'\n[tuners]\na = { start = 0.01, min = 0.001, max = 10, scale = 'log' }\n\
          [criteria]\ns = { settling-time = { signal = 'y', target = 1 }, demand = '2 s' }\n\
@@ -161,7 +161,7 @@ fn a_solver_leads_a_response_to_where_it_settles() {
 }
 
 #[test]
-fn what_may_be_meant_either_way_and_what_an_unstable_system_meets_is_refused() {
+fn ambiguous_demands_and_criteria_of_unstable_systems_are_refused() {
     for (criterion, fact) in [
         ("c = { phase-margin = {}, demand = '60 %' }", "expected an angle, found a share in %"),
         ("c = { damping-ratio = {}, demand = '45 deg' }", "expected a pure number, found an angle in deg"),
@@ -183,11 +183,11 @@ fn what_may_be_meant_either_way_and_what_an_unstable_system_meets_is_refused() {
         let message = refusal(&format!("{growth}{criterion}"));
         assert!(message.contains(fact), "{criterion}: {message}");
     }
-    // What grows without end settles nowhere, at its own last value neither.
+    // An unbounded response does not settle, not even at its own final value.
     let result = run(&format!("{growth}c = {{ settling-time = {{ signal = 'y' }}, demand = '10 s' }}"));
     let criterion = &result["criteria"][0];
     assert!(criterion["value"].is_null() && criterion["met"] == false, "{criterion}");
-    // An equality asks for the value, not for at least as much.
+    // An equality requires the value itself, not at least the value.
     let equal = run(&format!("{LOOP}c = {{ phase-margin = {{}}, demand = 1, usage = 'equality' }}"));
     assert!((number(&equal["criteria"][0]["value"]) - 1.0).abs() < 1e-3 && equal["criteria"][0]["at_least"] != true);
 }

@@ -1,17 +1,17 @@
-//! A few cases of the benchmark of the diagnosis: simulated experiments whose truth is known.
+//! Cases of the benchmark of the diagnosis: simulated experiments with a known missing effect.
 
 use mops::core::file::Files;
 use mops::discrepancy::{Diagnosis, Verdict};
 use mops::{Catalogue, Options, catalogue};
 use mops_testbed::{Missing, Trial, generate};
 
-/// The data files of a case.
+/// Data files of a case.
 struct Data<'a>(&'a Trial);
 
 impl Files for Data<'_> {
     fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
         let file = self.0.files.iter().find(|(name, _)| name == path);
-        Ok(file.expect("the case has it").1.as_bytes().to_vec())
+        Ok(file.expect("the case has this file").1.as_bytes().to_vec())
     }
 
     fn show(&self, path: &str) -> String {
@@ -19,12 +19,12 @@ impl Files for Data<'_> {
     }
 }
 
-/// The first case that there is, over a few seeds.
+/// Generates a case with the first suitable seed.
 fn case(plant: &str, missing: Missing<'_>, size: f64) -> Trial {
-    (1..20).find_map(|seed| generate(plant, missing, size, seed)).expect("some seed makes one")
+    (1..20).find_map(|seed| generate(plant, missing, size, seed)).expect("some seed gives a case")
 }
 
-/// What mops says of a case; with another order of the catalogue and another seed where `shuffled`.
+/// Diagnoses a case; if `shuffled`, with another order of the catalogue and another seed.
 fn diagnosis(case: &Trial, shuffled: bool) -> Diagnosis {
     let mut catalogue = catalogue();
     if shuffled {
@@ -34,14 +34,14 @@ fn diagnosis(case: &Trial, shuffled: bool) -> Diagnosis {
     diagnosis_among(case, catalogue, if shuffled { 4711 } else { 1 })
 }
 
-/// What mops says of a case with a catalogue and a seed.
+/// Diagnoses a case with a catalogue and a seed.
 fn diagnosis_among(case: &Trial, catalogue: Catalogue, seed: u64) -> Diagnosis {
     let file = mops::core::file::read(&catalogue, "study.toml", &case.study, &[], &Data(case));
     let mut study = file.unwrap_or_else(|mistake| panic!("{}: {mistake}", case.name)).study;
     study.set_seed(seed);
     let options = Options { effects: catalogue.effects, ..Options::default() };
     let solved = mops::solve(study, &options, &()).unwrap_or_else(|why| panic!("{}: {why}", case.name));
-    solved.outcome.found.diagnosis.expect("that was the task")
+    solved.outcome.found.diagnosis.expect("the task is a diagnosis")
 }
 
 /// Effects and places found.
@@ -51,7 +51,7 @@ fn found(diagnosis: &Diagnosis) -> Vec<(&str, &str)> {
 
 #[test]
 #[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
-fn a_missing_effect_is_found_at_its_place_and_its_strength_with_it() {
+fn a_missing_effect_is_found_with_its_place_and_its_parameter() {
     for (plant, effect, [name, told]) in [
         ("servo", "coulomb-friction", ["c", "torque"]),
         ("spring", "cubic-stiffness", ["k", "stiffness"]),
@@ -63,22 +63,22 @@ fn a_missing_effect_is_found_at_its_place_and_its_strength_with_it() {
         assert_eq!(diagnosis.verdict, Verdict::Effect, "{}", case.name);
         assert_eq!(found(&diagnosis), [(effect, truth.place.as_str())], "{}", case.name);
         let value = &diagnosis.found[0].strengths[0];
-        let expected = truth.strengths.iter().find(|(n, _)| n == told).expect("it is told").1;
-        // Forces of the equations are in SI units, those of the test bed's tanks in cm3/s.
+        let expected = truth.strengths.iter().find(|(n, _)| n == told).expect("the truth has this parameter").1;
+        // Forces in the equations are in SI units, flows of the testbed's tanks in cm3/s.
         let expected = if plant == "tanks" { 1e-6 } else { 1.0 } * expected;
         assert!(value.name == name && (value.value / expected - 1.0).abs() < 0.2, "{}: {value:?}", case.name);
         for error in &diagnosis.after {
-            assert!(error.normalised < 1.15, "{}: {} leaves {}", case.name, error.name, error.normalised);
+            assert!(error.normalised < 1.15, "{}: {} has the error {}", case.name, error.name, error.normalised);
         }
     }
 }
 
 #[test]
 #[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
-fn a_simple_friction_is_fitted_from_where_one_with_more_shapes_ended() {
-    // The pendulum stops: the fit of the Coulomb friction alone stays where the sum of squares is 25 times as large.
+fn a_simple_friction_is_refitted_from_the_optimum_of_a_more_general_one() {
+    // The pendulum comes to rest. A fit of Coulomb friction alone ends in a local minimum with 25 times the sum of squares.
     let missing = Missing::Effects(&["coulomb-friction"]);
-    let case = generate("pendulum", missing, 20.0, 403_726_925_825).expect("it can be made");
+    let case = generate("pendulum", missing, 20.0, 403_726_925_825).expect("the case can be generated");
     let diagnosis = diagnosis(&case, false);
     assert_eq!(found(&diagnosis), [("coulomb-friction", "joint:th")]);
     assert!(diagnosis.after.iter().all(|error| error.normalised < 1.1), "{:?}", diagnosis.after);
@@ -86,10 +86,10 @@ fn a_simple_friction_is_fitted_from_where_one_with_more_shapes_ended() {
 
 #[test]
 #[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
-fn a_constant_beside_a_declared_loss_is_not_told_as_a_loss_to_elsewhere() {
-    // `k (around - T)` explains the data as well, with the declared loss at zero.
+fn a_constant_heat_gain_is_not_mistaken_for_another_loss() {
+    // `k (around - T)` with the declared loss at zero explains the data equally well.
     let missing = Missing::Effects(&["constant-heat-gain"]);
-    let case = generate("jacket", missing, 20.0, 2_151_778_617_756).expect("it can be made");
+    let case = generate("jacket", missing, 20.0, 2_151_778_617_756).expect("the case can be generated");
     let diagnosis = diagnosis(&case, false);
     assert_eq!(found(&diagnosis), [("constant-force", "process:Tj")]);
     assert!(diagnosis.removed.is_empty(), "{:?}", diagnosis.removed);
@@ -97,10 +97,11 @@ fn a_constant_beside_a_declared_loss_is_not_told_as_a_loss_to_elsewhere() {
 
 #[test]
 #[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
-fn a_friction_whose_fit_sticks_on_its_way_from_nothing_is_fitted_anew() {
-    // In windows the base leaves 10 times the noise; from nothing the fit ended at a quarter of the friction, with 9 left.
+fn a_friction_fit_in_a_local_minimum_near_zero_is_restarted() {
+    // In windows the residual of the baseline model is 10 times the noise. From zero the fit ended at a quarter of the
+    // friction, with 9 times the noise.
     let missing = Missing::Effects(&["coulomb-friction"]);
-    let case = generate("furuta-free", missing, 20.0, 519_691_042_816).expect("it can be made");
+    let case = generate("furuta-free", missing, 20.0, 519_691_042_816).expect("the case can be generated");
     let mut few = catalogue();
     few.effects.retain(|effect| effect.name() == "coulomb-friction");
     let diagnosis = diagnosis_among(&case, few, 1);
@@ -111,24 +112,27 @@ fn a_friction_whose_fit_sticks_on_its_way_from_nothing_is_fitted_anew() {
 
 #[test]
 #[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
-fn a_break_away_force_that_no_slope_tells_is_found() {
-    // The mass sticks and slips: by slopes alone the fit stayed where it left 2.1 times the noise, with a third too much.
-    let case = generate("spring", Missing::Effects(&["stiction"]), 5.0, 3_337_189_589_112).expect("it can be made");
+fn a_break_away_force_is_found_although_the_residuals_are_discontinuous_in_it() {
+    // The mass sticks and slips. A fit by gradients alone ended at 2.1 times the noise, with a third too much friction.
+    let case =
+        generate("spring", Missing::Effects(&["stiction"]), 5.0, 3_337_189_589_112).expect("the case can be generated");
     let mut few = catalogue();
     few.effects.retain(|effect| effect.name() == "stiction");
     let diagnosis = diagnosis_among(&case, few, 1);
     assert_eq!(found(&diagnosis), [("stiction", "joint:x")]);
-    let truth = |name: &str| case.truth.effects[0].strengths.iter().find(|s| s.0 == name).expect("it has it").1;
+    let truth = |name: &str| {
+        case.truth.effects[0].strengths.iter().find(|s| s.0 == name).expect("the truth has this parameter").1
+    };
     let truths = [truth("coulomb"), truth("static") / truth("coulomb") - 1.0];
     for (strength, truth) in diagnosis.found[0].strengths.iter().zip(truths) {
-        let [low, high] = strength.interval95.expect("it has one");
+        let [low, high] = strength.interval95.expect("the parameter has an interval");
         assert!(low < truth && truth < high && high - low < 0.5 * truth, "{strength:?} {truth}");
     }
 }
 
 #[test]
 #[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
-fn where_nothing_is_missing_nothing_is_found() {
+fn no_effect_is_found_in_data_of_a_complete_model() {
     for plant in ["pendulum", "servo"] {
         let case = case(plant, Missing::Nothing, 0.0);
         let diagnosis = diagnosis(&case, false);

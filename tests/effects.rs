@@ -1,4 +1,4 @@
-//! Effects that a study declares at places of its model.
+//! Effects declared at places of a model.
 
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -9,7 +9,7 @@ use mops::{EffectBuilder, ModelBuilder};
 use mops_core::math;
 use serde_json::Value;
 
-/// A torsion pendulum, `w'' = -4 th`, with what the tests put under `effects` and `tuners`.
+/// Torsion pendulum `th'' = -4 th`; the tests insert effects and tuners.
 const STUDY: &str = r#"[study]
 name = "torsion"
 task = "calibration"
@@ -36,8 +36,8 @@ channels = { th = { column = "th", noise = 1e-3 } }
 th = { fit = { signal = "th" }, demand = 1e-3 }
 "#;
 
-/// The torsion pendulum with dry friction `c` (N m): half swings about `c/k` and `-c/k` in turn (den Hartog, Mechanical
-/// Vibrations, section 8.6).
+/// Angle of the torsion pendulum with dry friction `c` (N m): half swings about `c/k` and `-c/k` in turn (J. P. Den Hartog,
+/// Mechanical Vibrations, section 8.6).
 fn swing(c: f64, t: f64) -> f64 {
     let (angular, offset) = (2.0, c / 4.0);
     let half = (t * angular / PI).floor();
@@ -46,7 +46,7 @@ fn swing(c: f64, t: f64) -> f64 {
     sign * offset + amplitude * math::cos(angular * t)
 }
 
-/// Runs the study on a recording with dry friction 0.15 N m; the result.
+/// Runs the study with a recording with dry friction of 0.15 N m; returns the result.
 fn run(effects: &str, tuners: &str) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let mut csv = String::from("t[s],th[rad]\n");
@@ -68,7 +68,7 @@ fn result(folder: &Path) -> Value {
 }
 
 #[test]
-fn the_strength_of_a_declared_effect_is_a_tuner_like_any_other() {
+fn the_parameter_of_a_declared_effect_can_be_a_tuner() {
     let found = run(
         "effects.bearing = { coulomb-friction = { place = \"joint:th\" } }",
         "k = { start = 3.7, min = 1.0, max = 9.0 }\n\"bearing.c\" = { start = 0.05, min = 0.0, max = 1.0 }",
@@ -82,7 +82,7 @@ fn the_strength_of_a_declared_effect_is_a_tuner_like_any_other() {
 }
 
 #[test]
-fn a_strength_that_nothing_sets_changes_no_bit() {
+fn an_effect_at_its_null_value_changes_no_bit() {
     let tuners = "k = { start = 3.7, min = 1.0, max = 9.0 }";
     let without = run("", tuners);
     let with = run(
@@ -95,7 +95,7 @@ fn a_strength_that_nothing_sets_changes_no_bit() {
 }
 
 #[test]
-fn parameters_and_cases_set_strengths_too() {
+fn model_parameters_and_cases_set_parameters_of_effects() {
     let effects =
         "effects.bearing = { coulomb-friction = { place = \"joint:th\" } }\nparameters.\"bearing.c\" = \"0.15 N m\"";
     let found = run(effects, "k = { start = 4.0, min = 1.0, max = 9.0 }");
@@ -103,7 +103,7 @@ fn parameters_and_cases_set_strengths_too() {
 }
 
 #[test]
-fn in_rust_a_model_takes_its_effects_by_the_same_names() {
+fn effects_added_in_rust_have_the_same_parameter_names() {
     let catalogue = mops::catalogue();
     let plain = || {
         let kind = catalogue.models.iter().find(|kind| kind.name == "furuta").unwrap();
@@ -111,7 +111,7 @@ fn in_rust_a_model_takes_its_effects_by_the_same_names() {
     };
     let friction = |name: &str, place: &str| [EffectBuilder::new(name, "coulomb-friction", place)];
     let draft = plain().with_effects(&catalogue, &friction("arm", "joint:phi")).unwrap();
-    // More effects go beside those that are there.
+    // Further effects are added to those of the model.
     let draft = draft.with_effects(&catalogue, &friction("swing", "joint:theta")).unwrap();
     let names: Vec<&str> = draft.model.interface().parameters.iter().map(|p| &*p.variable.name).collect();
     assert_eq!(names[names.len() - 2..], ["arm.c", "swing.c"]);
@@ -120,7 +120,7 @@ fn in_rust_a_model_takes_its_effects_by_the_same_names() {
 }
 
 #[test]
-fn check_and_describe_tell_the_places() {
+fn check_and_describe_list_the_places_of_effects() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("swing.csv"), "t[s],th[rad]\n0,0.5\n1,0.4\n2,0.3\n3,0.2\n").unwrap();
     let study = STUDY.replace("EFFECTS", "").replace("TUNERS", "k = { start = 4.0, min = 1.0, max = 9.0 }");
@@ -133,13 +133,13 @@ fn check_and_describe_tell_the_places() {
     for place in ["joint:th", "actuator:u", "sensor:th", "sensor:w"] {
         assert!(checked.contains(place), "{place} in\n{checked}");
     }
-    assert!(!checked.contains("process:"), "the joint stands for the equation of its speed\n{checked}");
+    assert!(!checked.contains("process:"), "the place of the equation of the speed is the joint\n{checked}");
     assert!(print(&["describe", "furuta"]).contains("joint:theta"));
     assert!(!print(&["describe", "pid-loop"]).contains("laces for effects"));
 }
 
 #[test]
-fn editors_are_told_the_effects_and_what_each_needs() {
+fn the_schema_lists_the_effects_and_their_required_keys() {
     let output = cargo_bin_cmd!("mops").arg("schema").output().unwrap();
     let schema: Value = serde_json::from_slice(&output.stdout).unwrap();
     let named = &schema["properties"]["models"]["additionalProperties"]["properties"]["effects"];

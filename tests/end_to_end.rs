@@ -1,4 +1,4 @@
-//! What a user sees of the command line: commands, files, exit statuses.
+//! The command line as users see it: commands, files, exit statuses.
 
 #[path = "common/result.rs"]
 mod result;
@@ -15,7 +15,7 @@ fn mops(arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs a study into `folder`; the result.
+/// Runs a study into `folder`; returns the result.
 fn run(study: &str, folder: &Path, more: &[&str]) -> Value {
     let out = folder.join("out");
     let mut arguments = vec!["run", study, "--json", "--out", out.to_str().unwrap()];
@@ -23,7 +23,7 @@ fn run(study: &str, folder: &Path, more: &[&str]) -> Value {
     let output = mops(&arguments).output().unwrap();
     let result: Value =
         result::read(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)));
-    assert_eq!(std::fs::read(out.join("result.json")).unwrap(), output.stdout, "what is printed is what is written");
+    assert_eq!(std::fs::read(out.join("result.json")).unwrap(), output.stdout, "the printed result equals the file");
     result
 }
 
@@ -48,7 +48,7 @@ fn the_pid_studies_reach_their_known_optima() {
 }
 
 #[test]
-fn a_run_leaves_result_report_plots_and_evaluations() {
+fn a_run_writes_result_report_plots_and_evaluations() {
     let folder = tempfile::tempdir().unwrap();
     let result = run("pid-design", folder.path(), &["--max-evaluations", "60", "--seed", "7"]);
     let keys = [
@@ -78,7 +78,7 @@ fn a_run_leaves_result_report_plots_and_evaluations() {
     assert_eq!((&result["seed"], &result["stop"], &result["evaluations"]), (&7.into(), &"budget".into(), &60.into()));
     let out = folder.path().join("out");
     let rows = std::fs::read_to_string(out.join("evaluations.csv")).unwrap().lines().count();
-    assert_eq!(rows, 61, "one line per point, and the header");
+    assert_eq!(rows, 61, "a header, and one line per point");
     for file in ["report.html", "plots/convergence.svg", "plots/response-nominal-y.png"] {
         assert!(out.join(file).metadata().unwrap().len() > 1000, "{file}");
     }
@@ -103,10 +103,10 @@ fn thread_count_does_not_change_a_single_bit() {
 }
 
 #[test]
-fn the_calibration_recovers_the_device_within_its_intervals() {
+fn a_calibration_recovers_the_true_parameters_within_its_intervals() {
     let folder = tempfile::tempdir().unwrap();
     let result = run("furuta-swing", folder.path(), &[]);
-    // The values of the generator, studies/furuta-swing/generate.rs.
+    // True values of the generator, studies/furuta-swing/generate.rs.
     let truth = [
         ("b", 1.133e-3),
         ("c", 6.31e-4),
@@ -129,15 +129,15 @@ fn the_calibration_recovers_the_device_within_its_intervals() {
     }
 }
 
-/// Sum of a calibration's or validation's criteria, scaled.
+/// Sum of the scaled criteria of a calibration or validation.
 fn objective(result: &Value, case: &str) -> f64 {
     let criteria = result["criteria"].as_array().unwrap().iter().filter(|c| c["case"] == case);
     criteria.map(|c| c["scaled"].as_f64().unwrap()).sum()
 }
 
 #[test]
-fn a_third_joint_takes_the_residual_that_two_joints_leave() {
-    // Measurements by another derivation and method, table 4.6 of the thesis, noise of 0.003 rad: it leaves 0.0945.
+fn a_third_joint_explains_the_residual_of_the_two_joint_model() {
+    // Data simulated by an independent derivation and integrator; table 4.6 of the thesis, noise of 0.003 rad: residual 0.0945.
     let device = [
         "tuners.J.start=1.082e-3",
         "tuners.Ja.start=1.656e-3",
@@ -164,7 +164,7 @@ fn a_third_joint_takes_the_residual_that_two_joints_leave() {
 }
 
 #[test]
-fn retuned_gains_are_the_best_known_ones_to_a_thousandth() {
+fn retuned_gains_are_within_a_thousandth_of_the_best_known_optimum() {
     let folder = tempfile::tempdir().unwrap();
     let result = run("pole-placement-retuning", folder.path(), &[]);
     // 1.11584, found by an independent program (SciPy); the published gains score 1.3283.
@@ -173,10 +173,10 @@ fn retuned_gains_are_the_best_known_ones_to_a_thousandth() {
 }
 
 #[test]
-fn a_step_tells_both_inertias() {
+fn both_inertias_are_identified_from_one_step() {
     let folder = tempfile::tempdir().unwrap();
     let result = run("step-identification", folder.path(), &[]);
-    // The values of the generator; with noise of 0.01 rad the standard deviations are 1.66 % and 0.026 %.
+    // True values of the generator; for noise of 0.01 rad the standard deviations are 1.66 % and 0.026 %.
     let parameters = result["calibration"]["parameters"].as_array().unwrap();
     for (name, truth, part) in [("J", 0.0008, 0.0166), ("Ja", 0.02, 0.000_26)] {
         let found = parameters.iter().find(|p| p["name"] == name).unwrap();
@@ -187,7 +187,7 @@ fn a_step_tells_both_inertias() {
 }
 
 #[test]
-fn a_violated_constraint_is_status_1_and_still_a_result() {
+fn a_violated_constraint_gives_status_1_and_a_result() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let impossible = "criteria.settling.demand=0.1";
@@ -236,7 +236,7 @@ fn simulate_shows_the_published_criteria_at_the_published_parameters() {
 }
 
 #[test]
-fn check_list_and_describe_tell_what_is_there() {
+fn check_list_and_describe_show_the_whole_catalogue() {
     for study in mops::catalogue().studies {
         mops(&["check", study.name()]).assert().code(0);
         mops(&["describe", study.name()]).assert().code(0);
@@ -247,12 +247,12 @@ fn check_list_and_describe_tell_what_is_there() {
     for name in names.chain(catalogue.solvers.iter().map(|k| k.name)) {
         assert!(list.contains(name), "{name}");
         let page = String::from_utf8(mops(&["describe", name]).output().unwrap().stdout).unwrap();
-        assert!(page.contains("Source:") || name == "auto", "the page of {name} names its source");
+        assert!(page.contains("Source:") || name == "auto", "the page of {name} gives its source");
     }
 }
 
 #[test]
-fn check_tells_what_the_experiments_measure_and_what_is_fixed() {
+fn check_lists_channels_of_experiments_and_fixed_parameters() {
     let shown = |arguments: &[&str]| {
         let output = mops(&[&["check", "furuta-discrepancy"], arguments].concat()).output().unwrap();
         let lines = String::from_utf8(output.stdout).unwrap();
@@ -270,7 +270,7 @@ fn check_tells_what_the_experiments_measure_and_what_is_fixed() {
 }
 
 #[test]
-fn every_effect_is_listed_and_has_a_page_with_its_strengths() {
+fn every_effect_is_listed_and_described_with_its_parameters() {
     let list = String::from_utf8(mops(&["list", "effects"]).output().unwrap().stdout).unwrap();
     assert!(!list.contains("settling-time"), "{list}");
     for effect in mops::catalogue().effects {
@@ -284,7 +284,7 @@ fn every_effect_is_listed_and_has_a_page_with_its_strengths() {
 }
 
 #[test]
-fn a_new_study_checks_and_runs() {
+fn a_study_from_the_template_can_be_checked_and_run() {
     let folder = tempfile::tempdir().unwrap();
     mops(&["new", "mine"]).current_dir(&folder).assert().code(0);
     mops(&["check", "mine/study.toml"]).current_dir(&folder).assert().code(0);
@@ -315,7 +315,7 @@ fn the_schema_accepts_every_shipped_study_and_refuses_a_misspelt_one() {
 }
 
 #[test]
-fn data_shows_columns_units_gaps_and_sampling() {
+fn the_data_command_shows_columns_units_gaps_and_sample_time() {
     let folder = tempfile::tempdir().unwrap();
     let rows: String = (0..50)
         .map(|i| format!("{},{}\n", f64::from(i) * 0.1, if i == 7 { "".into() } else { i.to_string() }))
@@ -337,7 +337,7 @@ fn completions_are_written_for_every_shell() {
 
 #[cfg(unix)]
 #[test]
-fn an_interrupt_ends_the_run_with_the_best_point_on_disk() {
+fn an_interrupted_run_writes_the_best_point() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     // A swarm far too large to finish.
@@ -364,9 +364,9 @@ fn an_interrupt_ends_the_run_with_the_best_point_on_disk() {
     assert!(result["evaluations"].as_u64().unwrap() >= 1);
 }
 
-/// `x' = k u` from 0.5 at 0 s; the sensor is used from 2 s on, and the input drives the model before that.
+/// `x' = k u` from 0.5 at 0 s. Samples of the sensor are used from 2 s on; the recorded input also acts before.
 #[test]
-fn inputs_before_the_first_sample_that_is_used_are_those_of_the_file() {
+fn recorded_inputs_act_before_the_first_sample_used() {
     let folder = tempfile::tempdir().unwrap();
     let study = r#"
         [study]
@@ -389,7 +389,7 @@ fn inputs_before_the_first_sample_that_is_used_are_those_of_the_file() {
         [criteria]
         x = { normalised-error = { signal = "x" } }
     "#;
-    // The input is 3 up to 1.5 s, then -1; k = 0.7.
+    // The input is 3 until 1.5 s, then -1; k = 0.7.
     let row = |i: i32| {
         let t = 0.1 * f64::from(i);
         let x = 0.5 + 0.7 * (3.0 * t.min(1.5) - (t - 1.5).max(0.0));

@@ -1,4 +1,4 @@
-//! The examples run, and give what they say.
+//! The examples run and give the stated results.
 
 use mops_core::math;
 
@@ -6,11 +6,11 @@ use mops_core::math;
 mod own_study;
 
 #[test]
-fn a_study_in_rust_finds_the_best_compromise() {
+fn a_study_in_rust_reaches_the_optimum_of_a_dense_grid() {
     let solved = mops::solve(own_study::study().unwrap(), &mops::Options::default(), &()).unwrap();
     let outcome = &solved.outcome;
     assert!(outcome.worst_scaled < 0.6 * outcome.start.worst_scaled, "{}", outcome.worst_scaled);
-    // A dense grid over the box, evaluated independently of any solver, has nothing better to offer.
+    // A dense grid over the box, evaluated without a solver, has no better point.
     let steps = 60;
     let points = (0..=steps).flat_map(|i| (0..=steps).map(move |j| [f64::from(i), f64::from(j)]));
     let grid = points.map(|p| solved.problem.evaluate(&p.map(|x| x / f64::from(steps))).merit.objective);
@@ -19,18 +19,18 @@ fn a_study_in_rust_finds_the_best_compromise() {
 }
 
 #[test]
-fn the_slopes_at_the_optimum_are_those_of_the_criteria() {
+fn reported_gradients_at_the_optimum_agree_with_finite_differences() {
     let solved = mops::solve(own_study::study().unwrap(), &mops::Options::default(), &()).unwrap();
-    let found = solved.outcome.found.slopes.as_ref().expect("a design tells them");
+    let found = solved.outcome.found.slopes.as_ref().expect("a design has gradients");
     assert_eq!(found.tuners, ["k", "d"]);
     let keys: Vec<&str> = found.criteria.iter().map(|criterion| criterion.key.as_str()).collect();
-    let row = keys.iter().position(|key| key.ends_with("/shaking")).expect("it counts");
-    // The smooth one of the two, by differences of simulations.
+    let row = keys.iter().position(|key| key.ends_with("/shaking")).expect("the criterion is in the study");
+    // Finite differences of the smooth criterion.
     let at = solved.problem.point_of(&solved.best.tuners);
     let shaking = |j: usize, step: f64| {
         let mut point = at.clone();
         point[j] += step;
-        solved.problem.evaluate(&point).scaled.expect("it can be simulated")[row]
+        solved.problem.evaluate(&point).scaled.expect("the simulation succeeds")[row]
     };
     for (j, slope) in found.criteria[row].slopes.iter().enumerate() {
         let difference = (shaking(j, 1e-4) - shaking(j, -1e-4)) / 2e-4;
@@ -42,7 +42,7 @@ fn the_slopes_at_the_optimum_are_those_of_the_criteria() {
 mod shrinking_box;
 
 #[test]
-fn a_solver_of_ones_own_finds_what_the_default_one_finds_whatever_the_number_of_threads() {
+fn a_user_defined_solver_reaches_the_optimum_of_the_default_one_for_any_number_of_threads() {
     let kind = mops::SolverKind::of::<shrinking_box::ShrinkingBoxOptions>();
     let solved = |jobs| {
         let options = mops::Options { solver: kind.default_choice(), jobs: Some(jobs), ..mops::Options::default() };
@@ -60,10 +60,10 @@ fn a_solver_of_ones_own_finds_what_the_default_one_finds_whatever_the_number_of_
 mod repaired;
 
 #[test]
-fn a_repaired_study_as_a_program_is_the_calibration_that_its_file_is() {
+fn an_exported_repaired_study_equals_the_calibration_in_its_file() {
     let study = repaired::study().unwrap();
     assert_eq!((study.name(), study.task()), ("furuta-swing-repaired", mops::Task::Calibration));
-    // Start values are those found, the term that is not needed is no tuner, experiments and criteria are the user's.
+    // Initial guesses are the estimates, the dropped term is no tuner, experiments and criteria are those of the user.
     let start = |name: &str| study.tuners().iter().find(|tuner| tuner.name == name).map(|tuner| tuner.start);
     assert_eq!((start("b"), start("bp"), start("ca")), (Some(1.133e-3), None, Some(5e-4)));
     let keys: Vec<String> = study.rows().iter().map(|row| study.key(row)).collect();
@@ -75,13 +75,13 @@ fn a_repaired_study_as_a_program_is_the_calibration_that_its_file_is() {
 mod argmin_executor;
 
 #[test]
-fn an_executor_of_argmin_drives_a_solver_to_the_least_of_many_basins() {
+fn the_executor_of_argmin_runs_a_solver_to_the_global_minimum() {
     let (best, cost, evaluations) = argmin_executor::solve().unwrap();
     assert!(cost <= 1e-8 && best.iter().all(|x| x.abs() < 1e-4), "{cost} {best:?}");
     assert!(evaluations <= 20_000, "{evaluations}");
 }
 
-/// A file with every column that the recordings have, whatever its name.
+/// File of any name with all columns of the recordings.
 struct AnyRecording;
 
 impl mops::core::file::Files for AnyRecording {
@@ -100,7 +100,7 @@ impl mops::core::file::Files for AnyRecording {
 }
 
 #[test]
-fn the_studies_of_recordings_are_read_with_the_roles_of_their_experiments() {
+fn studies_of_recordings_have_the_declared_roles_of_experiments() {
     for (name, text, roles) in [
         ("furuta-lund", include_str!("../examples/recordings/furuta-lund.toml"), [1, 0, 0]),
         ("furuta-lund-blocks", include_str!("../examples/recordings/furuta-lund-blocks.toml"), [2, 1, 2]),

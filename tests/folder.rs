@@ -1,4 +1,4 @@
-//! The folder of a run: nothing in it is ever lost, whichever process has it open and whenever a run ends.
+//! The folder of a run: no data are lost, whichever process has a file open and however a run ends.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use serde_json::Value;
 
 const SEARCH: [&str; 6] = ["--solver", "cma-es", "--jobs", "1", "--max-evaluations", "1000000"];
 
-/// A task that evaluates nothing that could be kept.
+/// A task that stores no points.
 const LOCAL: [&str; 9] = [
     "run",
     "tank-level",
@@ -38,7 +38,7 @@ fn said(output: &Output) -> String {
     [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned()).concat()
 }
 
-/// A command on a folder that is no run.
+/// Runs a command on the folder of a run.
 fn look(what: &str, folder: &Path) -> Output {
     Command::new(cargo_bin!("mops")).arg(what).arg(folder).output().unwrap()
 }
@@ -52,7 +52,7 @@ fn result(out: &Path) -> Value {
     serde_json::from_slice(&fs::read(out.join("result.json")).unwrap()).unwrap()
 }
 
-/// A search that goes on in a new folder, once some points are written.
+/// Starts a search in a new folder; returns once some points are written.
 fn going(out: &Path) -> Child {
     let mut child = command(&[&["run", "pid-design", "--quiet"], &SEARCH[..]].concat(), out)
         .stdout(Stdio::null())
@@ -60,13 +60,13 @@ fn going(out: &Path) -> Child {
         .spawn()
         .unwrap();
     while points(&out.join("evaluations.sqlite")) < 300 {
-        assert!(child.try_wait().unwrap().is_none(), "it goes on");
+        assert!(child.try_wait().unwrap().is_none(), "the search is still running");
         std::thread::yield_now();
     }
     child
 }
 
-/// A search that was killed after some points.
+/// Kills a search after some points; returns their number.
 fn unfinished(out: &Path) -> usize {
     let _ = fs::remove_file(out.join("evaluations.sqlite"));
     let mut child = going(out);
@@ -75,7 +75,7 @@ fn unfinished(out: &Path) -> usize {
     points(&out.join("evaluations.sqlite"))
 }
 
-/// Points in a database; 0 where there is none.
+/// Returns the number of points in a database; 0 if it does not exist.
 fn points(database: &Path) -> usize {
     let count = || {
         let connection = Connection::open_with_flags(database, OpenFlags::SQLITE_OPEN_READ_ONLY).ok()?;
@@ -87,7 +87,7 @@ fn points(database: &Path) -> usize {
 const SHORT: [&str; 7] = ["run", "pid-design", "--quiet", "--solver", "genetic", "--max-evaluations", "60"];
 
 #[test]
-fn what_a_new_run_finds_and_does_not_understand_is_set_aside_and_never_deleted() {
+fn an_unreadable_database_is_renamed_by_a_new_run_and_never_deleted() {
     let root = tempfile::tempdir().unwrap();
     type Put = fn(&Path);
     let puts: [(&str, Put); 6] = [
@@ -146,7 +146,7 @@ fn what_a_new_run_finds_and_does_not_understand_is_set_aside_and_never_deleted()
 }
 
 #[test]
-fn points_of_every_unfinished_run_stay_each_under_a_name_of_its_own() {
+fn every_unfinished_run_keeps_its_points_under_its_own_file_name() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
     let mut counts = Vec::new();
@@ -154,7 +154,7 @@ fn points_of_every_unfinished_run_stay_each_under_a_name_of_its_own() {
         counts.push((name, unfinished(&out)));
         let output = mops(&["run", "pid-design", "--solver", "genetic", "--max-evaluations", "1"], &out);
         assert!(said(&output).contains(name), "{}", said(&output));
-        // The short run came to its end: the next one replaces it.
+        // The short run finished: the next run replaces it.
     }
     for (name, count) in counts {
         assert!(count >= 300);
@@ -163,7 +163,7 @@ fn points_of_every_unfinished_run_stay_each_under_a_name_of_its_own() {
 }
 
 #[test]
-fn a_database_that_somebody_reads_is_left_where_it_is_and_refused() {
+fn a_database_open_in_another_program_is_not_moved_and_the_run_is_refused() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
     let count = unfinished(&out);
@@ -184,7 +184,7 @@ fn a_database_that_somebody_reads_is_left_where_it_is_and_refused() {
 }
 
 #[test]
-fn a_lock_is_waited_for_and_all_that_waited_is_written_once_it_is_gone() {
+fn evaluations_wait_for_a_locked_database_and_are_written_after_its_release() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
     let mut child = going(&out);
@@ -193,7 +193,7 @@ fn a_lock_is_waited_for_and_all_that_waited_is_written_once_it_is_gone() {
     other.busy_timeout(Duration::from_secs(10)).unwrap();
     other.execute_batch("BEGIN IMMEDIATE").unwrap();
     let committed = points(&database);
-    // Its first word: that it cannot write.
+    // The first message reports that it cannot write.
     let mut stderr = std::io::BufReader::new(child.stderr.take().unwrap());
     let mut line = String::new();
     std::io::BufRead::read_line(&mut stderr, &mut line).unwrap();
@@ -213,7 +213,7 @@ fn a_lock_is_waited_for_and_all_that_waited_is_written_once_it_is_gone() {
 }
 
 #[test]
-fn a_lock_that_stays_costs_no_result_and_the_run_has_ended_all_the_same() {
+fn a_run_with_a_permanently_locked_database_still_writes_its_result_and_ends() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
     let child = going(&out);
@@ -227,7 +227,7 @@ fn a_lock_that_stays_costs_no_result_and_the_run_has_ended_all_the_same() {
     assert!(said(&output).contains("evaluations could not be stored: database is locked"), "{}", said(&output));
     let result = result(&out);
     assert_eq!(result["stop"], "interrupted");
-    // Neither the history nor a comparison takes it for unfinished, and no report is made of a part of it.
+    // The history does not list it as unfinished, and no report is written from part of its points.
     let listed = history(&out);
     assert_eq!((&listed[0]["state"], &listed[0]["evaluations"]), (&"interrupted".into(), &result["evaluations"]));
     let page = fs::read(out.join("report.html")).unwrap();
@@ -237,7 +237,7 @@ fn a_lock_that_stays_costs_no_result_and_the_run_has_ended_all_the_same() {
     assert_eq!(report.status.code(), Some(2), "{}", said(&report));
     assert!(said(&report).contains("of the run's"), "{}", said(&report));
     assert!(fs::read(out.join("report.html")).unwrap() == page);
-    // What is missing is simulated again.
+    // Missing points are simulated again.
     let search = [&["run", "pid-design"], &SEARCH[..4], &["--max-evaluations", "400", "--resume"]].concat();
     assert!(mops(&search, &out).status.success());
     assert!(look("report", &out).status.success());
@@ -245,14 +245,14 @@ fn a_lock_that_stays_costs_no_result_and_the_run_has_ended_all_the_same() {
 }
 
 #[test]
-fn every_task_takes_the_folder_and_makes_it_its_own() {
+fn every_task_replaces_the_files_of_an_earlier_run_in_its_folder() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
     assert!(mops(&SHORT, &out).status.success());
     assert!(out.join("plots/response-nominal-y.svg").is_file());
     fs::write(out.join("plots/mine.svg"), "").unwrap();
     assert!(mops(&LOCAL, &out).status.success());
-    // Result, database and page are of the new run; pictures of the old one are gone, and nobody else's.
+    // Result, database and page belong to the new run; plots of the old run are removed, other files are not.
     let listed = history(&out);
     assert_eq!(
         [&listed[0]["study"], &listed[0]["task"], &listed[0]["state"]],
@@ -264,7 +264,7 @@ fn every_task_takes_the_folder_and_makes_it_its_own() {
     let report = look("report", &out);
     assert_eq!(report.status.code(), Some(2), "{}", said(&report));
     assert!(fs::read(out.join("report.html")).unwrap() == page);
-    // While another run goes it is refused.
+    // A run is refused while another one is in progress.
     let busy = root.path().join("busy");
     let mut child = going(&busy);
     for task in [&LOCAL[..], &SHORT[..], &["diagnose", "furuta-swing", "--quiet"]] {
@@ -292,7 +292,7 @@ fn a_diagnosis_has_no_scaled_values_in_the_history() {
 }
 
 #[test]
-fn runs_are_compared_although_some_have_no_result() {
+fn runs_without_a_result_are_skipped_in_a_comparison() {
     let root = tempfile::tempdir().unwrap();
     let [a, b] = ["a", "b"].map(|name| root.path().join(name));
     assert!(mops(&SHORT, &a).status.success());
@@ -306,7 +306,7 @@ fn runs_are_compared_although_some_have_no_result() {
 }
 
 #[test]
-fn a_report_searches_nothing_beyond_the_points_that_are_known() {
+fn a_report_evaluates_no_points_beyond_the_stored_ones() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
     assert!(mops(&SHORT, &out).status.success());
@@ -323,7 +323,7 @@ fn a_report_searches_nothing_beyond_the_points_that_are_known() {
     change("UPDATE runs SET max_evaluations = 60, state = 'budget'");
     assert!(look("report", &out).status.success());
     assert!(fs::read_to_string(out.join("report.html")).unwrap() == page);
-    // A part of the points is no report of the whole run.
+    // No report is written from part of the points.
     change("DELETE FROM points WHERE id > 30");
     let report = look("report", &out);
     assert_eq!(report.status.code(), Some(2), "{}", said(&report));
@@ -332,7 +332,7 @@ fn a_report_searches_nothing_beyond_the_points_that_are_known() {
 
 #[cfg(unix)]
 #[test]
-fn a_folder_that_is_removed_while_the_run_goes_is_made_again_with_all_its_points() {
+fn a_folder_removed_during_the_run_is_restored_with_all_points() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
     let child = going(&out);
@@ -343,7 +343,7 @@ fn a_folder_that_is_removed_while_the_run_goes_is_made_again_with_all_its_points
     assert!(said(&output).contains("was removed during the run and has been restored"), "{}", said(&output));
     assert!(points(&out.join("evaluations.sqlite")) as u64 >= result(&out)["evaluations"].as_u64().unwrap());
     assert!(look("report", &out).status.success());
-    // Where another run has taken the place meanwhile, nothing of it is touched.
+    // Files of another run that uses the folder by then are not changed.
     let out = root.path().join("taken");
     let child = going(&out);
     fs::remove_dir_all(&out).unwrap();
@@ -359,7 +359,7 @@ fn a_folder_that_is_removed_while_the_run_goes_is_made_again_with_all_its_points
 
 #[cfg(unix)]
 #[test]
-fn what_links_lead_to_stays_as_it_is() {
+fn symbolic_links_are_replaced_and_their_targets_stay_unchanged() {
     use std::os::unix::fs::symlink;
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
@@ -376,14 +376,14 @@ fn what_links_lead_to_stays_as_it_is() {
 
 #[cfg(unix)]
 #[test]
-fn a_folder_whose_name_is_no_text_works_as_any_other() {
+fn a_folder_name_that_is_not_utf8_is_accepted() {
     use std::os::unix::ffi::OsStrExt;
     let root = tempfile::tempdir().unwrap();
     let odd = root.path().join(std::ffi::OsStr::from_bytes(b"out\xff"));
     assert!(mops(&SHORT, &odd).status.success());
     assert!(mops(&[&SHORT[..], &["--resume"]].concat(), &odd).status.success());
     assert!(look("report", &odd).status.success());
-    // A study that lies in such a folder, with its data.
+    // A study with data in such a folder.
     let study = odd.join("study");
     fs::create_dir(&study).unwrap();
     for (name, bytes) in mops::studies::shipped().iter().find(|s| s.name == "step-identification").unwrap().files {
@@ -401,7 +401,7 @@ fn a_folder_whose_name_is_no_text_works_as_any_other() {
 }
 
 #[test]
-fn a_database_that_stays_locked_is_named_before_anything_is_simulated() {
+fn a_locked_database_is_reported_before_the_first_simulation() {
     let root = tempfile::tempdir().unwrap();
     let [out, other] = ["out", "other"].map(|name| root.path().join(name));
     assert!(mops(&SHORT, &out).status.success());
@@ -426,7 +426,7 @@ fn a_database_that_stays_locked_is_named_before_anything_is_simulated() {
     assert!(mops(&resumed, &out).status.success() && mops(&reused, &other).status.success());
 }
 
-/// The database that such a run reads.
+/// Returns the database that a run reads.
 fn out_of(folder: &Path, arguments: &[&str]) -> std::path::PathBuf {
     let from =
         arguments.iter().position(|argument| *argument == "--reuse").map(|place| Path::new(arguments[place + 1]));

@@ -1,4 +1,4 @@
-//! The front of a study, against one computed without mops.
+//! The Pareto front of a study, compared with an independent computation.
 
 #[path = "common/result.rs"]
 mod result;
@@ -10,8 +10,8 @@ use mops::core::front::hypervolume;
 use mops_core::math;
 use serde_json::Value;
 
-/// Settling time, s, and overshoot of points of the front of the PID design: an independent computation with SciPy, the
-/// overshoot minimised for each settling time; printed to four digits.
+/// Settling time, s, and overshoot of points of the front of the PID design. Source: independent computation with SciPy, the
+/// overshoot minimised for each settling time, rounded to four digits.
 const FRONT: [[f64; 2]; 14] = [
     [2.40, 0.4576],
     [3.0, 0.4032],
@@ -29,7 +29,7 @@ const FRONT: [[f64; 2]; 14] = [
     [29.2, 0.0292],
 ];
 
-/// Half of the last digit printed.
+/// Half a unit in the last digit of these values.
 const PRINTED: f64 = 5e-5;
 
 fn pareto(folder: &Path, arguments: &[&str]) -> Value {
@@ -41,7 +41,7 @@ fn pareto(folder: &Path, arguments: &[&str]) -> Value {
     result::read(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
 }
 
-/// Settling time and overshoot of the points.
+/// Returns settling time and overshoot of the points.
 fn points(result: &Value) -> Vec<[f64; 2]> {
     let of =
         |point: &Value| ["nominal/settling", "nominal/overshoot"].map(|key| point["criteria"][key].as_f64().unwrap());
@@ -49,18 +49,18 @@ fn points(result: &Value) -> Vec<[f64; 2]> {
 }
 
 #[test]
-fn the_front_of_the_pid_design_is_that_of_an_independent_computation() {
+fn the_front_of_the_pid_design_agrees_with_an_independent_computation() {
     let folder = tempfile::tempdir().unwrap();
     let result = pareto(folder.path(), &["pid-pareto"]);
     let history = cargo_bin_cmd!("mops").args(["history", "--json", folder.path().to_str().unwrap()]).output().unwrap();
     let history: Value = serde_json::from_slice(&history.stdout).unwrap();
-    assert_eq!(history[0]["evaluations"], result["evaluations"], "certificates included");
+    assert_eq!(history[0]["evaluations"], result["evaluations"], "evaluations of certificates are included");
     assert_eq!((&result["stop"], &result["task"]), (&"converged".into(), &"pareto".into()));
     let front = points(&result);
     assert!((30..=34).contains(&front.len()), "{}", front.len());
     assert!(front.windows(2).all(|pair| pair[0][0] < pair[1][0] && pair[0][1] > pair[1][1]), "{front:?}");
     for [settling, overshoot] in &front {
-        // No point known is better in both by more than a thousandth.
+        // No reference point is better in both criteria by more than a thousandth.
         let better = |known: &&[f64; 2]| known[0] < settling * 0.999 && known[1] + PRINTED < overshoot * 0.999;
         assert_eq!(FRONT.iter().find(better), None, "{settling} {overshoot}");
     }
@@ -68,7 +68,7 @@ fn the_front_of_the_pid_design_is_that_of_an_independent_computation() {
         let better =
             |[settling, overshoot]: &&[f64; 2]| *settling < known[0] * 0.999 && *overshoot < known[1] * 0.999 - PRINTED;
         assert_eq!(front.iter().find(better), None, "{known:?}");
-        // A point of the front lies near it, as near as thirty points can.
+        // The front has a point nearby, within the spacing of thirty points.
         let near = |p: &[f64; 2]| math::hypot((p[0] - known[0]) / 27.0, (p[1] - known[1]) / 0.43);
         assert!(front.iter().map(near).fold(1.0, f64::min) < 0.05, "{known:?}");
     }
@@ -80,7 +80,7 @@ fn the_front_of_the_pid_design_is_that_of_an_independent_computation() {
 }
 
 #[test]
-fn the_read_outs_of_a_front_agree_with_its_points() {
+fn knee_nearest_point_and_exchange_rates_agree_with_the_points_of_the_front() {
     let folder = tempfile::tempdir().unwrap();
     let result = pareto(folder.path(), &["pid-pareto", "--points", "12"]);
     let (front, found) = (points(&result), &result["trade_offs"]);
@@ -90,11 +90,11 @@ fn the_read_outs_of_a_front_agree_with_its_points() {
     assert_eq!(found["nearest"], nearest);
     assert_eq!(
         result["tuners"][0]["value"], result["front"][nearest]["tuners"]["k"],
-        "the point reported is that point"
+        "the reported design is this point"
     );
-    // The design of the same demands: an independent computation with SciPy gives 0.8630704.
+    // The min-max design has the worst scaled value 0.8630704 (independent computation with SciPy).
     assert!((worst(front[nearest]) - 0.863_070_4).abs() < 2e-4, "{}", worst(front[nearest]));
-    // Between two secants of a front that bends one way lies the price that the multipliers tell.
+    // On a convex front the exchange rate given by the multipliers lies between the slopes of the two adjacent secants.
     let rates: Vec<f64> = found["neighbours"].as_array().unwrap().iter().map(|n| n["rate"].as_f64().unwrap()).collect();
     for (pair, i) in front.windows(2).zip(0..) {
         let rate: f64 = (pair[1][1] - pair[0][1]) / (pair[1][0] - pair[0][0]);
@@ -115,12 +115,12 @@ fn the_read_outs_of_a_front_agree_with_its_points() {
         );
     }
     let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
-    assert!(page.contains("<h2 id=\"front\">Front</h2>"), "the page has a section of its own");
+    assert!(page.contains("<h2 id=\"front\">Front</h2>"), "the page has a section on the front");
 }
 
-/// A pair of the published front as demands makes 1 the least worst scaled value there is.
+/// For demands equal to a point of the reference front, the optimal worst scaled value is 1.
 #[test]
-fn a_picked_point_serves_the_demands_as_well_as_can_be() {
+fn a_picked_point_is_optimal_for_its_demands() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
     pareto(folder.path(), &["pid-pareto", "--points", "12"]);

@@ -1,7 +1,7 @@
-//! Damaged input: whatever expressions, studies and data files say, they are read or refused, and nothing panics, overflows or
-//! hangs. A tenth of 20,000 inputs in the quick tier; `MOPS_FUZZ=1000000 cargo test --test fuzz -- --nocapture` reads a million.
+//! Damaged input: expressions, studies and data files of any content are read or refused, without panic, overflow or hang.
+//! A tenth of 20,000 inputs in the quick tier; `MOPS_FUZZ=1000000 cargo test --test fuzz -- --nocapture` reads a million.
 //!
-//! Input `i` follows from `i` alone, so that a failure can be looked at again.
+//! Input `i` depends on `i` alone, so that a failure can be reproduced.
 
 use std::io;
 use std::ops::Range;
@@ -17,7 +17,7 @@ use mops::core::file::Files;
 use rand::prelude::*;
 use rand::rngs::SmallRng;
 
-/// What inputs are made from.
+/// Texts from which inputs are made.
 struct Corpus {
     catalogue: Catalogue,
     studies: Vec<String>,
@@ -49,7 +49,7 @@ impl Corpus {
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         let studies: Vec<String> =
             files().filter(|(name, _)| name.ends_with(".toml")).map(|(_, bytes)| text(bytes)).collect();
-        // The beginning of a data file is as good as the whole, but for MATLAB files, which name their length.
+        // The first part of a data file suffices, except for MATLAB files, which contain their length.
         let short = |bytes: &[u8]| bytes[..bytes.len().min(1500)].to_vec();
         let mut data: Vec<Vec<u8>> =
             files().filter(|(name, _)| name.ends_with(".csv")).map(|(_, bytes)| short(bytes)).collect();
@@ -62,7 +62,7 @@ impl Corpus {
     }
 }
 
-/// Texts in quotation marks.
+/// Returns the texts in quotation marks.
 fn quoted(text: &str) -> Vec<String> {
     text.split('"').skip(1).step_by(2).filter(|part| part.contains(['*', '+', '-', '('])).map(str::to_owned).collect()
 }
@@ -93,7 +93,7 @@ fn matrices() -> Vec<Vec<u8>> {
     vec![level4, level5]
 }
 
-/// What is put into a text: what readers have rules for.
+/// Fragments inserted into a text: those with a meaning to the readers.
 const PIECES: [&str; 60] = [
     "(",
     ")",
@@ -157,7 +157,7 @@ const PIECES: [&str; 60] = [
     "[models.m.equations]\nstates = { x = \"1\" }\n",
 ];
 
-/// A text with some damage.
+/// Damages a text.
 fn damaged(text: &str, other: &str, random: &mut SmallRng) -> String {
     let mut text: Vec<char> = text.chars().collect();
     let other: Vec<char> = other.chars().collect();
@@ -185,7 +185,7 @@ fn damaged(text: &str, other: &str, random: &mut SmallRng) -> String {
     text.into_iter().collect()
 }
 
-/// Values that a key may have: right TOML, and mostly wrong there.
+/// Values for a key: valid TOML, but mostly invalid for the key.
 const VALUES: [&str; 40] = [
     "0",
     "-1",
@@ -229,7 +229,7 @@ const VALUES: [&str; 40] = [
     "\"../../x.csv\"",
 ];
 
-/// A study in which some values are others.
+/// Replaces some values of a study.
 fn revalued(text: &str, other: &str, random: &mut SmallRng) -> String {
     let mut text = text.to_owned();
     for _ in 0..random.random_range(1..4) {
@@ -243,7 +243,7 @@ fn revalued(text: &str, other: &str, random: &mut SmallRng) -> String {
     text
 }
 
-/// Where texts and numbers are that may be values.
+/// Returns the positions of texts and numbers that may be values.
 fn values(text: &str) -> Vec<Range<usize>> {
     let (bytes, mut places, mut at) = (text.as_bytes(), Vec::new(), 0);
     while at < bytes.len() {
@@ -262,7 +262,7 @@ fn values(text: &str) -> Vec<Range<usize>> {
     places
 }
 
-/// An expression by its grammar, of this many levels.
+/// Generates an expression of the grammar with this nesting depth.
 fn grown(levels: u32, random: &mut SmallRng) -> String {
     if levels == 0 || random.random_ratio(1, 6) {
         let leaves = ["x", "y", "T[2]", "1.5", "2", "pi", "time", "x'", "1e3"];

@@ -1,17 +1,16 @@
-//! The guide is true: every command of its pages runs, in one folder and in their order, and what a page shows of the output
-//! is in it.
+//! Checks the guide: every command of its pages runs, in order and in one folder, and prints the output shown.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A fenced block of a page: its language, the file that it is, and its lines.
+/// Fenced block of a page: its language, the file to write it to, and its lines.
 struct Block {
     language: String,
     file: Option<String>,
     lines: Vec<String>,
 }
 
-/// The fenced blocks of a page.
+/// Returns the fenced blocks of a page.
 fn blocks(page: &str) -> Vec<Block> {
     let mut all: Vec<Block> = Vec::new();
     let mut open = false;
@@ -32,12 +31,12 @@ fn blocks(page: &str) -> Vec<Block> {
     all
 }
 
-/// A line with single spaces, as tables are as wide as they must be.
+/// Returns the line with single spaces: the widths of table columns vary.
 fn plain(line: &str) -> String {
     line.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// The words of a command, as a shell takes them: what stands in double quotes is one.
+/// Splits a command into words as a shell does; a text in double quotes is one word.
 fn arguments(command: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut quoted = false;
@@ -45,15 +44,15 @@ fn arguments(command: &str) -> Vec<String> {
         match c {
             '"' => quoted = !quoted,
             ' ' if !quoted => words.push(String::new()),
-            _ => words.last_mut().expect("there is one").push(c),
+            _ => words.last_mut().expect("the list is not empty").push(c),
         }
     }
     words.retain(|word| !word.is_empty());
     words
 }
 
-/// Runs a command as it stands after `$ `; `shown` is what the page shows of its output: `? 2` is its exit status, `...` stands
-/// for any lines, and a line may go on.
+/// Runs the command of a line that starts with `$ `. `shown` is the output on the page: `? 2` is the exit status, `...` means any
+/// lines, and a line may continue.
 fn run(command: &str, shown: &[String], folder: &Path) {
     let words = arguments(command);
     assert_eq!(words[0], "mops", "{command}");
@@ -72,7 +71,7 @@ fn run(command: &str, shown: &[String], folder: &Path) {
     }
 }
 
-/// Does what the page says, in a folder that the pages share.
+/// Writes the files and runs the commands of a page in the common folder; returns the number of commands.
 fn follow(page: &Path, folder: &Path) -> usize {
     let text = std::fs::read_to_string(page).expect("the page can be read");
     let mut commands = 0;
@@ -94,11 +93,11 @@ fn follow(page: &Path, folder: &Path) -> usize {
 }
 
 #[test]
-fn every_command_of_the_guide_runs_and_prints_what_the_page_shows() {
-    let folder = tempfile::tempdir().expect("a folder");
+fn every_command_of_the_guide_runs_and_prints_the_output_shown() {
+    let folder = tempfile::tempdir().expect("a folder can be created");
     let mut pages: Vec<PathBuf> = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/guide"))
-        .expect("the guide is there")
-        .map(|entry| entry.expect("it can be read").path())
+        .expect("the guide exists")
+        .map(|entry| entry.expect("the folder can be read").path())
         .collect();
     pages.sort();
     let commands: usize = pages.iter().map(|page| follow(page, folder.path())).sum();

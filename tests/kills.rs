@@ -1,6 +1,7 @@
-//! A run that is killed at a system call resumes to the result of one that was not. A few calls in the quick tier, every one in
-//! the full tier: `cargo test --test kills --features full-tests -- --nocapture`. It needs strace, which is skipped where it is
-//! not there.
+//! A run killed at a system call resumes to the result of an uninterrupted run.
+//!
+//! The quick tier kills at a few calls, the full tier at a tenth of them, `MOPS_KILLS=all` at all. The tests need strace, and
+//! are skipped without it.
 
 #![cfg(target_os = "linux")]
 
@@ -12,7 +13,7 @@ use std::process::{Command, Output};
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
-/// The calls that write, make, move or remove something, or make that last.
+/// System calls that write, create, rename, remove or synchronise files.
 const CALLS: [&str; 12] = [
     "openat",
     "pwrite64",
@@ -30,7 +31,7 @@ const CALLS: [&str; 12] = [
 
 const STUDY: [&str; 9] = ["run", "pid-design", "--solver", "sqp", "--max-evaluations", "40", "--jobs", "1", "--quiet"];
 
-/// Another study in the same folder, whose run came to its end.
+/// Finished run of another study in the same folder.
 const OTHER: [&str; 6] = ["run", "tank-level", "--max-evaluations", "20", "--jobs", "1"];
 
 fn mops(arguments: &[&str], out: &Path) -> Command {
@@ -42,17 +43,17 @@ fn mops(arguments: &[&str], out: &Path) -> Command {
 fn under_strace(options: &[&str], arguments: &[&str], out: &Path) -> Output {
     let mut command = Command::new("strace");
     command.arg("-f").args(options).arg(cargo_bin!("mops")).args(arguments).arg("--out").arg(out);
-    command.output().expect("strace was there")
+    command.output().expect("strace is installed")
 }
 
-/// The result without what depends on the clock; `None` where it is not there or damaged.
+/// Returns the result without times; `None` if it is absent or damaged.
 fn result(out: &Path) -> Option<Value> {
     let mut result: Value = serde_json::from_slice(&fs::read(out.join("result.json")).ok()?).ok()?;
     result.as_object_mut()?.remove("seconds");
     Some(result)
 }
 
-/// What a run has there while it goes, and nothing after it.
+/// Returns the files that exist only during a run.
 fn passing(folder: &Path) -> Vec<String> {
     let names = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name());
     let all = names(folder).chain(names(&folder.join("plots"))).map(|name| name.to_string_lossy().into_owned());
@@ -60,7 +61,7 @@ fn passing(folder: &Path) -> Vec<String> {
     all.filter(|name| name.starts_with(".new-") || ends.iter().any(|end| name.ends_with(end))).collect()
 }
 
-/// How often a thread calls each of the calls, at most: strace counts by threads.
+/// Returns the largest number of calls by one thread, for each system call: strace counts per thread.
 fn counted(arguments: &[&str], root: &Path, prepare: &dyn Fn(&Path)) -> Vec<(&'static str, usize)> {
     let (out, log) = (root.join("counted"), root.join("log"));
     prepare(&out);
@@ -79,8 +80,8 @@ fn counted(arguments: &[&str], root: &Path, prepare: &dyn Fn(&Path)) -> Vec<(&'s
     CALLS.iter().map(|&call| (call, most(call))).collect()
 }
 
-/// Kills a run at its calls, `some` of them, each in a folder that `prepare` has made, and resumes it, after which the folder
-/// must hold what `keeps` asks for; the number of kills.
+/// Kills a run at `some` of its system calls, each in a folder set up by `prepare`, and resumes it; `keeps` then checks the
+/// folder. Returns the number of kills.
 fn killed(arguments: &[&str], root: &Path, [prepare, keeps]: [&dyn Fn(&Path); 2], some: usize) -> usize {
     let whole = root.join("whole");
     assert!(mops(&STUDY, &whole).status().unwrap().success());
@@ -105,20 +106,20 @@ fn killed(arguments: &[&str], root: &Path, [prepare, keeps]: [&dyn Fn(&Path); 2]
             continue;
         }
         kills += 1;
-        // Who looks on sees a run that is not there, or unfinished, and no other.
+        // Other commands see an absent or unfinished run.
         for look in ["history", "report"] {
             let looked = Command::new(cargo_bin!("mops")).arg(look).arg(&out).output().unwrap();
             if !matches!(looked.status.code(), Some(0 | 2 | 3)) {
                 wrong.push(format!("{call} {k}: {look} {:?}", looked.status));
             }
         }
-        // A result is that of the run before, or whole.
+        // The result is complete, or that of the earlier run.
         if out.join("result.json").exists() && result(&out).is_none() {
             wrong.push(format!("{call} {k}: the result is damaged"));
         }
         let mut again = mops(&STUDY, &out).arg("--resume").output().unwrap();
         let said = String::from_utf8_lossy(&again.stderr).into_owned();
-        // Killed before it touched the run that was there, it has not begun.
+        // If killed before it changed the earlier run, it has not started.
         if said.contains("contains another run") {
             again = mops(&STUDY, &out).output().unwrap();
         }
@@ -140,7 +141,7 @@ fn has_strace() -> bool {
 }
 
 #[test]
-fn a_run_killed_at_any_call_in_a_folder_of_its_own_resumes() {
+fn a_run_killed_at_any_system_call_in_an_empty_folder_resumes() {
     if has_strace() {
         let root = tempfile::tempdir().unwrap();
         let kills = killed(&STUDY, root.path(), [&|_| (), &|_| ()], 8);
@@ -150,7 +151,7 @@ fn a_run_killed_at_any_call_in_a_folder_of_its_own_resumes() {
 }
 
 #[test]
-fn a_run_killed_at_any_call_in_the_folder_of_another_resumes() {
+fn a_run_killed_at_any_system_call_in_the_folder_of_another_run_resumes() {
     if has_strace() {
         let root = tempfile::tempdir().unwrap();
         let other = root.path().join("other");
@@ -165,7 +166,7 @@ fn a_run_killed_at_any_call_in_the_folder_of_another_resumes() {
         eprintln!("{kills} kills in the folder of another run");
         assert!(kills >= 3);
 
-        // One that came to no end is set aside, with all its points.
+        // The database of an unfinished run is renamed, with all its points.
         let database = |out: &Path, name: &str| rusqlite::Connection::open(out.join(name)).unwrap();
         let unfinished = |out: &Path| {
             prepare(out);
@@ -186,7 +187,7 @@ fn a_run_killed_at_any_call_in_the_folder_of_another_resumes() {
 }
 
 #[test]
-fn a_run_killed_at_any_call_while_it_resumes_resumes_again() {
+fn a_resumed_run_killed_at_any_system_call_resumes_again() {
     if has_strace() {
         let root = tempfile::tempdir().unwrap();
         let short = root.path().join("short");

@@ -1,4 +1,4 @@
-//! What ends, bounds or refuses a run or a file: signals, limits of time and memory, devices, long lines, control characters.
+//! Limits: signals, time limits, devices as files, long lines, control characters, numbers that are not finite.
 
 use std::collections::HashSet;
 use std::fs;
@@ -21,7 +21,7 @@ fn result(out: &Path) -> Value {
     serde_json::from_slice(&fs::read(out.join("result.json")).unwrap()).unwrap()
 }
 
-/// A study whose only state turns `turns` times a second for 1 s; one turn takes some 30 steps.
+/// Study whose only state oscillates `turns` times in 1 s; one period takes about 30 steps.
 fn turning(turns: f64) -> String {
     let rate = turns * std::f64::consts::TAU;
     format!(
@@ -34,7 +34,7 @@ fn turning(turns: f64) -> String {
 
 #[cfg(unix)]
 #[test]
-fn every_signal_that_ends_a_run_is_told_by_its_status_and_heard_within_a_simulation() {
+fn every_terminating_signal_interrupts_a_simulation_and_gives_status_4() {
     let root = tempfile::tempdir().unwrap();
     // One simulation takes hours.
     fs::write(root.path().join("long.toml"), turning(1e9)).unwrap();
@@ -64,7 +64,7 @@ fn every_signal_that_ends_a_run_is_told_by_its_status_and_heard_within_a_simulat
         assert_eq!(child.wait().unwrap().code(), Some(4), "{signal}: {rest}");
         let result = result(&out);
         assert_eq!(result["stop"], "interrupted");
-        // The simulation that was cut off is no evaluation, and no failure.
+        // The interrupted simulation counts neither as an evaluation nor as a failure.
         assert_eq!(result["failures"], Value::Array(Vec::new()));
         assert_eq!(result["evaluations"] == 0, arguments.len() == long.len(), "{result}");
         assert!(out.join("report.html").is_file());
@@ -76,10 +76,10 @@ fn every_signal_that_ends_a_run_is_told_by_its_status_and_heard_within_a_simulat
 }
 
 #[test]
-fn a_limit_of_time_ends_every_task_as_a_spent_budget_does() {
+fn a_time_limit_ends_every_task_like_a_spent_budget() {
     let root = tempfile::tempdir().unwrap();
     fs::write(root.path().join("long.toml"), turning(1e9)).unwrap();
-    // The task, and whether something of it is known after a moment.
+    // Task, and true if it has a result after a short time.
     let tasks: [(&[&str], bool); 9] = [
         (&["run", "long.toml"], false),
         (&["run", "pid-design", "--solver", "genetic", "--max-evaluations", "100000000"], true),
@@ -134,7 +134,7 @@ fn a_limit_of_time_ends_every_task_as_a_spent_budget_does() {
 }
 
 #[test]
-fn a_run_that_its_time_ended_goes_on_to_the_result_of_one_with_all_the_time() {
+fn a_run_stopped_by_its_time_limit_resumes_to_the_result_of_an_unlimited_run() {
     let root = tempfile::tempdir().unwrap();
     let search =
         ["run", "pid-design-multi-case", "--quiet", "--solver", "genetic", "--max-evaluations", "1500", "--out"];
@@ -152,7 +152,7 @@ fn a_run_that_its_time_ended_goes_on_to_the_result_of_one_with_all_the_time() {
 }
 
 #[test]
-fn a_study_without_a_folder_of_its_own_writes_below_results_whatever_its_name() {
+fn without_an_output_folder_every_study_name_gives_one_folder_below_results() {
     let root = tempfile::tempdir().unwrap();
     let text = fs::read_to_string("studies/pid-design/study.toml").unwrap();
     let below = root.path().join("a/b/c");
@@ -169,7 +169,7 @@ fn a_study_without_a_folder_of_its_own_writes_below_results_whatever_its_name() 
         let folders: Vec<_> = fs::read_dir(&results).unwrap().map(|entry| entry.unwrap().path()).collect();
         assert!(folders.len() == 1 && folders[0].join("result.json").is_file(), "{name}: {folders:?}");
         fs::remove_dir_all(&results).unwrap();
-        // Nothing else has come to be anywhere.
+        // No other files were created.
         for (folder, expected) in
             [(root.path(), 1), (&root.path().join("a"), 1), (&root.path().join("a/b"), 1), (&below, 1)]
         {
@@ -179,7 +179,7 @@ fn a_study_without_a_folder_of_its_own_writes_below_results_whatever_its_name() 
 }
 
 #[test]
-fn a_mistake_in_a_long_line_is_shown_with_what_is_near_it() {
+fn an_error_in_a_long_line_is_shown_with_its_surroundings_only() {
     let root = tempfile::tempdir().unwrap();
     let at = |name: &str| root.path().join(name);
     let study = |blanks: usize| {
@@ -200,7 +200,7 @@ fn a_mistake_in_a_long_line_is_shown_with_what_is_near_it() {
     fs::write(at("wide.csv"), header.join(",") + "\n" + &row("1") + &row("1e999")).unwrap();
     let output = mops(&["data", "wide.csv"], root.path());
     assert!(output.status.code() == Some(2) && said(&output).contains("1e999"), "{}", said(&output));
-    // Letters of several bytes, and a mistake at the very end.
+    // Characters of several bytes, and an error at the end.
     fs::write(at("study.toml"), format!("[study]\nname = \"{}\" é", "é".repeat(70_000))).unwrap();
     assert!(said(&mops(&["check", "study.toml"], root.path())).contains("study.toml:2:"));
 }
@@ -243,7 +243,7 @@ fn no_control_character_reaches_the_terminal() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn what_cannot_be_printed_is_an_error_and_costs_no_result() {
+fn a_failed_print_is_an_error_and_the_result_is_kept() {
     let root = tempfile::tempdir().unwrap();
     let full = |arguments: &[&str]| {
         let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
@@ -265,7 +265,7 @@ fn what_cannot_be_printed_is_an_error_and_costs_no_result() {
         assert!(said(&output).contains("cannot write to standard output"), "{arguments:?}: {}", said(&output));
     }
     assert_eq!(result(&root.path().join("out"))["evaluations"], 20);
-    // A reader that has enough is no error.
+    // A reader that closes the pipe is not an error.
     let mut child = Command::new(cargo_bin!("mops")).arg("schema").stdout(Stdio::piped()).spawn().unwrap();
     drop(child.stdout.take());
     assert_eq!(child.wait().unwrap().code(), Some(0));
@@ -273,7 +273,7 @@ fn what_cannot_be_printed_is_an_error_and_costs_no_result() {
 
 #[cfg(unix)]
 #[test]
-fn devices_and_pipes_are_no_data_files() {
+fn devices_and_pipes_are_refused_as_data_files() {
     let root = tempfile::tempdir().unwrap();
     let at = |name: &str| root.path().join(name);
     assert!(Command::new("mkfifo").arg(at("pipe.csv")).status().unwrap().success());
@@ -296,7 +296,7 @@ fn devices_and_pipes_are_no_data_files() {
 }
 
 #[test]
-fn numbers_that_are_none_are_refused_where_they_stand() {
+fn numbers_that_are_not_finite_are_refused_with_their_position() {
     let root = tempfile::tempdir().unwrap();
     let text = fs::read_to_string("studies/tank-level/study.toml").unwrap();
     fs::write(root.path().join("study.toml"), &text).unwrap();
@@ -329,12 +329,12 @@ fn numbers_that_are_none_are_refused_where_they_stand() {
         let output = mops(&["check", "own.toml"], root.path());
         assert_eq!(output.status.success(), fits, "{case}: {}", said(&output));
     }
-    // An integral time may be infinite: it takes the integral away.
+    // An integral time may be infinite: there is then no integral action.
     assert!(mops(&["check", "pid-design", "--set", "tuners.Ti.start=2.0"], root.path()).status.success());
 }
 
 #[test]
-fn a_picked_study_overwrites_none_that_is_there() {
+fn a_picked_study_overwrites_no_existing_file() {
     let root = tempfile::tempdir().unwrap();
     let found = mops(&["pareto", "pid-design", "--points", "3", "--out", "out", "--quiet"], root.path());
     assert!(matches!(found.status.code(), Some(0 | 1)), "{}", said(&found));
@@ -349,7 +349,7 @@ fn a_picked_study_overwrites_none_that_is_there() {
 }
 
 #[test]
-fn an_empty_table_of_the_command_line_stands_for_the_table_that_is_there() {
+fn an_empty_table_on_the_command_line_replaces_the_table_of_the_study() {
     let root = tempfile::tempdir().unwrap();
     for (command, study) in
         [("run", "pid-design"), ("pareto", "multi-model"), ("pareto", "pid-design"), ("check", "tank-level")]
@@ -360,7 +360,7 @@ fn an_empty_table_of_the_command_line_stands_for_the_table_that_is_there() {
             assert!(!said(&output).contains("panicked"), "{}", said(&output));
         }
     }
-    // A table that may be empty: a front is found, and the study that is left for `pick` says the same.
+    // `solver` may be empty: the front is computed, and the study written for `pick` is valid.
     let output =
         mops(&["pareto", "pid-design", "--set", "solver={}", "--points", "3", "--out", "out", "--quiet"], root.path());
     assert!(output.status.success(), "{}", said(&output));
@@ -369,9 +369,9 @@ fn an_empty_table_of_the_command_line_stands_for_the_table_that_is_there() {
 }
 
 #[test]
-fn a_linearisation_ends_with_its_time_limit() {
+fn a_linearisation_ends_at_its_time_limit() {
     let root = tempfile::tempdir().unwrap();
-    // A rod of 400 pieces: its poles take longer than the limit.
+    // A rod of 400 nodes: computing its poles takes longer than the limit.
     let text = "[study]\nname = \"rod\"\n[models.rod.equations]\nstates = { \"T[1..400]\" = \"1\" }\ninputs = { u = \"1\" }\n\
                 parameters = { k = \"1/s\" }\nhorizon = \"1 s\"\n[models.rod.equations.der]\n\"T[1]\" = \"k*(u - 2*T[1] + T[2])\"\n\
                 \"T[i]\" = \"k*(T[i-1] - 2*T[i] + T[i+1])\"\n\"T[400]\" = \"k*(T[399] - 2*T[400])\"\n\
@@ -385,7 +385,7 @@ fn a_linearisation_ends_with_its_time_limit() {
 }
 
 #[test]
-fn cases_that_file_names_cannot_tell_apart_have_files_of_their_own() {
+fn cases_with_colliding_file_names_have_separate_files() {
     let root = tempfile::tempdir().unwrap();
     let names = ["load 0.5", "load 0.6", "load-0.5", "LOAD 0.5", "a/b", "a-b"];
     let cases: String = names.iter().map(|name| format!("\"{name}\" = {{ a = 0.0, b = -4.0, c = -1.0 }}\n")).collect();
@@ -406,7 +406,7 @@ fn cases_that_file_names_cannot_tell_apart_have_files_of_their_own() {
 }
 
 #[test]
-fn a_run_that_is_refused_leaves_no_folder() {
+fn a_refused_run_creates_no_folder() {
     let root = tempfile::tempdir().unwrap();
     for more in
         [&["--reuse", "nowhere"][..], &["--solver", "nonsense"], &["--set", "study.task=excitation", "--resume"]]

@@ -23,7 +23,7 @@ fn json(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// `A` and `B` as the thesis prints them (section 5.2).
+/// `A` and `B` of the thesis (section 5.2).
 const PENDULUM: &str = "
 [study]
 name = 'pendulum'
@@ -38,7 +38,7 @@ slowest = { slowest-pole = { output = 'phi' }, usage = 'monitor' }
 ";
 
 #[test]
-fn the_pendulum_of_the_thesis_gets_its_feedback_and_leaves_plots() {
+fn the_pendulum_of_the_thesis_gets_the_published_state_feedback_and_plots() {
     let folder = tempfile::tempdir().unwrap();
     let (file, out) = (study(folder.path(), PENDULUM), folder.path().join("out"));
     let placed = mops(&["linearise", &file, "--place=-5,-8,-10,-14", "--out", out.to_str().unwrap()]);
@@ -71,7 +71,7 @@ fn a_nonlinear_model_is_linearised_at_its_equilibrium() {
 }
 
 #[test]
-fn what_linearise_cannot_do_is_a_mistake_with_a_way_out() {
+fn errors_of_linearise_suggest_a_fix() {
     let folder = tempfile::tempdir().unwrap();
     let file = study(folder.path(), PENDULUM);
     for (arguments, fact) in [
@@ -89,7 +89,7 @@ fn what_linearise_cannot_do_is_a_mistake_with_a_way_out() {
 }
 
 #[test]
-fn mistakes_in_the_linearisation_of_a_study_have_their_place() {
+fn errors_in_the_linearisation_of_a_study_have_a_position() {
     let folder = tempfile::tempdir().unwrap();
     let wrong = |linearise: &str, criterion: &str| {
         let text = format!(
@@ -110,10 +110,10 @@ fn mistakes_in_the_linearisation_of_a_study_have_their_place() {
     assert!(sort.contains("`a` is a linear system"), "{sort}");
 }
 
-/// Found by two solvers; the margins and peaks at the optimum agree with NumPy on a grid of 4e6 frequencies.
+/// The optimum is from two solvers; margins and peaks there agree with NumPy on a grid of 4e6 frequencies.
 #[test]
 #[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
-fn one_set_of_tuners_serves_a_simulation_and_its_margins() {
+fn one_study_combines_a_simulation_and_stability_margins() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let output = mops(&["run", "multi-model", "--json", "--out", out.to_str().unwrap()]).output().unwrap();
@@ -171,7 +171,7 @@ response = { frequency-fit = { signal = 'y' }, demand = 1 }
 }
 
 #[test]
-fn a_measured_response_is_taken_in_the_units_of_the_model_or_refused() {
+fn a_measured_frequency_response_is_converted_to_the_units_of_the_model_or_refused() {
     // One second-order joint, 0.01 w' = u - 0.6 ph: 1/0.6 rad/(N m) at rest.
     let folder = tempfile::tempdir().unwrap();
     let text = "
@@ -209,7 +209,7 @@ response = { frequency-fit = { signal = 'ph', input = 'u' }, demand = 1 }
 }
 
 #[test]
-fn a_joint_with_dry_friction_is_held_by_the_input_alone_and_rounding_is_not_printed() {
+fn dry_friction_does_not_contribute_to_an_equilibrium_and_rounding_errors_are_not_printed() {
     let text = "
 [study]
 name = 'joint'
@@ -241,7 +241,7 @@ p = { peak = { signal = 'ph' }, usage = 'monitor' }
 }
 
 #[test]
-fn repeated_poles_of_several_inputs_are_placed_or_refused_and_what_they_are_worth_is_said() {
+fn repeated_poles_with_several_inputs_are_placed_or_refused_and_their_sensitivity_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let text = "
 [study]
@@ -272,7 +272,7 @@ slowest = { slowest-pole = { input = 'u1' }, usage = 'monitor' }
     }
     let largest = feedback["k"].as_array().unwrap().iter().flat_map(|row| row.as_array().unwrap());
     assert!(largest.map(|k| k.as_f64().unwrap().abs()).fold(0.0, f64::max) < 200.0, "{feedback}");
-    // An input that does not act any more: the rank, and everything else all the same.
+    // An input without effect: the rank is reported, and all other results.
     std::fs::remove_dir_all(&out).unwrap();
     let file = study(folder.path(), &text.replace("0.4", "0"));
     let refused = mops(&["linearise", &file, "--place=-3,-3,-9,-9", "--out", out.to_str().unwrap()]).output().unwrap();
@@ -285,7 +285,7 @@ slowest = { slowest-pole = { input = 'u1' }, usage = 'monitor' }
 #[test]
 fn several_free_axes_have_poles_at_zero_and_all_their_plots() {
     let folder = tempfile::tempdir().unwrap();
-    // Four axes; the last one hangs on a spring, the others roll freely.
+    // Four axes: the last one is attached to a spring, the others move freely.
     let text = "
 [study]
 name = 'stage'
@@ -319,7 +319,7 @@ slowest = { slowest-pole = { of = 'closed-loop' }, usage = 'monitor' }
 }
 
 #[test]
-fn where_there_are_no_plots_nobody_says_that_there_are() {
+fn the_output_does_not_mention_plots_that_were_not_written() {
     let folder = tempfile::tempdir().unwrap();
     let text = "
 [study]
@@ -338,7 +338,7 @@ x = { final-value = { signal = 'x' }, usage = 'monitor' }
     assert_eq!(std::fs::read_dir(&out).unwrap().count(), 1);
 }
 
-/// A tank with a free outlet, and a spring that is flat at rest.
+/// Tank with a free outlet, and spring with zero stiffness at rest.
 fn vessel(der: &str) -> String {
     format!(
         "
@@ -370,8 +370,7 @@ fn a_linearisation_that_does_not_exist_is_refused() {
         assert_eq!(refused.status.code(), Some(3), "{der}: {told}");
         assert!(told.contains("the rate of `x` is not differentiable with respect to `x` at x = 0"), "{der}: {told}");
     }
-    // Elsewhere, or where it is smooth, it exists; an output without a slope is noted. Below 0 the power is not defined, and
-    // then the output has a slope.
+    // At other points, and for smooth equations, the linearisation exists. An output that is not differentiable gets a note.
     for (der, at) in
         [("u - k*sqrt(x)", "x=0.25"), ("u - k*x^1.5", "x=0"), ("u - k*x*abs(x)", "x=0"), ("u - k*abs(x)", "x=-1")]
     {
@@ -381,7 +380,7 @@ fn a_linearisation_that_does_not_exist_is_refused() {
         let rough = at == "x=0" && !der.contains('^');
         assert_eq!(shown.contains("note: `size` is not differentiable with respect to `x`"), rough, "{der}: {shown}");
     }
-    // As a model of a study it has no value there.
+    // In a study, criteria of the linearisation have no value there.
     let text = vessel("u - k*sqrt(x)")
         .replace("horizon = 1", "horizon = 1\n[models.m.linearise]\noutputs = ['x']")
         .replace("final-value = { signal = 'x' }", "slowest-pole = {}");
@@ -393,7 +392,7 @@ fn a_linearisation_that_does_not_exist_is_refused() {
 #[test]
 fn an_equilibrium_is_found_from_a_start_without_a_slope() {
     let folder = tempfile::tempdir().unwrap();
-    // The equilibrium for k = 2, by hand.
+    // Equilibrium for k = 2, computed by hand.
     for (der, u, expected) in [
         ("u - k*sqrt(x)", "1", 0.25),
         ("u - k*sqrt(x)", "50", 625.0),

@@ -1,6 +1,6 @@
-//! What a user reads when a study, its data or the command line is wrong: the place, the fact and the way out.
+//! Error messages on studies, data and the command line: position, fact and fix.
 //!
-//! Every case breaks one thing of a study that is right. A page of messages per subject stands in `tests/snapshots`.
+//! Each case makes one error in a valid study. `tests/snapshots` has a page of messages per subject.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,7 +8,7 @@ use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
 
-/// A design that is right.
+/// Valid design.
 const DESIGN: &str = r#"[study]
 name = "loop"
 
@@ -29,7 +29,7 @@ overshoot = { overshoot     = { signal = "y", target = 1.0 },              deman
 settling  = { settling-time = { signal = "y", target = 1.0, band = 0.01 }, demand = "15 s" }
 "#;
 
-/// A calibration that is right.
+/// Valid calibration.
 const CALIBRATION: &str = r#"[study]
 name = "swing"
 task = "calibration"
@@ -53,7 +53,7 @@ free     = ["theta"]
 theta = { fit = { signal = "theta" }, demand = 1e-3 }
 "#;
 
-/// Its recording.
+/// Recording of the calibration.
 const RECORDING: &str = "\
 t[s],arm[rad],pendulum[rad],torque[N*m]
 0.00,0.000,3.00,0.0
@@ -62,7 +62,7 @@ t[s],arm[rad],pendulum[rad],torque[N*m]
 0.15,0.006,2.91,0.0
 ";
 
-/// One mistake: the files of the folder in which `mops` is called, and how it is called.
+/// One error: the files of the working directory, and the command line.
 struct Case {
     what: &'static str,
     files: BTreeMap<String, Vec<u8>>,
@@ -85,7 +85,7 @@ impl Case {
         Self { arguments: arguments.to_vec(), ..self }
     }
 
-    /// What `mops` says. It ends with status 2, prints no result and writes nothing.
+    /// Returns the message of `mops`, which exits with status 2, prints no result and writes no file.
     fn message(&self) -> String {
         let folder = tempfile::tempdir().unwrap();
         for (name, content) in &self.files {
@@ -102,7 +102,7 @@ impl Case {
     }
 }
 
-/// Every file in the folder, by its path from there.
+/// Returns all files below the folder, by relative path.
 fn files_below(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -117,55 +117,55 @@ fn files_below(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     files
 }
 
-/// `text` with `instead` in the place of `right`, which stands there once.
+/// Replaces `right`, which occurs once in `text`, by `instead`.
 fn broken(text: &str, right: &str, instead: &str) -> String {
-    assert_eq!(text.matches(right).count(), 1, "`{right}` must stand once in\n{text}");
+    assert_eq!(text.matches(right).count(), 1, "`{right}` must occur once in\n{text}");
     text.replace(right, instead)
 }
 
-/// The design with a mistake.
+/// Design with an error.
 fn design(what: &'static str, right: &str, instead: &str) -> Case {
     Case::new(what, &broken(DESIGN, right, instead))
 }
 
-/// The calibration with a mistake in its study.
+/// Calibration with an error in its study.
 fn calibration(what: &'static str, right: &str, instead: &str) -> Case {
     Case::new(what, &broken(CALIBRATION, right, instead)).with("swing.csv", RECORDING)
 }
 
-/// The calibration with a mistake in its recording.
+/// Calibration with an error in its recording.
 fn recording(what: &'static str, right: &str, instead: &str) -> Case {
     Case::new(what, CALIBRATION).with("swing.csv", broken(RECORDING, right, instead))
 }
 
-/// The calibration with another data file.
+/// Calibration with another data file.
 fn data_file(what: &'static str, file: &str, content: impl AsRef<[u8]>) -> Case {
     Case::new(what, &broken(CALIBRATION, "swing.csv", file)).with(file, content)
 }
 
-/// The design as it is, with a mistake on the command line.
+/// Valid design with an error on the command line.
 fn called(what: &'static str, arguments: &[&'static str]) -> Case {
     Case::new(what, DESIGN).called(arguments)
 }
 
-/// A file of level 4 with the column vector `t = [0; 1]`.
+/// MATLAB file of level 4 with the column vector `t = [0; 1]`.
 fn matlab_level_4() -> Vec<u8> {
     let header = [0_u32, 2, 1, 0, 2].map(u32::to_le_bytes).concat();
     [&header, b"t\0".as_slice(), &0.0_f64.to_le_bytes(), &1.0_f64.to_le_bytes()].concat()
 }
 
-/// A file of level 5 that announces a matrix of 1000 bytes and ends in it.
+/// MATLAB file of level 5 that ends within a matrix of 1000 bytes.
 fn matlab_level_5_cut_off() -> Vec<u8> {
     let header = format!("{:<124}\0\u{1}IM", "MATLAB 5.0 MAT-file, Platform: GLNXA64");
     [header.as_bytes(), &14_u32.to_le_bytes(), &1000_u32.to_le_bytes(), &[0; 16]].concat()
 }
 
-/// The beginning of a file of level 7.3.
+/// First bytes of a MATLAB file of level 7.3.
 fn matlab_level_7_3() -> Vec<u8> {
     [format!("{:<512}", "MATLAB 7.3 MAT-file, Platform: GLNXA64").as_bytes(), b"\x89HDF\r\n\x1a\n"].concat()
 }
 
-/// Words of the reader's innards, which help nobody with a study.
+/// Internal terms of the parsers, which must not occur in messages.
 const JARGON: [&str; 12] = [
     "invalid type",
     "wrong type",
@@ -181,7 +181,7 @@ const JARGON: [&str; 12] = [
     "panicked",
 ];
 
-/// The messages of all cases on one page, which is compared with its snapshot.
+/// Compares the messages of all cases, on one page, with the snapshot.
 fn check(subject: &str, cases: &[Case]) {
     let mut page = String::new();
     for case in cases {
@@ -197,7 +197,7 @@ fn check(subject: &str, cases: &[Case]) {
 }
 
 #[test]
-fn a_text_that_is_no_toml() {
+fn invalid_toml() {
     check(
         "toml",
         &[
@@ -218,7 +218,7 @@ fn a_text_that_is_no_toml() {
 }
 
 #[test]
-fn keys_that_are_not_known_or_not_there() {
+fn unknown_and_missing_keys() {
     check(
         "keys",
         &[
@@ -306,7 +306,7 @@ fn values_of_the_wrong_type() {
 }
 
 #[test]
-fn names_that_mean_nothing() {
+fn unknown_names() {
     check(
         "names",
         &[
@@ -344,7 +344,7 @@ fn names_that_mean_nothing() {
 }
 
 #[test]
-fn tuners_that_cannot_be_tuned() {
+fn invalid_tuners() {
     check(
         "tuners",
         &[
@@ -397,7 +397,7 @@ fn tuners_that_cannot_be_tuned() {
 }
 
 #[test]
-fn demands_that_cannot_be_met_or_missed() {
+fn invalid_demands() {
     check(
         "demands",
         &[
@@ -418,7 +418,7 @@ fn demands_that_cannot_be_met_or_missed() {
     );
 }
 
-/// A model from text that is right.
+/// Valid model of equations.
 const EQUATIONS: &str = r#"[study]
 name = "rig"
 
@@ -442,13 +442,13 @@ b = { start = 0.1, min = 0.0, max = 1.0 }
 highest = { peak = { signal = "th" }, demand = 1.0 }
 "#;
 
-/// The model from text with a mistake.
+/// Model of equations with an error.
 fn equations(what: &'static str, right: &str, instead: &str) -> Case {
     Case::new(what, &broken(EQUATIONS, right, instead))
 }
 
 #[test]
-fn models_from_text_that_are_wrong() {
+fn invalid_equations() {
     check(
         "equations",
         &[
@@ -484,7 +484,7 @@ fn models_from_text_that_are_wrong() {
 }
 
 #[test]
-fn models_that_cannot_be_simulated() {
+fn invalid_models() {
     check(
         "models",
         &[
@@ -510,7 +510,7 @@ fn models_that_cannot_be_simulated() {
 }
 
 #[test]
-fn experiments_that_do_not_fit_their_data() {
+fn experiments_that_contradict_their_data() {
     check(
         "experiments",
         &[
@@ -554,7 +554,7 @@ fn experiments_that_do_not_fit_their_data() {
 }
 
 #[test]
-fn recordings_that_are_damaged() {
+fn damaged_recordings() {
     check(
         "recordings",
         &[
@@ -603,7 +603,7 @@ fn recordings_that_are_damaged() {
 }
 
 #[test]
-fn a_command_line_that_asks_for_what_is_not_there() {
+fn invalid_command_lines() {
     check(
         "command-line",
         &[
@@ -638,7 +638,7 @@ fn a_command_line_that_asks_for_what_is_not_there() {
     );
 }
 
-/// The calibration on a model of its equations, with an effect in the place of its friction.
+/// Calibration of a model of equations with an effect instead of its friction.
 fn effect(what: &'static str, effects: &str) -> Case {
     let study = broken(CALIBRATION, "[models.rig.furuta]\n", SHAFT);
     let study = broken(&study, "[models.rig.parameters]\na = 9e-4\nb = 2e-3\nc = 4e-4\n", "");
@@ -661,7 +661,7 @@ dtheta = "J*dtheta' = d*sin(theta)"
 "#;
 
 #[test]
-fn effects_that_are_not_there_or_do_not_fit() {
+fn unknown_and_unsuitable_effects() {
     check(
         "effects",
         &[
@@ -709,7 +709,8 @@ fn effects_that_are_not_there_or_do_not_fit() {
     );
 }
 
-/// `mops` points at the last place of `wrong` in the file, line and column counted in characters from 1.
+/// Asserts that the message marks the last occurrence of `wrong` in the file; line and column are counted from 1, in
+/// characters.
 fn points_at(case: &Case, file: &str, wrong: &str) {
     let text = std::str::from_utf8(&case.files[file]).unwrap();
     let before = &text[..text.rfind(wrong).unwrap()];
@@ -720,7 +721,7 @@ fn points_at(case: &Case, file: &str, wrong: &str) {
 }
 
 #[test]
-fn the_second_of_two_like_places_is_pointed_at_where_it_is_the_wrong_one() {
+fn the_erroneous_one_of_two_equal_keys_is_marked() {
     let bounds = design("the bounds of the second tuner", "min = 0.01, max = 10.0", "min = 30.0, max = 20.0");
     points_at(&bounds, "study.toml", "20.0");
     let signal = design("the signal of the second criterion", "\"y\", target = 1.0, band", "\"k\", target = 1.0, band");
@@ -735,7 +736,7 @@ fn the_second_of_two_like_places_is_pointed_at_where_it_is_the_wrong_one() {
 }
 
 #[test]
-fn columns_count_characters_whatever_stands_before_them() {
+fn columns_are_counted_in_characters() {
     let above = design("characters above", "[cases]", "# Die Fälle: Größe, 大きさ\n[cases]\nbeide = { q = 1.0 }");
     points_at(&above, "study.toml", "q = 1.0");
     let before = design("characters before", "nominal = { p = 0.0 }", "\"größer, 大\" = { p = true }");
@@ -746,21 +747,21 @@ fn columns_count_characters_whatever_stands_before_them() {
 }
 
 #[test]
-fn a_study_written_on_windows_is_read_and_pointed_into() {
+fn positions_are_right_in_files_with_windows_line_ends_and_byte_order_marks() {
     let windows = broken(DESIGN, "demand = 0.10", "demand = -0.10").replace('\n', "\r\n");
     points_at(&Case::new("line ends of Windows", &windows), "study.toml", "-0.10");
     let marked = Case::new("a byte order mark", &format!("\u{feff}{}", broken(DESIGN, "name = \"loop\"", "name = 7")));
     assert!(marked.message().contains("[study.toml:2:8]"), "{}", marked.message());
 }
 
-/// The calibration as a diagnosis, with this in its table, called as one.
+/// Diagnosis with this text in its table.
 fn diagnosis(what: &'static str, table: &str) -> Case {
     let study = format!("{}\n[diagnosis]\n{table}\n", broken(CALIBRATION, "\"calibration\"", "\"diagnosis\""));
     Case::new(what, &study).with("swing.csv", RECORDING)
 }
 
 #[test]
-fn a_diagnosis_that_cannot_be_made() {
+fn invalid_diagnoses() {
     let diagnose: &[&str] = &["diagnose", "study.toml", "--out", "out"];
     check(
         "diagnosis",
@@ -794,13 +795,13 @@ fn a_diagnosis_that_cannot_be_made() {
     );
 }
 
-/// The design over an uncertain pole, with these tables.
+/// Design with an uncertain pole and these tables.
 fn uncertain(what: &'static str, tables: &str) -> Case {
     Case::new(what, &format!("{DESIGN}\n{tables}\n"))
 }
 
 #[test]
-fn uncertain_parameters_that_mean_nothing() {
+fn invalid_uncertain_parameters() {
     let worst: &[&str] = &["run", "study.toml", "--out", "out", "--set", "study.task='worst-case'"];
     let monte_carlo: &[&str] = &["run", "study.toml", "--out", "out", "--set", "study.task='monte-carlo'"];
     check(
@@ -856,14 +857,14 @@ fn uncertain_parameters_that_mean_nothing() {
     );
 }
 
-/// A front with a mistake, given more of the study.
+/// Pareto front with an error and further tables.
 fn front(what: &'static str, study: &str, criteria: &str, tables: &str) -> Case {
     let text = broken(DESIGN, "name = \"loop\"", &format!("name = \"loop\"\ntask = \"pareto\"{study}"));
     Case::new(what, &(broken(&text, "demand = \"15 s\" }", &format!("demand = \"15 s\"{criteria} }}")) + tables))
 }
 
 #[test]
-fn a_front_that_cannot_be_found() {
+fn invalid_fronts() {
     check(
         "front",
         &[
@@ -876,13 +877,13 @@ fn a_front_that_cannot_be_found() {
     );
 }
 
-/// The design beside a result of it, for `mops pick` with this demand.
+/// Design and its result, for `mops pick` with this demand.
 fn picked(what: &'static str, result: &str, demand: &'static str) -> Case {
     Case::new(what, DESIGN).with("result.json", result).called(&["pick", ".", "--demand", demand])
 }
 
 #[test]
-fn a_point_that_cannot_be_picked() {
+fn invalid_picks() {
     let front = r#"{ "study": "loop", "front": [{ "tuners": { "k": 4.0 } }], "trade_offs": {} }"#;
     check(
         "pick",

@@ -1,4 +1,4 @@
-//! What is done with runs that are over: listed, compared, reported again.
+//! Finished runs: history, comparison, and reports written again.
 
 use std::path::Path;
 
@@ -12,14 +12,14 @@ fn mops(arguments: &[&str]) -> Command {
     command
 }
 
-/// What a command that succeeds prints.
+/// Returns the output of a command that succeeds.
 fn said(arguments: &[&str]) -> String {
     let output = mops(arguments).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// What a command that is refused says.
+/// Returns the message of a command that is refused.
 fn refusal(arguments: &[&str]) -> String {
     let output = mops(arguments).output().unwrap();
     assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stdout));
@@ -33,7 +33,7 @@ fn run(study: &str, out: &Path, more: &[&str]) -> Value {
 }
 
 #[test]
-fn the_history_lists_runs_in_their_order_with_what_came_of_them() {
+fn the_history_lists_runs_with_state_and_result() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path().to_str().unwrap();
     let first = run("pid-design", &folder.path().join("a"), &["--seed", "3"]);
@@ -50,7 +50,7 @@ fn the_history_lists_runs_in_their_order_with_what_came_of_them() {
     let table = said(&["history", root]);
     assert_eq!(table.lines().count(), 3, "{table}");
     assert!(table.contains("pid-design-constrained") && table.contains("worst scaled"), "{table}");
-    // A run that was killed has no result, whatever an older one left.
+    // A killed run has no result, even if an older run left one.
     let database = rusqlite::Connection::open(folder.path().join("a/evaluations.sqlite")).unwrap();
     database.execute("UPDATE runs SET state = 'running'", []).unwrap();
     let runs: Value = serde_json::from_str(&said(&["history", root, "--json"])).unwrap();
@@ -60,7 +60,7 @@ fn the_history_lists_runs_in_their_order_with_what_came_of_them() {
 }
 
 #[test]
-fn a_report_is_written_again_as_it_was_without_the_study_file() {
+fn a_report_is_rewritten_identically_without_the_study_file() {
     let folder = tempfile::tempdir().unwrap();
     let study = folder.path().join("study.toml");
     std::fs::copy("studies/pid-design/study.toml", &study).unwrap();
@@ -74,15 +74,15 @@ fn a_report_is_written_again_as_it_was_without_the_study_file() {
         std::fs::remove_dir_all(out.join("plots")).unwrap();
         let result = std::fs::read(out.join("result.json")).unwrap();
         said(&["report", out.to_str().unwrap()]);
-        assert!(std::fs::read_to_string(out.join("report.html")).unwrap() == page, "the page is the same: {more:?}");
-        assert_eq!(std::fs::read(out.join("result.json")).unwrap(), result, "the result is left alone");
+        assert!(std::fs::read_to_string(out.join("report.html")).unwrap() == page, "the page is unchanged: {more:?}");
+        assert_eq!(std::fs::read(out.join("result.json")).unwrap(), result, "the result is unchanged");
     }
     let said = refusal(&["report", folder.path().to_str().unwrap()]);
     assert!(said.contains("is not the folder of a run"), "{said}");
 }
 
 #[test]
-fn a_report_of_a_diagnosis_is_written_again_as_it_was() {
+fn a_report_of_a_diagnosis_is_rewritten_identically() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
     let few = "diagnosis.effects=['coulomb-friction','viscous-friction']";
@@ -91,13 +91,13 @@ fn a_report_of_a_diagnosis_is_written_again_as_it_was() {
     assert!(page.contains("coulomb-friction"));
     std::fs::remove_file(folder.path().join("report.html")).unwrap();
     assert!(said(&["report", out]).contains("from the diagnosis"));
-    assert!(std::fs::read_to_string(folder.path().join("report.html")).unwrap() == page, "the page is the same");
+    assert!(std::fs::read_to_string(folder.path().join("report.html")).unwrap() == page, "the page is unchanged");
     std::fs::remove_file(folder.path().join("diagnosis.toml")).unwrap();
     assert!(refusal(&["report", out]).contains("diagnosis.toml cannot be read"));
 }
 
 #[test]
-fn a_comparison_has_differences_in_percent_and_the_responses() {
+fn a_comparison_shows_differences_in_percent_and_responses() {
     let folder = tempfile::tempdir().unwrap();
     let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
     let first = run("pid-design", &a, &[]);

@@ -1,18 +1,18 @@
-//! The pictures of the README show the present reports: the digest beside each is that of its study and of the template.
+//! The pictures of the README are up to date: the stored digest is that of the study and of the report template.
 
 use std::fs;
 use std::path::Path;
 
 use mops::core::file::digest;
 
-/// Pictures in docs/pictures, and the studies that they show.
+/// Pictures in docs/pictures, each with its study.
 const PICTURES: [(&str, &str); 2] = [("design", "pid-design"), ("diagnosis", "furuta-discrepancy")];
 
-/// Files of the template: layout, style, and the first part of a page.
+/// Files of the report template: layout, style, and the first part of a page.
 const TEMPLATE: [&str; 3] = ["src/report/page.rs", "src/report/style.css", "src/report/verdict.rs"];
 
 #[test]
-fn pictures_are_those_of_the_studies_and_the_template() {
+fn pictures_are_up_to_date_with_their_studies_and_the_report_template() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let read = |path: &str| fs::read(root.join(path)).unwrap_or_else(|error| panic!("{path}: {error}"));
     for (picture, study) in PICTURES {

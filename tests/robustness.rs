@@ -1,4 +1,4 @@
-//! How far a design or an estimate can be trusted: worst cases, distributions, effects and intervals against closed forms.
+//! Robustness and uncertainty: worst cases, distributions, sensitivities and intervals against closed forms.
 
 #[path = "common/function.rs"]
 mod function;
@@ -36,7 +36,7 @@ fn normal(mean: f64, deviation: f64) -> UncertainBuilder {
     UncertainBuilder { distribution: Some(distribution), ..UncertainBuilder::default() }
 }
 
-/// A study of `f` with one tuner `t` and the uncertain parameters `x0`, `x1`.
+/// Study of `f` with one tuner `t` and the uncertain parameters `x0`, `x1`.
 fn draft(
     task: Task,
     uncertain: [UncertainBuilder; 2],
@@ -73,9 +73,9 @@ fn solved(draft: StudyBuilder) -> Outcome {
 
 const BOX: fn() -> [UncertainBuilder; 2] = || [between(-1.0, 1.0), between(-1.0, 1.0)];
 
-/// Cases that differ in nothing but what is uncertain are one.
+/// Cases that differ only in uncertain parameters are merged.
 #[test]
-fn cases_that_are_the_same_without_their_uncertain_values_are_searched_once() {
+fn cases_that_differ_only_in_uncertain_values_are_searched_once() {
     let mut draft = draft(Task::WorstCase, BOX(), vec![end(0, 1.0, Usage::Minimise)], |p| Some(vec![p[1] + p[2]]));
     let mut other = draft.cases[0].clone();
     (other.name, other.parameters) = ("other".into(), vec![("x0".into(), 0.9.into()), ("x1".into(), 0.9.into())]);
@@ -85,9 +85,10 @@ fn cases_that_are_the_same_without_their_uncertain_values_are_searched_once() {
     assert!((found.criteria[0].value - 2.0).abs() < 1e-9);
 }
 
-/// A corner, a bump inside beside a lower one, the far side of an equality, and the low end of what should be large.
+/// Worst cases at a corner, at the higher of two interior maxima, at the far side of an equality, and at the minimum of a
+/// criterion to be maximised.
 #[test]
-fn worst_cases_are_where_closed_forms_have_them() {
+fn worst_cases_agree_with_closed_forms() {
     let f = |p: &[f64]| {
         let [t, x, y] = [p[0], p[1], p[2]];
         let bump = |a: f64, b: f64| math::exp(-20.0 * (math::powi(x - a, 2) + math::powi(y - b, 2)));
@@ -104,7 +105,7 @@ fn worst_cases_are_where_closed_forms_have_them() {
     let outcome = solved(draft(Task::WorstCase, BOX(), criteria, f));
     let found = outcome.found.worst_case.unwrap();
     assert!(!found.guaranteed && found.simulations > 100);
-    // Value, scaled value, place; of the bumps the higher is moved by the tail of the lower by less than 1e-6.
+    // Value, scaled value, place. The lower maximum shifts the higher one by less than 1e-6.
     let exact = [
         (6.5, 3.25, [Some(1.0), Some(-1.0)]),
         (1.0, 1.0, [Some(0.3), Some(-0.2)]),
@@ -124,7 +125,7 @@ fn worst_cases_are_where_closed_forms_have_them() {
 }
 
 #[test]
-fn failures_in_the_box_are_told_and_do_not_count_as_values() {
+fn failures_in_the_box_are_reported_and_do_not_count_as_values() {
     let f = |p: &[f64]| if p[1] > 0.6 { None } else { Some(vec![p[1] + 2.0]) };
     let outcome = solved(draft(Task::WorstCase, BOX(), vec![end(0, 1.0, Usage::Minimise)], f));
     let worst = &outcome.found.worst_case.as_ref().unwrap().criteria[0];
@@ -170,7 +171,7 @@ fn samples_of_a_linear_criterion_are_distributed_as_its_closed_form() {
     }
 }
 
-/// A tuner at 1.5 that is off by up to a tenth lies evenly between 1.35 and 1.65: a demand of 1.6 is met in five sixths.
+/// A tuner of 1.5 with a tolerance of 10 % is uniform between 1.35 and 1.65: a demand of 1.6 is met with probability 5/6.
 #[test]
 fn a_tolerance_is_a_range_around_the_design() {
     let mut draft = draft(Task::MonteCarlo, BOX(), vec![end(0, 1.6, Usage::Minimise)], |p| Some(vec![p[0]]));
@@ -183,7 +184,7 @@ fn a_tolerance_is_a_range_around_the_design() {
     assert!(criterion.min > 1.35 && criterion.max < 1.65 && (criterion.of.nominal - 1.5).abs() < 1e-12);
 }
 
-/// Of 1000 samples as many fail as lie in a fifth of the range: 200 with a standard deviation of 12.6.
+/// A fifth of the range fails: of 1000 samples 200, with a standard deviation of 12.6.
 #[test]
 fn samples_that_fail_do_not_meet_a_demand() {
     let f = |p: &[f64]| if p[1] > 0.6 { None } else { Some(vec![p[2]]) };
@@ -193,9 +194,9 @@ fn samples_that_fail_do_not_meet_a_demand() {
     assert_eq!(found.criteria[0].met.unwrap().count, 1000 - found.failed);
 }
 
-/// `min over t of max over x0 of (t - x0)^2`: t = 0, and 1 at both ends; nominally t = 0.5 would do with 0.
+/// `min over t of max over x0 of (t - x0)^2`: t = 0 with the value 1 at both ends; the nominal optimum is t = 0.5 with 0.
 #[test]
-fn a_design_against_the_worst_cases_stands_in_the_middle_of_the_box() {
+fn the_robust_design_of_a_symmetric_problem_is_the_centre_of_the_box() {
     let f = |p: &[f64]| Some(vec![math::powi(p[0] - p[1], 2) + 0.1 * math::powi(p[2], 2)]);
     let mut draft = draft(Task::Design, BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
     draft.tasks.robust = Some(RobustTask::default());
@@ -207,18 +208,18 @@ fn a_design_against_the_worst_cases_stands_in_the_middle_of_the_box() {
     assert!(t.abs() < 2e-3, "{t}");
     let round = &found.rounds[found.chosen];
     assert!((round.found - 1.1).abs() < 3e-3 && round.found - round.for_cases <= 1e-3, "{round:?}");
-    // The worst over the cases at hand only rises.
+    // The worst value over the present cases does not decrease.
     assert!(found.rounds.windows(2).all(|two| two[1].for_cases >= two[0].for_cases - 1e-9));
-    // What is reported is the worst that was found, not what the design was made for.
+    // The reported value is the worst one found, not that of the design cases.
     assert!((solved.outcome.worst_scaled - round.found).abs() < 2e-3);
-    // An independent look at the whole box.
+    // Independent evaluation of the whole box.
     let worst = (0..=100).map(|i| math::powi(t - (-1.0 + 0.02 * f64::from(i)), 2) + 0.1).fold(0.0, f64::max);
     assert!(worst <= round.found + 1e-9, "{worst} {}", round.found);
 }
 
-/// Of `x0 + 2 x1` on equal ranges, x1 has four fifths of the variance; both effects are slope times range.
+/// For `x0 + 2 x1` with equal ranges, x1 has four fifths of the variance; elementary effects are slope times range.
 #[test]
-fn effects_of_an_additive_criterion_are_its_slopes() {
+fn sensitivities_of_an_additive_criterion_follow_from_its_slopes() {
     let f = |p: &[f64]| Some(vec![p[1] + 2.0 * p[2]]);
     let with = |method, samples| {
         let mut draft = draft(Task::Sensitivity, BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
@@ -273,8 +274,7 @@ impl Model for Line {
     }
 }
 
-/// A line through 41 samples with noise from a table, and what the normal equations make of it: estimates, and the variance
-/// of the residuals with the inverse of the sums.
+/// Line through 41 noisy samples, and its least-squares solution: estimates, residual variance, inverse of the normal matrix.
 struct Fitted {
     outcome: Outcome,
     estimates: [f64; 2],
@@ -332,7 +332,7 @@ fn error() -> CriterionBuilder {
     CriterionBuilder::minimise(NormalisedError { signal: "y".into(), ..NormalisedError::default() }, 1.0)
 }
 
-/// Published: the t quantile of 97.5 % with 39 degrees of freedom is 2.022691.
+/// Published: the 97.5 % quantile of the t distribution with 39 degrees of freedom is 2.022691.
 const T39: f64 = 2.022_691;
 
 #[test]
@@ -346,7 +346,7 @@ fn the_profile_of_a_linear_model_is_its_t_interval() {
         for (end, sign) in profile.interval.iter().zip([-1.0, 1.0]) {
             assert!((end - (fitted.estimates[k] + sign * half)).abs() < 3e-3 * half, "{profile:?} {half}");
         }
-        // The root of the likelihood ratio is a straight line.
+        // The square root of the likelihood ratio is linear.
         for &(value, root) in &profile.points {
             let exact = (value - fitted.estimates[k]) / half * T39;
             assert!((root - exact).abs() < 2e-3, "{value} {root} {exact}");
@@ -355,8 +355,8 @@ fn the_profile_of_a_linear_model_is_its_t_interval() {
     }
 }
 
-/// The variance of an estimate over replicates is that of least squares with the variance of the residuals per sample, up
-/// to the 5 % that 200 replicates leave, three times over; single samples are drawn.
+/// The variance over replicates, drawn sample by sample, equals that of least squares within three times the sampling error of
+/// 200 replicates, 5 %.
 #[test]
 fn bootstrap_errors_of_a_linear_model_are_those_of_least_squares() {
     let task = UncertaintyTask { bootstrap: 200, block: Some(1), ..UncertaintyTask::default() };
@@ -384,7 +384,7 @@ fn bands_of_a_linear_model_are_those_of_regression() {
     }
 }
 
-/// Runs a shipped study into `folder/out`; the result.
+/// Runs a shipped study into `folder/out`; returns the result.
 fn run(study: &str, folder: &Path, settings: &[&str]) -> Json {
     let out = folder.join("out");
     let mut arguments = vec!["run", study, "--json", "--out", out.to_str().unwrap()];
@@ -413,7 +413,7 @@ fn the_worst_cases_of_the_pid_controller_are_the_published_ones() {
     assert!(folder.path().join("out/plots/slice-nominal-settling-a.svg").exists());
 }
 
-/// For the controller of table 5.1 the settling time is worst inside the box, on a jump: 21.738 s at a = 0.184.
+/// For the controller of table 5.1 the worst settling time is inside the box, at a discontinuity: 21.738 s at a = 0.184.
 #[test]
 fn a_worst_case_inside_the_box_on_a_jump_is_found() {
     let folder = tempfile::tempdir().unwrap();
@@ -439,7 +439,7 @@ fn a_worst_case_inside_an_edge_of_the_box_is_found() {
 }
 
 #[test]
-fn effects_over_the_ranges_are_told_of_a_study_file() {
+fn a_study_file_gives_sensitivities_over_the_ranges() {
     let folder = tempfile::tempdir().unwrap();
     for (method, key) in [("morris", "magnitude"), ("sobol", "total")] {
         let sensitivity = format!("sensitivity={{at='start',method='{method}',samples=16}}");
@@ -452,7 +452,7 @@ fn effects_over_the_ranges_are_told_of_a_study_file() {
 }
 
 #[test]
-fn samples_are_written_beside_the_result() {
+fn samples_are_written_to_the_folder_of_the_result() {
     let folder = tempfile::tempdir().unwrap();
     let settings = ["study.task='monte-carlo'", "monte-carlo={at='start',samples=64,method='sobol'}"];
     let result = run("pid-worst-case", folder.path(), &settings);
@@ -476,11 +476,11 @@ impl mops::core::file::Files for NoFiles {
     }
 }
 
-/// The three cases of `pid-design-multi-case` are found without being named, with their optimum 3.8955098; they leave a place
-/// where the settling time is 16.9 s. The design that is reported holds at every point of a grid that the search never saw.
+/// The search finds the three cases of `pid-design-multi-case`, with their optimum 3.8955098, and a further one with a settling
+/// time of 16.9 s. The reported design satisfies its worst case at every point of an independent grid.
 #[test]
 #[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
-fn the_pid_design_for_the_box_holds_on_an_independent_grid() {
+fn the_robust_pid_design_satisfies_its_worst_case_on_an_independent_grid() {
     let folder = tempfile::tempdir().unwrap();
     let result = run("pid-robust", folder.path(), &[]);
     let found = &result["robust"];

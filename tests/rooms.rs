@@ -1,17 +1,17 @@
-//! The modules of every crate import one another without a circle, so that each can be read after those that it stands on.
+//! The modules of every crate have no circular imports, so that each can be read after those that it imports.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The crates that are looked at; `discrepancy` is one circle of its own until its search is rebuilt.
+/// Crates that are checked; `discrepancy` still has circular imports.
 const CRATES: [&str; 7] = ["math", "mops-core", "criteria", "effects", "models", "solvers", "."];
 
-/// Modules, and what each imports.
+/// Modules with their imports.
 type Imports = BTreeMap<String, BTreeSet<String>>;
 
 #[test]
-fn no_modules_import_one_another_in_a_circle() {
+fn modules_have_no_circular_imports() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     for name in CRATES {
         let imports = imports(&root.join(name).join("src"));
@@ -23,7 +23,7 @@ fn no_modules_import_one_another_in_a_circle() {
 }
 
 #[test]
-fn a_circle_is_found() {
+fn a_circular_import_is_found() {
     let import = |from: &str, to: &[&str]| (from.to_owned(), to.iter().map(|to| (*to).to_owned()).collect());
     let open = Imports::from([import("a", &["b", "c"]), import("b", &["c"]), import("c", &[])]);
     assert_eq!(circle(&open), None);
@@ -32,7 +32,7 @@ fn a_circle_is_found() {
 }
 
 #[test]
-fn imports_are_read_however_they_are_written() {
+fn all_forms_of_imports_are_read() {
     let known = ["a", "b", "c"].map(str::to_owned);
     let exports = BTreeMap::from([("Thing".to_owned(), "c".to_owned())]);
     let read =
@@ -47,12 +47,12 @@ fn imports_are_read_however_they_are_written() {
     assert_eq!(read("// use crate::a;\n#[cfg(test)]\nmod tests { use crate::b; }", 1), "");
 }
 
-/// What the modules of a crate import, by the first name of their paths.
+/// Returns the imports of the modules of a crate, by the first name of each path.
 fn imports(src: &Path) -> Imports {
     let root = fs::read_to_string(src.join("lib.rs")).expect("the crate has a library");
     let files = files(src);
     let module = |file: &PathBuf| {
-        let path = file.strip_prefix(src).expect("it is below").with_extension("");
+        let path = file.strip_prefix(src).expect("the file is in the folder").with_extension("");
         path.iter().map(|part| part.to_string_lossy().into_owned()).collect::<Vec<_>>()
     };
     let paths: Vec<(Vec<String>, &PathBuf)> = files.iter().map(|file| (module(file), file)).collect();
@@ -60,7 +60,7 @@ fn imports(src: &Path) -> Imports {
     let exports = exports(&root, &known);
     let mut imports = Imports::new();
     for (path, file) in paths.iter().filter(|(path, _)| path[0] != "lib" && path[0] != "main") {
-        let text = fs::read_to_string(file).expect("it was listed");
+        let text = fs::read_to_string(file).expect("the file exists");
         let depth = path.iter().filter(|part| *part != "mod").count();
         let named = names(&text, depth, &known, &exports);
         imports.entry(path[0].clone()).or_default().extend(named.into_iter().filter(|name| *name != path[0]));
@@ -68,12 +68,12 @@ fn imports(src: &Path) -> Imports {
     imports
 }
 
-/// Files of a crate but those of its tests.
+/// Returns the files of a crate except its tests.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
-    for entry in fs::read_dir(folder).expect("the folder is there") {
-        let path = entry.expect("it can be read").path();
-        let name = path.file_name().expect("it has a name").to_string_lossy().into_owned();
+    for entry in fs::read_dir(folder).expect("the folder exists") {
+        let path = entry.expect("the folder can be read").path();
+        let name = path.file_name().expect("the path has a name").to_string_lossy().into_owned();
         if name.starts_with("tests") || name.ends_with("_tests.rs") {
             continue;
         }
@@ -86,7 +86,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The modules of what the root of a crate hands on: `pub use a::{X, Y}`.
+/// Returns the modules of the names that the root of a crate re-exports: `pub use a::{X, Y}`.
 fn exports(root: &str, known: &[String]) -> BTreeMap<String, String> {
     let statements = root.split(';').filter_map(|statement| Some(statement.rsplit_once("use ")?.1));
     let of = |statement: &str| -> Vec<(String, String)> {
@@ -97,7 +97,7 @@ fn exports(root: &str, known: &[String]) -> BTreeMap<String, String> {
     statements.flat_map(of).filter(|(_, module)| known.contains(module)).collect()
 }
 
-/// The modules that a file names, by `crate::` or by as many `super::` as lead to the root of its crate.
+/// Returns the modules that a file names by `crate::`, or by `super::` up to the root of its crate.
 fn names(text: &str, depth: usize, known: &[String], exports: &BTreeMap<String, String>) -> BTreeSet<String> {
     let lines = text.lines().filter(|line| !line.trim_start().starts_with("//"));
     let text = lines.collect::<Vec<_>>().join("\n");
@@ -123,7 +123,7 @@ fn names(text: &str, depth: usize, known: &[String], exports: &BTreeMap<String, 
     found
 }
 
-/// The first words of the members of a group, whose opening brace is cut off.
+/// Returns the first names of the members of a group; the text starts after the opening brace.
 fn firsts(group: &str) -> Vec<&str> {
     let (mut depth, mut begins) = (0, true);
     let mut firsts = Vec::new();
@@ -147,7 +147,7 @@ fn word(text: &str) -> &str {
     &text[..text.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(text.len())]
 }
 
-/// A circle of imports, if there is one, from a module back to itself.
+/// Returns a cycle of imports, from a module back to itself, if there is one.
 fn circle(imports: &Imports) -> Option<Vec<String>> {
     let mut done = BTreeSet::new();
     imports.keys().find_map(|start| visit(start, imports, &mut Vec::new(), &mut done))

@@ -1,17 +1,16 @@
-//! The same bits on processors with and without fused products and wide registers.
+//! Equal bits on processors with and without fused multiply-add and wide registers.
 //!
-//! The C library of the system chooses its kernels by the processor when a program is loaded, and takes other features for
-//! missing where it is told to: a run that called one of its elementary functions has other bits then. What asks the processor
-//! itself is not reached by this.
+//! The C library chooses its kernels by the processor when a program is loaded; an environment variable disables features. A
+//! run that calls one of its elementary functions then has other bits. Code that queries the processor itself is not covered.
 
 use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
 
-/// Features of processors that the GNU C library has kernels for, by its names before and after 2.33.
+/// Processor features with kernels of their own in the GNU C library, by the names before and after version 2.33.
 const MASKED: &str = "glibc.cpu.hwcaps=-AVX2,-AVX,-FMA,-FMA4,-AVX512F,-AVX2_Usable,-FMA_Usable,-AVX512F_Usable";
 
-/// Runs a study into a folder; result.json without the line of `seconds`, and evaluations.csv.
+/// Runs a study into a folder; returns result.json without the line of `seconds`, and evaluations.csv.
 fn run(study: &str, more: &[&str], out: &Path, tunables: Option<&str>) -> [String; 2] {
     let mut command = cargo_bin_cmd!("mops");
     command.args(["run", study, "--quiet", "--out"]).arg(out).args(more).env_remove("GLIBC_TUNABLES");
@@ -69,14 +68,14 @@ fn a_processor_without_fused_products_gives_the_same_bits() {
     }
 }
 
-/// Elementary functions of the C library that IEEE 754 leaves the last digit of.
+/// Elementary functions of the C library whose last digit IEEE 754 does not specify.
 #[cfg(target_os = "linux")]
 const ROUNDED: [&str; 27] = [
     "sin", "cos", "tan", "sincos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
     "exp", "exp2", "exp10", "expm1", "log", "log2", "log10", "log1p", "pow", "cbrt", "hypot", "lgamma", "tgamma",
 ];
 
-/// Names of the symbols that a 64-bit ELF file takes from libraries.
+/// Returns the symbols that a 64-bit ELF file imports from libraries.
 ///
 /// Source: System V Application Binary Interface, edition 4.1, chapter 4: section headers, symbol table.
 #[cfg(target_os = "linux")]
@@ -95,11 +94,11 @@ fn imported(file: &[u8]) -> Vec<String> {
     undefined.map(|at| file[at..].iter().take_while(|b| **b != 0).map(|b| char::from(*b)).collect()).collect()
 }
 
-/// The two that are left compute nothing of ours: `log` is SQLite's, for the ranks of a full-text search, and `pow` is indicatif's,
-/// for the time that a progress bar foretells.
+/// The two remaining functions do not affect results: SQLite uses `log` for ranks of a full-text search, indicatif uses `pow`
+/// for the remaining time of a progress bar.
 #[cfg(target_os = "linux")]
 #[test]
-fn the_program_asks_the_system_for_no_elementary_function_that_counts() {
+fn the_program_links_no_elementary_function_that_affects_results() {
     let symbols = imported(&std::fs::read(assert_cmd::cargo::cargo_bin!("mops")).unwrap());
     assert!(symbols.iter().any(|name| name == "malloc"), "symbols are read: {symbols:?}");
     let mut asked: Vec<&str> = symbols.iter().map(String::as_str).filter(|name| ROUNDED.contains(name)).collect();

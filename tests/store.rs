@@ -1,4 +1,4 @@
-//! Runs that last: what is killed goes on, what is known is not simulated again.
+//! Stored evaluations: killed runs resume, stored points are not simulated again.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Stdio};
@@ -14,7 +14,7 @@ fn mops(arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs a study into a folder; what is said on the terminal.
+/// Runs a study into a folder; returns the output on the terminal.
 fn run(study: &str, out: &Path, more: &[&str]) -> String {
     let arguments = [&["run", study, "--out", out.to_str().unwrap()], more].concat();
     let output = mops(&arguments).output().unwrap();
@@ -23,7 +23,7 @@ fn run(study: &str, out: &Path, more: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap() + &error
 }
 
-/// The result of a run, without what depends on the clock.
+/// Returns the result of a run without times.
 fn result(out: &Path) -> Value {
     let mut result: Value = serde_json::from_slice(&std::fs::read(out.join("result.json")).unwrap()).unwrap();
     result.as_object_mut().unwrap().remove("seconds");
@@ -37,7 +37,7 @@ fn counts(said: &str) -> [usize; 3] {
     numbers.try_into().unwrap()
 }
 
-/// A folder with the study `pid-design` in which every `from` is a `to`.
+/// Creates a folder with the study `pid-design` in which `from` is replaced by `to`.
 fn changed(folder: &Path, from: &str, to: &str) -> PathBuf {
     let text = std::fs::read_to_string("studies/pid-design/study.toml").unwrap();
     assert!(text.contains(from), "{text}");
@@ -49,12 +49,12 @@ fn changed(folder: &Path, from: &str, to: &str) -> PathBuf {
 const SEARCH: [&str; 4] = ["--solver", "genetic", "--max-evaluations", "600"];
 
 #[test]
-fn a_run_that_is_resumed_after_its_end_simulates_nothing_and_has_the_same_result() {
+fn resuming_a_finished_run_simulates_nothing_and_gives_the_same_result() {
     let folder = tempfile::tempdir().unwrap();
     let runs = [
         ("pid-design", &SEARCH[..]),
         ("pid-design", &[]),
-        // Residuals and slopes of a least-squares solver.
+        // Residuals and derivatives of a least-squares solver.
         ("furuta-calibration", &["--max-evaluations", "40"]),
         // Points at values of uncertain parameters.
         ("pid-robust", &["--set", "robust.samples=16", "--set", "robust.starts=1", "--max-evaluations", "400"]),
@@ -75,7 +75,7 @@ fn a_run_that_is_resumed_after_its_end_simulates_nothing_and_has_the_same_result
     }
 }
 
-/// Kills a run again and again at moments that a seeded generator draws, and continues it each time.
+/// Kills a run repeatedly at times from a seeded generator, and resumes it each time.
 fn killed_again_and_again(kills: usize, seed: u64) {
     let folder = tempfile::tempdir().unwrap();
     let (whole, torn) = (folder.path().join("whole"), folder.path().join("torn"));
@@ -96,7 +96,7 @@ fn killed_again_and_again(kills: usize, seed: u64) {
         std::thread::sleep(Duration::from_millis(50 + (state >> 33) % 900));
         process.kill().unwrap();
         if process.wait().unwrap().code().is_some() {
-            // It came to its end first: the next one begins anew.
+            // The run ended first: start a new one.
             assert_eq!(result(&torn), result(&whole));
             std::fs::remove_dir_all(&torn).unwrap();
             most = 0;
@@ -116,7 +116,7 @@ fn killed_again_and_again(kills: usize, seed: u64) {
     }
 }
 
-/// Points in the database of a folder.
+/// Returns the number of points in the database of a folder.
 fn points(folder: &Path) -> usize {
     let path = folder.join("evaluations.sqlite");
     if !path.exists() {
@@ -126,22 +126,22 @@ fn points(folder: &Path) -> usize {
     connection.query_row("SELECT count(*) FROM points", [], |row| row.get::<_, i64>(0)).map_or(0, |n| n as usize)
 }
 
-/// Five kills; `MOPS_KILLS` asks for more.
+/// Five kills, or as many as `MOPS_KILLS` states.
 #[test]
-fn a_run_that_is_killed_at_random_moments_has_the_result_of_one_that_was_not() {
+fn a_run_killed_at_random_moments_resumes_to_the_result_of_an_uninterrupted_one() {
     let kills = std::env::var("MOPS_KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(5);
     killed_again_and_again(kills, 1);
 }
 
 #[test]
-fn a_changed_demand_simulates_no_known_point_again() {
+fn after_a_change_of_a_demand_no_stored_point_is_simulated_again() {
     let folder = tempfile::tempdir().unwrap();
     let (first, second) = (folder.path().join("first"), folder.path().join("second"));
     run("pid-design", &first, &["--solver", "genetic", "--max-evaluations", "5000"]);
     let known = points(&first);
     assert!(known >= 5000);
 
-    // The best of 5000 points under the new demand, by hand.
+    // The best of 5000 points under the new demand, computed independently.
     let study = changed(folder.path(), "demand = \"15 s\"", "demand = \"9 s\"");
     let table = std::fs::read_to_string(first.join("evaluations.csv")).unwrap();
     let demand = |text: &str| text.parse::<f64>().ok();
@@ -152,7 +152,7 @@ fn a_changed_demand_simulates_no_known_point_again() {
     });
     let best = best.fold(f64::INFINITY, f64::min);
 
-    // With a budget of one evaluation the run looks at its start alone: the best known point.
+    // With a budget of one evaluation the run evaluates its initial point only: the best stored point.
     let reuse = ["--reuse", first.to_str().unwrap()];
     let said = run(study.to_str().unwrap(), &second, &[&reuse[..], &["--max-evaluations", "1"]].concat());
     assert_eq!(counts(&said)[0], known);
@@ -160,19 +160,19 @@ fn a_changed_demand_simulates_no_known_point_again() {
     assert_eq!((found["evaluations"].as_u64(), found["reused"].as_u64()), (Some(1), Some(1)));
     assert_eq!(found["worst_scaled"].as_f64(), Some(best));
 
-    // A whole search: what it meets again is not simulated, and no point is written twice.
+    // A whole search: stored points are not simulated again, and no point is written twice.
     let said = run(study.to_str().unwrap(), &second, &[&reuse[..], &["--max-evaluations", "200"]].concat());
     let [_, met, simulated] = counts(&said);
     let found = result(&second);
     assert!(met >= 1 && simulated >= 1, "{said}");
-    // Points that are met twice (by the search, then by the certificate) are written once.
+    // Points evaluated twice (by the search, then by the certificate) are written once.
     assert!(points(&second) <= met + simulated && points(&second) > simulated, "every point once: {said}");
     assert_eq!(found["reused"].as_u64().map(|reused| 200 - reused as usize <= simulated), Some(true), "{said}");
     assert!(found["worst_scaled"].as_f64().unwrap() <= best);
 }
 
 #[test]
-fn a_run_that_uses_its_own_folder_again_keeps_what_it_learns_with_the_rest() {
+fn a_run_that_reuses_its_own_folder_adds_its_points_to_the_database() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     run("pid-design", &out, &SEARCH);
@@ -183,7 +183,7 @@ fn a_run_that_uses_its_own_folder_again_keeps_what_it_learns_with_the_rest() {
     assert_eq!((known, points(&out)), (before, before + simulated));
 }
 
-/// What is said of a run that is refused.
+/// Returns the message of a run that is refused.
 fn refusal(arguments: &[&str]) -> String {
     let output = mops(arguments).output().unwrap();
     assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stdout));
@@ -191,7 +191,7 @@ fn refusal(arguments: &[&str]) -> String {
 }
 
 #[test]
-fn what_another_study_left_is_refused_with_the_reason() {
+fn evaluations_of_another_study_are_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let place = out.to_str().unwrap();
@@ -217,7 +217,7 @@ fn what_another_study_left_is_refused_with_the_reason() {
 }
 
 #[test]
-fn a_budget_that_grows_makes_a_run_longer() {
+fn a_larger_budget_extends_a_run() {
     let folder = tempfile::tempdir().unwrap();
     let (short, long) = (folder.path().join("short"), folder.path().join("long"));
     run("pid-design", &short, &["--solver", "genetic", "--max-evaluations", "300"]);
@@ -228,7 +228,7 @@ fn a_budget_that_grows_makes_a_run_longer() {
 }
 
 #[test]
-fn a_new_run_keeps_the_points_of_one_that_came_to_no_end() {
+fn a_new_run_keeps_the_points_of_an_unfinished_one() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     run("pid-design", &out, &SEARCH);

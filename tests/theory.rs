@@ -1,4 +1,4 @@
-//! Theory as tools: what inputs excite, what data and criteria determine, and surfaces, as a user sees them.
+//! Excitation, identifiability and sweeps, as users see them.
 
 #[path = "common/result.rs"]
 mod result;
@@ -16,7 +16,7 @@ fn mops(arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs a study into `folder/out`; the result.
+/// Runs a study into `folder/out`; returns the result.
 fn run(study: &str, folder: &Path, settings: &[&str]) -> Value {
     let out = folder.join("out");
     let mut arguments = vec!["run", study, "--json", "--out", out.to_str().unwrap()];
@@ -25,7 +25,7 @@ fn run(study: &str, folder: &Path, settings: &[&str]) -> Value {
     result::read(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
 }
 
-/// The study of a free swing that lies beside the tests.
+/// Path of the study of a free swing in `tests/swing`.
 fn swing() -> String {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/swing/study.toml").to_str().unwrap().to_owned()
 }
@@ -34,8 +34,8 @@ fn page(folder: &Path) -> String {
     std::fs::read_to_string(folder.join("out/report.html")).unwrap()
 }
 
-/// A recording every 0.01 s of inputs whose order is known, and of `y(t) = 1.5 y(t-1) - 0.7 y(t-2) + u(t-1) + 0.5 u(t-2)`
-/// under the last of them, a maximum-length sequence of seven bits.
+/// Recording, every 0.01 s, of inputs of known excitation order, and of the response
+/// `y(t) = 1.5 y(t-1) - 0.7 y(t-2) + u(t-1) + 0.5 u(t-2)` to the last one, a maximum-length sequence of seven bits.
 fn recording() -> String {
     let (mut register, mut before, mut y) = (1u8, [0.0; 2], [0.0; 2]);
     let mut text = "t[s],pulse,step,sine,five,bits[N m],y[rad]\n".to_owned();
@@ -82,7 +82,7 @@ fn inputs(folder: &Path, text: &str) -> String {
 }
 
 #[test]
-fn orders_of_known_inputs_are_found_without_a_simulation() {
+fn excitation_orders_of_known_inputs_are_found_without_a_simulation() {
     let folder = tempfile::tempdir().unwrap();
     let result = run(&inputs(folder.path(), INPUTS), folder.path(), &[]);
     let found = result["excitation"]["inputs"].as_array().unwrap();
@@ -100,7 +100,7 @@ fn orders_of_known_inputs_are_found_without_a_simulation() {
 }
 
 #[test]
-fn regressions_find_the_system_or_say_that_the_input_is_too_poor() {
+fn regressions_identify_the_system_or_report_insufficient_excitation() {
     let folder = tempfile::tempdir().unwrap();
     let result = run(&inputs(folder.path(), INPUTS), folder.path(), &[]);
     let [arx, fir] = &result["excitation"]["regressions"].as_array().unwrap()[..] else { panic!("two of them") };
@@ -108,12 +108,12 @@ fn regressions_find_the_system_or_say_that_the_input_is_too_poor() {
         let [batch, recursive] = [&parameter[1], &parameter[3]].map(|v| v.as_f64().unwrap());
         assert!((batch - exact).abs() < 1e-9 && (recursive - exact).abs() < 1e-4, "{parameter}");
     }
-    // The edge of the step lies within the record: all three are determined, by it alone.
+    // The edge of the step is within the record and alone determines all three.
     assert_eq!((&fir["rank"], &fir["forgetting"]), (&3.into(), &0.99.into()));
 }
 
 #[test]
-fn a_column_of_a_data_file_can_be_asked_for_its_order() {
+fn the_data_command_computes_the_excitation_order_of_a_column() {
     let folder = tempfile::tempdir().unwrap();
     inputs(folder.path(), INPUTS);
     let data = folder.path().join("data.csv");
@@ -130,7 +130,7 @@ fn a_column_of_a_data_file_can_be_asked_for_its_order() {
 }
 
 #[test]
-fn a_free_swing_leaves_a_common_factor_open_and_says_so() {
+fn a_free_swing_does_not_determine_a_common_factor_and_the_result_reports_it() {
     let folder = tempfile::tempdir().unwrap();
     let settings = ["study.task='sensitivity'", "sensitivity.at='start'", "tuners.a.active=true"];
     let result = run(&swing(), folder.path(), &settings);
@@ -142,15 +142,15 @@ fn a_free_swing_leaves_a_common_factor_open_and_says_so() {
     let expected = "a common factor of `b`, `c`, `d`, `ba`, `bp`, `ca`, `cp` and `a` has no effect: only their ratios can \
                     be estimated";
     assert_eq!(direction["words"], expected);
-    // Along it the residuals stay what they are, also far away.
+    // Residuals are constant along this direction, also at large distances.
     assert!(direction["remaining"].as_f64().unwrap() < 1e-6, "{direction}");
     assert_eq!(found["tuners"][0]["std_error"], Value::Null);
     assert!(page(folder.path()).contains("has no effect: only their ratios can be estimated"));
 }
 
-/// The arm's inertia about its axis is that about its centre of mass and its mass times 0.1225 m squared.
+/// The inertia of the arm about its axis is that about its centre of mass plus its mass times (0.1225 m)^2.
 #[test]
-fn of_the_arms_inertia_and_mass_only_one_combination_can_be_estimated() {
+fn only_one_combination_of_arm_inertia_and_mass_is_identifiable() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::copy(swing().replace("study.toml", "swing.csv"), folder.path().join("swing.csv")).unwrap();
     let text = std::fs::read_to_string(swing()).unwrap();
@@ -165,14 +165,14 @@ fn of_the_arms_inertia_and_mass_only_one_combination_can_be_estimated() {
     let found = &result["sensitivity"];
     assert_eq!(found["directions"][0]["words"], "only `Jc` + 0.0150 `m` can be estimated");
     assert!(found["directions"][0]["remaining"].as_f64().unwrap() < 1e-6);
-    // Its block of the matrix has the eigenvectors (1, 0.015) and (-0.015, 1), and eigenvalues of which one is zero.
+    // The block of the matrix has the eigenvectors (1, 0.015) and (-0.015, 1); one eigenvalue is zero.
     let block = |i: usize, j: usize| found["matrix"][i][j].as_f64().unwrap();
     let [a, b, d] = [block(0, 0), block(0, 1), block(1, 1)];
     assert!((b / a - 0.01500625).abs() < 1e-9 && ((a * d - b * b) / (a * d)).abs() < 1e-9, "{a} {b} {d}");
 }
 
 #[test]
-fn a_calibration_tells_what_its_data_can_tell() {
+fn a_calibration_reports_the_identifiability_of_its_tuners() {
     let folder = tempfile::tempdir().unwrap();
     let result = run(&swing(), folder.path(), &[]);
     let found = &result["calibration"]["sensitivity"];
@@ -180,7 +180,7 @@ fn a_calibration_tells_what_its_data_can_tell() {
     let pairs =
         found["words"].as_array().unwrap().iter().any(|w| w.as_str().unwrap().contains("`b` and `c` are correlated"));
     assert!(pairs, "{}", found["words"]);
-    // Errors of the section are those of the parameters.
+    // Standard errors in the section equal those of the parameters.
     let parameters = result["calibration"]["parameters"].as_array().unwrap();
     for (parameter, tuner) in parameters.iter().zip(found["tuners"].as_array().unwrap()) {
         assert_eq!((&parameter["name"], &parameter["std_error"]), (&tuner["name"], &tuner["std_error"]));
@@ -199,7 +199,7 @@ fn a_sweep_over_two_tuners_draws_a_surface_with_its_minimum() {
     assert!(heights.len() == 6 && heights.iter().all(|row| row.len() == 9));
     let lowest = heights.iter().flatten().copied().fold(f64::INFINITY, f64::min);
     assert_eq!(found["best"][2].as_f64(), Some(lowest));
-    // The start is one of 55 points; a grid point that is the start's neighbour has its own value.
+    // The initial guess is one of 55 points; its neighbour on the grid has another value.
     assert_eq!((&result["evaluations"], &found["y"]["tuner"]), (&55.into(), &"Ti".into()));
     let rows = std::fs::read_to_string(folder.path().join("out/evaluations.csv")).unwrap().lines().count();
     assert_eq!(rows, 56);
@@ -216,7 +216,7 @@ fn a_sweep_over_one_tuner_is_a_line() {
 }
 
 #[test]
-fn mistakes_in_the_tables_of_tasks_have_a_place_and_a_way_out() {
+fn errors_in_the_tables_of_tasks_have_a_position_and_a_fix() {
     let folder = tempfile::tempdir().unwrap();
     let cases = [
         ("sweep={x='q'}", "the study has no tuner `q`", "known: b, c"),

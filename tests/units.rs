@@ -1,4 +1,4 @@
-//! Units in a study as a user meets them: converted where they can be, refused with the place where they cannot.
+//! Units in a study: converted if possible, otherwise refused with their position.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ fn mops(folder: &Path, arguments: &[&str]) -> (i32, String) {
     (output.status.code().unwrap(), text)
 }
 
-/// A study in a folder of its own, with a data file beside it.
+/// Writes a study with a data file into a new folder.
 fn study(text: &str, data: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("study.toml"), text).unwrap();
@@ -24,7 +24,7 @@ fn result(folder: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(folder.join("out/result.json")).unwrap()).unwrap()
 }
 
-/// Values of the criteria at the start values, by name.
+/// Returns the values of the criteria at the initial guess, by name.
 fn values(text: &str, data: &str) -> Vec<(String, f64, String)> {
     let folder = study(text, data);
     let (code, output) = mops(folder.path(), &["run", "study.toml", "--max-evaluations", "1", "--out", "out"]);
@@ -37,8 +37,8 @@ fn values(text: &str, data: &str) -> Vec<(String, f64, String)> {
 }
 
 #[test]
-fn the_angle_of_a_motor_that_runs_out_is_the_integral_of_its_speed() {
-    // 1 - exp(-1) turns of 100 rpm for one second, in deg: 379.
+fn the_angle_of_a_decelerating_motor_is_the_integral_of_its_speed_in_any_unit() {
+    // (1 - exp(-1)) times the angle of one second at 100 rpm, in deg: 379.
     let text = |criterion: &str| {
         format!(
             "[study]\nname = 'motor'\n[models.m.equations]\nstates = {{ w = 'rpm', x = 'deg' }}\nparameters = {{ k = '1/s' }}\n\
@@ -72,7 +72,7 @@ top  = { peak = { signal = 'T' }, demand = '25 degC' }
 ";
 
 #[test]
-fn a_room_at_rest_stays_at_rest_whatever_scale_its_temperatures_are_on() {
+fn a_room_in_equilibrium_stays_there_on_every_temperature_scale() {
     for state in ["K", "degC", "degF"] {
         for (input, base) in [("K", "degC"), ("degC", "K"), ("degF", "degF")] {
             let text = ROOM.replace("STATE", state).replace("INPUT", input).replace("BASE", base);
@@ -100,7 +100,7 @@ fn recorded_temperatures_are_converted_and_their_noise_is_a_difference() {
              [criteria]\nT = {{ normalised-error = {{ signal = 'T' }} }}\n"
         )
     };
-    // Off by 0.5 K everywhere: one standard deviation.
+    // The error is 0.5 K everywhere: one standard deviation.
     let data = |unit: &str, factor: f64, zero: f64| {
         let row = |k: i32| {
             let t = 10.0 * f64::from(k);
@@ -140,7 +140,7 @@ w = { final-value = { signal = 'w' }, demand = '1 rad/s' }
 ";
 
 #[test]
-fn constants_are_converted_and_a_wrong_unit_of_one_is_refused_at_the_equation() {
+fn constants_are_converted_and_a_wrong_unit_is_refused_at_the_equation() {
     let plain = SERVO.replace("0.8 mH", "0.8e-3 H").replace("80 kg mm2", "8e-5 kg m2");
     let (found, same) = (values(SERVO, ""), values(&plain, ""));
     assert!((found[0].1 - same[0].1).abs() < 1e-9, "{found:?} {same:?}");
@@ -163,7 +163,7 @@ fn constants_are_converted_and_a_wrong_unit_of_one_is_refused_at_the_equation() 
 }
 
 #[test]
-fn check_lists_bare_numbers_units_that_were_found_and_frequencies_in_rad_per_second() {
+fn check_lists_numbers_without_units_inferred_units_and_frequencies_in_rad_per_second() {
     let text = "[study]\nname = 'm'\n[models.m.equations]\nstates = { h = 'm', v = 'm/s' }\nparameters = { c = '', f = 'rad/s' }\n\
                 der = { h = 'v', v = '-9.81 - c*v*abs(v) + 1 [m/s2]*sin(f*time)' }\nhorizon = '1 s'\n\
                 [tuners]\nc = { start = 0.1, min = 0, max = 1 }\nf = { start = '5 Hz', min = '1 Hz', max = '10 Hz' }\n\
@@ -258,7 +258,7 @@ fn a_case_gives_each_model_its_parameter_in_the_unit_of_the_model() {
 }
 
 #[test]
-fn a_temperature_that_nothing_drives_is_named() {
+fn a_temperature_input_that_is_not_driven_is_reported() {
     let text = "[study]\nname = 'm'\n[models.m.equations]\nstates = { T = 'degC' }\ninputs = { Ta = 'degC', Q = 'W' }\n\
                 parameters = { k = '1/s' }\nconstants = { C = '1 J/K' }\nder = { T = 'k*(Ta - T) + Q/C' }\nhorizon = '1 s'\n\
                 [tuners]\nk = { start = 1, min = 0.1, max = 2 }\n[cases]\ncold = { }\nwarm = { inputs.Ta.constant = '18 degC' }\n\
@@ -273,7 +273,7 @@ fn a_temperature_that_nothing_drives_is_named() {
 }
 
 #[test]
-fn a_loop_of_equations_is_closed_in_one_dimension_whatever_the_unit_of_its_speed() {
+fn unity_feedback_requires_equal_dimensions_and_converts_units() {
     let text = |unit: &str, input: &str, law: &str| {
         format!(
             "[study]\nname = 'loop'\n[models.m]\nlinearise = {{ inputs = ['u'], outputs = ['w'] }}\n[models.m.equations]\n\
@@ -297,7 +297,7 @@ fn a_loop_of_equations_is_closed_in_one_dimension_whatever_the_unit_of_its_speed
 }
 
 #[test]
-fn units_are_read_as_engineers_type_them() {
+fn common_notations_of_units_are_read() {
     let text = "[study]\nname = 'm'\n[models.m.equations]\nstates = { x = 'J' }\nparameters = { E = 'J' }\nder = { x = 'E/1[s]' }\nhorizon = '1 s'\n\
                 [tuners]\nE = { start = '2 Wh', min = '1 Wh', max = '1 kWh' }\n[criteria]\ny = { final-value = { signal = 'x' }, demand = 'DEMAND' }\n";
     assert!((values(&text.replace("DEMAND", "1 Wh"), "")[0].1 - 7200.0).abs() < 1e-6);

@@ -1,4 +1,4 @@
-//! The live page of a run: what a browser sees, what everybody else does, and that nobody holds up the run.
+//! The live page of a run: access, content, and that no viewer delays the run.
 
 #[path = "common/devtools.rs"]
 mod devtools;
@@ -14,7 +14,7 @@ use std::time::Duration;
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
-/// A run that goes, and the address of its page; it ends with this.
+/// Run in progress and the address of its page; dropping it ends the run.
 struct Watched {
     process: Child,
     port: u16,
@@ -28,7 +28,7 @@ impl Drop for Watched {
     }
 }
 
-/// Begins a run with `--watch`.
+/// Starts a run with `--watch`.
 fn watched(out: &Path, more: &[&str]) -> Watched {
     let mut process = Command::new(cargo_bin!("mops"))
         .args(["run", "pid-design", "--quiet", "--watch", "--out", out.to_str().unwrap()])
@@ -40,7 +40,7 @@ fn watched(out: &Path, more: &[&str]) -> Watched {
     let mut said = BufReader::new(process.stderr.take().unwrap());
     let mut line = String::new();
     said.read_line(&mut line).unwrap();
-    // What else it says must find a reader.
+    // Further output must be read, so that the run does not block.
     std::thread::spawn(move || std::io::copy(&mut said, &mut std::io::sink()));
     let address = line.trim().rsplit(' ').next().unwrap().to_owned();
     let rest = address.strip_prefix("http://127.0.0.1:").unwrap_or_else(|| panic!("{line}"));
@@ -48,7 +48,7 @@ fn watched(out: &Path, more: &[&str]) -> Watched {
     Watched { process, port: port.parse().unwrap(), token: token.to_owned() }
 }
 
-/// A search that goes on for a while: each simulation takes a long time.
+/// A long search: each simulation takes a long time.
 const LONG: [&str; 6] =
     ["--solver", "genetic", "--max-evaluations", "100000", "--set", "models.loop.pid-loop.horizon=\"20000 s\""];
 
@@ -59,7 +59,7 @@ impl Watched {
         stream
     }
 
-    /// The whole answer to a request with this head.
+    /// Returns the whole response to a request with this header.
     fn ask(&self, head: &str) -> String {
         let mut stream = self.connect();
         stream.write_all(head.as_bytes()).unwrap();
@@ -68,7 +68,7 @@ impl Watched {
         answer
     }
 
-    /// The first state with a best point that comes.
+    /// Returns the first state that has a best point.
     fn first_state(&self) -> Value {
         let mut stream = self.connect();
         let head = format!("GET /{}/events HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", self.token, self.port);
@@ -84,7 +84,7 @@ impl Watched {
 }
 
 #[test]
-fn the_page_is_there_for_who_knows_its_address_and_for_nobody_else() {
+fn the_page_requires_the_token_in_its_url() {
     let folder = tempfile::tempdir().unwrap();
     let run = watched(&folder.path().join("out"), &LONG);
     let (host, token) = (format!("127.0.0.1:{}", run.port), run.token.clone());
@@ -113,7 +113,7 @@ fn the_page_is_there_for_who_knows_its_address_and_for_nobody_else() {
 }
 
 #[test]
-fn states_come_as_events_and_count_only_what_is_written() {
+fn events_count_only_committed_evaluations() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let run = watched(&out, &LONG);
@@ -126,11 +126,11 @@ fn states_come_as_events_and_count_only_what_is_written() {
     assert_eq!(criteria, ["overshoot", "settling"]);
     let database = rusqlite::Connection::open(out.join("evaluations.sqlite")).unwrap();
     let written: i64 = database.query_row("SELECT count(*) FROM points", [], |row| row.get(0)).unwrap();
-    assert!(written >= told, "{told} were told of, {written} are written");
+    assert!(written >= told, "{told} evaluations reported, {written} committed");
 }
 
 #[test]
-fn viewers_that_say_or_take_nothing_do_not_hold_up_a_run() {
+fn idle_and_faulty_viewers_do_not_affect_a_run() {
     let folder = tempfile::tempdir().unwrap();
     let (alone, crowded) = (folder.path().join("alone"), folder.path().join("crowded"));
     let search = ["--solver", "genetic", "--max-evaluations", "20000"];
@@ -147,8 +147,8 @@ fn viewers_that_say_or_take_nothing_do_not_hold_up_a_run() {
     let elsewhere = head.replacen(&run.token, "nowhere", 1);
     let rebound = head.replacen("Host: 127.0.0.1", "Host: rebound.example", 1);
     for i in 0..60 {
-        // Some say nothing, some half of it, some never read, some leave at once, some ask for what is not theirs; a run that
-        // is over takes no more.
+        // Viewers send nothing or half a request, never read, disconnect at once, or request a wrong address. A finished run
+        // accepts no connection.
         let Ok(mut viewer) = TcpStream::connect(("127.0.0.1", run.port)) else { break };
         let said = ["", &head[..head.len() / 2], &head, &head, &elsewhere, &rebound][i % 6];
         let _ = viewer.write_all(said.as_bytes());
@@ -161,11 +161,11 @@ fn viewers_that_say_or_take_nothing_do_not_hold_up_a_run() {
 }
 
 #[test]
-fn connections_that_say_nothing_keep_no_viewer_away() {
+fn idle_connections_do_not_block_other_viewers() {
     let folder = tempfile::tempdir().unwrap();
     let run = watched(&folder.path().join("out"), &LONG);
     let host = format!("127.0.0.1:{}", run.port);
-    // Many more than there are places, all open at once; some have begun to say something.
+    // Many more connections than the server accepts, all open at once; some have sent part of a request.
     let silent: Vec<TcpStream> = (0..200)
         .map(|i| {
             let mut stream = run.connect();
@@ -184,7 +184,7 @@ fn connections_that_say_nothing_keep_no_viewer_away() {
 }
 
 #[test]
-fn a_browser_sees_values_move_while_the_run_goes_and_that_it_is_over() {
+fn a_browser_shows_values_during_the_run_and_its_end() {
     let Some(browser) = headless::browser() else {
         eprintln!("{}", headless::SKIPPED);
         return;
@@ -213,7 +213,7 @@ fn a_browser_sees_values_move_while_the_run_goes_and_that_it_is_over() {
         assert!(text.contains(part), "{part}: {text}");
     }
     assert!(told["curve"].as_u64().unwrap() > 0 && told["dot"] == 1, "{told}");
-    // By keys alone: the first stop is the table of criteria, which scrolls on a narrow screen.
+    // By keyboard alone: the first focus is the table of criteria, which scrolls on a narrow screen.
     page.press("Tab");
     assert_eq!(page.evaluate("document.activeElement.getAttribute('aria-label')"), "Criteria");
     let pid = run.process.id().to_string();

@@ -1,4 +1,4 @@
-//! A page in a browser without a screen that is driven while it lives: the DevTools protocol over two pipes.
+//! Remote control of a page in a headless browser: the DevTools protocol over two pipes.
 //!
 //! Source: the Chrome DevTools Protocol (domains Target, Runtime, Log, Input); messages are JSON that ends with a zero byte.
 
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::headless::FLAGS;
 
-/// A page that lives as long as this.
+/// Open page; dropping it closes the browser.
 pub struct Page {
     browser: Child,
     to: File,
@@ -59,7 +59,7 @@ impl Page {
         page
     }
 
-    /// The value of an expression, or of what it promises.
+    /// Returns the value of an expression, or of its promise.
     pub fn evaluate(&mut self, expression: &str) -> Value {
         let question = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
         let answer = self.ask("Runtime.evaluate", &question);
@@ -67,17 +67,17 @@ impl Page {
         answer["result"]["value"].clone()
     }
 
-    /// The value of an expression once it is not null.
+    /// Returns the value of an expression once it is not null.
     pub fn once(&mut self, expression: &str) -> Value {
         let value = self.evaluate(&format!(
             "new Promise((done) => {{ const end = Date.now() + 60000; const look = () => {{ const found = {expression}; \
              if (found === null && Date.now() < end) setTimeout(look, 50); else done(found); }}; look(); }})"
         ));
-        assert!(!value.is_null(), "nothing came of {expression}");
+        assert!(!value.is_null(), "{expression} stayed null");
         value
     }
 
-    /// Presses a key, as a keyboard would.
+    /// Presses a key.
     pub fn press(&mut self, key: &str) {
         for kind in ["rawKeyDown", "keyUp"] {
             let code = if key == "Tab" { 9 } else { 0 };
@@ -88,13 +88,13 @@ impl Page {
         }
     }
 
-    /// What the console said of errors so far.
+    /// Returns the errors on the console so far.
     pub fn problems(&mut self) -> Vec<String> {
         self.evaluate("0");
         std::mem::take(&mut self.problems)
     }
 
-    /// Asks the browser, and hears what it says until it answers.
+    /// Sends a request to the browser, and reads messages until the response.
     fn ask(&mut self, method: &str, parameters: &Value) -> Value {
         self.asked += 1;
         let mut question = json!({ "id": self.asked, "method": method, "params": parameters });
@@ -105,7 +105,7 @@ impl Page {
         loop {
             let mut said = Vec::new();
             self.from.read_until(0, &mut said).unwrap();
-            assert!(said.pop() == Some(0), "the browser is gone");
+            assert!(said.pop() == Some(0), "the browser has ended");
             let said: Value = serde_json::from_slice(&said).unwrap();
             if said["id"] == self.asked {
                 assert!(said["error"].is_null(), "{method}: {said}");

@@ -1,4 +1,4 @@
-//! A function dressed as a model, and the criterion that reads its values.
+//! A model given by a function, and the criterion that reads its values.
 
 use mops::core::{Job, Response};
 use mops::{
@@ -6,14 +6,14 @@ use mops::{
     Variable,
 };
 
-/// A function of its parameters: signal `fi` stays at `f(x)[i]`; where there is no value the simulation diverges.
+/// Model with constant signals `fi = f(x)[i]`; without a value the simulation diverges.
 pub struct Function {
     interface: Interface,
     f: fn(&[f64]) -> Option<Vec<f64>>,
 }
 
 impl Function {
-    /// So many values of parameters of these names.
+    /// Creates a model with this number of values and these parameters.
     pub fn new(parameters: &[&str], values: usize, f: fn(&[f64]) -> Option<Vec<f64>>) -> Self {
         let interface = Interface {
             signals: (0..values).map(|i| Variable::new(format!("f{i}"), "1", "value")).collect(),
@@ -41,7 +41,7 @@ impl Model for Function {
     }
 }
 
-/// The value of a signal at the end.
+/// Final value of a signal.
 #[derive(Clone)]
 pub struct End(pub String);
 

@@ -1,4 +1,4 @@
-//! A browser without a screen, where there is one.
+//! A headless browser, if one is installed.
 
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use assert_cmd::Command;
 
-/// What a test says that needs a browser where there is none.
+/// Message of a test that is skipped because no browser is installed.
 pub const SKIPPED: &str = "skipped: no browser of the Chromium family is on the path";
 
-/// A browser of the Chromium family on the path.
+/// Returns a browser of the Chromium family on the path.
 pub fn browser() -> Option<PathBuf> {
     let names = ["chromium", "chromium-browser", "google-chrome", "chrome"];
     let path = std::env::var_os("PATH")?;
@@ -17,7 +17,7 @@ pub fn browser() -> Option<PathBuf> {
     names.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name))).find(|file| file.is_file())
 }
 
-/// What a browser is told that shows nothing and asks nobody.
+/// Options of a browser without window, dialogs or network services.
 pub const FLAGS: [&str; 8] = [
     "--headless",
     "--no-sandbox",
@@ -29,7 +29,7 @@ pub const FLAGS: [&str; 8] = [
     "--disable-sync",
 ];
 
-/// The document that an address leads to once its scripts have run, with a profile of its own in the folder.
+/// Returns the document at an address after its scripts have run; the browser profile is in the folder.
 #[allow(dead_code)]
 pub fn dump(browser: &Path, folder: &Path, address: &str, more: &[&str]) -> Output {
     let profile = format!("--user-data-dir={}", folder.join("profile").display());

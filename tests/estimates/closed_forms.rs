@@ -1,4 +1,4 @@
-//! Standard errors, profiles and replicates against closed forms: of linear models, and of a rate that decays.
+//! Standard errors, profiles and bootstrap replicates against closed forms of linear models and of an exponential decay.
 
 use mops::core::{Chosen, UncertaintyTask};
 use mops::{CriterionBuilder, TunerBuilder};
@@ -7,15 +7,15 @@ use nalgebra::{DMatrix, DVector};
 use super::models::{Calibration, Channel, Curve, fit, lines, normalised, parameters, words};
 use mops_core::math;
 
-/// Samples of one record as the estimator counts them: slopes along the parameters, weights of squared deviations, and the
-/// standard deviation of their noise.
+/// Samples of one record: derivatives with respect to the parameters, weights of squared residuals, and the standard deviation
+/// of the noise.
 pub struct Samples {
     pub slopes: Vec<Vec<f64>>,
     pub weights: Vec<f64>,
     pub noise: f64,
 }
 
-/// Scatter of the estimates that minimise the weighted sum of squares of a linear model: of `theta = (sum w x x')^-1 sum w x y`.
+/// Standard deviation of the weighted least-squares estimate `theta = (sum w x x')^-1 sum w x y` of a linear model.
 pub fn scatter(records: &[Samples]) -> Vec<f64> {
     let n = records[0].slopes[0].len();
     let (mut a, mut b) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
@@ -30,7 +30,7 @@ pub fn scatter(records: &[Samples]) -> Vec<f64> {
     (&inverse * b * &inverse).diagonal().iter().map(|v| v.sqrt()).collect()
 }
 
-/// Half the way from the sample before to the one after: the weights of a fit.
+/// Weights of a fit: half the interval from the previous to the next sample.
 fn intervals(times: &[f64]) -> Vec<f64> {
     let last = times.len() - 1;
     (0..=last).map(|i| 0.5 * (times[(i + 1).min(last)] - times[i.saturating_sub(1)])).collect()
@@ -39,7 +39,7 @@ fn intervals(times: &[f64]) -> Vec<f64> {
 /// Weights of the squared deviations of a channel, given its times.
 type Weights = Box<dyn Fn(&[f64]) -> Vec<f64>>;
 
-/// Two lines under criteria, and what weighs the deviations of each channel.
+/// Two lines with criteria, and the weights of the squared residuals of each channel.
 struct Lines {
     what: &'static str,
     calibration: Calibration,
@@ -148,9 +148,9 @@ fn calibration(channels: [Channel; 2], criteria: fn() -> Vec<(&'static str, Crit
     }
 }
 
-/// The standard error to what forty data sets leave of the noise of twenty samples each: 2.5 %, four times over.
+/// Tolerance: four times the 2.5 % to which forty data sets of twenty samples determine the noise.
 #[test]
-fn standard_errors_are_the_scatter_of_the_estimator_whatever_counts_and_weights() {
+fn standard_errors_equal_the_scatter_of_the_estimator_for_any_counts_and_weights() {
     const SETS: u32 = 40;
     for of in neighbours() {
         let samples = |k: usize| {
@@ -178,9 +178,9 @@ fn standard_errors_are_the_scatter_of_the_estimator_whatever_counts_and_weights(
     }
 }
 
-/// The likelihood ratio of a linear model is a parabola: its interval is that of the standard error.
+/// The likelihood ratio of a linear model is a parabola: its interval equals that of the standard error.
 #[test]
-fn profiles_of_linear_models_are_their_intervals_whatever_counts_and_weights() {
+fn profiles_of_linear_models_equal_their_intervals_for_any_counts_and_weights() {
     for Lines { what, mut calibration, .. } in neighbours() {
         calibration.uncertainty = Some(UncertaintyTask { profile: Chosen::All, ..UncertaintyTask::default() });
         let outcome = calibration.run(1);
@@ -225,9 +225,9 @@ fn a_rate_of_a_short_record_has_the_error_of_its_own_samples() {
     }
 }
 
-/// The mean of two means counts each of ten samples a hundred times: 0.0057. Every sample counted alike: 0.0011.
+/// The mean of two means weights each of ten samples a hundredfold: 0.0057. With equal weights of all samples: 0.0011.
 #[test]
-fn a_shared_rate_has_the_error_of_the_estimator_and_words_on_what_equal_counts_would_give() {
+fn a_shared_rate_has_the_error_of_the_estimator_and_a_note_on_equal_weights() {
     let outcome = decays([1000, 10], true, None).run(0);
     let parameter = &parameters(&outcome)[0];
     assert!((parameter.std_error / 0.0057 - 1.0).abs() < 0.1, "{parameter:?}");
@@ -239,18 +239,18 @@ fn a_shared_rate_has_the_error_of_the_estimator_and_words_on_what_equal_counts_w
 }
 
 #[test]
-fn bootstrap_errors_are_standard_errors_where_records_differ_in_length() {
+fn bootstrap_errors_equal_standard_errors_for_records_of_different_length() {
     let task = UncertaintyTask { bootstrap: 300, block: Some(1), ..UncertaintyTask::default() };
     let outcome = decays([300, 12], false, Some(task)).run(0);
     let found = outcome.found.uncertainty.as_ref().unwrap().bootstrap.as_ref().unwrap();
     for (one, parameter) in found.parameters.iter().zip(parameters(&outcome)) {
-        // 300 replicates leave 4 % of a standard error.
+        // 300 replicates determine a standard error to 4 %.
         assert!((one.std_error / parameter.std_error - 1.0).abs() < 0.15, "{one:?} {parameter:?}");
     }
 }
 
 #[test]
-fn a_noise_that_residuals_contradict_is_reported_and_does_not_count() {
+fn a_declared_noise_contradicted_by_residuals_is_reported_and_ignored() {
     let of = neighbours().into_iter().find(|of| of.what == "a noise declared ten times too large").unwrap();
     let words = words(&of.calibration.run(0));
     assert!(words.contains("The residuals of `z` in `rig` show a noise level of 0.0"), "{words}");

@@ -1,4 +1,4 @@
-//! How often 95 % intervals hold the truth, over simulated calibrations whose seeds are 0, 1, 2, ...
+//! Coverage of 95 % intervals over simulated calibrations with the seeds 0, 1, 2, ...
 
 use mops::core::statistics::share_interval;
 use mops::{CriterionBuilder, TunerBuilder};
@@ -12,7 +12,7 @@ const CALIBRATIONS: u32 = 2000;
 /// Shares that count as 95 %.
 const RIGHT: [f64; 2] = [0.93, 0.97];
 
-/// How many intervals of each parameter hold the truth.
+/// Returns the number of intervals of each parameter that contain the true value.
 fn hits(calibration: &Calibration, truth: &[(&str, f64)], count: u32) -> Vec<usize> {
     let one = |seed: u32| -> Vec<bool> {
         let outcome = calibration.run(u64::from(seed));
@@ -26,7 +26,7 @@ fn hits(calibration: &Calibration, truth: &[(&str, f64)], count: u32) -> Vec<usi
     (0..truth.len()).map(|k| all.iter().filter(|one| one[k]).count()).collect()
 }
 
-/// Of all calibrations the share lies within [`RIGHT`]; of fewer, chance (one in a thousand) explains the distance.
+/// Checks that the share of all calibrations is within [`RIGHT`]; for fewer, within the bounds of chance (one in a thousand).
 fn assert_covers(calibration: &Calibration, truth: &[(&str, f64)]) {
     let count = mops_tiers::cases(CALIBRATIONS);
     for ((name, _), hits) in truth.iter().zip(hits(calibration, truth, count)) {
@@ -60,12 +60,12 @@ fn unequal_lengths(declared: bool) -> Calibration {
 const RATES: [(&str, f64); 3] = [("g", 1.0), ("long/k", 1.0), ("short/k", 0.5)];
 
 #[test]
-fn intervals_of_records_of_1000_and_10_samples_hold_the_truth() {
+fn intervals_cover_the_truth_for_records_of_1000_and_10_samples() {
     assert_covers(&unequal_lengths(true), &RATES);
 }
 
 #[test]
-fn intervals_of_records_of_1000_and_10_samples_hold_the_truth_where_the_noise_is_not_known() {
+fn intervals_cover_the_truth_for_records_of_1000_and_10_samples_with_unknown_noise() {
     assert_covers(&unequal_lengths(false), &RATES);
 }
 
@@ -86,12 +86,12 @@ fn two_channels(noise: [f64; 2], criteria: fn() -> Vec<(&'static str, CriterionB
 const LINES: [(&str, f64); 3] = [("a", 0.3), ("b", -0.2), ("slope", 0.7)];
 
 #[test]
-fn intervals_of_two_channels_of_different_noise_hold_the_truth() {
+fn intervals_cover_the_truth_for_two_channels_of_different_noise() {
     assert_covers(&two_channels([0.002, 0.05], || vec![("y", fit("y")), ("z", fit("z"))]), &LINES);
 }
 
 #[test]
-fn intervals_under_a_weight_of_ten_on_one_criterion_hold_the_truth() {
+fn intervals_cover_the_truth_with_a_weight_of_ten_on_one_criterion() {
     let mut calibration = two_channels([0.02, 0.05], || {
         vec![("y", normalised("y")), ("z", CriterionBuilder { weight: 10.0, ..normalised("z") })]
     });
@@ -99,9 +99,9 @@ fn intervals_under_a_weight_of_ten_on_one_criterion_hold_the_truth() {
     assert_covers(&calibration, &LINES);
 }
 
-/// Reported without a target: the sandwich of correlated residuals is known to be too small on average.
+/// Has no target: the sandwich estimator for correlated residuals is known to be too small on average.
 #[test]
-fn correlated_noise_is_reported_beside_its_intervals() {
+fn intervals_with_correlated_noise_are_reported_as_such() {
     let mut calibration = two_channels([0.02, 0.05], || vec![("y", normalised("y")), ("z", normalised("z"))]);
     for channel in &mut calibration.channels {
         channel.times = (0..200).map(|i| 0.01 * f64::from(i)).collect();
@@ -110,7 +110,7 @@ fn correlated_noise_is_reported_beside_its_intervals() {
     let count = mops_tiers::cases(CALIBRATIONS);
     for ((name, _), hits) in LINES.iter().zip(hits(&calibration, &LINES, count)) {
         println!("correlated noise, {name}: {hits} of {count} intervals hold the truth");
-        // Those of white noise of this size would hold 48 %, as errors are sqrt((1 + 0.8)/(1 - 0.8)) = 3 times as large.
+        // Intervals for white noise would cover 48 %, as errors are sqrt((1 + 0.8)/(1 - 0.8)) = 3 times as large.
         assert!(hits as f64 > 0.6 * f64::from(count), "{name}: {hits}");
     }
     let words = words(&calibration.run(0));

@@ -1,4 +1,4 @@
-//! What counts as determined: directions are judged by the noise, not by the stiffest of them.
+//! Identifiability: directions are compared with the noise, not with the stiffest direction.
 
 use mops::core::{Chosen, UncertaintyTask};
 use mops::{Outcome, TunerBuilder};
@@ -11,7 +11,7 @@ use mops_core::math;
 fn sum_and_difference(stiff: f64, soft: f64) -> Calibration {
     let of = move |sign: f64| [sign * soft, stiff, 0.0, 0.0, 0.0];
     let mut channel = Channel::new("e", "y", 101, 1.0, |_| 0.0, 0.01).declared();
-    // The truth scales with the stiffness; a function pointer cannot know it.
+    // The true values scale with the stiffness, which a function pointer cannot capture.
     channel.gain = stiff;
     channel.truth = |t| t;
     Calibration {
@@ -28,9 +28,9 @@ fn rank(outcome: &Outcome) -> usize {
 }
 
 /// The difference is known to `0.01 / (soft |1 - t mean(t)/mean(t^2)|)`, however stiff the sum; `a` and `b` to about half of it.
-/// One data set of 101 samples shows its noise to 7 %, three times over.
+/// Tolerance: three times the 7 % to which 101 samples determine the noise.
 #[test]
-fn a_direction_above_the_noise_is_determined_beside_any_stiff_one() {
+fn a_direction_above_the_noise_is_determined_next_to_any_stiffer_one() {
     for power in 0..=6 {
         let stiff = math::powi(10.0, power);
         let outcome = sum_and_difference(stiff, 1.0).run(0);
@@ -45,7 +45,7 @@ fn a_direction_above_the_noise_is_determined_beside_any_stiff_one() {
     }
 }
 
-/// Below, one standard error of the difference moves `a` through all of its range.
+/// Below the noise, one standard error of the difference covers the whole range of `a`.
 #[test]
 fn a_direction_below_the_noise_is_not_determined_and_has_no_interval() {
     for soft in [0.0, 1e-9, 3e-6, 1e-5] {
@@ -81,7 +81,7 @@ fn a_standard_error_above_the_value_is_called_practically_not_identifiable() {
 }
 
 #[test]
-fn tuners_without_any_effect_leave_nothing_determined() {
+fn tuners_without_effect_are_not_determined() {
     let outcome = sum_and_difference(0.0, 0.0).run(0);
     assert_eq!(rank(&outcome), 0);
     let words = words(&outcome);

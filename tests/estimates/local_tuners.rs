@@ -32,7 +32,7 @@ fn error(outcome: &Outcome, experiment: &str) -> f64 {
 }
 
 #[test]
-fn a_local_tuner_is_estimated_from_its_own_record_wherever_the_search_starts() {
+fn a_local_tuner_is_estimated_from_its_own_record_for_any_initial_guess() {
     for criterion in [normalised, fit] {
         for role in [Role::Validation, Role::Selection] {
             let found: Vec<[f64; 2]> = [0.11, 0.7, 1.0, 5.0, 9.9]
@@ -42,7 +42,7 @@ fn a_local_tuner_is_estimated_from_its_own_record_wherever_the_search_starts() {
                 })
                 .into();
             for [k, error] in &found {
-                // Five standard errors, and the noise to what 41 samples tell of it.
+                // Five standard errors; tolerance of the noise estimated from 41 samples.
                 assert!((k - 1.5).abs() < 0.1 && (error / 0.01 - 1.0).abs() < 0.4, "{role:?}: {found:?}");
                 assert!((k - found[0][0]).abs() < 1e-4 && (error - found[0][1]).abs() < 1e-6, "{role:?}: {found:?}");
             }
@@ -50,7 +50,7 @@ fn a_local_tuner_is_estimated_from_its_own_record_wherever_the_search_starts() {
     }
 }
 
-/// What is local to a validation record moves nothing else.
+/// Tuners that are local to a validation record change nothing else.
 #[test]
 fn calibrated_tuners_do_not_depend_on_validation_records() {
     let alone = {
@@ -65,7 +65,7 @@ fn calibrated_tuners_do_not_depend_on_validation_records() {
 }
 
 #[test]
-fn a_local_tuner_that_no_criterion_shows_leaves_no_validation_error() {
+fn a_local_tuner_without_effect_on_criteria_gives_no_validation_error() {
     let outcome = records(Role::Validation, 1.0, normalised).run(0);
     assert!(outcome.warnings.is_empty(), "{:?}", outcome.warnings);
     let of = |case: &str, usage: Usage| CriterionBuilder {

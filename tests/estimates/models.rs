@@ -32,7 +32,7 @@ pub fn lines() -> ModelBuilder {
 /// Signals that are sums of parameters times polynomials of the time.
 pub struct Polynomials {
     interface: Interface,
-    /// Of every signal and parameter, the coefficients of `t^0 ... t^4`.
+    /// Coefficients of `t^0 ... t^4` for every signal and parameter.
     terms: Vec<Vec<[f64; 5]>>,
 }
 
@@ -102,7 +102,7 @@ impl Model for Curve {
         Ok(Self::response(job.horizon, |t| (self.f)(job.parameters, t)))
     }
 
-    /// By differences in closed form, which keep ten digits.
+    /// Differences of the closed form, accurate to ten digits.
     fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
         let along = |seed: &Vec<f64>| {
             let moved = |by: f64| -> Vec<f64> { job.parameters.iter().zip(seed).map(|(p, d)| p + by * d).collect() };
@@ -124,28 +124,28 @@ fn interface(parameters: &[&str], signals: &[&str]) -> Interface {
     }
 }
 
-/// A channel of an experiment: what is measured, and with what noise.
+/// Channel of an experiment: signal and noise.
 #[derive(Clone)]
 pub struct Channel {
     pub experiment: &'static str,
     pub role: Role,
     pub signal: &'static str,
     pub times: Vec<f64>,
-    /// What is measured, over the gain.
+    /// Measured signal, divided by the gain.
     pub truth: fn(f64) -> f64,
     pub gain: f64,
     /// Standard deviation of the noise.
     pub noise: f64,
-    /// The one that the study declares.
+    /// Declared standard deviation of the noise.
     pub declared: Option<f64>,
-    /// Autocorrelation of neighbours.
+    /// Correlation of adjacent samples.
     pub correlation: f64,
-    /// All but every so manieth sample is a gap.
+    /// Only every n-th sample is present; the others are gaps.
     pub every: usize,
 }
 
 impl Channel {
-    /// Of a calibration experiment, with white noise that the study does not declare, sampled evenly from 0 to `end`.
+    /// Channel of a calibration experiment with undeclared white noise, sampled uniformly from 0 to `end`.
     pub fn new(
         experiment: &'static str,
         signal: &'static str,
@@ -163,12 +163,12 @@ impl Channel {
         Self { declared: Some(self.noise), ..self }
     }
 
-    /// With a gap in place of all but every so manieth sample.
+    /// Replaces all but every n-th sample by gaps.
     pub fn kept(self, every: usize) -> Self {
         Self { every, ..self }
     }
 
-    /// The samples under the noise of this seed; NaN is a gap.
+    /// Returns the samples with the noise of this seed; NaN is a gap.
     pub fn values(&self, seed: u64) -> Vec<f64> {
         let mut random = stream(seed, &format!("{} {}", self.experiment, self.signal));
         // G. E. P. Box, M. E. Muller, Annals of Mathematical Statistics 29 (1958) 610-611.
@@ -199,7 +199,7 @@ impl Channel {
     }
 }
 
-/// What is calibrated.
+/// Calibration problem.
 pub struct Calibration {
     pub model: Box<dyn Fn() -> ModelBuilder>,
     pub tuners: Vec<(&'static str, TunerBuilder)>,
@@ -237,12 +237,12 @@ impl Calibration {
     }
 }
 
-/// The parameters of a calibration.
+/// Returns the parameters of a calibration.
 pub fn parameters(outcome: &Outcome) -> &[ParameterReport] {
     &outcome.calibration.as_ref().unwrap().parameters
 }
 
-/// What the data tell, in one text.
+/// Returns the sentences on identifiability in one text.
 pub fn words(outcome: &Outcome) -> String {
     outcome.calibration.as_ref().unwrap().sensitivity.as_ref().unwrap().words.join("\n")
 }

@@ -1,4 +1,4 @@
-//! Ends of profiles where the likelihood is flat up to a cliff, against profiles on a fine grid.
+//! Ends of profile likelihoods that are flat up to a steep rise, compared with a fine grid.
 
 use mops::core::statistics::t_quantile;
 use mops::core::{Chosen, ProfileReport, UncertaintyTask};
@@ -30,7 +30,7 @@ fn profile(outcome: &Outcome) -> &ProfileReport {
     &outcome.found.uncertainty.as_ref().unwrap().profiles[0]
 }
 
-/// The values within the limit on a grid, given the least sum of squares for each.
+/// Returns the range of grid values within the limit, given the smallest sum of squares for each.
 fn grid(least: impl Fn(f64) -> f64, between: [f64; 2], freedom: f64) -> [f64; 2] {
     let values: Vec<f64> =
         (0..=4000).map(|i| between[0] * math::powf(between[1] / between[0], f64::from(i) / 4000.0)).collect();
@@ -116,9 +116,9 @@ fn joint(of: &Joint) -> Joint {
     Joint { what, f: *f, speed: *speed, truth: *truth, noise: *noise, tuner: tuner.clone(), scale: *scale }
 }
 
-/// For `k` held the model is linear in the rest.
+/// For fixed `k` the model is linear in the other parameters.
 #[test]
-fn the_slope_of_a_friction_curve_has_the_interval_of_a_fine_grid() {
+fn the_interval_of_the_slope_of_a_friction_curve_agrees_with_a_fine_grid() {
     for joint in joints() {
         let channel = Channel::new("e", "y", SAMPLES, 2.0, joint.truth, joint.noise);
         let tuners = vec![
@@ -149,9 +149,9 @@ fn the_slope_of_a_friction_curve_has_the_interval_of_a_fine_grid() {
     }
 }
 
-/// Only `a/b` shows: `a` may fall until `b` meets its lower bound, and rises to its own upper bound.
+/// Only `a/b` is identifiable: `a` can decrease until `b` reaches its lower bound, and increase to its own upper bound.
 #[test]
-fn a_factor_of_a_ratio_goes_to_where_the_other_meets_its_bound() {
+fn the_profile_of_a_factor_of_a_ratio_ends_at_the_bound_of_the_other_factor() {
     for (bounds, start) in [([0.01, 100.0], 1.0), ([0.1, 10.0], 3.0), ([1e-4, 1e4], 0.5), ([0.5, 2.0], 1.0)] {
         let channel = Channel::new("e", "y", SAMPLES, 2.0, |t| math::exp(-1.1 * t), 0.01);
         let tuner = || TunerBuilder::new(start, bounds[0], bounds[1]).log();
@@ -171,7 +171,7 @@ fn a_factor_of_a_ratio_goes_to_where_the_other_meets_its_bound() {
 
 /// A stop that the motion does not reach: the sum of squares is flat above 1 and rises steeply below.
 #[test]
-fn a_stop_that_is_not_reached_is_bounded_from_below_alone() {
+fn a_stop_that_is_not_reached_is_bounded_from_below_only() {
     for (max, start) in [(100.0, 5.0), (1e6, 5.0), (100.0, 80.0), (3.0, 1.5)] {
         let channel = Channel::new("e", "y", SAMPLES, 3.0, |t| 0.9 * math::sin(t), 0.01);
         let tuners = vec![("stop", TunerBuilder::new(start, 0.5, max).log()), ("g", TunerBuilder::new(1.0, 0.5, 2.0))];
