@@ -118,6 +118,18 @@ fn the_read_outs_of_a_front_agree_with_its_points() {
 
 /// A pair of the published front as demands makes 1 the least worst scaled value there is.
 #[test]
+fn a_front_of_few_evaluations_has_points_with_improving_directions_but_none_that_dominates_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let result = pareto(folder.path(), &["pid-pareto", "--max-evaluations", "40"]);
+    let found = &result["trade_offs"];
+    let improvable = found["points"].as_array().unwrap().iter().filter(|point| point["pareto"] == "no").count();
+    let words = found["words"].as_array().unwrap().iter().map(|line| line.as_str().unwrap()).collect::<Vec<_>>();
+    assert!(words[0].ends_with("No point of the front dominates another."), "{words:?}");
+    let last = words.last().unwrap();
+    assert!(improvable > 0 && last.ends_with(&format!("; {improvable} have a known improving direction.")), "{last}");
+}
+
+#[test]
 fn a_picked_point_serves_the_demands_as_well_as_can_be() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
