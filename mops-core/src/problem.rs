@@ -12,6 +12,7 @@ use crate::experiment::Role;
 use crate::failure::Failure;
 use crate::known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes as KnownSlopes, RowValue};
 use crate::model::{Analysis, Job};
+use crate::panics::caught;
 use crate::random::stream;
 use crate::scalar::Dual;
 use crate::solver::Shape;
@@ -271,7 +272,8 @@ impl Problem {
         Evaluation { point, tuners, readings, scaled, residuals, failures, merit }
     }
 
-    /// Returns the values of all rows that read one job. A criterion without a value does not affect the others.
+    /// Returns the values of all rows that read one job. A criterion without a value does not affect the others. A panic of
+    /// the model or of a criterion is a failure.
     fn run_job(&self, job: usize, tuners: &[f64]) -> JobValues {
         let study = &self.study;
         let plan = &study.jobs[job];
@@ -281,9 +283,11 @@ impl Problem {
         }
         let parameters = study.parameters(plan, tuners);
         let request = Job { case, parameters: &parameters, signals: &plan.signals, horizon: plan.horizon };
-        let analysis = study.models[plan.model].1.analyse(&request)?;
+        let (name, model) = &study.models[plan.model];
+        let panicked = |why: String| Err(Failure::Undefined(format!("model `{name}` {why}")));
+        let analysis = caught(|| model.analyse(&request)).unwrap_or_else(panicked)?;
         let rows = study.rows.iter().enumerate().filter(|(_, row)| row.job == job);
-        let value = |row: &Row| match row.criterion.value(case, &analysis) {
+        let value = |row: &Row| match caught(|| row.criterion.value(case, &analysis)).unwrap_or_else(Err) {
             Ok(value) if !value.number.is_finite() => Err("its value is not finite".to_owned()),
             other => other,
         };
@@ -336,8 +340,11 @@ impl Problem {
             return None;
         }
         let moves = self.tuner_slopes(&at.tuners);
-        let of_jobs: Vec<Option<Vec<RowSlopes>>> =
-            self.counting.par_iter().map(|&job| self.job_slopes(job, &at.tuners, &moves, reach)).collect();
+        let of_jobs: Vec<Option<Vec<RowSlopes>>> = self
+            .counting
+            .par_iter()
+            .map(|&job| caught(|| self.job_slopes(job, &at.tuners, &moves, reach)).ok()?)
+            .collect();
         let mut rows: KnownSlopes = of_jobs.into_iter().collect::<Option<Vec<_>>>()?.into_iter().flatten().collect();
         if self.shape.residuals == 0 {
             rows.iter_mut().flat_map(|(_, along)| along).for_each(|slope| slope.residuals.clear());
