@@ -165,6 +165,11 @@ fn a_panic_of_a_closure_is_a_failure_of_its_point_that_names_the_model_or_criter
     let outcome = mops::solve(study, &mops::Options::default(), &()).unwrap().outcome;
     assert!((outcome.tuners[0].value - 1.5).abs() < 0.05, "{}", outcome.tuners[0].value);
     assert_eq!((outcome.failures[0].model.as_str(), outcome.failures[0].case.as_str()), ("decay", "nominal"));
+    // A run without any point ends with the failure.
+    let study = closures(["x", "y"], |k| no_large(9.0 * k), |x| x).build().unwrap();
+    let options = mops::Options { max_evaluations: 5, ..mops::Options::default() };
+    let solved = mops::solve(study, &options, &()).unwrap();
+    assert_eq!((solved.best.failures.len(), &solved.outcome.failures[0].failure[..]), (1, "model undefined"));
 }
 
 #[test]

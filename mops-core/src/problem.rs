@@ -178,12 +178,13 @@ impl Problem {
         let plan = &self.study.jobs[job];
         let model = &self.study.models[plan.model].1;
         let signals: Vec<usize> = (0..model.interface().signals.len()).collect();
-        model.analyse(&Job {
+        let request = Job {
             case: &self.study.cases[plan.case],
             parameters: &self.study.parameters(plan, tuners),
             signals: &signals,
             horizon: horizon.unwrap_or(plan.horizon),
-        })
+        };
+        self.study.analyse(plan.model, &request)
     }
 
     /// Returns the evaluation of a point that was not simulated: no row has a value.
@@ -272,8 +273,7 @@ impl Problem {
         Evaluation { point, tuners, readings, scaled, residuals, failures, merit }
     }
 
-    /// Returns the values of all rows that read one job. A criterion without a value does not affect the others. A panic of
-    /// the model or of a criterion is a failure.
+    /// Returns the values of all rows that read one job. A criterion without a value does not affect the others.
     fn run_job(&self, job: usize, tuners: &[f64]) -> JobValues {
         let study = &self.study;
         let plan = &study.jobs[job];
@@ -283,11 +283,9 @@ impl Problem {
         }
         let parameters = study.parameters(plan, tuners);
         let request = Job { case, parameters: &parameters, signals: &plan.signals, horizon: plan.horizon };
-        let (name, model) = &study.models[plan.model];
-        let panicked = |why: String| Err(Failure::Undefined(format!("model `{name}` {why}")));
-        let analysis = caught(|| model.analyse(&request)).unwrap_or_else(panicked)?;
+        let analysis = study.analyse(plan.model, &request)?;
         let rows = study.rows.iter().enumerate().filter(|(_, row)| row.job == job);
-        let value = |row: &Row| match caught(|| row.criterion.value(case, &analysis)).unwrap_or_else(Err) {
+        let value = |row: &Row| match row.value(case, &analysis) {
             Ok(value) if !value.number.is_finite() => Err("its value is not finite".to_owned()),
             other => other,
         };
