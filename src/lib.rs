@@ -94,8 +94,26 @@ pub fn catalogue() -> Catalogue {
     }
 }
 
-/// Runs the command line with a catalogue; a crate that adds its own kinds calls this function from its `main`.
+/// Runs the command line of `mops` with a catalogue. A crate that adds its own kinds uses [`main!`], which has its name and
+/// version.
 #[cfg(feature = "cli")]
 pub fn main(catalogue: Catalogue) -> std::process::ExitCode {
-    cli::main(catalogue)
+    cli::main(catalogue, "mops", env!("CARGO_PKG_VERSION"))
+}
+
+/// Runs the command line with a catalogue, as a program with the name and version of the calling crate:
+/// `fn main() -> std::process::ExitCode { mops::main!(my_mops::catalogue()) }`.
+#[cfg(feature = "cli")]
+#[macro_export]
+macro_rules! main {
+    ($catalogue:expr) => {
+        $crate::main_as($catalogue, env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))
+    };
+}
+
+/// Runs the command line with a catalogue, as a program of this name and version; see [`main!`].
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub fn main_as(catalogue: Catalogue, name: &'static str, version: &str) -> std::process::ExitCode {
+    cli::main(catalogue, name, format!("{version} (mops {})", env!("CARGO_PKG_VERSION")).leak())
 }

@@ -118,3 +118,69 @@ fn studies_of_recordings_have_the_declared_roles_of_experiments() {
         );
     }
 }
+
+/// A study of closures: `x' = -k x`, and the logarithm of `x` at the end by a closure that may panic.
+fn closures(names: [&str; 2], rate: fn(f64) -> f64, end: fn(f64) -> f64) -> mops::StudyBuilder {
+    use mops::prelude::*;
+    let interface = Interface {
+        signals: names.map(|name| Variable::new(name, "1", "state")).to_vec(),
+        parameters: vec![Parameter::new("k", "1/s", "rate")],
+        horizon: Some(1.0),
+        ..Interface::default()
+    };
+    let decay = mops::models::from_fn(interface, [1.0, 0.0], move |at, p, dx| dx[0] = -rate(p[0]) * at.x[0]);
+    let last = mops::criteria::from_fn([names[0]], Unit::one(), move |traces| end(traces[0].last()));
+    StudyBuilder {
+        name: "closures".into(),
+        models: vec![("decay".into(), decay.into())],
+        tuners: vec![("k".into(), TunerBuilder::new(1.0, 0.5, 2.0))],
+        criteria: vec![("last".into(), CriterionBuilder::minimise(last, 1.0))],
+        ..StudyBuilder::default()
+    }
+}
+
+fn no_small(value: f64) -> f64 {
+    assert!(value > 0.2, "{value} is too small");
+    value
+}
+
+fn no_large(value: f64) -> f64 {
+    assert!(value < 1.5, "{value} is too large");
+    value
+}
+
+#[test]
+fn a_panic_of_a_closure_is_a_failure_of_its_point_that_names_the_model_or_criterion() {
+    let failures = |rate, end| {
+        let study = closures(["x", "y"], rate, end).build().unwrap();
+        let problem = mops::core::Problem::new(std::sync::Arc::new(study));
+        [[0.0], [1.0]].map(|point| problem.evaluate(&point).failures.pop().map(|(_, failure)| failure.to_string()))
+    };
+    let [none, criterion] = failures(|k| k, no_small);
+    assert_eq!((none, criterion.as_deref().unwrap().split("0.13").next()), (None, Some("last: panicked: ")));
+    let [none, model] = failures(no_large, |x| x);
+    assert_eq!((none, model.as_deref()), (None, Some("model `decay` panicked: 2 is too large")));
+    // The run goes on and finds the best point without a failure.
+    let study = closures(["x", "y"], no_large, |x| x).build().unwrap();
+    let outcome = mops::solve(study, &mops::Options::default(), &()).unwrap().outcome;
+    assert!((outcome.tuners[0].value - 1.5).abs() < 0.05, "{}", outcome.tuners[0].value);
+    assert_eq!((outcome.failures[0].model.as_str(), outcome.failures[0].case.as_str()), ("decay", "nominal"));
+    // A run without any point ends with the failure.
+    let study = closures(["x", "y"], |k| no_large(9.0 * k), |x| x).build().unwrap();
+    let options = mops::Options { max_evaluations: 5, ..mops::Options::default() };
+    let solved = mops::solve(study, &options, &()).unwrap();
+    assert_eq!((solved.best.failures.len(), &solved.outcome.failures[0].failure[..]), (1, "model undefined"));
+}
+
+#[test]
+fn a_panic_of_the_function_that_builds_a_study_is_an_error_that_names_the_study() {
+    let broken = mops::BuiltStudy::new("broken", "", || panic!("no data"));
+    let error = mops::core::file::built(&mops::catalogue(), &broken, &[], "").err().unwrap();
+    assert_eq!(error.message, "the function that builds the study `broken` panicked: no data");
+}
+
+#[test]
+fn a_model_with_two_signals_of_one_name_is_refused() {
+    let error = closures(["x", "x"], |k| k, |x| x).build().err().unwrap();
+    assert!(error.to_string().starts_with("models.decay.signals.x: duplicate name `x`"), "{error}");
+}

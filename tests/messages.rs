@@ -62,6 +62,14 @@ t[s],arm[rad],pendulum[rad],torque[N*m]
 0.15,0.006,2.91,0.0
 ";
 
+/// A list of recordings that are not included.
+const SOURCES: &str = "\
+# Recordings of others.
+[\"swings.csv\"]
+source = \"cell 1 of Y in swings.mat\"
+sha256 = \"06d8\"
+";
+
 /// One error: the files of the working directory, and the command line.
 struct Case {
     what: &'static str,
@@ -329,6 +337,7 @@ fn unknown_names() {
             ),
             design("a parameter without a value", "{ p = 0.0 }", "{}"),
             design("an input that no model has", "{ p = 0.0 }", "{ p = 0.0, inputs = { w = { constant = 1.0 } } }"),
+            driven_without_inputs(),
             calibration("a recorded input that no model has", "inputs   = { u =", "inputs   = { tau ="),
             calibration("a channel for no signal", "channels = { phi =", "channels = { phy ="),
             calibration("a free state that no model has", "[\"theta\"]", "[\"theta\", \"omega\"]"),
@@ -442,6 +451,13 @@ b = { start = 0.1, min = 0.0, max = 1.0 }
 highest = { peak = { signal = "th" }, demand = 1.0 }
 "#;
 
+/// The model from text without inputs, driven by one that it does not have.
+fn driven_without_inputs() -> Case {
+    let still = broken(&broken(EQUATIONS, "inputs     = { u = \"N m\" }\n", ""), "u - load", "-load");
+    let driven = broken(&still, "[criteria]", "[cases]\npushed = { inputs = { u = { constant = 1.0 } } }\n[criteria]");
+    Case::new("an input of a model without inputs", &driven)
+}
+
 /// Model of equations with an error.
 fn equations(what: &'static str, right: &str, instead: &str) -> Case {
     Case::new(what, &broken(EQUATIONS, right, instead))
@@ -515,6 +531,10 @@ fn experiments_that_contradict_their_data() {
         "experiments",
         &[
             calibration("a file that is not there", "swing.csv", "swings.csv"),
+            calibration("a file that is listed in sources.toml", "swing.csv", "swings.csv")
+                .with("sources.toml", SOURCES),
+            calibration("a file that is not there beside a broken sources.toml", "swing.csv", "swings.csv")
+                .with("sources.toml", broken(SOURCES, "\"06d8\"", "06d8")),
             calibration("a file that is a folder", "swing.csv", "data").with("data/swing.csv", RECORDING),
             calibration("a column that is not there", "\"pendulum\"", "\"pendulm\""),
             calibration("a time column that is not there", "free     =", "time = \"clock\"\nfree     ="),
@@ -633,6 +653,12 @@ fn invalid_command_lines() {
             called("a copy of an unknown study", &["new", "mine", "--from", "furuta"]),
             called("a kind that is not there", &["describe", "settle-time"]),
             called("a data file that is not there", &["data", "swing.csv"]),
+            called("a data file that is listed in sources.toml", &["data", "swings.csv"]).with("sources.toml", SOURCES),
+            called("a data file whose entry in sources.toml is broken", &["data", "swings.csv"])
+                .with("sources.toml", broken(SOURCES, "sha256", "sha")),
+            Case::new("a study of the name of a shipped one", "")
+                .with("mine/loop/study.toml", broken(DESIGN, "\"loop\"", "\"pid-design\""))
+                .called(&["list", "--studies", "mine"]),
             called("an unknown command", &["rum", "study.toml"]),
         ],
     );

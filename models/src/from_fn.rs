@@ -104,7 +104,7 @@ impl Model for FnModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mops_core::{Case, Input, Parameter, Variable, math};
+    use mops_core::{Case, Input, Linearise, Linearised, Parameter, Variable, math};
 
     /// `T = P/k (1 - exp(-k t/C))`.
     #[test]
@@ -127,5 +127,7 @@ mod tests {
             assert!((found - expected).abs() < 1e-6, "{t}: {found} {expected}");
         }
         assert!(tank.tangents(&job, &[vec![1.0, 0.0]]).is_none());
+        let refused = Linearised::new(Arc::new(tank), &Linearise::default()).err().unwrap().to_string();
+        assert!(refused.contains("needs the derivatives") && refused.contains("`PlantModel`"), "{refused}");
     }
 }

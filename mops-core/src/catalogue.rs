@@ -9,6 +9,7 @@ use toml::de::ValueDeserializer;
 
 use crate::catalogue_study::CatalogueStudy;
 use crate::criterion::CriterionSpec;
+use crate::diagnostic::Diagnostic;
 use crate::effect::{Effect, Placement};
 use crate::model::Model;
 use crate::solver::Solver;
@@ -181,13 +182,39 @@ impl Catalogue {
     }
 
     /// Adds a study: files in the program ([`crate::Shipped`]), a folder ([`crate::StudyFolder`]), or one built in Rust
-    /// ([`crate::BuiltStudy`]). It replaces a study of the same name.
+    /// ([`crate::BuiltStudy`]). Its name is its own: see [`Self::check_names`].
     #[must_use]
     pub fn with_study(mut self, study: impl Into<CatalogueStudy>) -> Self {
-        let study = study.into();
-        self.studies.retain(|known| known.name() != study.name());
-        self.studies.push(study);
+        self.studies.push(study.into());
         self
+    }
+
+    /// Checks that no two kinds of one sort and no two studies have the same name; the command line does so first.
+    ///
+    /// # Errors
+    /// Returns an error that names the two.
+    pub fn check_names(&self) -> Result<(), Diagnostic> {
+        let sorts: [(&str, Vec<&str>); 4] = [
+            ("models", self.models.iter().map(|kind| kind.name).collect()),
+            ("criteria", self.criteria.iter().map(|kind| kind.name).collect()),
+            ("solvers", self.solvers.iter().map(|kind| kind.name).collect()),
+            ("effects", self.effects.iter().map(|effect| effect.name()).collect()),
+        ];
+        for (sort, names) in sorts {
+            if let Some([first, _]) = twice(&names) {
+                return Err(Diagnostic::new(format!("two {sort} of the catalogue are named `{}`", names[first]))
+                    .with_help("rename one of them: studies name them by their kinds"));
+            }
+        }
+        let names: Vec<&str> = self.studies.iter().map(CatalogueStudy::name).collect();
+        match twice(&names) {
+            Some([first, second]) => {
+                let [a, b] = [first, second].map(|index| self.studies[index].origin());
+                Err(Diagnostic::new(format!("two studies are named `{}`: one {a}, one {b}", names[first]))
+                    .with_help("rename one of them: for a folder, `name` in the [study] of its study.toml"))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Returns the study of this name.
@@ -196,10 +223,31 @@ impl Catalogue {
     }
 }
 
+/// Returns the indices of the first two equal names.
+fn twice(names: &[&str]) -> Option<[usize; 2]> {
+    (0..names.len()).find_map(|i| Some([names[..i].iter().position(|name| *name == names[i])?, i]))
+}
+
 /// Returns the self-contained schema of a type.
 pub fn schema_of<T: JsonSchema>() -> Schema {
     let mut settings = SchemaSettings::draft07();
     settings.inline_subschemas = true;
     settings.meta_schema = None;
     settings.into_generator().into_root_schema_for::<T>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue_study::{BuiltStudy, Shipped};
+    use crate::study::StudyBuilder;
+
+    #[test]
+    fn two_studies_of_one_name_are_refused_with_their_origins() {
+        let built = |name: &str| BuiltStudy::new(name, "", StudyBuilder::default);
+        let one = Catalogue::default().with_study(built("a")).with_study(Shipped { name: "b", files: &[] });
+        assert_eq!(one.check_names(), Ok(()));
+        let twice = one.with_study(built("b")).check_names().unwrap_err();
+        assert_eq!(twice.message, "two studies are named `b`: one shipped with the program, one built in Rust");
+    }
 }

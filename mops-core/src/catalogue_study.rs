@@ -33,7 +33,7 @@ impl Shipped {
     }
 }
 
-/// Folder with `study.toml`, data, and `README.md`; the study is known by the folder's name.
+/// Folder with `study.toml`, data, and `README.md`; the study is known by its name in `study.toml`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StudyFolder {
     name: String,
@@ -57,13 +57,25 @@ impl CatalogueStudy {
             Self::Built(built) => &built.name,
         }
     }
+
+    /// Returns where the study comes from, in a few words.
+    pub(crate) fn origin(&self) -> String {
+        match self {
+            Self::Shipped(_) => "shipped with the program".to_owned(),
+            Self::Folder(folder) => format!("in the folder {}", folder.path.display()),
+            Self::Built(_) => "built in Rust".to_owned(),
+        }
+    }
 }
 
 impl StudyFolder {
-    /// Returns the study in a folder that has a `study.toml`; `None` for other folders.
+    /// Returns the study in a folder that has a `study.toml`; `None` for other folders. Without a readable name in the file,
+    /// the study has the name of the folder, and its errors are reported when it is read.
     pub fn open(path: &Path) -> Option<Self> {
-        let name = path.file_name()?.to_str()?.to_owned();
-        path.join("study.toml").is_file().then(|| Self { name, path: path.to_owned() })
+        let file = path.join("study.toml");
+        let folder = path.file_name()?.to_str()?;
+        file.is_file()
+            .then(|| Self { name: name_in(&file).unwrap_or_else(|| folder.to_owned()), path: path.to_owned() })
     }
 
     /// Returns the path of `study.toml`.
@@ -75,6 +87,12 @@ impl StudyFolder {
     pub fn path(&self) -> &Path {
         &self.path
     }
+}
+
+/// Returns the name of a study in its file.
+fn name_in(file: &Path) -> Option<String> {
+    let table: toml::Table = std::fs::read_to_string(file).ok()?.parse().ok()?;
+    Some(table.get("study")?.get("name")?.as_str()?.to_owned())
 }
 
 impl BuiltStudy {

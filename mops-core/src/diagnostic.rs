@@ -139,7 +139,7 @@ pub fn suggestion<'a>(given: &str, known: impl IntoIterator<Item = &'a str> + Cl
         None => {
             let names: Vec<&str> = known.into_iter().collect();
             if names.is_empty() {
-                "no names are defined here".to_owned()
+                "there are none to choose from".to_owned()
             } else {
                 format!("known: {}", names.join(", "))
             }

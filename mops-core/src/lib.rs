@@ -30,6 +30,7 @@ pub mod linear;
 mod linearised;
 mod model;
 mod outcome;
+mod panics;
 mod placement;
 mod plant;
 mod port;

@@ -98,12 +98,17 @@ impl Linearised {
         let states = model.equation_states();
         let of = model.interface();
         if states.is_empty() {
-            let fact = match of.analysis {
-                AnalysisKind::Time if model.augmented().is_some() => "a model with effects cannot be linearised",
-                AnalysisKind::Time => "this model cannot be linearised: its equations are not available",
-                AnalysisKind::Linear => "this model is already linear",
+            let (fact, way_out) = match of.analysis {
+                AnalysisKind::Time if model.augmented().is_some() => {
+                    ("a model with effects cannot be linearised", "linearise the model without `effects`")
+                }
+                AnalysisKind::Time => (
+                    "a linearisation needs the derivatives of the equations, which this model does not provide",
+                    "write the equations in a study file (kind `equations`), or in Rust as a `PlantModel`",
+                ),
+                AnalysisKind::Linear => ("this model is already linear", "remove `linearise`"),
             };
-            return Err(StudyError::here(fact).with_help("remove `linearise`"));
+            return Err(StudyError::here(fact).with_help(way_out));
         }
         let inputs = chosen("inputs", options.inputs.as_deref(), &of.inputs, "input")?;
         let outputs = chosen("outputs", options.outputs.as_deref(), &of.signals, "signal")?;

@@ -17,8 +17,8 @@ impl Problem {
         let case = &self.study().cases[plan.case];
         let parameters = self.study().parameters(plan, tuners);
         let request = Job { case, parameters: &parameters, signals: &plan.signals, horizon: plan.horizon };
-        let analysis = self.study().models[plan.model].1.analyse(&request).ok()?;
-        row.criterion.value(case, &analysis).ok().map(|value| value.number).filter(|number| number.is_finite())
+        let analysis = self.study().analyse(plan.model, &request).ok()?;
+        row.value(case, &analysis).ok().map(|value| value.number).filter(|number| number.is_finite())
     }
 
     /// Returns a signal of a job at increasing times, and its derivative with respect to every active tuner, in the tuner's

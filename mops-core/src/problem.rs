@@ -12,6 +12,7 @@ use crate::experiment::Role;
 use crate::failure::Failure;
 use crate::known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes as KnownSlopes, RowValue};
 use crate::model::{Analysis, Job};
+use crate::panics::caught;
 use crate::random::stream;
 use crate::scalar::Dual;
 use crate::solver::Shape;
@@ -177,12 +178,13 @@ impl Problem {
         let plan = &self.study.jobs[job];
         let model = &self.study.models[plan.model].1;
         let signals: Vec<usize> = (0..model.interface().signals.len()).collect();
-        model.analyse(&Job {
+        let request = Job {
             case: &self.study.cases[plan.case],
             parameters: &self.study.parameters(plan, tuners),
             signals: &signals,
             horizon: horizon.unwrap_or(plan.horizon),
-        })
+        };
+        self.study.analyse(plan.model, &request)
     }
 
     /// Returns the evaluation of a point that was not simulated: no row has a value.
@@ -281,9 +283,9 @@ impl Problem {
         }
         let parameters = study.parameters(plan, tuners);
         let request = Job { case, parameters: &parameters, signals: &plan.signals, horizon: plan.horizon };
-        let analysis = study.models[plan.model].1.analyse(&request)?;
+        let analysis = study.analyse(plan.model, &request)?;
         let rows = study.rows.iter().enumerate().filter(|(_, row)| row.job == job);
-        let value = |row: &Row| match row.criterion.value(case, &analysis) {
+        let value = |row: &Row| match row.value(case, &analysis) {
             Ok(value) if !value.number.is_finite() => Err("its value is not finite".to_owned()),
             other => other,
         };
@@ -336,8 +338,11 @@ impl Problem {
             return None;
         }
         let moves = self.tuner_slopes(&at.tuners);
-        let of_jobs: Vec<Option<Vec<RowSlopes>>> =
-            self.counting.par_iter().map(|&job| self.job_slopes(job, &at.tuners, &moves, reach)).collect();
+        let of_jobs: Vec<Option<Vec<RowSlopes>>> = self
+            .counting
+            .par_iter()
+            .map(|&job| caught(|| self.job_slopes(job, &at.tuners, &moves, reach)).ok()?)
+            .collect();
         let mut rows: KnownSlopes = of_jobs.into_iter().collect::<Option<Vec<_>>>()?.into_iter().flatten().collect();
         if self.shape.residuals == 0 {
             rows.iter_mut().flat_map(|(_, along)| along).for_each(|slope| slope.residuals.clear());

@@ -33,10 +33,10 @@ mod tables;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use mops_core::Catalogue;
 
-use crate::terminal::{CommandError, print};
+use crate::terminal::{CommandError, print, show_each_panic_once};
 
 /// Multi-objective parameter synthesis: design controllers and identify models from measurements.
 ///
@@ -60,7 +60,7 @@ failed; 4 stopped by a signal, with the best point saved."
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Folder of studies that are found by name, each a folder with study.toml; adds to the folders in MOPS_STUDIES.
+    /// Folder of studies, each a folder with study.toml, found by the name in it; adds to the folders in MOPS_STUDIES.
     #[arg(long = "studies", value_name = "DIR", global = true, help_heading = "Global options")]
     studies: Vec<PathBuf>,
 }
@@ -104,18 +104,21 @@ enum Command {
     },
 }
 
-/// Parses the command line and runs the command.
-pub(crate) fn main(catalogue: Catalogue) -> ExitCode {
-    let Arguments { command, studies } = Arguments::parse();
+/// Parses the command line of a program and runs the command.
+pub(crate) fn main(catalogue: Catalogue, name: &'static str, version: &'static str) -> ExitCode {
+    show_each_panic_once();
+    let program = Arguments::command().name(name).version(version);
+    let arguments = Arguments::from_arg_matches(&program.clone().get_matches());
+    let Arguments { command, studies } = arguments.unwrap_or_else(|error| error.exit());
     let of_environment = std::env::var_os("MOPS_STUDIES").unwrap_or_default();
     let folders = std::env::split_paths(&of_environment).filter(|path| !path.as_os_str().is_empty()).chain(studies);
     match study::with_folders(catalogue, &folders.collect::<Vec<_>>()) {
-        Ok(catalogue) => perform(&catalogue, command),
+        Ok(catalogue) => perform(&catalogue, command, program),
         Err(mistake) => CommandError::from(mistake).report(),
     }
 }
 
-fn perform(catalogue: &Catalogue, command: Command) -> ExitCode {
+fn perform(catalogue: &Catalogue, command: Command, mut program: clap::Command) -> ExitCode {
     let outcome = match command {
         Command::Run(arguments) => run::run(catalogue, &arguments),
         Command::Pareto(arguments) => pareto::pareto(catalogue, &arguments),
@@ -134,7 +137,8 @@ fn perform(catalogue: &Catalogue, command: Command) -> ExitCode {
         Command::Schema(arguments) => schema::schema(catalogue, &arguments),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Arguments::command(), "mops", &mut script);
+            let name = program.get_name().to_owned();
+            clap_complete::generate(shell, &mut program, name, &mut script);
             print(&String::from_utf8_lossy(&script)).map(|()| ExitCode::SUCCESS)
         }
     };

@@ -105,16 +105,23 @@ fn program() -> String {
     bytes.map_or_else(|_| String::new(), |bytes| mops_core::file::digest(&bytes))
 }
 
-/// Adds the studies in `folders` to the catalogue: every subfolder that has a `study.toml`, by its name.
+/// Adds the studies in `folders` to the catalogue: every subfolder that has a `study.toml`. A folder that is given twice is
+/// read once.
 ///
 /// # Errors
-/// If a folder cannot be read.
+/// If a folder cannot be read, or two studies have one name.
 pub(super) fn with_folders(mut catalogue: Catalogue, folders: &[PathBuf]) -> Result<Catalogue, Diagnostic> {
+    let mut seen = Vec::new();
     for folder in folders {
         let cannot = |error: std::io::Error| {
             Diagnostic::new(format!("cannot read the folder of studies {}: {error}", folder.display()))
                 .with_help("set --studies or MOPS_STUDIES to a folder of study folders")
         };
+        let real = folder.canonicalize().map_err(cannot)?;
+        if seen.contains(&real) {
+            continue;
+        }
+        seen.push(real);
         let mut paths = Vec::new();
         for entry in std::fs::read_dir(folder).map_err(cannot)? {
             paths.push(entry.map_err(cannot)?.path());
@@ -124,6 +131,7 @@ pub(super) fn with_folders(mut catalogue: Catalogue, folders: &[PathBuf]) -> Res
             catalogue = catalogue.with_study(study);
         }
     }
+    catalogue.check_names()?;
     Ok(catalogue)
 }
 

@@ -30,6 +30,57 @@ fn every_shipped_study_measures_as_itself_so_that_its_points_are_stored() {
     assert!(!one.measures_as(&other));
 }
 
+/// Returns a study built in Rust, with settings.
+fn built(settings: &[&str]) -> StudyFile {
+    use mops_core::{BuiltStudy, CriterionBuilder, Interface, Parameter, StudyBuilder, TunerBuilder, Unit, Variable};
+    let draft = || {
+        let model = Interface {
+            signals: vec![Variable::new("x", "m", "")],
+            parameters: vec![Parameter::new("k", "1/s", ""), Parameter::new("d", "1/s", "").with_default(1.0)],
+            horizon: Some(1.0),
+            ..Interface::default()
+        };
+        let model = mops_models::from_fn(model, [1.0], |at, p, dx| dx[0] = (p[1] - p[0]) * at.x[0]);
+        let end = mops_criteria::from_fn(["x"], Unit::known("m"), |traces| traces[0].last());
+        StudyBuilder {
+            models: vec![("m".into(), model.into())],
+            tuners: vec![("k".into(), TunerBuilder::new(1.0, 0.1, 10.0))],
+            criteria: vec![("end".into(), CriterionBuilder::minimise(end, 10.0))],
+            ..StudyBuilder::default()
+        }
+    };
+    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+    let study = BuiltStudy::new("closure", "", draft);
+    mops_core::file::built(&crate::catalogue(), &study, &settings, "0").unwrap()
+}
+
+#[test]
+fn every_setting_of_a_study_built_in_rust_makes_another_run() {
+    let identity = |settings: &[&str]| {
+        let file = built(settings);
+        Identity::of(&file, &file.study, file.solver.kind)
+    };
+    let plain = identity(&[]);
+    assert_eq!(plain.refuses_to_continue(&identity(&[])), None);
+    assert_eq!(plain.refuses_to_continue(&identity(&["solver.max-evaluations=7"])), None);
+    for setting in [
+        "study.seed=7",
+        "study.objective=\"sum\"",
+        "tuners.k.start=2.0",
+        "solver.genetic.population=50",
+        "monte-carlo.samples=50",
+        "sweep.x={ tuner = \"k\", points = 7 }",
+        "uncertain.d={ min = 0.5, max = 2.0 }",
+    ] {
+        let key = setting.split('=').next().unwrap();
+        let why = plain.refuses_to_continue(&identity(&[setting])).unwrap_or_default();
+        assert!(why.contains(key.split('.').next().unwrap()), "{setting}: {why}");
+    }
+    // A demand reads as in a study file.
+    let content = &built(&[]).content;
+    assert_eq!(content["criteria"]["end"], serde_json::json!({ "demand": 10.0, "usage": "minimise", "weight": 1.0 }));
+}
+
 /// Creates a database in memory with the given points and derivatives of a study.
 fn written(study: &Study, points: &[PointRow], slopes: &[(Vec<u64>, f64, Option<RowSlopes>)]) -> Database {
     let file = file("pid-design", &[]);

@@ -59,7 +59,7 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<Strin
         format!("{} from {best} to {worst}", name(found, k))
     });
     let mut words = vec![format!(
-        "The Pareto front has {} points: {}. All points are mutually non-dominated.",
+        "The Pareto front has {} points: {}. No point of the front dominates another.",
         front.len(),
         ends.collect::<Vec<_>>().join(", ")
     )];
@@ -100,7 +100,8 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<Strin
     }
     let of = |pareto: Pareto| found.points.iter().filter(|point: &&FrontPoint| point.pareto == pareto).count();
     words.push(format!(
-        "{} of {} points satisfy the first-order Pareto conditions; {} could not be checked; {} are dominated.",
+        "{} of {} points satisfy the first-order Pareto conditions; {} could not be checked; {} have a known improving \
+         direction.",
         of(Pareto::CertifiedLocal),
         found.points.len(),
         of(Pareto::NotShown),

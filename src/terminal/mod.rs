@@ -3,6 +3,7 @@
 mod date;
 mod limits;
 mod mistake;
+mod panics;
 mod progress;
 mod sparkline;
 mod table;
@@ -15,6 +16,7 @@ use mops_core::Diagnostic;
 
 pub use date::date;
 pub(crate) use limits::{Limit, cancel_after, cancel_on_signal, exit_after};
+pub(crate) use panics::show_each_panic_once;
 pub use progress::Progress;
 pub use table::{number, table};
 pub use write::print;

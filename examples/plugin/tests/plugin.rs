@@ -17,6 +17,14 @@ fn text(arguments: &[&str]) -> String {
 }
 
 #[test]
+fn the_program_has_its_own_name_and_version() {
+    let version = env!("CARGO_PKG_VERSION");
+    assert_eq!(text(&["--version"]), format!("mops-plugin {version} (mops {version})\n"));
+    assert!(text(&["run", "--help"]).contains("Usage: mops-plugin run"));
+    assert!(text(&["completions", "zsh"]).starts_with("#compdef mops-plugin"));
+}
+
+#[test]
 fn the_additions_are_listed_and_described() {
     let list = text(&["list"]);
     for name in ["quarter-car", "ride-comfort", "shrinking-box", "eddy-brake", "suspension", "pid-design"] {
@@ -72,13 +80,23 @@ fn folders_of_studies_are_known_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let mine = folder.path().join("mine");
     std::fs::create_dir_all(&mine).unwrap();
-    std::fs::write(mine.join("study.toml"), include_str!("../studies/quarter-car/study.toml")).unwrap();
+    let shipped = include_str!("../studies/quarter-car/study.toml");
+    let own = shipped.replacen("name = \"quarter-car\"", "name = \"half-car\"", 1);
+    std::fs::write(mine.join("study.toml"), own).unwrap();
     std::fs::write(mine.join("README.md"), "# Mine\n").unwrap();
     let studies = folder.path().to_str().unwrap();
-    assert!(text(&["list", "studies", "--studies", studies]).contains("Mine"));
-    assert!(text(&["check", "mine", "--studies", studies]).contains("comfort"));
-    let by_variable = plugin(&["check", "mine"]).env("MOPS_STUDIES", studies).output().unwrap();
+    // The name is that of the study, not of its folder; a folder that is given twice is read once.
+    let list = text(&["list", "studies", "--studies", studies, "--studies", studies]);
+    assert!(list.lines().any(|line| line.contains("half-car") && line.contains("Mine")), "{list}");
+    assert!(text(&["check", "half-car", "--studies", studies]).contains("comfort"));
+    let by_variable = plugin(&["check", "half-car"]).env("MOPS_STUDIES", studies).output().unwrap();
     assert!(by_variable.status.success());
+    std::fs::write(mine.join("study.toml"), shipped).unwrap();
+    let twice = plugin(&["list", "--studies", studies]).output().unwrap();
+    let message = String::from_utf8_lossy(&twice.stderr).into_owned();
+    assert_eq!(twice.status.code(), Some(2), "{message}");
+    let fact = "two studies are named `quarter-car`: one shipped with the program, one in the folder";
+    assert!(message.replace("\n  │ ", " ").contains(fact), "{message}");
     let nowhere = plugin(&["list", "--studies", "nowhere"]).output().unwrap();
     assert_eq!(nowhere.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&nowhere.stderr).contains("nowhere"));

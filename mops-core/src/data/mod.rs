@@ -99,8 +99,11 @@ impl DataFile {
             Ok(bytes) => Self::parse(&name, bytes),
             Err(error) => {
                 let source = Arc::new(Source { name, text: String::new() });
-                let listed = || source_of(path, &read_regular(&path.with_file_name(SOURCES)).ok()?);
-                if let Some(way_out) = (error.kind() == ErrorKind::NotFound).then(listed).flatten() {
+                let sources = path.with_file_name(SOURCES);
+                if error.kind() == ErrorKind::NotFound
+                    && let Ok(bytes) = read_regular(&sources)
+                    && let Some(way_out) = source_of(path, &sources.display().to_string(), bytes)?
+                {
                     return Err(Diagnostic::new("the file does not exist").with_help(way_out).at(&source, 0..0));
                 }
                 let (fact, way_out) = match error.kind() {

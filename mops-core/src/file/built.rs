@@ -6,11 +6,14 @@ use schemars::JsonSchema;
 use serde_json::{Value, json};
 
 use super::tree::{Node, Text};
-use super::{StudyFile, read_solver, tasks};
+use super::{StudyFile, content, digest, read_solver, tasks};
+use crate::case::Case;
 use crate::catalogue::Catalogue;
 use crate::catalogue_study::BuiltStudy;
+use crate::demand::Demand;
 use crate::diagnostic::{Diagnostic, suggestion};
 use crate::evaluation::Objective;
+use crate::panics::caught;
 use crate::study::{Study, StudyBuilder, Task};
 use crate::unit::Quantity;
 
@@ -58,7 +61,10 @@ fn read(catalogue: &Catalogue, built: &BuiltStudy, text: &Arc<Text>, program: &s
     let root = text.parse()?;
     root.check_keys(&[&["study", "tuners", "solver"][..], &tasks::TABLES[..]].concat())
         .map_err(|mistake| mistake.with_help("a study built in Rust is changed there"))?;
-    let mut draft = built.draft();
+    let mut draft = caught(|| built.draft()).map_err(|why| {
+        Diagnostic::new(format!("the function that builds the study `{}` {why}", built.name()))
+            .with_help("correct the function: the report of the panic names its line")
+    })?;
     draft.name = built.name().to_owned();
     if let Some(node) = root.child("study") {
         let settings: StudySettings = node.read()?;
@@ -82,7 +88,7 @@ fn read(catalogue: &Catalogue, built: &BuiltStudy, text: &Arc<Text>, program: &s
         }
     })?;
     Ok(StudyFile {
-        content: content(&study),
+        content: content_of(&root, &study),
         study,
         solver,
         max_evaluations,
@@ -109,22 +115,39 @@ fn set_tuner(draft: &mut StudyBuilder, name: &str, node: &Node<'_>) -> Result<()
     Ok(())
 }
 
-/// Content of the study as far as it is data, in the layout of a study file.
-fn content(study: &Study) -> Value {
+/// Content of the study as far as it is data, in the layout of a study file: its settings, with the values that they replace.
+/// The digest of the program stands for the rest.
+fn content_of(root: &Node<'_>, study: &Study) -> Value {
     let tuners = study.tuners.iter().map(|tuner| {
         let [min, max] = tuner.bounds;
-        (
-            tuner.name.clone(),
-            json!({ "start": tuner.start, "min": min, "max": max, "scale": format!("{:?}", tuner.scale) }),
-        )
+        (tuner.name.clone(), json!({ "start": tuner.start, "min": min, "max": max, "scale": tuner.scale }))
     });
+    let cases = study.cases.iter().map(|case| (case.name.clone(), json!(data(case))));
     let criteria = study.rows.iter().map(|row| {
-        let demand = format!("{:?}", row.demand);
-        (study.key(row), json!({ "usage": format!("{:?}", row.usage), "demand": demand, "weight": row.weight }))
+        let demand = match row.demand {
+            Demand::AtMost(demand) | Demand::AtLeast(demand) => json!({ "demand": demand }),
+            Demand::Pair { good, bad } => json!({ "good": good, "bad": bad }),
+            Demand::None => json!({}),
+        };
+        let Value::Object(mut table) = demand else { unreachable!("it is a table") };
+        table.extend([("usage".to_owned(), json!(row.usage)), ("weight".to_owned(), json!(row.weight))]);
+        (row.name.clone(), Value::Object(table))
     });
-    json!({
-        "study": { "name": study.name, "task": study.task, "seed": study.seed },
-        "tuners": tuners.collect::<serde_json::Map<_, _>>(),
-        "criteria": criteria.collect::<serde_json::Map<_, _>>(),
-    })
+    let Value::Object(mut content) = content::of(root.value()) else { unreachable!("the root is a table") };
+    content.extend([
+        (
+            "study".to_owned(),
+            json!({ "name": study.name, "task": study.task, "objective": study.objective, "seed": study.seed }),
+        ),
+        ("tuners".to_owned(), Value::Object(tuners.collect())),
+        ("cases".to_owned(), Value::Object(cases.collect())),
+        ("criteria".to_owned(), Value::Object(criteria.collect())),
+    ]);
+    Value::Object(content)
+}
+
+/// Returns the digest of the values and data of a case.
+fn data(case: &Case) -> String {
+    let Case { parameters, inputs, experiment, horizon, .. } = case;
+    digest(format!("{:?}", (parameters, inputs, experiment, horizon)).as_bytes())
 }

@@ -62,22 +62,27 @@ pub(super) fn entry<'t>(node: &Node<'t>, table: &str, key: &str) -> Node<'t> {
 }
 
 fn open(node: &Node<'_>, path: &str, files: &dyn Files) -> Result<DataFile, Diagnostic> {
-    let bytes = files.read(path).map_err(|error| {
-        let shown = files.show(path);
-        let why = match error.kind() {
-            ErrorKind::NotFound => format!("no data file `{shown}`"),
-            ErrorKind::IsADirectory => format!("`{shown}` is a folder, not a data file"),
-            _ => format!("the data file `{shown}` cannot be read: {error}"),
-        };
-        let place = node.child("file").expect("it was just read");
-        let sources = Path::new(path).with_file_name(SOURCES);
-        let listed = || source_of(Path::new(path), &files.read(sources.to_str()?).ok()?);
-        let way_out = (error.kind() == ErrorKind::NotFound).then(listed).flatten();
-        place
-            .diagnostic(why)
-            .with_help(way_out.as_deref().unwrap_or("paths are relative to the folder of the study file"))
-    })?;
-    DataFile::parse(&files.show(path), bytes)
+    let shown = files.show(path);
+    let error = match files.read(path) {
+        Ok(bytes) => return DataFile::parse(&shown, bytes),
+        Err(error) => error,
+    };
+    let mut way_out = None;
+    let why = match error.kind() {
+        ErrorKind::NotFound => {
+            let sources = Path::new(path).with_file_name(SOURCES).to_string_lossy().into_owned();
+            if let Ok(bytes) = files.read(&sources) {
+                way_out = source_of(Path::new(&shown), &files.show(&sources), bytes)?;
+            }
+            format!("no data file `{shown}`")
+        }
+        ErrorKind::IsADirectory => format!("`{shown}` is a folder, not a data file"),
+        _ => format!("the data file `{shown}` cannot be read: {error}"),
+    };
+    let place = node.child("file").expect("it was just read");
+    Err(place
+        .diagnostic(why)
+        .with_help(way_out.as_deref().unwrap_or("paths are relative to the folder of the study file")))
 }
 
 /// The part of a data file that an experiment uses, with its time.

@@ -89,7 +89,7 @@ pub fn records(problem: &Problem, tuners: &[f64]) -> Option<Vec<Record>> {
             }
             None => {
                 let analysis = problem.analyse_all(row.job, tuners, None).ok()?;
-                let count = row.criterion.value(&study.cases[case], &analysis).ok()?.residuals.len();
+                let count = row.value(&study.cases[case], &analysis).ok()?.residuals.len();
                 Record::new(case, None, None, first, vec![factor; count])
             }
         };

@@ -32,7 +32,9 @@ use crate::case::Case;
 use crate::criterion::{Criterion, Usage, Value};
 use crate::demand::{Demand, Scaled};
 use crate::evaluation::{FEASIBLE, Objective, Reading};
-use crate::model::Model;
+use crate::failure::Failure;
+use crate::model::{Analysis, Job, Model};
+use crate::panics::caught;
 use crate::scalar::Scalar;
 use crate::tuner::Tuner;
 use crate::unit::Unit;
@@ -241,6 +243,11 @@ pub struct Row {
 }
 
 impl Row {
+    /// Computes the value for one case; a panic of the criterion is an error.
+    pub(crate) fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
+        caught(|| self.criterion.value(case, analysis)).unwrap_or_else(Err)
+    }
+
     /// Returns the reading of a value: the value scaled by the demand.
     pub fn reading(&self, value: &Value) -> Reading {
         let Scaled { value: scaled, slope } = self.demand.scaled(value);
@@ -335,6 +342,13 @@ impl Study {
             && same(&self.jobs, &other.jobs, same_job)
             && same(&self.rows, &other.rows, same_row)
             && same(&self.tuners, &other.tuners, same_tuner)
+    }
+
+    /// Analyses one case with a model, by index into [`Self::models`]; a panic of the model is a failure.
+    pub(crate) fn analyse(&self, model: usize, job: &Job<'_>) -> Result<Analysis, Failure> {
+        let (name, model) = &self.models[model];
+        let panicked = |why| Err(Failure::Undefined(format!("model `{name}` {why}")));
+        caught(|| model.analyse(job)).unwrap_or_else(panicked)
     }
 
     /// Connects the simulations of this study, and of every study derived from it, to a cancellation request.

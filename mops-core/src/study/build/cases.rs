@@ -20,8 +20,11 @@ pub(super) fn build_case(draft: &CaseBuilder, models: &Models, warnings: &mut Ve
             |mistake: StudyError| if draft.measured.is_some() { mistake.within("parameters") } else { mistake };
         let known: Vec<&Parameter> = models.iter().flat_map(|(_, m)| &m.interface().parameters).collect();
         let parameter = known.iter().find(|p| p.variable.name == *name).ok_or_else(|| {
-            within(StudyError::new(name, format!("no model has a parameter `{name}`")))
-                .with_help(suggestion(name, known.iter().map(|p| p.variable.name.as_str())))
+            within(StudyError::new(name, format!("no model has a parameter `{name}`"))).with_help(similar(
+                name,
+                "parameters",
+                known.iter().map(|p| p.variable.name.as_str()),
+            ))
         })?;
         parameters.push((name.clone(), in_range(quantity, parameter).map_err(|m| within(m.within(name)))?));
     }
@@ -45,6 +48,14 @@ pub(super) fn build_case(draft: &CaseBuilder, models: &Models, warnings: &mut Ve
     })
 }
 
+/// Returns the way out of an unknown name: a similar one, or to remove it if the models have none of the kind.
+fn similar<'a>(name: &str, what: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
+    match known.clone().next() {
+        Some(_) => suggestion(name, known),
+        None => format!("the models of the study have no {what}: remove `{name}`"),
+    }
+}
+
 fn build_input(
     (name, input, unit): &(String, Input, Option<Unit>),
     models: &Models,
@@ -52,7 +63,7 @@ fn build_input(
     let known: Vec<&Variable> = models.iter().flat_map(|(_, m)| &m.interface().inputs).collect();
     let variable = known.iter().find(|v| v.name == *name).ok_or_else(|| {
         StudyError::new(name, format!("no model has an input `{name}`"))
-            .with_help(suggestion(name, known.iter().map(|v| v.name.as_str())))
+            .with_help(similar(name, "inputs", known.iter().map(|v| v.name.as_str())))
             .within("inputs")
     })?;
     same_unit(name, &variable.unit, &known).map_err(|m| m.within("inputs"))?;
@@ -137,7 +148,7 @@ fn build_experiment(
     for channel in &draft.channels {
         let variable = known.iter().find(|v| v.name == channel.signal).ok_or_else(|| {
             StudyError::new(&channel.signal, format!("no model has a signal `{}`", channel.signal))
-                .with_help(suggestion(&channel.signal, known.iter().map(|v| v.name.as_str())))
+                .with_help(similar(&channel.signal, "signals", known.iter().map(|v| v.name.as_str())))
                 .within("channels")
         })?;
         same_unit(&channel.signal, &variable.unit, &known).map_err(|m| m.within("channels"))?;

@@ -36,8 +36,12 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
     let mut models: Vec<(String, Arc<dyn Model>)> = Vec::new();
     let mut fixed = Vec::new();
     for (name, draft) in draft.models {
-        let Interface { parameters, horizon, .. } = draft.model.interface();
+        let Interface { signals, parameters, states, inputs, horizon, .. } = draft.model.interface();
         let within = |mistake: StudyError| mistake.within(&name).within("models");
+        distinct("signals", signals.iter().map(|signal| &signal.name)).map_err(within)?;
+        distinct("parameters", parameters.iter().map(|parameter| &parameter.variable.name)).map_err(within)?;
+        distinct("states", states.iter().map(|state| &state.name)).map_err(within)?;
+        distinct("inputs", inputs.iter().map(|input| &input.name)).map_err(within)?;
         check_horizon(*horizon).map_err(within)?;
         fixed.push(fixed_values(&draft.parameters, parameters).map_err(|m| within(m.within("parameters")))?);
         models.push((name, Arc::from(draft.model)));
@@ -169,7 +173,7 @@ fn distinct<'n>(table: &str, names: impl Iterator<Item = &'n String>) -> Result<
         if known.contains(&name) {
             return Err(StudyError::new(name, format!("duplicate name `{name}`"))
                 .within(table)
-                .with_help("rename one of them: results are listed by these names"));
+                .with_help("rename one of them: studies and results use these names"));
         }
         known.push(name);
     }
