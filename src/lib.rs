@@ -91,14 +91,8 @@ pub fn catalogue() -> Catalogue {
         effects: mops_effects::effects(),
         augment: Some(|model, effects| Ok(Box::new(mops_models::WithEffects::new(model, effects)?))),
         studies: mops_studies::shipped().into_iter().map(Into::into).collect(),
+        program: None,
     }
-}
-
-/// Runs the command line of `mops` with a catalogue. A crate that adds its own kinds uses [`main!`], which has its name and
-/// version.
-#[cfg(feature = "cli")]
-pub fn main(catalogue: Catalogue) -> std::process::ExitCode {
-    cli::main(catalogue, "mops", env!("CARGO_PKG_VERSION"))
 }
 
 /// Runs the command line with a catalogue, as a program with the name and version of the calling crate:
@@ -114,6 +108,6 @@ macro_rules! main {
 /// Runs the command line with a catalogue, as a program of this name and version; see [`main!`].
 #[cfg(feature = "cli")]
 #[doc(hidden)]
-pub fn main_as(catalogue: Catalogue, name: &'static str, version: &str) -> std::process::ExitCode {
-    cli::main(catalogue, name, format!("{version} (mops {})", env!("CARGO_PKG_VERSION")).leak())
+pub fn main_as(catalogue: Catalogue, name: &'static str, version: &'static str) -> std::process::ExitCode {
+    cli::main(catalogue, name, version)
 }

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    mops::main(mops::catalogue())
+    mops::main!(mops::catalogue())
 }

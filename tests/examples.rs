@@ -175,7 +175,7 @@ fn a_panic_of_a_closure_is_a_failure_of_its_point_that_names_the_model_or_criter
 #[test]
 fn a_panic_of_the_function_that_builds_a_study_is_an_error_that_names_the_study() {
     let broken = mops::BuiltStudy::new("broken", "", || panic!("no data"));
-    let error = mops::core::file::built(&mops::catalogue(), &broken, &[], "").err().unwrap();
+    let error = mops::core::file::built(&mops::catalogue(), &broken, &[]).err().unwrap();
     assert_eq!(error.message, "the function that builds the study `broken` panicked: no data");
 }
 

@@ -150,6 +150,8 @@ pub struct Catalogue {
     pub augment: Option<Augment>,
     /// Studies known by name.
     pub studies: Vec<CatalogueStudy>,
+    /// Digest of the program, if its own code computes values or builds studies; part of the identity of runs.
+    pub program: Option<String>,
 }
 
 impl Catalogue {
@@ -165,6 +167,11 @@ impl Catalogue {
     pub fn with_criterion(mut self, kind: CriterionKind) -> Self {
         self.criteria.push(kind);
         self
+    }
+
+    /// Returns the digest of the program under its name in the identity of a run.
+    pub(crate) fn program_digest(&self) -> Option<(String, String)> {
+        self.program.clone().map(|digest| ("program".to_owned(), digest))
     }
 
     /// Adds an effect, as in `catalogue.with_effect(effect::<EddyBrake>())`.

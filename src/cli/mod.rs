@@ -104,10 +104,15 @@ enum Command {
     },
 }
 
-/// Parses the command line of a program and runs the command.
-pub(crate) fn main(catalogue: Catalogue, name: &'static str, version: &'static str) -> ExitCode {
+/// Parses the command line of a program and runs the command. A program other than `mops` has code of its own: its version
+/// names that of mops too, and its digest is part of the identity of runs.
+pub(crate) fn main(mut catalogue: Catalogue, name: &'static str, version: &'static str) -> ExitCode {
     show_each_panic_once();
-    let program = Arguments::command().name(name).version(version);
+    let mut program = Arguments::command().name(name).version(version);
+    if name != "mops" {
+        program = program.version(format!("{version} (mops {})", env!("CARGO_PKG_VERSION")).leak() as &str);
+        catalogue.program = study::digest_of_program();
+    }
     let arguments = Arguments::from_arg_matches(&program.clone().get_matches());
     let Arguments { command, studies } = arguments.unwrap_or_else(|error| error.exit());
     let of_environment = std::env::var_os("MOPS_STUDIES").unwrap_or_default();

@@ -82,7 +82,7 @@ pub(super) fn open_as(
     let path = match home(catalogue, arguments) {
         Home::File(path) => path,
         Home::Shipped(shipped) => return shipped.open(catalogue, settings),
-        Home::Built(built) => return mops_core::file::built(catalogue, &built, settings, &program()),
+        Home::Built(built) => return mops_core::file::built(catalogue, &built, settings),
     };
     let bytes = read_text(&path).map_err(|error| no_study(catalogue, study, &error))?;
     let source = Source::from_bytes(&path.display().to_string(), bytes)?;
@@ -99,10 +99,10 @@ pub(super) fn text_of(study: &CatalogueStudy, name: &str) -> Option<String> {
     }
 }
 
-/// Returns the digest of this program, which builds studies in Rust: another build may give other values.
-fn program() -> String {
+/// Returns the digest of this program: another build may compute other values. Empty if it cannot be read.
+pub(super) fn digest_of_program() -> Option<String> {
     let bytes = std::env::current_exe().and_then(std::fs::read);
-    bytes.map_or_else(|_| String::new(), |bytes| mops_core::file::digest(&bytes))
+    Some(bytes.map_or_else(|_| String::new(), |bytes| mops_core::file::digest(&bytes)))
 }
 
 /// Adds the studies in `folders` to the catalogue: every subfolder that has a `study.toml`. A folder that is given twice is
@@ -160,7 +160,7 @@ pub(super) fn read_at(
         Some(CatalogueStudy::Shipped(shipped)) => {
             return mops_core::file::read(catalogue, &format!("{name}/study.toml"), text, settings, shipped);
         }
-        Some(CatalogueStudy::Built(built)) => return mops_core::file::built(catalogue, built, settings, &program()),
+        Some(CatalogueStudy::Built(built)) => return mops_core::file::built(catalogue, built, settings),
         _ => {}
     }
     let folder = home.parent().unwrap_or(Path::new("")).to_owned();

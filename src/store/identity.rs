@@ -114,7 +114,7 @@ impl Difference {
         let name = match path.as_slice() {
             ["study", rest @ ..] => rest.join("."),
             ["data", ..] if self.before.contains("program") => {
-                return "the program that builds the study was rebuilt".to_owned();
+                return "the program was rebuilt, and its own models, criteria or studies may have changed".to_owned();
             }
             ["data", ..] => return "a data file has changed".to_owned(),
             ["tuners", ..] => return "the tuners have changed".to_owned(),

@@ -51,7 +51,7 @@ fn built(settings: &[&str]) -> StudyFile {
     };
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     let study = BuiltStudy::new("closure", "", draft);
-    mops_core::file::built(&crate::catalogue(), &study, &settings, "0").unwrap()
+    mops_core::file::built(&crate::catalogue(), &study, &settings).unwrap()
 }
 
 #[test]

@@ -47,17 +47,12 @@ struct TunerSettings {
 ///
 /// # Errors
 /// The first mistake, in the settings or in the study.
-pub fn built(
-    catalogue: &Catalogue,
-    study: &BuiltStudy,
-    settings: &[String],
-    program: &str,
-) -> Result<StudyFile, Diagnostic> {
+pub fn built(catalogue: &Catalogue, study: &BuiltStudy, settings: &[String]) -> Result<StudyFile, Diagnostic> {
     let text = Arc::new(Text::new(study.name(), "", settings));
-    read(catalogue, study, &text, program).map_err(|mistake| text.settle(mistake))
+    read(catalogue, study, &text).map_err(|mistake| text.settle(mistake))
 }
 
-fn read(catalogue: &Catalogue, built: &BuiltStudy, text: &Arc<Text>, program: &str) -> Result<StudyFile, Diagnostic> {
+fn read(catalogue: &Catalogue, built: &BuiltStudy, text: &Arc<Text>) -> Result<StudyFile, Diagnostic> {
     let root = text.parse()?;
     root.check_keys(&[&["study", "tuners", "solver"][..], &tasks::TABLES[..]].concat())
         .map_err(|mistake| mistake.with_help("a study built in Rust is changed there"))?;
@@ -93,7 +88,7 @@ fn read(catalogue: &Catalogue, built: &BuiltStudy, text: &Arc<Text>, program: &s
         solver,
         max_evaluations,
         source: Arc::clone(text.source()),
-        data: vec![("program".to_owned(), program.to_owned())],
+        data: catalogue.program_digest().into_iter().collect(),
         text: Arc::clone(text),
     })
 }

@@ -198,7 +198,8 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
     let (solver, max_evaluations) = read_solver(catalogue, &root)?;
     let mut study = draft.build().map_err(|mistake| root.locate(&mistake))?;
     study.notes.extend(tasks::unused(&root, study.task));
-    let (content, data) = (content::of(root.value()), files.digests());
+    let content = content::of(root.value());
+    let data = files.digests().into_iter().chain(catalogue.program_digest()).collect();
     Ok(StudyFile {
         study,
         solver,
