@@ -67,7 +67,7 @@ fn ranked(round: &Round<'_>, index: usize, probability: f64, bic_gain: f64) -> O
     let screened = round.screened.iter().find(|s| s.added.candidate.is(&a.candidate));
     let parameters = &mops_core::Model::interface(trial.variant.model.as_ref()).parameters;
     let first = trial.variant.first[trial.added.len() - 1];
-    let strengths = a.candidate.effect.strengths().iter().enumerate().map(|(k, s)| StrengthValue {
+    let strengths = a.candidate.effect.parameters().iter().enumerate().map(|(k, s)| StrengthValue {
         name: s.name.to_owned(),
         value: a.strengths[k],
         unit: a.candidate.unit(s, &parameters[first + k].variable.unit),
@@ -139,7 +139,7 @@ pub fn held_back<'a>(
 pub fn widen(found: &mut [Found], other: &Calibrated<'_>, last: &Trial<'_>) {
     for (index, found) in found.iter_mut().enumerate() {
         let theirs = other.strengths(index, &last.variant);
-        let strengths = last.added[index].candidate.effect.strengths();
+        let strengths = last.added[index].candidate.effect.parameters();
         for ((own, theirs), strength) in found.strengths.iter_mut().zip(theirs).zip(strengths) {
             // What no fit moves has no interval of its own.
             let told = |value: &StrengthValue| value.interval95.or(strength.fixed.then_some([value.value; 2]));
@@ -165,7 +165,7 @@ pub fn noticeable(rounds: &[Arc<Round<'_>>], subject: &Subject, level: f64) -> V
     let needed = (needed_gain(level, round.directions) * Dispersion::of(&round.from).weight()).sqrt();
     let one = |s: &Screened| {
         let candidate = &s.added.candidate;
-        let strength = &candidate.effect.strengths()[0];
+        let strength = &candidate.effect.parameters()[0];
         let model = crate::variant::Variant::new(subject, std::slice::from_ref(&s.added), &[]);
         let parameter = &mops_core::Model::interface(model.model.as_ref()).parameters[model.first[0]];
         Some(Noticeable {

@@ -50,7 +50,7 @@ impl Candidate {
 
     /// Whether it is at the same place, and has fewer strengths.
     pub fn has_fewer_strengths_than(&self, other: &Self) -> bool {
-        self.port == other.port && self.effect.strengths().len() < other.effect.strengths().len()
+        self.port == other.port && self.effect.parameters().len() < other.effect.parameters().len()
     }
 
     /// The unit of a strength as results spell it: empty where the model does not tell that of its forces.
@@ -61,13 +61,13 @@ impl Candidate {
 
     /// Whether fits of it that have stuck are restarted at every shape: [`EffectParameter::restarts`].
     pub fn has_restarts(&self) -> bool {
-        !self.effect.strengths()[0].restarts.is_empty()
+        !self.effect.parameters()[0].restarts.is_empty()
     }
 
     /// Whether it is dry friction: a joint has one at most.
     pub fn is_dry_friction(&self) -> bool {
         let strengths: Vec<f64> =
-            self.effect.strengths().iter().map(|s| 1.0_f64.clamp(s.bounds[0], s.bounds[1])).collect();
+            self.effect.parameters().iter().map(|s| 1.0_f64.clamp(s.bounds[0], s.bounds[1])).collect();
         let moving = PortState {
             t: 0.0,
             value: 0.0,
@@ -80,7 +80,7 @@ impl Candidate {
             u: &[],
             closed: None,
         };
-        self.effect.act(&strengths).friction(&moving, &vec![0.0; self.effect.states()]).is_some()
+        self.effect.bind(&strengths).friction(&moving, &vec![0.0; self.effect.states()]).is_some()
     }
 
     /// Its place as results spell it, `kind:name`.
@@ -109,7 +109,7 @@ pub fn candidates(
     let mut all = Vec::new();
     for effect in effects {
         for (index, (port, kind)) in ports.iter().enumerate().filter(|(_, (_, kind))| effect.ports().contains(kind)) {
-            let companions: Vec<Option<Port>> = match effect.companion() {
+            let companions: Vec<Option<Port>> = match effect.second_port() {
                 None => vec![None],
                 Some(wanted) => {
                     let others = if effect.mutual() { &ports[index..] } else { &ports[..] };
@@ -217,7 +217,7 @@ impl Sizes {
     /// a constant one that would yield after a path much longer than the motion.
     pub fn bounds(&self, strength: &EffectParameter) -> [f64; 2] {
         let [low, high] = strength.bounds;
-        let [least, most] = match (strength.neutral, strength.trials) {
+        let [least, most] = match (strength.null_value, strength.grid) {
             (None, InitialGrid::Scaled(multiples)) => {
                 let largest = multiples.iter().copied().fold(0.0, f64::max) * self.of(strength.dimension);
                 [f64::NEG_INFINITY, FARTHEST_SHAPE * largest]
@@ -291,8 +291,8 @@ impl Sizes {
 
     /// All combinations of the values tried of an effect's strengths.
     pub fn combinations(&self, effect: &dyn Effect) -> Vec<Vec<f64>> {
-        effect.strengths().iter().fold(vec![Vec::new()], |all, strength| {
-            let values = self.values(strength.dimension, strength.trials, strength.bounds);
+        effect.parameters().iter().fold(vec![Vec::new()], |all, strength| {
+            let values = self.values(strength.dimension, strength.grid, strength.bounds);
             all.iter().flat_map(|start| values.iter().map(move |&v| [start.as_slice(), &[v]].concat())).collect()
         })
     }

@@ -45,7 +45,7 @@ fn drawn(port: &Port, effects: &[usize], last: &Trial<'_>) -> Option<Evidence> {
     if at_sensor {
         // What it shows without them.
         for &index in effects {
-            let neutral = last.added[index].candidate.effect.strengths()[0].neutral.unwrap_or(0.0);
+            let neutral = last.added[index].candidate.effect.parameters()[0].null_value.unwrap_or(0.0);
             fit.pieces.iter_mut().for_each(|piece| piece.fixed.push((last.variant.first[index], neutral)));
         }
     }

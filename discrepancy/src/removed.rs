@@ -40,7 +40,7 @@ impl Search<'_> {
                 .filter(|(likeness, _)| likeness.is_finite())
         };
         // One strength, in proportion to which it acts: what a declared term is.
-        let plain = |c: &&Candidate| c.effect.strengths().len() == 1 && c.only.is_none();
+        let plain = |c: &&Candidate| c.effect.parameters().len() == 1 && c.only.is_none();
         let all = self.candidates(&[]);
         let best = all.iter().filter(plain).filter_map(likeness).max_by(|a, b| a.0.total_cmp(&b.0))?;
         (best.0 > ALIKE).then_some(best.1)

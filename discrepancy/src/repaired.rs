@@ -82,7 +82,7 @@ impl<'a> Search<'a> {
         let mut free = Vec::new();
         for (index, a) in added.iter_mut().enumerate() {
             a.take(index, &variant, &fit, &fitted.point);
-            let strengths = a.candidate.effect.strengths();
+            let strengths = a.candidate.effect.parameters();
             let shared = |k: &usize| strengths[*k].scope == mops_core::Scope::Study && !strengths[*k].fixed;
             free.extend((0..strengths.len()).filter(shared).map(|k| (index, k)));
         }
@@ -192,7 +192,7 @@ impl Calibrated<'_> {
                 interval95,
             }
         };
-        a.candidate.effect.strengths().iter().enumerate().map(one).collect()
+        a.candidate.effect.parameters().iter().enumerate().map(one).collect()
     }
 
     /// Standard error and interval of a global that sets a strength at a port, as far as the data tell them.

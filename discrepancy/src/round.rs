@@ -149,7 +149,7 @@ impl<'a> Search<'a> {
             let is_best = !places.contains(&&added.candidate.port);
             places.push(&added.candidate.port);
             // Of what is not proportional to its strength, the screening knows less.
-            let is_linear = added.candidate.effect.strengths()[0].trials == InitialGrid::Linear;
+            let is_linear = added.candidate.effect.parameters()[0].grid == InitialGrid::Linear;
             is_best || !is_linear || from.fitted.chi2 - FARTHEST * gain <= goal
         });
         let shapes = chosen.iter().flat_map(|&i| std::iter::once(&screened[i].added).chain(&screened[i].others));
@@ -356,8 +356,8 @@ impl<'a> Search<'a> {
     /// An effect as a fit begins with it: from where nothing has changed every step leads downwards.
     pub(crate) fn neutral_start(&self, added: &Added) -> Added {
         let mut added = added.clone();
-        let first = &added.candidate.effect.strengths()[0];
-        if let (InitialGrid::Linear, Some(neutral)) = (first.trials, first.neutral) {
+        let first = &added.candidate.effect.parameters()[0];
+        if let (InitialGrid::Linear, Some(neutral)) = (first.grid, first.null_value) {
             added.strengths[0] = neutral;
         }
         added
@@ -369,7 +369,7 @@ impl<'a> Search<'a> {
         let added = [from.added.as_slice(), more].concat();
         let (pieces, locals) = (self.pieces(from.windows), self.own_locals(from));
         let (fit, point, variant) = problem(self.subject, &added, pieces, tuners, locals, &[], self.simulations);
-        let neutral = |a: &Added| a.candidate.effect.strengths()[0].neutral == Some(a.strengths[0]);
+        let neutral = |a: &Added| a.candidate.effect.parameters()[0].null_value == Some(a.strengths[0]);
         let fitted = if more.iter().all(neutral) {
             fit.solve_beside(point, known, iterations)?
         } else {

@@ -243,7 +243,7 @@ impl Left {
 }
 
 fn is_linear(strength: &EffectParameter) -> bool {
-    matches!(strength.trials, InitialGrid::Linear)
+    matches!(strength.grid, InitialGrid::Linear)
 }
 
 /// The best of the strengths tried of a candidate, and the best gains on the draws.
@@ -258,14 +258,14 @@ fn best_of(
 ) -> Option<(Option<Screened>, Vec<f64>)> {
     let effect = candidate.effect.as_ref();
     let own: Vec<usize> =
-        (0..effect.strengths().len()).filter(|&k| effect.strengths()[k].scope == Scope::Experiment).collect();
-    let is_fixed = |&k: &usize| effect.strengths()[k].fixed || effect.strengths()[k].trials.jumps();
-    let fixed: Vec<usize> = (0..effect.strengths().len()).filter(is_fixed).collect();
+        (0..effect.parameters().len()).filter(|&k| effect.parameters()[k].scope == Scope::Experiment).collect();
+    let is_fixed = |&k: &usize| effect.parameters()[k].fixed || effect.parameters()[k].grid.jumps();
+    let fixed: Vec<usize> = (0..effect.parameters().len()).filter(is_fixed).collect();
     let mut found: Vec<Screened> = Vec::new();
     let mut by_chance = vec![0.0_f64; draws.len()];
     let combinations = sizes.combinations(effect);
-    let resolved = effect.strengths().iter().filter(|s| s.trials == InitialGrid::Frequencies);
-    let resolved = resolved.map(|s| sizes.values(s.dimension, s.trials, s.bounds).len()).max().unwrap_or(0);
+    let resolved = effect.parameters().iter().filter(|s| s.grid == InitialGrid::Frequencies);
+    let resolved = resolved.map(|s| sizes.values(s.dimension, s.grid, s.bounds).len()).max().unwrap_or(0);
     let periods = u32::try_from(resolved).unwrap_or(u32::MAX);
     // Combinations that differ in what each experiment has of its own come together.
     let shared = |c: &[f64]| -> Vec<u64> {
@@ -274,7 +274,7 @@ fn best_of(
     let pieces = fit.pieces.iter().zip(&scene.trajectories);
     let views: Option<Vec<View<'_>>> = pieces.map(|(piece, along)| View::new(candidate, model, piece, along)).collect();
     let views = views?;
-    let first = &effect.strengths()[0];
+    let first = &effect.parameters()[0];
     for group in combinations.chunk_by(|a, b| !own.is_empty() && shared(a) == shared(b)) {
         let traces = views.iter().map(|view| group.iter().filter_map(|s| Some((s, view.trace(s)?))).collect());
         let traces: Traces<'_> = traces.collect();

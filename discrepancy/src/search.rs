@@ -420,7 +420,7 @@ impl<'a> Trial<'a> {
     /// Number of unknowns that its effects bring in for each experiment anew: phases, say, and where their states begin.
     pub fn own_unknowns(&self) -> usize {
         let free = |s: &&EffectParameter| s.scope == Scope::Experiment && !s.fixed;
-        let of = |effect: &dyn Effect| effect.strengths().iter().filter(free).count() + effect.free_starts().len();
+        let of = |effect: &dyn Effect| effect.parameters().iter().filter(free).count() + effect.free_starts().len();
         self.added.iter().map(|a| of(a.candidate.effect.as_ref())).sum()
     }
 

@@ -37,7 +37,7 @@ impl<'a> Search<'a> {
 /// For every other value of a shape that no fit moves, strengths to begin with.
 fn others(own: &Added) -> Vec<Vec<Vec<f64>>> {
     let effect = own.candidate.effect.as_ref();
-    let kept: Vec<usize> = (0..effect.strengths().len()).filter(|&k| effect.strengths()[k].fixed).collect();
+    let kept: Vec<usize> = (0..effect.parameters().len()).filter(|&k| effect.parameters()[k].fixed).collect();
     let values = |strengths: &[f64]| kept.iter().map(|&k| strengths[k]).collect::<Vec<f64>>();
     let mut others: Vec<Vec<Vec<f64>>> = Vec::new();
     if kept.is_empty() {
@@ -47,7 +47,7 @@ fn others(own: &Added) -> Vec<Vec<Vec<f64>>> {
         if values(&strengths) == values(&own.strengths) {
             continue;
         }
-        if effect.strengths()[0].trials == InitialGrid::Linear {
+        if effect.parameters()[0].grid == InitialGrid::Linear {
             strengths[0] = own.strengths[0];
         }
         match others.iter_mut().find(|begins| values(&begins[0]) == values(&strengths)) {

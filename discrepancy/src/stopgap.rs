@@ -83,11 +83,11 @@ impl Effect for Stopgap {
         &[PortKind::Joint, PortKind::Process, PortKind::Actuator, PortKind::Sensor]
     }
 
-    fn strengths(&self) -> &'static [EffectParameter] {
+    fn parameters(&self) -> &'static [EffectParameter] {
         &VALUES[..self.points.len()]
     }
 
-    fn act(&self, strengths: &[f64]) -> Box<dyn BoundEffect<f64>> {
+    fn bind(&self, strengths: &[f64]) -> Box<dyn BoundEffect<f64>> {
         self.acting(strengths)
     }
 

@@ -192,7 +192,7 @@ pub fn relative_sizes(
 
 /// The same with what samples at a sensor tell of an effect whose strengths ask for it: the size of steps, a gap.
 pub fn sizes_by_samples(sizes: Sizes, candidate: &Candidate, model: &WithEffects, pieces: &[Piece]) -> Sizes {
-    let asks = |wanted: fn(InitialGrid) -> bool| candidate.effect.strengths().iter().any(|s| wanted(s.trials));
+    let asks = |wanted: fn(InitialGrid) -> bool| candidate.effect.parameters().iter().any(|s| wanted(s.grid));
     let of_steps = asks(|trials| trials == InitialGrid::Steps);
     let of_gap = asks(|trials| matches!(trials, InitialGrid::WithinAndGap(_) | InitialGrid::ScaledAndGap(_)));
     if !(of_steps || of_gap) {
@@ -322,7 +322,7 @@ impl<'a> View<'a> {
         let small = if effect.is_inertial() { 1e-6 } else { 1.0 };
         let mut strengths = strengths.to_vec();
         strengths[0] *= small;
-        let acting = effect.act(&strengths);
+        let acting = effect.bind(&strengths);
         if let Spot::Sensor(index) = self.here {
             let mut all = vec![0.0; total];
             let offset: usize = series[..index].iter().map(|s| s.times.len()).sum();
@@ -338,7 +338,7 @@ impl<'a> View<'a> {
     /// What the candidate at these strengths adds at its place, at the nodes of the motion or at the samples of a sensor, in the
     /// unit of the place, forces forward; `None` where that is not finite.
     pub fn added(&self, strengths: &[f64]) -> Option<Vec<f64>> {
-        let acting = self.candidate.effect.act(strengths);
+        let acting = self.candidate.effect.bind(strengths);
         let sign = match self.here {
             _ if self.seen.is_empty() => return Some(Vec::new()),
             Spot::Sensor(index) => {
@@ -395,9 +395,9 @@ impl<'a> View<'a> {
     ) -> Vec<f64> {
         let effect = self.candidate.effect.as_ref();
         let mut z = vec![0.0; effect.states()];
-        let mut memory = vec![f64::NAN; effect.memory()];
+        let mut memory = vec![f64::NAN; effect.hysteresis_states()];
         if matches!(self.here, Spot::Actuator(_)) && !memory.is_empty() {
-            self.before().iter().for_each(|at| acting.remember(at, &mut memory));
+            self.before().iter().for_each(|at| acting.update_hysteresis(at, &mut memory));
         }
         let delay = acting.delay();
         let one = |(k, at): (usize, &PortState<'_, f64>)| {
@@ -411,8 +411,8 @@ impl<'a> View<'a> {
             } else if memory.is_empty() {
                 acting.value(at, &z)
             } else {
-                acting.remember(at, &mut memory);
-                acting.recall(at, &memory)
+                acting.update_hysteresis(at, &mut memory);
+                acting.hysteresis_value(at, &memory)
             };
             made(at, value, &z)
         };

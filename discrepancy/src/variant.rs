@@ -33,7 +33,7 @@ impl Added {
     /// Takes what a solution says of the effect `index` of a variant: its strengths, and in the experiments of the fit those of
     /// its own there and the start values of its states.
     pub fn take(&mut self, index: usize, variant: &Variant, fit: &Fit<'_>, point: &Point) {
-        let count = self.candidate.effect.strengths().len();
+        let count = self.candidate.effect.parameters().len();
         let in_piece = |m: usize| fit.pieces.iter().position(|p| p.measurement == m);
         let piece = self.candidate.only.and_then(in_piece).unwrap_or(0);
         self.strengths = variant.strengths(fit, point, index, count, piece);
@@ -52,8 +52,8 @@ impl Added {
     /// Whether its first strength stands at a finite bound that is not neutral: more is no effect but a mistake, as the gain of
     /// a sensor is that is off by half. An actuator may well be at such a limit: dead, or acting one way only.
     pub fn is_at_limit(&self) -> bool {
-        let (first, value) = (&self.candidate.effect.strengths()[0], self.strengths[0]);
-        let is_limit = |end: &f64| end.is_finite() && first.neutral != Some(*end);
+        let (first, value) = (&self.candidate.effect.parameters()[0], self.strengths[0]);
+        let is_limit = |end: &f64| end.is_finite() && first.null_value != Some(*end);
         !matches!(self.candidate.port, Port::Actuator { .. })
             && first.bounds.iter().filter(|e| is_limit(e)).any(|&e| e == value)
     }
@@ -61,7 +61,7 @@ impl Added {
     /// The same at all shapes that are tried, and as strong as a fit is restarted from: [`mops_core::EffectParameter::restarts`].
     pub fn restarts(&self) -> Vec<Self> {
         let effect = self.candidate.effect.as_ref();
-        let first = &effect.strengths()[0];
+        let first = &effect.parameters()[0];
         let shapes = self.sizes.combinations(effect);
         let at = |times: &f64| {
             let strength = (times * self.sizes.of(first.dimension)).clamp(first.bounds[0], first.bounds[1]);
@@ -72,22 +72,22 @@ impl Added {
 
     /// The same as strong as it is, and twice as strong; none where it is neutral. A limit is the stronger the lower it is.
     pub fn as_strong_and_twice(&self) -> Vec<Self> {
-        let (first, strength) = (&self.candidate.effect.strengths()[0], self.strengths[0]);
+        let (first, strength) = (&self.candidate.effect.parameters()[0], self.strengths[0]);
         let at = |times: f64| {
-            let strength = strength * if first.neutral == Some(0.0) { times } else { 1.0 / times };
+            let strength = strength * if first.null_value == Some(0.0) { times } else { 1.0 / times };
             let mut strong = self.clone();
             strong.strengths[0] = strength.clamp(first.bounds[0], first.bounds[1]);
             strong
         };
-        if first.neutral == Some(strength) { Vec::new() } else { [1.0, 2.0].map(at).to_vec() }
+        if first.null_value == Some(strength) { Vec::new() } else { [1.0, 2.0].map(at).to_vec() }
     }
 
     /// The same where strengths that another effect has by the same name begin as they are there: so an effect begins as the
     /// simpler part of one that was fitted.
     pub fn begun_like(&self, other: &Self) -> Self {
         let mut begun = self.clone();
-        let theirs = other.candidate.effect.strengths();
-        for (strength, value) in self.candidate.effect.strengths().iter().zip(&mut begun.strengths) {
+        let theirs = other.candidate.effect.parameters();
+        for (strength, value) in self.candidate.effect.parameters().iter().zip(&mut begun.strengths) {
             let [low, high] = strength.bounds;
             let known = theirs.iter().position(|s| s.name == strength.name && s.dimension == strength.dimension);
             if let Some(known) =
@@ -138,7 +138,7 @@ impl Variant {
         for a in added {
             first.push(next);
             let effect = &a.candidate.effect;
-            next += effect.strengths().len() + effect.free_starts().len();
+            next += effect.parameters().len() + effect.free_starts().len();
         }
         Self { model: Arc::new(model), first }
     }
@@ -152,8 +152,8 @@ impl Variant {
 
 /// Whether a strength is looked for in its logarithm: shapes that cannot be 0, and are not tried there.
 fn is_log(strength: &EffectParameter, value: f64) -> bool {
-    !matches!(strength.trials, InitialGrid::Plain([0.0]))
-        && strength.neutral != Some(0.0)
+    !matches!(strength.grid, InitialGrid::Plain([0.0]))
+        && strength.null_value != Some(0.0)
         && strength.bounds[0] >= 0.0
         && value > 0.0
 }
@@ -193,7 +193,7 @@ pub fn problem<'a>(
     for (a, &first) in added.iter().zip(&variant.first) {
         let effect = a.candidate.effect.as_ref();
         expected.extend(a.expected.iter().map(|w| Expected { first: all.len(), whitening: Arc::clone(w) }));
-        for (k, strength) in effect.strengths().iter().enumerate() {
+        for (k, strength) in effect.parameters().iter().enumerate() {
             let (parameter, value) = (first + k, a.strengths[k]);
             let typical = a.sizes.of(strength.dimension);
             let scale = if value != 0.0 { value.abs() } else { 0.1 * typical };
@@ -208,8 +208,8 @@ pub fn problem<'a>(
                 }
             } else {
                 let log = is_log(strength, value);
-                let steps = strength.trials.jumps();
-                let scale = match strength.trials {
+                let steps = strength.grid.jumps();
+                let scale = match strength.grid {
                     // Half way to the next value that was tried.
                     InitialGrid::Steps => 0.5 * a.sizes.gap_to_next_size(value),
                     InitialGrid::ScaledAndGap(_) => 0.1 * scale,
@@ -223,13 +223,13 @@ pub fn problem<'a>(
             }
         }
         if let Some(only) = a.candidate.only {
-            let neutral = effect.strengths()[0].neutral.unwrap_or(0.0);
+            let neutral = effect.parameters()[0].null_value.unwrap_or(0.0);
             pieces.iter_mut().filter(|p| p.measurement != only).for_each(|p| p.fixed.push((first, neutral)));
         }
         let known = known_starts(a, &pieces);
         for ((piece, locals), known) in pieces.iter_mut().zip(&mut locals).zip(known) {
             for (state, &dimension) in effect.free_starts().iter().enumerate() {
-                let parameter = first + effect.strengths().len() + state;
+                let parameter = first + effect.parameters().len() + state;
                 let scale = a.sizes.of(dimension);
                 // What has no unit is a share of its limit.
                 let most = if dimension == Dimension::ONE { 1.0 } else { 10.0 * scale };

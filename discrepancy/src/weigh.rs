@@ -101,9 +101,9 @@ pub fn weighed(trials: &[Trial<'_>], dispersion: &Dispersion) -> Vec<f64> {
 /// Whether shapes of an effect are within a decade of those that are tried first. What is far off tells nothing because the
 /// effect has vanished there, and such shapes are few among all that are likely.
 fn is_plausible(added: &Added) -> bool {
-    let strengths = added.candidate.effect.strengths().iter().zip(&added.strengths).skip(1);
+    let strengths = added.candidate.effect.parameters().iter().zip(&added.strengths).skip(1);
     strengths.filter(|(strength, _)| strength.bounds[0] >= 0.0).all(|(strength, &value)| {
-        let tried = added.sizes.values(strength.dimension, strength.trials, strength.bounds);
+        let tried = added.sizes.values(strength.dimension, strength.grid, strength.bounds);
         let low = tried.iter().copied().fold(f64::INFINITY, f64::min);
         let high = tried.iter().copied().fold(0.0, f64::max);
         // Where nothing but 0 was tried, nothing says how far off a value is. One at its limit has run away.

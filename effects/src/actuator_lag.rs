@@ -9,7 +9,7 @@ use super::terms::damped;
 pub struct ActuatorLag;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     tau: S,
 }
 
@@ -22,16 +22,16 @@ impl Definition for ActuatorLag {
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("tau", "time constant", Dimension::TIME)
-            .tried(InitialGrid::Scaled(&[0.02, 0.05, 0.1, 0.3, 1.0]))];
+            .with_grid(InitialGrid::Scaled(&[0.02, 0.05, 0.1, 0.3, 1.0]))];
     const STATES: usize = 1;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { tau: s[0] })
+        Box::new(AtParameters { tau: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn start(&self, at: &PortState<'_, S>, z: &mut [S]) {
         z[0] = at.value;
     }

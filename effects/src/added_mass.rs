@@ -8,7 +8,7 @@ use super::Definition;
 pub struct AddedMass;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     m: S,
 }
 
@@ -28,11 +28,11 @@ impl Definition for AddedMass {
     const IS_INERTIAL: bool = true;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { m: s[0] })
+        Box::new(AtParameters { m: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.m * at.a / (self.m * at.mobility + 1.0)
     }

@@ -8,7 +8,7 @@ use super::Definition;
 pub struct BackEmf;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
 }
 
@@ -25,11 +25,11 @@ impl Definition for BackEmf {
         &[EffectParameter::positive("k", "loss of command per speed", Dimension::OUTPUT.over(Dimension::SPEED))];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0] })
+        Box::new(AtParameters { k: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value - self.k * at.other_speed
     }

@@ -9,7 +9,7 @@ use super::terms::clamp;
 pub struct Backlash;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     gap: S,
 }
 
@@ -24,26 +24,26 @@ impl Definition for Backlash {
     const PORTS: &'static [PortKind] = &[PortKind::Actuator, PortKind::Sensor];
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("gap", "width of the gap", Dimension::VALUE)
-            .tried(InitialGrid::Scaled(&[0.05, 0.15, 0.4]))];
-    const MEMORY: usize = 1;
+            .with_grid(InitialGrid::Scaled(&[0.05, 0.15, 0.4]))];
+    const HYSTERESIS_STATES: usize = 1;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { gap: s[0] })
+        Box::new(AtParameters { gap: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value
     }
 
-    fn remember(&self, at: &PortState<'_, S>, memory: &mut [S]) {
+    fn update_hysteresis(&self, at: &PortState<'_, S>, memory: &mut [S]) {
         let first = memory[0].value().is_nan();
-        memory[0] = if first { at.value } else { self.recall(at, memory) };
+        memory[0] = if first { at.value } else { self.hysteresis_value(at, memory) };
     }
 
-    fn recall(&self, at: &PortState<'_, S>, memory: &[S]) -> S {
+    fn hysteresis_value(&self, at: &PortState<'_, S>, memory: &[S]) -> S {
         if self.gap.value() > 0.0 {
             clamp(memory[0], at.value - self.gap * 0.5, at.value + self.gap * 0.5)
         } else {

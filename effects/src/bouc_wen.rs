@@ -9,7 +9,7 @@ use super::terms::{power, sign};
 pub struct BoucWen;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     c: S,
     y: S,
     sigma: S,
@@ -56,11 +56,11 @@ impl Definition for BoucWen {
     const FREE_STARTS: &'static [Dimension] = &[Dimension::ONE];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { c: s[0], y: s[1], sigma: s[2], n: s[3] })
+        Box::new(AtParameters { c: s[0], y: s[1], sigma: s[2], n: s[3] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn rates(&self, at: &PortState<'_, S>, z: &[S], dz: &mut [S]) {
         let full = power(z[0].abs(), self.n);
         let against = self.sigma * at.v.abs() * full * sign(z[0].value());

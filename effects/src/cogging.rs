@@ -9,7 +9,7 @@ use super::terms::{phase, waves};
 pub struct Cogging;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     a: S,
     n: S,
     phase: S,
@@ -31,11 +31,11 @@ impl Definition for Cogging {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { a: s[0], n: s[1], phase: s[2] })
+        Box::new(AtParameters { a: s[0], n: s[1], phase: s[2] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         self.a * (self.n * at.q + self.phase).sin()
     }

@@ -8,7 +8,7 @@ use super::Definition;
 pub struct ConstantForce;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     f: S,
 }
 
@@ -25,11 +25,11 @@ impl Definition for ConstantForce {
     const RARITY: u8 = 0;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { f: s[0] })
+        Box::new(AtParameters { f: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         self.f
     }

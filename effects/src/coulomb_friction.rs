@@ -25,8 +25,8 @@ impl Definition for CoulombFriction {
         &[EffectParameter::positive("c", "friction force", Dimension::OUTPUT)];
     const RARITY: u8 = 0;
 
-    fn make<S: Scalar>(strengths: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(Coulomb { torque: strengths[0] })
+    fn make<S: Scalar>(parameters: &[S]) -> Box<dyn BoundEffect<S>> {
+        Box::new(Coulomb { torque: parameters[0] })
     }
 }
 

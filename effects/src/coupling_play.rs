@@ -9,7 +9,7 @@ use super::terms::{NOT_NEGATIVE, Pressed};
 pub struct CouplingPlay;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
     gap: S,
     tau: S,
@@ -54,11 +54,11 @@ impl Definition for CouplingPlay {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0], gap: s[1], tau: s[2] })
+        Box::new(AtParameters { k: s[0], gap: s[1], tau: s[2] })
     }
 }
 
-impl<S: Scalar> AtStrengths<S> {
+impl<S: Scalar> AtParameters<S> {
     /// Returns the contact on the side on which one joint leads the other, and the sign of that side.
     fn nearer(&self, at: &PortState<'_, S>) -> (Pressed<S>, f64) {
         let (ahead, faster) = (at.q - at.other, at.v - at.other_speed);
@@ -67,7 +67,7 @@ impl<S: Scalar> AtStrengths<S> {
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let (pressed, side) = self.nearer(at);
         let coupled = at.q - at.other + self.tau * (at.v - at.other_speed);

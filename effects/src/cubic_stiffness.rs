@@ -9,7 +9,7 @@ use super::terms::ANY;
 pub struct CubicStiffness;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
     rest: S,
 }
@@ -39,11 +39,11 @@ impl Definition for CubicStiffness {
     const RARITY: u8 = 0;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0], rest: s[1] })
+        Box::new(AtParameters { k: s[0], rest: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let d = at.q - self.rest;
         -self.k * d * d * d

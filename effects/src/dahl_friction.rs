@@ -8,7 +8,7 @@ use super::Definition;
 pub struct DahlFriction;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     c: S,
     y: S,
 }
@@ -35,11 +35,11 @@ impl Definition for DahlFriction {
     const RARITY: u8 = 2;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { c: s[0], y: s[1] })
+        Box::new(AtParameters { c: s[0], y: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn rates(&self, at: &PortState<'_, S>, z: &[S], dz: &mut [S]) {
         dz[0] = (at.v - z[0] * at.v.abs()) / self.y;
     }

@@ -8,7 +8,7 @@ use super::Definition;
 pub struct DampingDrift;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     r: S,
 }
 
@@ -28,11 +28,11 @@ impl Definition for DampingDrift {
     )];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { r: s[0] })
+        Box::new(AtParameters { r: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.r * at.v * at.t
     }

@@ -9,7 +9,7 @@ use super::terms::{STEPS_BEGIN, STEPS_LAST, Span, from, length};
 pub struct DampingStep;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     d: S,
     span: Span<S>,
 }
@@ -31,11 +31,11 @@ impl Definition for DampingStep {
     const IS_ONE_OFF: bool = true;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { d: s[0], span: Span::new(&s[1..]) })
+        Box::new(AtParameters { d: s[0], span: Span::new(&s[1..]) })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn breaks(&self) -> Vec<f64> {
         self.span.breaks()
     }

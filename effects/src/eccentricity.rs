@@ -9,7 +9,7 @@ use super::terms::phase;
 pub struct Eccentricity;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     a: S,
     phase: S,
 }
@@ -27,11 +27,11 @@ impl Definition for Eccentricity {
         &[EffectParameter::positive("a", "amplitude", Dimension::OUTPUT).within(0.0, 0.5), phase()];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { a: s[0], phase: s[1] })
+        Box::new(AtParameters { a: s[0], phase: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value + self.a * (at.value + self.phase).sin()
     }

@@ -9,7 +9,7 @@ use super::terms::{ANY, NOT_NEGATIVE, Pressed};
 pub struct EndStop;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
     low: S,
     high: S,
@@ -51,11 +51,11 @@ impl Definition for EndStop {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0], low: s[1], high: s[2], tau: s[3] })
+        Box::new(AtParameters { k: s[0], low: s[1], high: s[2], tau: s[3] })
     }
 }
 
-impl<S: Scalar> AtStrengths<S> {
+impl<S: Scalar> AtParameters<S> {
     /// Returns the contact with the nearer stop, and the direction of its force. If the stops have crossed, both are at
     /// their middle.
     fn nearer(&self, at: &PortState<'_, S>) -> (Pressed<S>, f64) {
@@ -67,7 +67,7 @@ impl<S: Scalar> AtStrengths<S> {
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let (pressed, to) = self.nearer(at);
         self.k * pressed.force(at.closed) * to

@@ -9,7 +9,7 @@ use super::terms::NOT_NEGATIVE;
 pub struct FlexibleMode;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     m: S,
     w: S,
     d: S,
@@ -41,11 +41,11 @@ impl Definition for FlexibleMode {
     const FREE_STARTS: &'static [Dimension] = &[Dimension::POSITION, Dimension::SPEED];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { m: s[0], w: s[1], d: s[2] })
+        Box::new(AtParameters { m: s[0], w: s[1], d: s[2] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn start(&self, at: &PortState<'_, S>, z: &mut [S]) {
         z.copy_from_slice(&[at.q, at.v]);
     }
@@ -59,7 +59,7 @@ impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
     }
 }
 
-impl<S: Scalar> AtStrengths<S> {
+impl<S: Scalar> AtParameters<S> {
     /// Returns the force on the joint per attached mass.
     fn pull(&self, at: &PortState<'_, S>, z: &[S]) -> S {
         self.w * self.w * (z[0] - at.q) + self.d * self.w * (z[1] - at.v) * 2.0

@@ -9,7 +9,7 @@ use super::terms::NOT_NEGATIVE;
 pub struct HiddenStore;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
     tau: S,
 }
@@ -37,11 +37,11 @@ impl Definition for HiddenStore {
     const FREE_STARTS: &'static [Dimension] = &[Dimension::POSITION];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0], tau: s[1] })
+        Box::new(AtParameters { k: s[0], tau: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn start(&self, at: &PortState<'_, S>, z: &mut [S]) {
         z[0] = at.q;
     }

@@ -9,7 +9,7 @@ use super::terms::phase;
 pub struct Imbalance;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     a: S,
     phase: S,
 }
@@ -26,11 +26,11 @@ impl Definition for Imbalance {
         &[EffectParameter::positive("a", "amplitude of the gravity torque", Dimension::OUTPUT), phase()];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { a: s[0], phase: s[1] })
+        Box::new(AtParameters { a: s[0], phase: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.a * (at.q - self.phase).sin()
     }

@@ -8,7 +8,7 @@ use super::Definition;
 pub struct InputBias;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     b: S,
 }
 
@@ -23,11 +23,11 @@ impl Definition for InputBias {
     const RARITY: u8 = 0;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { b: s[0] })
+        Box::new(AtParameters { b: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value + self.b
     }

@@ -9,7 +9,7 @@ use super::terms::clamp;
 pub struct InputDeadZone;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     width: S,
 }
 
@@ -23,15 +23,15 @@ impl Definition for InputDeadZone {
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("width", "largest command without effect", Dimension::VALUE)
-            .tried(InitialGrid::Scaled(&[0.05, 0.15, 0.3, 0.6]))];
+            .with_grid(InitialGrid::Scaled(&[0.05, 0.15, 0.3, 0.6]))];
     const RARITY: u8 = 0;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { width: s[0] })
+        Box::new(AtParameters { width: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value - clamp(at.value, -self.width, self.width)
     }

@@ -8,7 +8,7 @@ use super::Definition;
 pub struct InputDelay;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     delay: S,
 }
 
@@ -21,15 +21,15 @@ impl Definition for InputDelay {
     const CLASS: EffectClass = EffectClass::DelayLike;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::positive("delay", "delay", Dimension::TIME)
-        .tried(InitialGrid::Scaled(&[0.02, 0.05, 0.1, 0.2, 0.5]))];
+        .with_grid(InitialGrid::Scaled(&[0.02, 0.05, 0.1, 0.2, 0.5]))];
     const RARITY: u8 = 0;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { delay: s[0] })
+        Box::new(AtParameters { delay: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value
     }

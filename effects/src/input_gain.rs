@@ -8,7 +8,7 @@ use super::Definition;
 pub struct InputGain;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     g: S,
 }
 
@@ -23,11 +23,11 @@ impl Definition for InputGain {
         &[EffectParameter::signed("g", "relative error of the gain", Dimension::ONE).within(-1.0, f64::INFINITY)];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { g: s[0] })
+        Box::new(AtParameters { g: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value * (self.g + 1.0)
     }

@@ -9,7 +9,7 @@ use super::terms::{STEPS_BEGIN, STEPS_LAST, Span, from, length};
 pub struct InputGainStep;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     g: S,
     span: Span<S>,
 }
@@ -32,11 +32,11 @@ impl Definition for InputGainStep {
     const IS_ONE_OFF: bool = true;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { g: s[0], span: Span::new(&s[1..]) })
+        Box::new(AtParameters { g: s[0], span: Span::new(&s[1..]) })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn breaks(&self) -> Vec<f64> {
         self.span.breaks()
     }

@@ -9,7 +9,7 @@ use super::terms::quantised;
 pub struct InputQuantisation;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     step: S,
 }
 
@@ -21,15 +21,15 @@ impl Definition for InputQuantisation {
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const PARAMETERS: &'static [EffectParameter] =
-        &[EffectParameter::positive("step", "quantisation step", Dimension::VALUE).tried(InitialGrid::Steps)];
+        &[EffectParameter::positive("step", "quantisation step", Dimension::VALUE).with_grid(InitialGrid::Steps)];
     const RARITY: u8 = 2;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { step: s[0] })
+        Box::new(AtParameters { step: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         quantised(at.value, self.step)
     }

@@ -9,7 +9,7 @@ use super::terms::clamp;
 pub struct InputRateLimit;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     rate: S,
 }
 
@@ -22,28 +22,28 @@ impl Definition for InputRateLimit {
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("rate", "maximum rate", Dimension::VALUE.over(Dimension::TIME))
-            .neutral_at(f64::INFINITY)
-            .tried(InitialGrid::SlewAndScaled(&[0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 0.95], &[0.3, 1.0, 3.0]))];
-    const MEMORY: usize = 2;
+            .null_at(f64::INFINITY)
+            .with_grid(InitialGrid::SlewAndScaled(&[0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 0.95], &[0.3, 1.0, 3.0]))];
+    const HYSTERESIS_STATES: usize = 2;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { rate: s[0] })
+        Box::new(AtParameters { rate: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value
     }
 
-    fn remember(&self, at: &PortState<'_, S>, memory: &mut [S]) {
+    fn update_hysteresis(&self, at: &PortState<'_, S>, memory: &mut [S]) {
         let first = memory[0].value().is_nan();
-        memory[0] = if first { at.value } else { self.recall(at, memory) };
+        memory[0] = if first { at.value } else { self.hysteresis_value(at, memory) };
         memory[1] = S::from(at.t);
     }
 
-    fn recall(&self, at: &PortState<'_, S>, memory: &[S]) -> S {
+    fn hysteresis_value(&self, at: &PortState<'_, S>, memory: &[S]) -> S {
         let way = self.rate * (at.t - memory[1].value());
         if way.value().is_nan() { at.value } else { clamp(at.value, memory[0] - way, memory[0] + way) }
     }

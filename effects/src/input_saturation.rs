@@ -9,7 +9,7 @@ use super::terms::clamp;
 pub struct InputSaturation;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     limit: S,
 }
 
@@ -21,16 +21,16 @@ impl Definition for InputSaturation {
     const CLASS: EffectClass = EffectClass::Gain;
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::positive("limit", "limit", Dimension::VALUE)
-        .neutral_at(f64::INFINITY)
-        .tried(InitialGrid::WithinSize(&[0.4, 0.6, 0.7, 0.8, 0.9, 0.96]))];
+        .null_at(f64::INFINITY)
+        .with_grid(InitialGrid::WithinSize(&[0.4, 0.6, 0.7, 0.8, 0.9, 0.96]))];
     const RARITY: u8 = 0;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { limit: s[0] })
+        Box::new(AtParameters { limit: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         clamp(at.value, -self.limit, self.limit)
     }

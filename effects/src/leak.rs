@@ -9,7 +9,7 @@ use super::terms::NOT_NEGATIVE;
 pub struct Leak;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
     hole: S,
 }
@@ -33,11 +33,11 @@ impl Definition for Leak {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0], hole: s[1] })
+        Box::new(AtParameters { k: s[0], hole: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let head = at.q - self.hole;
         if head.value() > 0.0 { -self.k * head.sqrt() } else { S::from(0.0) }

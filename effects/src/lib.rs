@@ -100,18 +100,18 @@ pub trait Definition: Send + Sync + 'static {
     const FORM_OF: Option<&'static str> = None;
     /// Value of [`Effect::ports`].
     const PORTS: &'static [PortKind];
-    /// Value of [`Effect::companion`].
+    /// Value of [`Effect::second_port`].
     const SECOND_PORT: Option<PortKind> = None;
     /// Value of [`Effect::mutual`].
     const MUTUAL: bool = false;
-    /// Value of [`Effect::strengths`].
+    /// Value of [`Effect::parameters`].
     const PARAMETERS: &'static [EffectParameter];
     /// Value of [`Effect::states`].
     const STATES: usize = 0;
     /// Value of [`Effect::free_starts`].
     const FREE_STARTS: &'static [Dimension] = &[];
-    /// Value of [`Effect::memory`].
-    const MEMORY: usize = 0;
+    /// Value of [`Effect::hysteresis_states`].
+    const HYSTERESIS_STATES: usize = 0;
     /// Value of [`Effect::is_inertial`].
     const IS_INERTIAL: bool = false;
     /// Value of [`Effect::is_one_off`].
@@ -120,7 +120,7 @@ pub trait Definition: Send + Sync + 'static {
     const RARITY: u8 = 1;
 
     /// Creates the effect at given parameters.
-    fn make<S: Scalar>(strengths: &[S]) -> Box<dyn BoundEffect<S>>;
+    fn make<S: Scalar>(parameters: &[S]) -> Box<dyn BoundEffect<S>>;
 }
 
 /// Effect given by its definition.
@@ -148,13 +148,13 @@ impl<D: Definition> Effect for Defined<D> {
     fn form_of(&self) -> Option<&'static str> {
         D::FORM_OF
     }
-    fn companion(&self) -> Option<PortKind> {
+    fn second_port(&self) -> Option<PortKind> {
         D::SECOND_PORT
     }
     fn mutual(&self) -> bool {
         D::MUTUAL
     }
-    fn strengths(&self) -> &'static [EffectParameter] {
+    fn parameters(&self) -> &'static [EffectParameter] {
         D::PARAMETERS
     }
     fn states(&self) -> usize {
@@ -163,8 +163,8 @@ impl<D: Definition> Effect for Defined<D> {
     fn free_starts(&self) -> &'static [Dimension] {
         D::FREE_STARTS
     }
-    fn memory(&self) -> usize {
-        D::MEMORY
+    fn hysteresis_states(&self) -> usize {
+        D::HYSTERESIS_STATES
     }
     fn is_inertial(&self) -> bool {
         D::IS_INERTIAL
@@ -175,11 +175,11 @@ impl<D: Definition> Effect for Defined<D> {
     fn rarity(&self) -> u8 {
         D::RARITY
     }
-    fn act(&self, strengths: &[f64]) -> Box<dyn BoundEffect<f64>> {
-        D::make(strengths)
+    fn bind(&self, parameters: &[f64]) -> Box<dyn BoundEffect<f64>> {
+        D::make(parameters)
     }
-    fn bind_dual(&self, strengths: &[Dual7]) -> Box<dyn BoundEffect<Dual7>> {
-        D::make(strengths)
+    fn bind_dual(&self, parameters: &[Dual7]) -> Box<dyn BoundEffect<Dual7>> {
+        D::make(parameters)
     }
 }
 

@@ -8,7 +8,7 @@ use super::Definition;
 pub struct LoadDependentFriction;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     mu: S,
 }
 
@@ -28,11 +28,11 @@ impl Definition for LoadDependentFriction {
         &[EffectParameter::positive("mu", "friction force per input", Dimension::OUTPUT.over(Dimension::VALUE))];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { mu: s[0] })
+        Box::new(AtParameters { mu: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         S::from(0.0)
     }

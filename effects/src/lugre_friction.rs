@@ -9,7 +9,7 @@ use super::terms::NOT_NEGATIVE;
 pub struct LugreFriction;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     c: S,
     rise: S,
     vs: S,
@@ -60,11 +60,11 @@ impl Definition for LugreFriction {
     const RARITY: u8 = 2;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { c: s[0], rise: s[1], vs: s[2], y: s[3], tau: s[4] })
+        Box::new(AtParameters { c: s[0], rise: s[1], vs: s[2], y: s[3], tau: s[4] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn rates(&self, at: &PortState<'_, S>, z: &[S], dz: &mut [S]) {
         dz[0] = self.slip(at, z[0]);
     }
@@ -74,7 +74,7 @@ impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
     }
 }
 
-impl<S: Scalar> AtStrengths<S> {
+impl<S: Scalar> AtParameters<S> {
     /// Returns the rate of the deflection.
     fn slip(&self, at: &PortState<'_, S>, z: S) -> S {
         let mut steady = S::from(1.0);

@@ -8,7 +8,7 @@ use super::Definition;
 pub struct MassLoss;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     r: S,
 }
 
@@ -25,11 +25,11 @@ impl Definition for MassLoss {
     const IS_INERTIAL: bool = true;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { r: s[0] })
+        Box::new(AtParameters { r: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         // The lost mass as a fraction of the moving mass, limited so that some mass remains.
         let gone = self.r * at.t;

@@ -9,7 +9,7 @@ use super::terms::power;
 pub struct OrificeExponent;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
     n: S,
 }
@@ -27,11 +27,11 @@ impl Definition for OrificeExponent {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0], n: s[1] })
+        Box::new(AtParameters { k: s[0], n: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.k * power(at.q, self.n)
     }

@@ -9,7 +9,7 @@ use super::terms::{ANY, power};
 pub struct Overflow;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
     level: S,
     n: S,
@@ -42,11 +42,11 @@ impl Definition for Overflow {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0], level: s[1], n: s[2] })
+        Box::new(AtParameters { k: s[0], level: s[1], n: s[2] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.k * power(at.q - self.level, self.n)
     }

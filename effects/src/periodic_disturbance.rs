@@ -9,7 +9,7 @@ use super::terms::{NOT_NEGATIVE, phase};
 pub struct PeriodicDisturbance;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     a: S,
     w: S,
     phase: S,
@@ -35,11 +35,11 @@ impl Definition for PeriodicDisturbance {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { a: s[0], w: s[1], phase: s[2] })
+        Box::new(AtParameters { a: s[0], w: s[1], phase: s[2] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn longest_step(&self) -> f64 {
         std::f64::consts::TAU / (16.0 * self.w.value().abs())
     }

@@ -11,7 +11,7 @@ use super::terms::{phase, waves};
 pub struct PositionDependentFriction;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     c: S,
     a: S,
     n: S,
@@ -43,11 +43,11 @@ impl Definition for PositionDependentFriction {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { c: s[0], a: s[1], n: s[2], phase: s[3] })
+        Box::new(AtParameters { c: s[0], a: s[1], n: s[2], phase: s[3] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         S::from(0.0)
     }

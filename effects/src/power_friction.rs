@@ -9,7 +9,7 @@ use super::terms::{power, sign};
 pub struct PowerFriction;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     c: S,
     p: S,
 }
@@ -29,11 +29,11 @@ impl Definition for PowerFriction {
     const RARITY: u8 = 2;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { c: s[0], p: s[1] })
+        Box::new(AtParameters { c: s[0], p: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.c * power(at.v.abs(), self.p) * sign(at.v.value())
     }

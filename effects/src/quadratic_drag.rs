@@ -8,7 +8,7 @@ use super::Definition;
 pub struct QuadraticDrag;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
 }
 
@@ -24,11 +24,11 @@ impl Definition for QuadraticDrag {
     const RARITY: u8 = 0;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0] })
+        Box::new(AtParameters { k: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.k * at.v * at.v.abs()
     }

@@ -8,7 +8,7 @@ use super::Definition;
 pub struct QuadraticInput;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     a: S,
 }
 
@@ -26,11 +26,11 @@ impl Definition for QuadraticInput {
     )];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { a: s[0] })
+        Box::new(AtParameters { a: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value + self.a * at.value * at.value.abs()
     }

@@ -11,7 +11,7 @@ use super::terms::ANY;
 pub struct QuadraticStiffness;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
     rest: S,
 }
@@ -42,11 +42,11 @@ impl Definition for QuadraticStiffness {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0], rest: s[1] })
+        Box::new(AtParameters { k: s[0], rest: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let d = at.q - self.rest;
         -self.k * d * d

@@ -9,7 +9,7 @@ use super::terms::{NOT_NEGATIVE, RADIATION, emission, radiated};
 pub struct RadiationExchange;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
     zero: S,
 }
@@ -36,11 +36,11 @@ impl Definition for RadiationExchange {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0], zero: s[1] })
+        Box::new(AtParameters { k: s[0], zero: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -radiated(self.k, at.q, at.other, self.zero)
     }

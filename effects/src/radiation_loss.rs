@@ -9,7 +9,7 @@ use super::terms::{ANY, NOT_NEGATIVE, RADIATION, emission, radiated};
 pub struct RadiationLoss;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
     around: S,
     zero: S,
@@ -42,11 +42,11 @@ impl Definition for RadiationLoss {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0], around: s[1], zero: s[2] })
+        Box::new(AtParameters { k: s[0], around: s[1], zero: s[2] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -radiated(self.k, at.q, self.around, self.zero)
     }

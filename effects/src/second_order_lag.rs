@@ -9,7 +9,7 @@ use super::terms::damped;
 pub struct SecondOrderLag;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     tau: S,
     d: S,
 }
@@ -23,18 +23,18 @@ impl Definition for SecondOrderLag {
     const PORTS: &'static [PortKind] = &[PortKind::Actuator, PortKind::Sensor];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("tau", "inverse of the natural frequency", Dimension::TIME)
-            .tried(InitialGrid::Scaled(&[0.02, 0.05, 0.1, 0.3])),
+            .with_grid(InitialGrid::Scaled(&[0.02, 0.05, 0.1, 0.3])),
         EffectParameter::shape("d", "damping ratio", Dimension::ONE, [0.05, 5.0], InitialGrid::Plain(&[0.3, 0.8, 1.5])),
     ];
     const STATES: usize = 2;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE, Dimension::VALUE.over(Dimension::TIME)];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { tau: s[0], d: s[1] })
+        Box::new(AtParameters { tau: s[0], d: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn start(&self, at: &PortState<'_, S>, z: &mut [S]) {
         z.copy_from_slice(&[at.value, S::from(0.0)]);
     }

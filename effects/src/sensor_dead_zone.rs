@@ -9,7 +9,7 @@ use super::terms::{ANY, clamp};
 pub struct SensorDeadZone;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     width: S,
     centre: S,
 }
@@ -25,7 +25,7 @@ impl Definition for SensorDeadZone {
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("width", "largest change that is not measured", Dimension::VALUE)
-            .tried(InitialGrid::Scaled(&[0.05, 0.2, 0.5])),
+            .with_grid(InitialGrid::Scaled(&[0.05, 0.2, 0.5])),
         EffectParameter::shape(
             "centre",
             "middle of the dead zone",
@@ -36,11 +36,11 @@ impl Definition for SensorDeadZone {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { width: s[0], centre: s[1] })
+        Box::new(AtParameters { width: s[0], centre: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value - clamp(at.value - self.centre, -self.width, self.width)
     }

@@ -8,7 +8,7 @@ use super::Definition;
 pub struct SensorDrift;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     r: S,
 }
 
@@ -23,11 +23,11 @@ impl Definition for SensorDrift {
         &[EffectParameter::signed("r", "drift per time", Dimension::OUTPUT.over(Dimension::TIME))];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { r: s[0] })
+        Box::new(AtParameters { r: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value + self.r * at.t
     }

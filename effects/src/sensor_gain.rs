@@ -8,7 +8,7 @@ use super::Definition;
 pub struct SensorGain;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     g: S,
 }
 
@@ -24,11 +24,11 @@ impl Definition for SensorGain {
         &[EffectParameter::signed("g", "relative error of the gain", Dimension::ONE).within(-0.5, 0.5)];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { g: s[0] })
+        Box::new(AtParameters { g: s[0] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         at.value * (self.g + 1.0)
     }

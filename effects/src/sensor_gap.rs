@@ -9,7 +9,7 @@ use super::terms::ANY;
 pub struct SensorGap;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     width: S,
     centre: S,
 }
@@ -24,7 +24,7 @@ impl Definition for SensorGap {
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("width", "half the width of the gap", Dimension::VALUE)
-            .tried(InitialGrid::ScaledAndGap(&[0.05, 0.1, 0.2, 0.4])),
+            .with_grid(InitialGrid::ScaledAndGap(&[0.05, 0.1, 0.2, 0.4])),
         EffectParameter::shape(
             "centre",
             "middle of the gap, and the value shown there",
@@ -35,11 +35,11 @@ impl Definition for SensorGap {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { width: s[0], centre: s[1] })
+        Box::new(AtParameters { width: s[0], centre: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         if (at.value - self.centre).value().abs() < self.width.value() { self.centre } else { at.value }
     }

@@ -9,7 +9,7 @@ use super::terms::{ANY, clamp};
 pub struct SensorSaturation;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     limit: S,
     side: f64,
 }
@@ -25,8 +25,8 @@ impl Definition for SensorSaturation {
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("limit", "limit", Dimension::VALUE)
             .within(ANY[0], ANY[1])
-            .neutral_at(f64::INFINITY)
-            .tried(InitialGrid::Within(&[0.04, 0.1, 0.2, 0.3, 0.6, 0.7, 0.8, 0.9, 0.96])),
+            .null_at(f64::INFINITY)
+            .with_grid(InitialGrid::Within(&[0.04, 0.1, 0.2, 0.3, 0.6, 0.7, 0.8, 0.9, 0.96])),
         EffectParameter::shape(
             "side",
             "side that saturates: 1 above, -1 below, 0 both",
@@ -38,11 +38,11 @@ impl Definition for SensorSaturation {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { limit: s[0], side: s[1].value() })
+        Box::new(AtParameters { limit: s[0], side: s[1].value() })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let (y, limit) = (at.value, self.limit);
         if limit.value().is_infinite() {

@@ -9,7 +9,7 @@ use super::terms::{NOT_NEGATIVE, clamp};
 pub struct SpringPlay;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
     gap: S,
 }
@@ -41,11 +41,11 @@ impl Definition for SpringPlay {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0], gap: s[1] })
+        Box::new(AtParameters { k: s[0], gap: s[1] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let half = self.gap * 0.5;
         self.k * clamp(at.q, -half, half)

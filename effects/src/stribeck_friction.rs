@@ -11,7 +11,7 @@ use super::terms::NOT_NEGATIVE;
 pub struct StribeckFriction;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     c: S,
     rise: S,
     vs: S,
@@ -45,11 +45,11 @@ impl Definition for StribeckFriction {
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { c: s[0], rise: s[1], vs: s[2] })
+        Box::new(AtParameters { c: s[0], rise: s[1], vs: s[2] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         S::from(0.0)
     }

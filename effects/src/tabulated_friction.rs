@@ -11,7 +11,7 @@ use super::terms::NOT_NEGATIVE;
 pub struct TabulatedFriction;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     c: S,
     r1: S,
     r2: S,
@@ -65,11 +65,11 @@ impl Definition for TabulatedFriction {
     const RARITY: u8 = 2;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { c: s[0], r1: s[1], r2: s[2], r3: s[3], top: s[4] })
+        Box::new(AtParameters { c: s[0], r1: s[1], r2: s[2], r3: s[3], top: s[4] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, _: &PortState<'_, S>, _: &[S]) -> S {
         S::from(0.0)
     }

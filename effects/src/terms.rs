@@ -127,8 +127,8 @@ pub(super) struct Span<S> {
 
 impl<S: Scalar> Span<S> {
     /// Creates the time span with these two parameters.
-    pub fn new(strengths: &[S]) -> Self {
-        Self { from: strengths[0], length: strengths[1] }
+    pub fn new(parameters: &[S]) -> Self {
+        Self { from: parameters[0], length: parameters[1] }
     }
 
     /// Returns start and end of the time span, s.

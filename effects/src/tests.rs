@@ -41,8 +41,8 @@ fn at<S: Scalar>(seen: &[S; 11]) -> PortState<'static, S> {
 fn answer<S: Scalar>(effect: &dyn Effect, acting: &dyn BoundEffect<S>, seen: &[S; 11]) -> Vec<S> {
     let at = at(seen);
     let z = &seen[7..7 + effect.states()];
-    let mut all = vec![if effect.memory() > 0 {
-        acting.recall(&at, &seen[9..9 + effect.memory()])
+    let mut all = vec![if effect.hysteresis_states() > 0 {
+        acting.hysteresis_value(&at, &seen[9..9 + effect.hysteresis_states()])
     } else {
         acting.value(&at, z)
     }];
@@ -58,7 +58,7 @@ fn answer<S: Scalar>(effect: &dyn Effect, acting: &dyn BoundEffect<S>, seen: &[S
 }
 
 /// Returns a value within the bounds.
-fn strength(of: &EffectParameter, even: &mut Even) -> f64 {
+fn parameter(of: &EffectParameter, even: &mut Even) -> f64 {
     match of.bounds {
         [low, high] if high.is_finite() => low + (high.min(low + 3.0) - low) * even.between(0.2, 0.8),
         [low, _] if low.is_finite() => even.between(0.3, 1.5),
@@ -66,8 +66,8 @@ fn strength(of: &EffectParameter, even: &mut Even) -> f64 {
     }
 }
 
-fn strengths(effect: &dyn Effect, even: &mut Even) -> Vec<f64> {
-    effect.strengths().iter().map(|of| strength(of, even)).collect()
+fn parameters(effect: &dyn Effect, even: &mut Even) -> Vec<f64> {
+    effect.parameters().iter().map(|of| parameter(of, even)).collect()
 }
 
 fn at_joints(effect: &dyn Effect) -> bool {
@@ -97,12 +97,12 @@ fn every_effect_has_a_description_a_formula_and_a_source() {
 #[test]
 fn only_the_first_strength_has_a_null_value_and_it_is_within_the_bounds() {
     for effect in effects() {
-        let [first, shapes @ ..] = effect.strengths() else { panic!("{} has no strength", effect.name()) };
-        let neutral = first.neutral.expect("the first strength makes it vanish");
+        let [first, shapes @ ..] = effect.parameters() else { panic!("{} has no parameter", effect.name()) };
+        let neutral = first.null_value.expect("the first parameter makes it vanish");
         assert!(first.bounds[0] <= neutral && neutral <= first.bounds[1], "{}", effect.name());
-        assert!(shapes.iter().all(|shape| shape.neutral.is_none()), "{}", effect.name());
-        let names: BTreeSet<&str> = effect.strengths().iter().map(|s| s.name).collect();
-        assert_eq!(names.len(), effect.strengths().len(), "{}", effect.name());
+        assert!(shapes.iter().all(|shape| shape.null_value.is_none()), "{}", effect.name());
+        let names: BTreeSet<&str> = effect.parameters().iter().map(|s| s.name).collect();
+        assert_eq!(names.len(), effect.parameters().len(), "{}", effect.name());
     }
 }
 
@@ -110,10 +110,10 @@ fn only_the_first_strength_has_a_null_value_and_it_is_within_the_bounds() {
 fn first_trials_are_few_and_allowed() {
     for effect in effects() {
         let mut count = 1;
-        for of in effect.strengths() {
+        for of in effect.parameters() {
             let allowed = |values: &[f64]| values.iter().all(|v| of.bounds[0] <= *v && *v <= of.bounds[1]);
-            match of.trials {
-                InitialGrid::Linear => assert!(of.neutral == Some(0.0), "{}: {}", effect.name(), of.name),
+            match of.grid {
+                InitialGrid::Linear => assert!(of.null_value == Some(0.0), "{}: {}", effect.name(), of.name),
                 InitialGrid::Plain(values) | InitialGrid::Jumps(values) => {
                     assert!(allowed(values), "{}", effect.name());
                     count *= values.len();
@@ -139,9 +139,9 @@ fn a_neutral_effect_changes_no_bit() {
     let mut even = Even(0.1);
     for effect in effects() {
         for _ in 0..50 {
-            let mut s = strengths(effect.as_ref(), &mut even);
-            s[0] = effect.strengths()[0].neutral.expect("the first strength makes it vanish");
-            let (acting, seen) = (effect.act(&s), place(&mut even));
+            let mut s = parameters(effect.as_ref(), &mut even);
+            s[0] = effect.parameters()[0].null_value.expect("the first parameter makes it vanish");
+            let (acting, seen) = (effect.bind(&s), place(&mut even));
             let all = answer(effect.as_ref(), acting.as_ref(), &seen);
             if effect.ports().iter().any(|port| matches!(port, PortKind::Actuator | PortKind::Sensor)) {
                 assert_eq!(all[0].to_bits(), seen[0].to_bits(), "{} {s:?} {seen:?}", effect.name());
@@ -165,7 +165,7 @@ fn dissipative_effects_add_no_energy() {
     };
     for effect in effects().iter().filter(dissipative) {
         for _ in 0..200 {
-            let acting = effect.act(&strengths(effect.as_ref(), &mut even));
+            let acting = effect.bind(&parameters(effect.as_ref(), &mut even));
             let at = at(&place(&mut even));
             assert!(acting.value(&at, &[]) * at.v <= 0.0, "{} {at:?}", effect.name());
             let Some(friction) = acting.friction(&at, &[]) else { continue };
@@ -180,7 +180,7 @@ fn dissipative_effects_add_no_energy() {
 #[test]
 fn friction_with_states_dissipates_energy_over_a_cycle() {
     for effect in effects().iter().filter(|e| e.class() == EffectClass::Dissipative && e.states() > 0) {
-        let acting = effect.act(&strengths(effect.as_ref(), &mut Even(0.3)));
+        let acting = effect.bind(&parameters(effect.as_ref(), &mut Even(0.3)));
         let (mut z, mut dz) = ([0.0], [0.0]);
         let (mut work, h) = (0.0, 1e-4);
         // q = sin t over three periods, of which the last counts.
@@ -205,7 +205,7 @@ fn odd_effects_are_odd() {
     let passing = ["input-saturation", "input-dead-zone", "quadratic-input"];
     let mut even = Even(0.4);
     for effect in effects().iter().filter(|e| odd.contains(&e.name()) || passing.contains(&e.name())) {
-        let acting = effect.act(&strengths(effect.as_ref(), &mut even));
+        let acting = effect.bind(&parameters(effect.as_ref(), &mut even));
         for _ in 0..50 {
             let seen = place(&mut even);
             let there = acting.value(&at(&seen), &[]);
@@ -222,7 +222,7 @@ fn moved(effect: &dyn Effect, s: &[f64], seen: &[f64; 11], index: usize, by: f64
     } else {
         seen[index - s.len()] += by;
     }
-    answer(effect, effect.act(&s).as_ref(), &seen)
+    answer(effect, effect.bind(&s).as_ref(), &seen)
 }
 
 #[test]
@@ -230,13 +230,13 @@ fn tangents_agree_with_differences() {
     let mut even = Even(0.5);
     for effect in effects() {
         for _ in 0..30 {
-            let (s, seen) = (strengths(effect.as_ref(), &mut even), place(&mut even));
+            let (s, seen) = (parameters(effect.as_ref(), &mut even), place(&mut even));
             for index in 0..s.len() + seen.len() - 1 {
                 let lifted = |i: usize, x: f64| if i == index { Dual7::variable(x, 0) } else { Dual7::from(x) };
                 let with: Vec<Dual7> = s.iter().enumerate().map(|(i, &x)| lifted(i, x)).collect();
                 let sees: [Dual7; 11] = std::array::from_fn(|i| lifted(s.len() + i, seen[i]));
                 let exact = answer(effect.as_ref(), effect.bind_dual(&with).as_ref(), &sees);
-                let plain = answer(effect.as_ref(), effect.act(&s).as_ref(), &seen);
+                let plain = answer(effect.as_ref(), effect.bind(&s).as_ref(), &seen);
                 let [up, down] = [1e-6, -1e-6].map(|by| moved(effect.as_ref(), &s, &seen, index, by));
                 for (k, exact) in exact.iter().enumerate() {
                     assert_eq!(exact.value, plain[k], "{}: tangents change no value", effect.name());
@@ -255,7 +255,7 @@ fn tangents_agree_with_differences() {
 #[test]
 fn free_start_values_are_those_of_all_states_or_that_of_a_memory() {
     for effect in effects() {
-        let all = if effect.memory() > 0 { 1 } else { effect.states() };
+        let all = if effect.hysteresis_states() > 0 { 1 } else { effect.states() };
         assert!([0, all].contains(&effect.free_starts().len()), "{}", effect.name());
     }
 }
@@ -274,12 +274,12 @@ fn the_catalogue_has_the_effects_that_engineers_name() {
 
 #[test]
 fn play_keeps_its_output_until_the_gap_is_crossed() {
-    let play = effects().into_iter().find(|e| e.name() == "backlash").expect("it is there").act(&[0.4]);
+    let play = effects().into_iter().find(|e| e.name() == "backlash").expect("it is there").bind(&[0.4]);
     let mut memory = [f64::NAN];
     let follow = |value: f64, memory: &mut [f64; 1]| {
         let at = at(&[value, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        play.remember(&at, memory);
-        play.recall(&at, memory)
+        play.update_hysteresis(&at, memory);
+        play.hysteresis_value(&at, memory)
     };
     let output = [0.0, 0.1, 0.3, 1.0, 0.7, 0.5, -1.0].map(|u| follow(u, &mut memory));
     for (found, expected) in output.into_iter().zip([0.0, 0.0, 0.1, 0.8, 0.8, 0.7, -0.8]) {
@@ -289,7 +289,7 @@ fn play_keeps_its_output_until_the_gap_is_crossed() {
 
 #[test]
 fn a_gust_has_the_impulse_of_its_integral() {
-    let gust = effects().into_iter().find(|e| e.name() == "wind-gust").expect("it is there").act(&[3.0, 0.7, 0.45]);
+    let gust = effects().into_iter().find(|e| e.name() == "wind-gust").expect("it is there").bind(&[3.0, 0.7, 0.45]);
     let h = 1e-4;
     let push: f64 =
         (0..20_000).map(|k| gust.value(&PortState { t: f64::from(k) * h, ..at(&[0.0; 11]) }, &[]) * h).sum();
@@ -323,11 +323,11 @@ fn what_passes_an_actuator_or_a_sensor_is_what_the_formula_says() {
         ("sensor-gap", &[0.5, 1.0], 1.3, 1.0),
         ("sensor-gap", &[0.5, 1.0], 1.6, 1.6),
     ];
-    for (name, strengths, value, expected) in cases {
+    for (name, parameters, value, expected) in cases {
         let effect = effects().into_iter().find(|e| e.name() == name).expect("it is in the catalogue");
         let mut seen = [0.0; 11];
         seen[0] = value;
-        let found = effect.act(strengths).value(&at(&seen), &[]);
+        let found = effect.bind(parameters).value(&at(&seen), &[]);
         assert!((found - expected).abs() < 1e-15, "{name} {value}: {found}");
     }
 }

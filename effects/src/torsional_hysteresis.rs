@@ -9,7 +9,7 @@ use super::terms::NOT_NEGATIVE;
 pub struct TorsionalHysteresis;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     k: S,
     h: S,
     y: S,
@@ -49,11 +49,11 @@ impl Definition for TorsionalHysteresis {
     const RARITY: u8 = 2;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { k: s[0], h: s[1], y: s[2] })
+        Box::new(AtParameters { k: s[0], h: s[1], y: s[2] })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn rates(&self, at: &PortState<'_, S>, z: &[S], dz: &mut [S]) {
         dz[0] = (at.v - z[0] * at.v.abs()) / self.y;
     }

@@ -24,8 +24,8 @@ impl Definition for ViscousFriction {
         &[EffectParameter::positive("d", "force per speed", Dimension::OUTPUT.over(Dimension::SPEED))];
     const RARITY: u8 = 0;
 
-    fn make<S: Scalar>(strengths: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(Viscous { factor: strengths[0] })
+    fn make<S: Scalar>(parameters: &[S]) -> Box<dyn BoundEffect<S>> {
+        Box::new(Viscous { factor: parameters[0] })
     }
 }
 

@@ -9,7 +9,7 @@ use super::terms::{Span, from, length};
 pub struct WindGust;
 
 /// Effect at given parameters.
-struct AtStrengths<S> {
+struct AtParameters<S> {
     a: S,
     span: Span<S>,
 }
@@ -30,11 +30,11 @@ impl Definition for WindGust {
     const IS_ONE_OFF: bool = true;
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
-        Box::new(AtStrengths { a: s[0], span: Span::new(&s[1..]) })
+        Box::new(AtParameters { a: s[0], span: Span::new(&s[1..]) })
     }
 }
 
-impl<S: Scalar> BoundEffect<S> for AtStrengths<S> {
+impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn breaks(&self) -> Vec<f64> {
         self.span.breaks()
     }

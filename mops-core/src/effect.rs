@@ -1,4 +1,4 @@
-//! Effects: physical effects that a model may lack at one of its ports. Their parameters (strengths) have null values at
+//! Effects: physical effects that a model may lack at one of its ports. Their parameters have null values at
 //! which the effect vanishes.
 
 use std::sync::Arc;
@@ -207,7 +207,7 @@ pub enum Scope {
     Experiment,
 }
 
-/// A parameter (strength) of an effect: a magnitude or a shape parameter.
+/// A parameter of an effect: a magnitude or a shape parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EffectParameter {
     /// Name, such as `torque`.
@@ -217,11 +217,11 @@ pub struct EffectParameter {
     /// Unit.
     pub dimension: Dimension,
     /// Null value, 0 or infinity, at which the effect vanishes; `None` for a shape parameter.
-    pub neutral: Option<f64>,
+    pub null_value: Option<f64>,
     /// Smallest and largest physically possible value.
     pub bounds: [f64; 2],
     /// Initial grid.
-    pub trials: InitialGrid,
+    pub grid: InitialGrid,
     /// Scope: the study or a single experiment.
     pub scope: Scope,
     /// True if the parameter keeps its grid value, such as an integer number of periods per turn.
@@ -238,9 +238,9 @@ impl EffectParameter {
             name,
             about,
             dimension,
-            neutral: Some(0.0),
+            null_value: Some(0.0),
             bounds: [0.0, f64::INFINITY],
-            trials: InitialGrid::Linear,
+            grid: InitialGrid::Linear,
             scope: Scope::Study,
             fixed: false,
             restarts: &[],
@@ -258,22 +258,22 @@ impl EffectParameter {
         about: &'static str,
         dimension: Dimension,
         bounds: [f64; 2],
-        trials: InitialGrid,
+        grid: InitialGrid,
     ) -> Self {
-        Self { bounds, trials, neutral: None, ..Self::positive(name, about, dimension) }
+        Self { bounds, grid, null_value: None, ..Self::positive(name, about, dimension) }
     }
 
     /// Sets another initial grid.
     #[must_use]
-    pub const fn tried(mut self, trials: InitialGrid) -> Self {
-        self.trials = trials;
+    pub const fn with_grid(mut self, grid: InitialGrid) -> Self {
+        self.grid = grid;
         self
     }
 
     /// Sets another null value.
     #[must_use]
-    pub const fn neutral_at(mut self, neutral: f64) -> Self {
-        self.neutral = Some(neutral);
+    pub const fn null_at(mut self, null_value: f64) -> Self {
+        self.null_value = Some(null_value);
         self
     }
 
@@ -392,12 +392,12 @@ pub trait BoundEffect<S: Scalar> {
         f64::INFINITY
     }
 
-    /// Updates the hysteresis state ([`Effect::memory`]), which is NaN before the first update. Called at an actuator before
+    /// Updates the hysteresis state ([`Effect::hysteresis_states`]), which is NaN before the first update. Called at an actuator before
     /// and after each jump of the command or of its derivative, at a sensor along the simulation.
-    fn remember(&self, _at: &PortState<'_, S>, _memory: &mut [S]) {}
+    fn update_hysteresis(&self, _at: &PortState<'_, S>, _memory: &mut [S]) {}
 
     /// Returns the output, as [`BoundEffect::value`], for an effect with a hysteresis state.
-    fn recall(&self, at: &PortState<'_, S>, _memory: &[S]) -> S {
+    fn hysteresis_value(&self, at: &PortState<'_, S>, _memory: &[S]) -> S {
         self.value(at, &[])
     }
 }
@@ -428,7 +428,7 @@ pub trait Effect: Send + Sync {
     fn ports(&self) -> &'static [PortKind];
 
     /// Returns the kind of the second port, if one is needed: the origin of drag, a sensor with cross-talk.
-    fn companion(&self) -> Option<PortKind> {
+    fn second_port(&self) -> Option<PortKind> {
         None
     }
 
@@ -438,7 +438,7 @@ pub trait Effect: Send + Sync {
     }
 
     /// Returns the parameters; the effect vanishes if the first is at its null value.
-    fn strengths(&self) -> &'static [EffectParameter];
+    fn parameters(&self) -> &'static [EffectParameter];
 
     /// Returns the number of states; a diagnosis does not consider effects with more than eight.
     fn states(&self) -> usize {
@@ -446,7 +446,7 @@ pub trait Effect: Send + Sync {
     }
 
     /// Returns the number of values of the hysteresis state; the first is the output.
-    fn memory(&self) -> usize {
+    fn hysteresis_states(&self) -> usize {
         0
     }
 
@@ -474,16 +474,16 @@ pub trait Effect: Send + Sync {
     }
 
     /// Returns the effect at the given parameters.
-    fn act(&self, strengths: &[f64]) -> Box<dyn BoundEffect<f64>>;
+    fn bind(&self, parameters: &[f64]) -> Box<dyn BoundEffect<f64>>;
 
     /// Returns the effect with tangents, at parameters with tangents.
-    fn bind_dual(&self, strengths: &[Dual7]) -> Box<dyn BoundEffect<Dual7>>;
+    fn bind_dual(&self, parameters: &[Dual7]) -> Box<dyn BoundEffect<Dual7>>;
 }
 
 /// An effect at a place of a model.
 #[derive(Clone)]
 pub struct Placement {
-    /// Name of the effect in the model; its parameters are called `name.strength`.
+    /// Name of the effect in the model; its parameters are called `name.parameter`.
     pub name: String,
     /// The effect.
     pub effect: Arc<dyn Effect>,

@@ -253,15 +253,15 @@ pub trait Opening: Scalar {
     fn open<'a>(model: &'a dyn Open, parameters: &'a [Self]) -> Result<Box<dyn Plant<Self> + 'a>, Failure>;
 
     /// Calls [`crate::Effect::act`] or [`crate::Effect::bind_dual`].
-    fn act(effect: &dyn crate::Effect, strengths: &[Self]) -> Box<dyn crate::BoundEffect<Self>>;
+    fn bind(effect: &dyn crate::Effect, parameters: &[Self]) -> Box<dyn crate::BoundEffect<Self>>;
 }
 
 impl Opening for f64 {
     fn open<'a>(model: &'a dyn Open, parameters: &'a [Self]) -> Result<Box<dyn Plant<Self> + 'a>, Failure> {
         model.open(parameters)
     }
-    fn act(effect: &dyn crate::Effect, strengths: &[Self]) -> Box<dyn crate::BoundEffect<Self>> {
-        effect.act(strengths)
+    fn bind(effect: &dyn crate::Effect, parameters: &[Self]) -> Box<dyn crate::BoundEffect<Self>> {
+        effect.bind(parameters)
     }
 }
 
@@ -269,7 +269,7 @@ impl Opening for Dual7 {
     fn open<'a>(model: &'a dyn Open, parameters: &'a [Self]) -> Result<Box<dyn Plant<Self> + 'a>, Failure> {
         model.open_dual(parameters)
     }
-    fn act(effect: &dyn crate::Effect, strengths: &[Self]) -> Box<dyn crate::BoundEffect<Self>> {
-        effect.bind_dual(strengths)
+    fn bind(effect: &dyn crate::Effect, parameters: &[Self]) -> Box<dyn crate::BoundEffect<Self>> {
+        effect.bind_dual(parameters)
     }
 }

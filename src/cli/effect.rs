@@ -10,7 +10,7 @@ pub(super) fn page(effect: &dyn Effect) -> String {
         page += &format!("{fact}.\n");
     }
     page += "\nParameters:\n";
-    for parameter in effect.strengths() {
+    for parameter in effect.parameters() {
         page += &format!("  {} ({})\n      {}\n", parameter.name, parameter_facts(parameter), parameter.about);
     }
     page + &format!("\nSource: {}.\n", effect.source())
@@ -19,7 +19,7 @@ pub(super) fn page(effect: &dyn Effect) -> String {
 /// Returns the class of an effect, its places, and its states.
 pub(super) fn facts(effect: &dyn Effect) -> Vec<String> {
     let places: Vec<&str> = effect.ports().iter().copied().map(place).collect();
-    let second = effect.companion().map_or_else(String::new, |kind| format!(". Second port: {}", place(kind)));
+    let second = effect.second_port().map_or_else(String::new, |kind| format!(". Second port: {}", place(kind)));
     let mut facts = vec![format!("Class: {}. Acts at: {}{second}", effect.class().name(), places.join("; "))];
     if let Some(wider) = effect.form_of() {
         facts.push(format!("Special case of: {wider}"));
@@ -28,7 +28,7 @@ pub(super) fn facts(effect: &dyn Effect) -> Vec<String> {
         let free = if effect.free_starts().is_empty() { "" } else { ", with a free initial state in each experiment" };
         facts.push(format!("Additional states: {}{free}", effect.states()));
     }
-    if effect.memory() > 0 && !effect.free_starts().is_empty() {
+    if effect.hysteresis_states() > 0 && !effect.free_starts().is_empty() {
         facts.push("Its initial output is free in each experiment".to_owned());
     }
     facts
@@ -53,7 +53,7 @@ pub(super) fn parameter_facts(parameter: &EffectParameter) -> String {
         [low, _] if low.is_finite() => facts.push(format!("at least {}", number(low))),
         _ => facts.push("of either sign".into()),
     }
-    match parameter.neutral {
+    match parameter.null_value {
         Some(neutral) if neutral.is_finite() => facts.push(format!("null value {}", number(neutral))),
         Some(_) => facts.push("null value infinity".into()),
         None => {}

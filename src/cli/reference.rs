@@ -74,7 +74,7 @@ fn the_page_of_effects_shows_the_catalogue() {
         let parameter = |of: &mops_core::EffectParameter| {
             format!("- `{}` ({}): {}\n", of.name, effect::parameter_facts(of), on_one_line(of.about))
         };
-        let parameters: String = effect.strengths().iter().map(parameter).collect();
+        let parameters: String = effect.parameters().iter().map(parameter).collect();
         let (name, about, formula, source) = (effect.name(), effect.about(), effect.formula(), effect.source());
         format!("### {name}\n\n{about}\n\n    {formula}\n\n{facts}\nParameters:\n\n{parameters}\nSource: {source}.\n")
     };

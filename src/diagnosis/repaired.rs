@@ -144,17 +144,17 @@ fn effect(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diagnosis, f
     let known = original.effects.iter().find(|effect| effect.name() == found.effect);
     for strength in &found.strengths {
         let same_name = |known: &&EffectParameter| known.name == strength.name;
-        let known = known.and_then(|effect| effect.strengths().iter().find(same_name));
+        let known = known.and_then(|effect| effect.parameters().iter().find(same_name));
         let tuner_name = format!("{name}.{}", strength.name);
         let own = diagnosis.starts.iter().filter(|(_, parameter, value)| *parameter == tuner_name && value.is_finite());
         let own: Vec<(String, f64)> = own.map(|(experiment, _, value)| (experiment.clone(), *value)).collect();
         text.set(&["tuners", &tuner_name], &tuner(strength, known, &own));
     }
     // An effect of one experiment has its null value in all others.
-    if let (Some(only), Some(first)) = (&found.only, known.and_then(|effect| effect.strengths().first())) {
+    if let (Some(only), Some(first)) = (&found.only, known.and_then(|effect| effect.parameters().first())) {
         let parameter = format!("{name}.{}", first.name);
         for experiment in text.keys(&["experiments"]).iter().filter(|experiment| *experiment != only) {
-            text.set(&["experiments", experiment, "parameters", &parameter], &number(first.neutral.unwrap_or(0.0)));
+            text.set(&["experiments", experiment, "parameters", &parameter], &number(first.null_value.unwrap_or(0.0)));
         }
     }
 }
@@ -320,7 +320,7 @@ free     = [\"phi\", \"theta\"]
         let phase =
             StrengthValue { name: "phase".into(), value: 0.4, unit: "rad".into(), std_error: None, interval95: None };
         let catalogue = crate::catalogue();
-        let known = catalogue.effects.iter().flat_map(|effect| effect.strengths());
+        let known = catalogue.effects.iter().flat_map(|effect| effect.parameters());
         let known = known.filter(|known| known.scope == Scope::Experiment).find(|known| known.name == "phase").unwrap();
         let own = [("swing".to_owned(), 0.4), ("push".to_owned(), -2.5)];
         let text = tuner(&phase, Some(known), &own);

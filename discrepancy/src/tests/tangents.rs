@@ -44,8 +44,8 @@ fn every_effect_that_is_linear_in_its_strength_is_screened_by_the_tangent_of_the
     let mut compared = Vec::new();
     for candidate in candidates(&effects(), subject.model.interface(), &measured, &[0]) {
         let effect = Arc::clone(&candidate.effect);
-        let first = &effect.strengths()[0];
-        if first.trials != InitialGrid::Linear || first.neutral != Some(0.0) {
+        let first = &effect.parameters()[0];
+        if first.grid != InitialGrid::Linear || first.null_value != Some(0.0) {
             continue;
         }
         let Some(sizes) = sizes(&candidate.port, &variant.model, &fit.pieces, &scene.trajectories) else { continue };
@@ -138,7 +138,7 @@ fn in_a_window_an_actuator_is_screened_with_what_was_commanded_before() {
                 .flat_map(|s| run.trace(&s.name).sample(&s.times).into_iter().map(|y| y / s.noise))
                 .collect()
         };
-        let neutral = candidate.effect.strengths()[0].neutral.expect("it has one");
+        let neutral = candidate.effect.parameters()[0].null_value.expect("it has one");
         let changed = simulated(strength).iter().zip(simulated(neutral)).map(|(a, b)| a - b).collect::<Vec<f64>>();
         let off: Vec<f64> = screened.iter().zip(&changed).map(|(a, b)| a - b).collect();
         let error = (dot(&off, &off) / dot(&changed, &changed)).sqrt();

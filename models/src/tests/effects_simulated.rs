@@ -455,7 +455,7 @@ fn everywhere() -> Vec<(WithEffects, &'static str, bool)> {
                 PortKind::Sensor => "sensor:x",
             };
             let coupled = effect.name() == "coupling-play";
-            let companion = effect.companion().map(|kind| match kind {
+            let companion = effect.second_port().map(|kind| match kind {
                 PortKind::Joint if coupled => "joint:y",
                 PortKind::Joint => "joint:x",
                 PortKind::Process => "process:h",
@@ -489,7 +489,7 @@ fn acting(name: &str, effect: &dyn Effect) -> Vec<f64> {
         "p" => 1.4,
         _ => 0.3,
     };
-    let mut all: Vec<f64> = effect.strengths().iter().map(of).collect();
+    let mut all: Vec<f64> = effect.parameters().iter().map(of).collect();
     if name == "bouc-wen" {
         all[3] = 1.5;
     }
@@ -525,7 +525,7 @@ fn every_effect_simulates_at_its_ports_with_tangents_that_agree_with_differences
         let job = Job { case: &case, parameters: &parameters, signals: &signals, horizon: 3.7 };
         let plain = analysis(&model, &parameters, input.clone(), 3.7);
         // Rounding has zero derivative between its jumps.
-        let shaped = |k: &usize| !name.ends_with("quantisation") && !effect.strengths()[*k].fixed;
+        let shaped = |k: &usize| !name.ends_with("quantisation") && !effect.parameters()[*k].fixed;
         let moved: Vec<usize> = (0..count - first).filter(shaped).map(|k| first + k).collect();
         let seed = |i: &usize| (0..parameters.len()).map(|j| f64::from(u8::from(*i == j))).collect();
         let seeds: Vec<Vec<f64>> = moved.iter().map(seed).collect();

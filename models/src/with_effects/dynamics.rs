@@ -29,11 +29,11 @@ impl<S: Scalar> Actor<S> {
     /// Updates the hysteresis state to an instant, and returns the output.
     pub(super) fn follow(&mut self, at: &PortState<'_, S>) -> S {
         let first = self.memory[0].value().is_nan();
-        self.acting.remember(at, &mut self.memory);
+        self.acting.update_hysteresis(at, &mut self.memory);
         if first {
             self.memory[0] += self.ahead;
         }
-        self.acting.recall(at, &self.memory)
+        self.acting.hysteresis_value(at, &self.memory)
     }
 }
 
@@ -50,14 +50,14 @@ impl WithEffects {
         let mut states = own;
         let actor = |&index: &usize| {
             let (effect, place) = (&self.placements[index].effect, self.places[index]);
-            let strengths = &parameters[place.strengths..place.strengths + effect.strengths().len()];
+            let parameters = &parameters[place.parameters..place.parameters + effect.parameters().len()];
             let z = (states, effect.states());
             states += effect.states();
             Actor {
-                acting: S::act(effect.as_ref(), strengths),
+                acting: S::bind(effect.as_ref(), parameters),
                 place,
                 z,
-                memory: vec![S::from(f64::NAN); effect.memory()],
+                memory: vec![S::from(f64::NAN); effect.hysteresis_states()],
                 ahead: S::from(0.0),
                 closed: None,
                 inertial: effect.is_inertial(),
@@ -291,7 +291,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             let passed = if actor.memory.is_empty() {
                 actor.acting.value(&at, self.states(actor, x))
             } else {
-                actor.acting.recall(&at, &actor.memory)
+                actor.acting.hysteresis_value(&at, &actor.memory)
             };
             u[input] = passed;
         }
@@ -430,7 +430,7 @@ impl<'a, S: Opening> Driven<'a, S> {
     }
 
     /// Updates the hysteresis states of actuators to the current command.
-    fn remember(&mut self, t: f64, x: &[S]) {
+    fn update_hysteresis(&mut self, t: f64, x: &[S]) {
         let mut u: Vec<S> = self.commands.iter().map(|command| command.at(t)).collect();
         for index in 0..self.actors.len() {
             let Site::Actuator { input } = self.actors[index].place.site else { continue };
@@ -463,9 +463,9 @@ impl<'a, S: Opening> Driven<'a, S> {
         let mut t = 0.0 - self.begins;
         while t < 0.0 {
             self.follow_commands(t);
-            self.remember(t, x);
+            self.update_hysteresis(t, x);
             t = self.next_break(t).min(0.0);
-            self.remember(t, x);
+            self.update_hysteresis(t, x);
         }
         for (actor, ahead) in self.actors.iter_mut().zip(ahead) {
             actor.ahead = ahead;
@@ -672,13 +672,13 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         let remembers = self.actors.iter().any(|actor| at_actuator(actor) && !actor.memory.is_empty());
         // Hysteresis states are updated just before the break, and across it.
         if remembers && self.started {
-            self.remember(t, x);
+            self.update_hysteresis(t, x);
         } else if remembers && self.begins > 0.0 {
             self.run_up(x);
         }
         self.pass(t, x);
         if remembers {
-            self.remember(t, x);
+            self.update_hysteresis(t, x);
         }
         let first = !std::mem::replace(&mut self.started, true);
         if !first && self.guards() == 0 {

@@ -32,7 +32,7 @@ pub struct WithEffects {
 struct Place {
     site: Site,
     companion: Option<Site>,
-    strengths: usize,
+    parameters: usize,
     starts: Option<usize>,
 }
 
@@ -69,26 +69,26 @@ impl WithEffects {
         for placement in &placements {
             let Placement { name, effect, .. } = placement;
             let sites = Site::of_both(placement, of, &states).map_err(|mistake| mistake.within(name))?;
-            let strengths = interface.parameters.len();
-            for strength in effect.strengths() {
+            let parameters = interface.parameters.len();
+            for parameter in effect.parameters() {
                 let variable = Variable {
-                    name: format!("{name}.{}", strength.name),
-                    unit: match strength.trials {
+                    name: format!("{name}.{}", parameter.name),
+                    unit: match parameter.grid {
                         // With the unit 1/s, 5 Hz would be read as 5 rad/s.
                         InitialGrid::Frequencies => Unit::known("rad/s"),
-                        _ => unit(strength.dimension, &placement.port, placement.companion.as_ref(), of),
+                        _ => unit(parameter.dimension, &placement.port, placement.companion.as_ref(), of),
                     },
-                    about: strength.about.to_owned(),
+                    about: parameter.about.to_owned(),
                 };
                 if interface.parameters.iter().any(|p| p.variable.name == variable.name) {
                     let fact = format!("the model already has a parameter `{}`", variable.name);
                     return Err(StudyError::new(name, fact).with_help("give the effect another name"));
                 }
-                let default = strength.neutral;
+                let default = parameter.null_value;
                 interface.parameters.push(Parameter {
                     variable,
                     default,
-                    range: strength.bounds,
+                    range: parameter.bounds,
                     infinite: default == Some(f64::INFINITY),
                 });
             }
@@ -105,7 +105,7 @@ impl WithEffects {
                 let name = format!("{name}.{}", k + 1);
                 interface.states.push(State { name, start: parameter, signal: None, rate_of: None });
             }
-            places.push(Place { site: sites.0, companion: sites.1, strengths, starts });
+            places.push(Place { site: sites.0, companion: sites.1, parameters, starts });
         }
         Ok(Self { model, placements, places, interface, max_steps: usize::MAX })
     }
@@ -139,8 +139,8 @@ impl WithEffects {
 
     /// Returns true if an effect may change the response or its tangents.
     fn acts<S: Scalar>(&self, index: usize, parameters: &[S]) -> bool {
-        let neutral = self.placements[index].effect.strengths()[0].neutral;
-        let first = parameters[self.places[index].strengths];
+        let neutral = self.placements[index].effect.parameters()[0].null_value;
+        let first = parameters[self.places[index].parameters];
         neutral.is_none_or(|neutral| first.value() != neutral) || first.tangents().iter().any(|&t| t != 0.0)
     }
 
@@ -175,7 +175,7 @@ impl Site {
             return Err(StudyError::new("place", fact).with_help(format!("the effect acts at: {}", names.join(", "))));
         }
         let here = site("place", port)?;
-        let there = match (effect.companion(), companion) {
+        let there = match (effect.second_port(), companion) {
             (None, None) => None,
             (Some(wanted), Some(companion)) if kind(companion) == Some(wanted) => Some(site("companion", companion)?),
             (Some(wanted), given) => {
@@ -278,7 +278,7 @@ impl Model for WithEffects {
 
     fn tangents(&self, job: &Job<'_>, seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
         let neutral = |i: usize| {
-            let first = self.places[i].strengths;
+            let first = self.places[i].parameters;
             !self.acts(i, job.parameters) && seeds.iter().all(|seed| seed[first] == 0.0)
         };
         if seeds.is_empty() {

@@ -185,7 +185,7 @@ fn a_window_of_a_record_agrees_with_the_whole_record_for_actuators_with_hysteres
     let times: Vec<f64> = (0..20).map(|k| f64::from(k) * 0.1).collect();
     let values: Vec<f64> = (0..20).map(|k| math::sin(f64::from(k) * 1.7)).collect();
     let block = equations(BLOCK);
-    for (effect, strength) in [("input-rate-limit", 1.9), ("backlash", 0.8), ("input-delay", 0.17)] {
+    for (effect, parameter) in [("input-rate-limit", 1.9), ("backlash", 0.8), ("input-delay", 0.17)] {
         let model = with(&block, &[(effect, "actuator:u")]);
         for hold in [Hold::Zero, Hold::First] {
             let input = |from: f64| {
@@ -193,7 +193,7 @@ fn a_window_of_a_record_agrees_with_the_whole_record_for_actuators_with_hysteres
                 vec![("u".to_owned(), Input::Sampled { times, values: values.clone(), hold })]
             };
             let parameters = |[x, v]: [f64; 2]| {
-                let mut parameters = vec![2.0, x, v, strength];
+                let mut parameters = vec![2.0, x, v, parameter];
                 parameters.resize(model.interface().parameters.len(), 0.0);
                 parameters
             };
@@ -329,8 +329,8 @@ fn bodies_with_bearings_take_forces_at_every_joint() {
                 ("viscous-friction", "joint:theta"),
             ],
         );
-        let strengths = [("e0.c", 0.012), ("e1.c", 0.001), ("e2.d", 0.001)];
-        let (added, _) = pushed(&added, &[&bodies[..], third, &strengths].concat(), signals);
+        let parameters = [("e0.c", 0.012), ("e1.c", 0.001), ("e2.d", 0.001)];
+        let (added, _) = pushed(&added, &[&bodies[..], third, &parameters].concat(), signals);
         assert!(apart(&own, &added) < 1e-7, "{kind}: {}", apart(&own, &added));
     }
 }

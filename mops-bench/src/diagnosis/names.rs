@@ -111,7 +111,7 @@ mod tests {
                         strengths: parameters.to_vec(),
                     };
                     for (strength, _) in strengths(&truth) {
-                        assert!(known.strengths().iter().any(|s| s.name == strength), "{name} has no `{strength}`");
+                        assert!(known.parameters().iter().any(|s| s.name == strength), "{name} has no `{strength}`");
                     }
                 }
             }
