@@ -62,6 +62,12 @@ fn demand(text: &str) -> Result<(String, String), String> {
 pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let front = front(&arguments.folder)?;
     let path = arguments.study.clone().unwrap_or_else(|| arguments.folder.join("study.toml"));
+    if arguments.study.is_none() && !path.is_file() {
+        let fact = format!("the folder `{}` has no study.toml whose demands could change", arguments.folder.display());
+        return Err(Diagnostic::new(fact)
+            .with_help("name the study of the front with --study; change the demands of a study built in Rust there")
+            .into());
+    }
     let out = output_path(arguments)?;
     let open = |settings: Vec<String>| {
         let study = StudyArguments { study: path.display().to_string(), settings };

@@ -161,6 +161,11 @@ pub(super) fn read_at(
             return mops_core::file::read(catalogue, &format!("{name}/study.toml"), text, settings, shipped);
         }
         Some(CatalogueStudy::Built(built)) => return mops_core::file::built(catalogue, built, settings),
+        // Only a study built in Rust has no text.
+        None if text.trim().is_empty() => {
+            return Err(Diagnostic::new(format!("this program has no study `{name}`, which was built in Rust"))
+                .with_help("use the program that made the run"));
+        }
         _ => {}
     }
     let folder = home.parent().unwrap_or(Path::new("")).to_owned();

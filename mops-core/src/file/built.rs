@@ -70,9 +70,7 @@ fn read(catalogue: &Catalogue, built: &BuiltStudy, text: &Arc<Text>) -> Result<S
     for (name, node) in root.table("tuners")? {
         set_tuner(&mut draft, &name, &node)?;
     }
-    if tasks::TABLES.iter().any(|table| root.child(table).is_some()) {
-        draft.tasks = tasks::read(&root, catalogue)?;
-    }
+    tasks::read(&root, catalogue, &mut draft.tasks)?;
     let (solver, max_evaluations) = read_solver(catalogue, &root)?;
     let study = draft.build().map_err(|mistake| {
         let located = root.locate(&mistake);

@@ -194,7 +194,7 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
     for (name, node) in root.table("criteria")? {
         draft.criteria.push((name, read_criterion(catalogue, &node)?));
     }
-    draft.tasks = tasks::read(&root, catalogue)?;
+    tasks::read(&root, catalogue, &mut draft.tasks)?;
     let (solver, max_evaluations) = read_solver(catalogue, &root)?;
     let mut study = draft.build().map_err(|mistake| root.locate(&mistake))?;
     study.notes.extend(tasks::unused(&root, study.task));

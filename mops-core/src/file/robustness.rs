@@ -148,6 +148,7 @@ pub(super) enum AllOrSome {
 /// Reads the tables; absent tables have their defaults.
 pub(super) fn read(root: &Node<'_>, tasks: &mut TasksBuilder) -> Result<(), Diagnostic> {
     for (name, node) in root.table("uncertain")? {
+        tasks.uncertain.retain(|(known, _)| *known != name);
         tasks.uncertain.push((name, uncertain(&node)?));
     }
     if let Some(node) = root.child("worst-case") {

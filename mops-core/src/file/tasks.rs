@@ -157,8 +157,7 @@ pub(super) fn unused(root: &Node<'_>, task: Task) -> Vec<String> {
 }
 
 /// Reads the tables of all tasks; absent tables have their defaults.
-pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksBuilder, Diagnostic> {
-    let mut tasks = TasksBuilder::default();
+pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue, tasks: &mut TasksBuilder) -> Result<(), Diagnostic> {
     if let Some(node) = root.child("excitation") {
         let section: ExcitationSection = node.read()?;
         let regression = |(name, r): (String, RegressionSection)| {
@@ -203,8 +202,7 @@ pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue) -> Result<TasksBuilde
         let ParetoSection { points } = node.read()?;
         tasks.pareto = ParetoTask { points: points.unwrap_or(ParetoTask::default().points) };
     }
-    robustness::read(root, &mut tasks)?;
-    Ok(tasks)
+    robustness::read(root, tasks)
 }
 
 /// Rejects names that are not effects of the catalogue.
