@@ -95,14 +95,19 @@ pub fn catalogue() -> Catalogue {
     }
 }
 
-/// Runs the command line with a catalogue, as a program with the name and version of the calling crate:
+/// Runs the command line with a catalogue, as a program with the name of the calling binary and its version:
 /// `fn main() -> std::process::ExitCode { mops::main!(my_mops::catalogue()) }`.
 #[cfg(feature = "cli")]
 #[macro_export]
 macro_rules! main {
-    ($catalogue:expr) => {
-        $crate::main_as($catalogue, env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))
-    };
+    ($catalogue:expr) => {{
+        // Cargo names the binary; elsewhere, as in a doctest, the package has the name.
+        const NAME: &str = match option_env!("CARGO_BIN_NAME") {
+            Some(name) => name,
+            None => env!("CARGO_PKG_NAME"),
+        };
+        $crate::main_as($catalogue, NAME, env!("CARGO_PKG_VERSION"))
+    }};
 }
 
 /// Runs the command line with a catalogue, as a program of this name and version; see [`main!`].

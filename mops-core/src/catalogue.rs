@@ -169,11 +169,6 @@ impl Catalogue {
         self
     }
 
-    /// Returns the digest of the program under its name in the identity of a run.
-    pub(crate) fn program_digest(&self) -> Option<(String, String)> {
-        self.program.clone().map(|digest| ("program".to_owned(), digest))
-    }
-
     /// Adds an effect, as in `catalogue.with_effect(effect::<EddyBrake>())`.
     #[must_use]
     pub fn with_effect(mut self, effect: Arc<dyn Effect>) -> Self {
@@ -189,14 +184,14 @@ impl Catalogue {
     }
 
     /// Adds a study: files in the program ([`crate::Shipped`]), a folder ([`crate::StudyFolder`]), or one built in Rust
-    /// ([`crate::BuiltStudy`]). Its name is its own: see [`Self::check_names`].
+    /// ([`crate::BuiltStudy`]). Names must be unique: see [`Self::check_names`].
     #[must_use]
     pub fn with_study(mut self, study: impl Into<CatalogueStudy>) -> Self {
         self.studies.push(study.into());
         self
     }
 
-    /// Checks that no two kinds of one sort and no two studies have the same name; the command line does so first.
+    /// Checks that no two kinds of one sort and no two studies have the same name; the command line calls it before every command.
     ///
     /// # Errors
     /// Returns an error that names the two.
@@ -209,16 +204,17 @@ impl Catalogue {
         ];
         for (sort, names) in sorts {
             if let Some([first, _]) = twice(&names) {
-                return Err(Diagnostic::new(format!("two {sort} of the catalogue are named `{}`", names[first]))
-                    .with_help("rename one of them: studies name them by their kinds"));
+                return Err(Diagnostic::new(format!("the catalogue has two {sort} named `{}`", names[first]))
+                    .with_help("rename one of them: a study selects a kind by its name"));
             }
         }
         let names: Vec<&str> = self.studies.iter().map(CatalogueStudy::name).collect();
         match twice(&names) {
             Some([first, second]) => {
                 let [a, b] = [first, second].map(|index| self.studies[index].origin());
-                Err(Diagnostic::new(format!("two studies are named `{}`: one {a}, one {b}", names[first]))
-                    .with_help("rename one of them: for a folder, `name` in the [study] of its study.toml"))
+                Err(Diagnostic::new(format!("two studies are named `{}`: one {a}, one {b}", names[first])).with_help(
+                    "rename one of them; the name of a study in a folder is `name` in [study] of its study.toml",
+                ))
             }
             None => Ok(()),
         }

@@ -13,7 +13,7 @@ use crate::study_error::StudyError;
 /// An effect at a place of a model, as written in a study and not yet checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EffectBuilder {
-    /// Name of the effect in the model; its parameters are called `name.strength`.
+    /// Name of the effect in the model; its parameters are called `name.parameter`.
     pub name: String,
     /// Kind of effect.
     pub kind: String,
@@ -56,7 +56,7 @@ impl EffectBuilder {
 }
 
 impl ModelBuilder {
-    /// Adds effects at places of the model; each effect parameter is a model parameter `name.strength`.
+    /// Adds effects at places of the model; each effect parameter is a model parameter `name.parameter`.
     ///
     /// # Errors
     /// Returns an error as [`Catalogue::with_effects`] does.
@@ -66,7 +66,7 @@ impl ModelBuilder {
 }
 
 impl Catalogue {
-    /// Returns a model with effects at its places. Each effect parameter is a model parameter `name.strength`, at its null
+    /// Returns a model with effects at its places. Each effect parameter is a model parameter `name.parameter`, at its null
     /// value by default.
     ///
     /// # Errors

@@ -252,7 +252,7 @@ pub trait Opening: Scalar {
     /// Returns an error as these functions do.
     fn open<'a>(model: &'a dyn Open, parameters: &'a [Self]) -> Result<Box<dyn Plant<Self> + 'a>, Failure>;
 
-    /// Calls [`crate::Effect::act`] or [`crate::Effect::bind_dual`].
+    /// Calls [`crate::Effect::bind`] or [`crate::Effect::bind_dual`].
     fn bind(effect: &dyn crate::Effect, parameters: &[Self]) -> Box<dyn crate::BoundEffect<Self>>;
 }
 

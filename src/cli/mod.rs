@@ -60,7 +60,7 @@ failed; 4 stopped by a signal, with the best point saved."
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Folder of studies, each a folder with study.toml, found by the name in it; adds to the folders in MOPS_STUDIES.
+    /// Folder that contains studies, one subfolder with study.toml each; adds to the folders in MOPS_STUDIES.
     #[arg(long = "studies", value_name = "DIR", global = true, help_heading = "Global options")]
     studies: Vec<PathBuf>,
 }
@@ -111,7 +111,10 @@ pub(crate) fn main(mut catalogue: Catalogue, name: &'static str, version: &'stat
     let mut program = Arguments::command().name(name).version(version);
     if name != "mops" {
         program = program.version(format!("{version} (mops {})", env!("CARGO_PKG_VERSION")).leak() as &str);
-        catalogue.program = study::digest_of_program();
+        catalogue.program = match study::digest_of_program() {
+            Ok(digest) => Some(digest),
+            Err(mistake) => return CommandError::from(mistake).report(),
+        };
     }
     let arguments = Arguments::from_arg_matches(&program.clone().get_matches());
     let Arguments { command, studies } = arguments.unwrap_or_else(|error| error.exit());

@@ -63,9 +63,11 @@ pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     let front = front(&arguments.folder)?;
     let path = arguments.study.clone().unwrap_or_else(|| arguments.folder.join("study.toml"));
     if arguments.study.is_none() && !path.is_file() {
-        let fact = format!("the folder `{}` has no study.toml whose demands could change", arguments.folder.display());
+        let fact = format!("there is no study.toml in `{}`", arguments.folder.display());
         return Err(Diagnostic::new(fact)
-            .with_help("name the study of the front with --study; change the demands of a study built in Rust there")
+            .with_help(
+                "pass the study file with --study; change the demands of a study built in Rust in its source code",
+            )
             .into());
     }
     let out = output_path(arguments)?;

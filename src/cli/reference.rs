@@ -84,7 +84,8 @@ fn the_page_of_effects_shows_the_catalogue() {
 
 #[test]
 fn the_page_of_the_command_line_shows_the_help() {
-    let mut command = Arguments::command();
+    // Not the width of the terminal that runs the test.
+    let mut command = Arguments::command().term_width(100);
     command.build();
     let help = |command: &mut clap::Command| command.render_long_help().to_string();
     let mut page = format!("## mops\n\n```text\n{}```\n", help(&mut command));

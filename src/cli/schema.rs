@@ -10,8 +10,8 @@ use mops_core::Catalogue;
 /// Arguments of `mops schema`.
 #[derive(Args)]
 pub(super) struct Arguments {
-    /// File whose schema is printed.
-    #[arg(value_enum, default_value = "study")]
+    /// File to print the schema of.
+    #[arg(value_enum, value_name = "FILE", default_value = "study")]
     of: File,
 }
 

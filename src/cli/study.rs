@@ -99,10 +99,16 @@ pub(super) fn text_of(study: &CatalogueStudy, name: &str) -> Option<String> {
     }
 }
 
-/// Returns the digest of this program: another build may compute other values. Empty if it cannot be read.
-pub(super) fn digest_of_program() -> Option<String> {
-    let bytes = std::env::current_exe().and_then(std::fs::read);
-    Some(bytes.map_or_else(|_| String::new(), |bytes| mops_core::file::digest(&bytes)))
+/// Returns the digest of this program: another build may compute other values.
+///
+/// # Errors
+/// If the program cannot be read.
+pub(super) fn digest_of_program() -> Result<String, Diagnostic> {
+    let bytes = std::env::current_exe().and_then(std::fs::read).map_err(|error| {
+        Diagnostic::new(format!("cannot read this program, whose digest identifies its runs: {error}"))
+            .with_help("give the user read permission for it")
+    })?;
+    Ok(mops_core::file::digest(&bytes))
 }
 
 /// Adds the studies in `folders` to the catalogue: every subfolder that has a `study.toml`. A folder that is given twice is

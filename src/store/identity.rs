@@ -14,6 +14,9 @@ pub(crate) struct Identity {
     study: Value,
     /// Data files, with a digest of their bytes.
     data: Vec<(String, String)>,
+    /// Digest of the program, if its own code computes values.
+    #[serde(default)]
+    program: Option<String>,
     /// Names of the tuners, in order.
     tuners: Vec<String>,
     /// Names of the rows, in order.
@@ -53,6 +56,7 @@ impl Identity {
             mops: env!("CARGO_PKG_VERSION").to_owned(),
             study: file.content.clone(),
             data: file.data.clone(),
+            program: file.program.clone(),
             tuners: study.tuners().iter().map(|tuner| tuner.name.clone()).collect(),
             rows: study.rows().iter().map(|row| study.key(row)).collect(),
             uncertain: study.tasks().uncertain.iter().map(|u| format!("{}[{}]", u.name, u.unit)).collect(),
@@ -95,7 +99,7 @@ impl Difference {
         let path: Vec<&str> = self.path.iter().map(String::as_str).collect();
         match path.as_slice() {
             ["study", "solver", "max-evaluations"] => Meaning::Budget,
-            ["study", "models" | "cases", ..] | ["mops" | "data" | "rows", ..] => Meaning::Values,
+            ["study", "models" | "cases", ..] | ["mops" | "data" | "program" | "rows", ..] => Meaning::Values,
             ["tuners", ..] => Meaning::Values,
             ["study", "experiments", _, "role"] => Meaning::Path,
             ["study", "experiments", ..] => Meaning::Values,
@@ -113,7 +117,7 @@ impl Difference {
         let path: Vec<&str> = self.path.iter().map(String::as_str).collect();
         let name = match path.as_slice() {
             ["study", rest @ ..] => rest.join("."),
-            ["data", ..] if self.before.contains("program") => {
+            ["program"] => {
                 return "the program was rebuilt, and its own models, criteria or studies may have changed".to_owned();
             }
             ["data", ..] => return "a data file has changed".to_owned(),

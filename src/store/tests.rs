@@ -76,6 +76,15 @@ fn every_setting_of_a_study_built_in_rust_makes_another_run() {
         let why = plain.refuses_to_continue(&identity(&[setting])).unwrap_or_default();
         assert!(why.contains(key.split('.').next().unwrap()), "{setting}: {why}");
     }
+    let changed = |data: &str, program: &str| {
+        let mut file = built(&[]);
+        (file.data, file.program) = (vec![("d.csv".to_owned(), data.to_owned())], Some(program.to_owned()));
+        Identity::of(&file, &file.study, file.solver.kind)
+    };
+    let reason = |data: &str, program: &str| changed("1", "1").refuses_to_reuse(&changed(data, program));
+    assert_eq!(reason("1", "1"), None);
+    assert_eq!(reason("2", "1").as_deref(), Some("a data file has changed"));
+    assert!(reason("1", "2").is_some_and(|why| why.starts_with("the program was rebuilt")));
     // A demand reads as in a study file.
     let content = &built(&[]).content;
     assert_eq!(content["criteria"]["end"], serde_json::json!({ "demand": 10.0, "usage": "minimise", "weight": 1.0 }));

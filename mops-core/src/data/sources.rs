@@ -38,7 +38,8 @@ pub fn source_of(path: &Path, shown: &str, bytes: Vec<u8>) -> Result<Option<Stri
     for (key, value) in table.into_inner() {
         let (name, place) = (key.get_ref(), key.span());
         let entry = Entry::deserialize(ValueDeserializer::from(value));
-        let entry = entry.map_err(|_| wrong(place, format!("the entry `{name}` lacks a `source` or a `sha256`")))?;
+        let entry =
+            entry.map_err(|_| wrong(place, format!("the entry `{name}` needs the strings `source` and `sha256`")))?;
         if path.file_name().is_some_and(|file| file == name.as_ref()) {
             found = Some(format!("it is not included; source: {}; SHA-256: {}", entry.source, entry.sha256));
         }
@@ -66,7 +67,7 @@ mod tests {
     fn a_broken_list_is_reported_with_its_line() {
         let start = |sources| found("a.mat", sources).unwrap_err();
         let fact = "no data file `a.mat`, and its source cannot be looked up";
-        let lacks = format!("sources.toml:2:1: {fact}: the entry `b.mat` lacks a `source` or a `sha256`; ");
+        let lacks = format!("sources.toml:2:1: {fact}: the entry `b.mat` needs the strings `source` and `sha256`; ");
         assert!(start("# Data\n\"b.mat\" = 3").starts_with(&lacks), "{}", start("# Data\n\"b.mat\" = 3"));
         let invalid = start("[\"a.mat\"]\nsource = somewhere\n");
         assert!(invalid.starts_with(&format!("sources.toml:2:10: {fact}: invalid TOML: ")), "{invalid}");

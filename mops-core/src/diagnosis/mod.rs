@@ -145,7 +145,7 @@ pub struct Ranked {
     pub probability: f64,
     /// Decrease of the BIC when the effect is added.
     pub bic_gain: f64,
-    /// Its strengths.
+    /// Estimates of its parameters.
     pub strengths: Vec<StrengthValue>,
     /// Share of the effect's output signature that parameters and initial states absorb.
     pub absorbed: f64,

@@ -42,8 +42,8 @@ struct TunerSettings {
 }
 
 /// Builds a study and applies `settings`, which are `key=value` pairs: `study.task`, `study.objective`, `study.seed`, `start`, `min`
-/// and `max` of tuners, `solver`, and the tables of tasks. `program` identifies the program that builds the study: stored
-/// evaluations of another program are not reused.
+/// and `max` of tuners, `solver`, and the tables of tasks. The identity of a run includes [`Catalogue::program`]:
+/// stored evaluations of another build are not reused.
 ///
 /// # Errors
 /// The first mistake, in the settings or in the study.
@@ -55,10 +55,10 @@ pub fn built(catalogue: &Catalogue, study: &BuiltStudy, settings: &[String]) -> 
 fn read(catalogue: &Catalogue, built: &BuiltStudy, text: &Arc<Text>) -> Result<StudyFile, Diagnostic> {
     let root = text.parse()?;
     root.check_keys(&[&["study", "tuners", "solver"][..], &tasks::TABLES[..]].concat())
-        .map_err(|mistake| mistake.with_help("a study built in Rust is changed there"))?;
+        .map_err(|mistake| mistake.with_help("change everything else in the source code of the study"))?;
     let mut draft = caught(|| built.draft()).map_err(|why| {
         Diagnostic::new(format!("the function that builds the study `{}` {why}", built.name()))
-            .with_help("correct the function: the report of the panic names its line")
+            .with_help("correct the function; the panic message on standard error shows the line")
     })?;
     draft.name = built.name().to_owned();
     if let Some(node) = root.child("study") {
@@ -86,7 +86,8 @@ fn read(catalogue: &Catalogue, built: &BuiltStudy, text: &Arc<Text>) -> Result<S
         solver,
         max_evaluations,
         source: Arc::clone(text.source()),
-        data: catalogue.program_digest().into_iter().collect(),
+        data: Vec::new(),
+        program: catalogue.program.clone(),
         text: Arc::clone(text),
     })
 }

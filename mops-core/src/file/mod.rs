@@ -131,6 +131,8 @@ pub struct StudyFile {
     pub content: serde_json::Value,
     /// Data files that were read: names as in the study, and digests of their bytes.
     pub data: Vec<(String, String)>,
+    /// Digest of the program, if its own code computes values or builds the study ([`Catalogue::program`]).
+    pub program: Option<String>,
     text: Arc<Text>,
 }
 
@@ -199,7 +201,7 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
     let mut study = draft.build().map_err(|mistake| root.locate(&mistake))?;
     study.notes.extend(tasks::unused(&root, study.task));
     let content = content::of(root.value());
-    let data = files.digests().into_iter().chain(catalogue.program_digest()).collect();
+    let data = files.digests();
     Ok(StudyFile {
         study,
         solver,
@@ -207,6 +209,7 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
         source: Arc::clone(text.source()),
         content,
         data,
+        program: catalogue.program.clone(),
         text: Arc::clone(text),
     })
 }
