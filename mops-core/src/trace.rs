@@ -242,6 +242,11 @@ impl Trace {
         sum
     }
 
+    /// Returns true if the trace is finite throughout.
+    pub fn is_finite(&self) -> bool {
+        self.segments.iter().all(|c| c.iter().all(|c| c.is_finite())) && self.jumped.is_none_or(f64::is_finite)
+    }
+
     /// Returns the integral of `f(t, |y - level|)` by the quadrature of [`Trace::integral`]. Segments are split at crossings
     /// of `level`, so that the kink of the absolute value costs no accuracy.
     pub fn integral_of_deviation(&self, level: f64, f: impl Fn(f64, f64) -> f64) -> f64 {

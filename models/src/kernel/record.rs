@@ -108,8 +108,11 @@ const HALVINGS: u32 = 12;
 const LONGER: f64 = 1.2;
 
 /// Weights of the values at [`Trace::NODES`] in the derivative of their quartic at the first node, for a step of unit
-/// length. At the last node the weights are reversed, with opposite sign.
+/// length.
 const SLOPE: [f64; 5] = [-25.0 / 3.0, 16.0, -12.0, 16.0 / 3.0, -1.0];
+
+/// Weights at the last node: reversed, with opposite sign.
+const END_SLOPE: [f64; 5] = [1.0, -16.0 / 3.0, 12.0, -16.0, 25.0 / 3.0];
 
 /// Weights of the values at [`Trace::NODES`] in their quartic at [`CHECK`]: Lagrange's basis. Reversed, they apply at
 /// the same distance from the end.
@@ -158,10 +161,10 @@ impl<S: Scalar> Recorder<'_, S> {
     /// longer than all compared ones, or the derivative of the quartic does not continue that of the last one within
     /// tolerance.
     fn must_compare(&mut self, index: usize, length: f64, values: &[S; 5]) -> bool {
-        let slope = |weight: &dyn Fn(usize) -> f64| (0..5).map(|k| weight(k) * values[k].value()).sum::<f64>() / length;
-        let begin = slope(&|k| SLOPE[k]);
+        let slope = |weights: [f64; 5]| (0..5).map(|k| weights[k] * values[k].value()).sum::<f64>() / length;
+        let begin = slope(SLOPE);
         let off = (begin - self.resolved[index].slope).abs() * length;
-        self.resolved[index].slope = slope(&|k| -SLOPE[4 - k]);
+        self.resolved[index].slope = slope(END_SLOPE);
         length > LONGER * self.resolved[index].longest || off.is_nan() || off > self.allowed(index, largest(values))
     }
 
