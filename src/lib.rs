@@ -106,13 +106,13 @@ macro_rules! main {
             Some(name) => name,
             None => env!("CARGO_PKG_NAME"),
         };
-        $crate::main_as($catalogue, NAME, env!("CARGO_PKG_VERSION"))
+        $crate::main_as($catalogue, [env!("CARGO_PKG_NAME"), NAME], env!("CARGO_PKG_VERSION"))
     }};
 }
 
-/// Runs the command line with a catalogue, as a program of this name and version; see [`main!`].
+/// Runs the command line with a catalogue, as a program of this package, name and version; see [`main!`].
 #[cfg(feature = "cli")]
 #[doc(hidden)]
-pub fn main_as(catalogue: Catalogue, name: &'static str, version: &'static str) -> std::process::ExitCode {
-    cli::main(catalogue, name, version)
+pub fn main_as(catalogue: Catalogue, names: [&'static str; 2], version: &'static str) -> std::process::ExitCode {
+    cli::main(catalogue, names, version)
 }

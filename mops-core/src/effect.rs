@@ -392,8 +392,8 @@ pub trait BoundEffect<S: Scalar> {
         f64::INFINITY
     }
 
-    /// Updates the hysteresis state ([`Effect::hysteresis_states`]), which is NaN before the first update. Called at an actuator before
-    /// and after each jump of the command or of its derivative, at a sensor along the simulation.
+    /// Updates the hysteresis state ([`Effect::hysteresis_states`]), which is NaN before the first update. Called at an
+    /// actuator before and after each jump of the command or of its derivative, at a sensor along the simulation.
     fn update_hysteresis(&self, _at: &PortState<'_, S>, _memory: &mut [S]) {}
 
     /// Returns the output, as [`BoundEffect::value`], for an effect with a hysteresis state.

@@ -104,20 +104,23 @@ enum Command {
     },
 }
 
-/// Parses the command line of a program and runs the command. A program other than `mops` has code of its own: its version
-/// names that of mops too, and its digest is part of the identity of runs.
-pub(crate) fn main(mut catalogue: Catalogue, name: &'static str, version: &'static str) -> ExitCode {
+/// Parses the command line of a program and runs the command. A program of another package than `mops`, whatever its name, has
+/// code of its own: its version names that of mops too, and its digest is part of the identity of runs.
+pub(crate) fn main(mut catalogue: Catalogue, [package, name]: [&'static str; 2], version: &'static str) -> ExitCode {
     show_each_panic_once();
     let mut program = Arguments::command().name(name).version(version);
-    if name != "mops" {
+    let has_own_code = package != env!("CARGO_PKG_NAME");
+    if has_own_code {
         program = program.version(format!("{version} (mops {})", env!("CARGO_PKG_VERSION")).leak() as &str);
+    }
+    let arguments = Arguments::from_arg_matches(&program.clone().get_matches());
+    let Arguments { command, studies } = arguments.unwrap_or_else(|error| error.exit());
+    if has_own_code {
         catalogue.program = match study::digest_of_program() {
             Ok(digest) => Some(digest),
             Err(mistake) => return CommandError::from(mistake).report(),
         };
     }
-    let arguments = Arguments::from_arg_matches(&program.clone().get_matches());
-    let Arguments { command, studies } = arguments.unwrap_or_else(|error| error.exit());
     let of_environment = std::env::var_os("MOPS_STUDIES").unwrap_or_default();
     let folders = std::env::split_paths(&of_environment).filter(|path| !path.as_os_str().is_empty()).chain(studies);
     match study::with_folders(catalogue, &folders.collect::<Vec<_>>()) {

@@ -145,7 +145,7 @@ pub(super) enum AllOrSome {
     Some(Vec<String>),
 }
 
-/// Reads the tables; absent tables have their defaults.
+/// Reads the tables into `tasks`; absent tables leave it as it is.
 pub(super) fn read(root: &Node<'_>, tasks: &mut TasksBuilder) -> Result<(), Diagnostic> {
     for (name, node) in root.table("uncertain")? {
         tasks.uncertain.retain(|(known, _)| *known != name);

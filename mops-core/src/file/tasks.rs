@@ -156,7 +156,7 @@ pub(super) fn unused(root: &Node<'_>, task: Task) -> Vec<String> {
     unused.map(|table| format!("[{table}] is not used by the task {word}")).collect()
 }
 
-/// Reads the tables of all tasks; absent tables have their defaults.
+/// Reads the tables of all tasks into `tasks`; absent tables leave it as it is.
 pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue, tasks: &mut TasksBuilder) -> Result<(), Diagnostic> {
     if let Some(node) = root.child("excitation") {
         let section: ExcitationSection = node.read()?;
