@@ -425,7 +425,7 @@ impl<S: Scalar> Plant<S> for Loop<S> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
         let (r, y) = (at.u[0], self.output(at.x));
         match signal {

@@ -158,26 +158,50 @@ impl Trace {
     /// Returns the monotone pieces, in order of time: every extremum and every jump lies at the ends of pieces.
     pub fn pieces(&self) -> Vec<Piece> {
         let mut pieces = Vec::with_capacity(self.segments.len());
-        for (segment, c) in self.segments.iter().enumerate() {
-            let (t0, h) = (self.knots[segment], self.knots[segment + 1] - self.knots[segment]);
-            let mut add = |from: f64, to: f64| {
-                pieces.push(Piece {
-                    time: [t0 + from * h, if to == 1.0 { self.knots[segment + 1] } else { t0 + to * h }],
-                    value: [polynomial(c, from), polynomial(c, to)],
-                    segment,
-                    within: [from, to],
-                });
-            };
-            let mut from = 0.0;
-            for extremum in cubic_roots([c[1], 2.0 * c[2], 3.0 * c[3], 4.0 * c[4]]) {
-                if extremum > from {
-                    add(from, extremum);
-                    from = extremum;
-                }
-            }
-            add(from, 1.0);
+        for segment in 0..self.segments.len() {
+            self.pieces_of(segment, |piece| pieces.push(piece));
         }
         pieces
+    }
+
+    /// Returns the last monotone piece with a property.
+    pub fn last_piece(&self, has: impl Fn(&Piece) -> bool) -> Option<Piece> {
+        let mut last = None;
+        for segment in (0..self.segments.len()).rev() {
+            self.pieces_of(segment, |piece| {
+                if has(&piece) {
+                    last = Some(piece);
+                }
+            });
+            if last.is_some() {
+                break;
+            }
+        }
+        last
+    }
+
+    /// Passes on the monotone pieces of a segment, in order of time.
+    #[inline(always)]
+    fn pieces_of(&self, segment: usize, mut add: impl FnMut(Piece)) {
+        let c = &self.segments[segment];
+        let (t0, t1) = (self.knots[segment], self.knots[segment + 1]);
+        let h = t1 - t0;
+        let mut add = |from: f64, to: f64| {
+            add(Piece {
+                time: [t0 + from * h, if to == 1.0 { t1 } else { t0 + to * h }],
+                value: [polynomial(c, from), polynomial(c, to)],
+                segment,
+                within: [from, to],
+            });
+        };
+        let mut from = 0.0;
+        for extremum in cubic_roots([c[1], 2.0 * c[2], 3.0 * c[3], 4.0 * c[4]]) {
+            if extremum > from {
+                add(from, extremum);
+                from = extremum;
+            }
+        }
+        add(from, 1.0);
     }
 
     /// Returns the time within a monotone piece at which the trace crosses `level`; `None` if it does not.
@@ -204,12 +228,14 @@ impl Trace {
 
     fn extremum(&self, better: impl Fn(f64, f64) -> bool) -> (f64, f64) {
         let mut best = (self.first(), self.start());
-        for piece in self.pieces() {
-            for end in 0..2 {
-                if better(piece.value[end], best.0) {
-                    best = (piece.value[end], piece.time[end]);
+        for segment in 0..self.segments.len() {
+            self.pieces_of(segment, |piece| {
+                for (value, time) in piece.value.into_iter().zip(piece.time) {
+                    if better(value, best.0) {
+                        best = (value, time);
+                    }
                 }
-            }
+            });
         }
         match self.jumped {
             Some(value) if better(value, best.0) => (value, self.end()),

@@ -155,14 +155,13 @@ impl Answer<'_> {
     pub fn last_outside(&self, band: f64) -> Option<f64> {
         let (low, high) = (self.target - band, self.target + band);
         let is_outside = |y: f64| y < low || y > high;
-        let pieces = self.trace.pieces();
-        let last = pieces.iter().rev().find(|piece| piece.value.into_iter().any(is_outside))?;
+        let last = self.trace.last_piece(|piece| piece.value.into_iter().any(is_outside))?;
         if is_outside(last.value[1]) {
             return Some(last.time[1]);
         }
         // The piece is monotone: it enters across the edge beyond which it starts.
         let edge = if last.value[0] > high { high } else { low };
-        Some(self.trace.crossing(last, edge).unwrap_or(last.time[0]))
+        Some(self.trace.crossing(&last, edge).unwrap_or(last.time[0]))
     }
 
     /// Returns true if the response, within `band` of the target since `time` (s), appears to stay there after the end.
@@ -179,13 +178,10 @@ impl Answer<'_> {
         {
             return true;
         }
-        let moves = self.trace.pieces().into_iter().filter(|piece| piece.time[1] > time).map(|piece| {
-            let [from, to] = piece.value;
-            // A reversal at rounding level is ignored.
-            if (to - from).abs() <= TURN * band { 0.0 } else { (to - from).signum() }
-        });
-        let moves: Vec<f64> = moves.filter(|direction| *direction != 0.0).collect();
-        moves.windows(2).any(|pair| pair[0] != pair[1])
+        let since = self.trace.pieces().into_iter().rev().take_while(|piece| piece.time[1] > time);
+        // A reversal at rounding level is ignored.
+        let mut moves = since.map(|piece| piece.value[1] - piece.value[0]).filter(|y| y.abs() > TURN * band);
+        moves.next().is_some_and(|last| moves.any(|earlier| earlier.signum() != last.signum()))
     }
 
     /// Adds a note if the target is the last value and the response does not appear to stay within 2 % of the step

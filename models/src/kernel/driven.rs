@@ -93,7 +93,7 @@ impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
         self.plant.rates(&Instant { t, x, u: &inputs, w: &self.forces }, dx);
     }
 
-    #[inline]
+    #[inline(always)]
     fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
         self.look(t, x, |plant, at| plant.signal(signal, at))
     }

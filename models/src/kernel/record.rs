@@ -160,6 +160,7 @@ impl<S: Scalar> Recorder<'_, S> {
     /// Returns true if the quartic of a step of this length must be compared with the signal. Reasons: the step is
     /// longer than all compared ones, or the derivative of the quartic does not continue that of the last one within
     /// tolerance.
+    #[inline]
     fn must_compare(&mut self, index: usize, length: f64, values: &[S; 5]) -> bool {
         let slope = |weights: [f64; 5]| (0..5).map(|k| weights[k] * values[k].value()).sum::<f64>() / length;
         let begin = slope(SLOPE);

@@ -95,6 +95,9 @@ fn states_of<S: Scalar, const N: usize>(dense: &[Vec<S>; 5], thetas: &[f64], sta
 fn state_of<S: Scalar, const N: usize>([r0, r1, r2, r3, r4]: &[Vec<S>; 5], theta: f64, x: &mut [S]) {
     let n = if N == 0 { x.len() } else { N };
     let (x, r0, r1, r2, r3, r4) = (&mut x[..n], &r0[..n], &r1[..n], &r2[..n], &r3[..n], &r4[..n]);
+    if theta == 0.0 {
+        return x.copy_from_slice(r0);
+    }
     for j in 0..n {
         x[j] = value([r0[j], r1[j], r2[j], r3[j], r4[j]], theta);
     }
