@@ -7,6 +7,7 @@ mod brute_force;
 mod candidate;
 mod diagnose;
 mod drawn;
+pub mod error_models;
 mod family;
 mod fit;
 mod gap;

@@ -26,6 +26,7 @@ pub mod file;
 pub mod front;
 pub mod identification;
 mod known;
+mod least_squares;
 pub mod linear;
 mod linearised;
 mod model;
@@ -75,6 +76,7 @@ pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
 pub use failure::Failure;
 pub use known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes, RowValue, Store};
+pub use least_squares::{LeastSquares, LeastSquaresStep};
 pub use linear::StateSpace;
 pub use linearised::{Linearise, Linearised, Resting, Rough};
 pub use model::{

@@ -1,7 +1,6 @@
 //! Levenberg-Marquardt method for sums of squares, with bounds and multistart.
 
-use mops_core::math;
-use mops_core::{Halt, Linearisation, Oracle, Progress, Shape, Solver, SolverOptions};
+use mops_core::{Halt, LeastSquares, Linearisation, Oracle, Progress, Shape, Solver, SolverOptions};
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -14,7 +13,7 @@ use crate::start::usable_start;
 /// (J'J + lambda D^2) d = -J'r,   D^2 the largest diagonal of J'J so far
 /// ```
 /// Bounds are handled by an active set: tuners that the step would move beyond a bound are fixed there, and the step is
-/// recomputed.
+/// recomputed. See [`LeastSquares`].
 ///
 /// The method runs from the initial guess of the study, then from the best points of a sample of the box. It then
 /// restarts around the best point, until two rounds in succession improve it by less than a thousandth.
@@ -99,13 +98,7 @@ struct Local {
 }
 
 struct State {
-    iterate: Linearisation,
-    jacobian: DMatrix<f64>,
-    residuals: DVector<f64>,
-    /// Squared scale of every coordinate.
-    scale: DVector<f64>,
-    damping: f64,
-    damping_growth: f64,
+    iterate: LeastSquares,
     iterations: usize,
     /// Number of successive steps with negligible decrease.
     stalled_steps: usize,
@@ -121,52 +114,34 @@ impl Solver for Local {
         let Some(start) = usable_start(oracle, start)? else { return Ok(()) };
         let Some(at) = oracle.linearise(&start, 1.0)? else { return Ok(()) };
         let (jacobian, residuals) = matrices(&at);
-        let scale = DVector::from_iterator(start.len(), jacobian.column_iter().map(|c| c.norm_squared().max(1e-30)));
-        self.state = Some(State {
-            iterate: at,
-            jacobian,
-            residuals,
-            scale,
-            damping: 1e-3,
-            damping_growth: 2.0,
-            iterations: 0,
-            stalled_steps: 0,
-        });
+        let iterate = LeastSquares::new(vec![[0.0, 1.0]; start.len()], at.at.point, residuals, jacobian);
+        self.state = Some(State { iterate, iterations: 0, stalled_steps: 0 });
         Ok(())
     }
 
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
         state.iterations += 1;
-        if state.iterate.at.point.is_empty() {
+        if state.iterate.point().is_empty() {
             return Ok(Progress::Converged);
         }
         if state.iterations > self.options.max_iterations {
             return Ok(Progress::Stalled);
         }
-        let sum = state.residuals.norm_squared();
-        let Some(step) = state.bounded_step() else { return Ok(Progress::Stalled) };
-        let predicted = sum - (&state.residuals + &state.jacobian * &step).norm_squared();
-        if predicted <= self.options.tolerance * sum {
+        let sum = state.iterate.sum();
+        let Some(step) = state.iterate.step() else { return Ok(Progress::Stalled) };
+        if step.predicted <= self.options.tolerance * sum {
             return Ok(state.termination());
         }
-        let point: Vec<f64> = state.iterate.at.point.iter().zip(&step).map(|(u, d)| (u + d).clamp(0.0, 1.0)).collect();
-        let answer = oracle.evaluate(std::slice::from_ref(&point))?.pop().expect("one point, one answer");
+        let answer = oracle.evaluate(std::slice::from_ref(&step.to))?.pop().expect("one point, one answer");
         let actual = if answer.scaled.is_some() { sum - answer.merit.objective } else { f64::NEG_INFINITY };
-        let ratio = actual / predicted;
-        if ratio <= 1e-4 {
-            state.damping *= state.damping_growth;
-            state.damping_growth *= 2.0;
-            return Ok(if state.damping > 1e12 { state.termination() } else { Progress::Continue });
+        let ratio = actual / step.predicted;
+        if !LeastSquares::accepts(ratio) {
+            return Ok(if state.iterate.reject() { Progress::Continue } else { state.termination() });
         }
-        let Some(at) = oracle.linearise(&point, 1.0)? else { return Ok(Progress::Stalled) };
-        (state.jacobian, state.residuals) = matrices(&at);
-        state.iterate = at;
-        for (scale, column) in state.scale.iter_mut().zip(state.jacobian.column_iter()) {
-            *scale = scale.max(column.norm_squared());
-        }
-        state.damping *= (1.0 - math::powi(2.0 * ratio - 1.0, 3)).max(1.0 / 3.0);
-        state.damping_growth = 2.0;
+        let Some(at) = oracle.linearise(&step.to, 1.0)? else { return Ok(Progress::Stalled) };
+        let (jacobian, residuals) = matrices(&at);
+        state.iterate.accept(at.at.point, residuals, jacobian, ratio);
         state.stalled_steps = if actual <= 100.0 * self.options.tolerance * sum { state.stalled_steps + 1 } else { 0 };
         Ok(if state.stalled_steps >= 3 { state.termination() } else { Progress::Continue })
     }
@@ -186,49 +161,6 @@ impl State {
     fn termination(&self) -> Progress {
         /// Largest cosine regarded as orthogonal: the accuracy of finite-difference gradients.
         const ORTHOGONAL: f64 = 1e-3;
-        let norm = self.residuals.norm();
-        let cosine = |j: usize| {
-            let column = self.jacobian.column(j);
-            let gradient = column.dot(&self.residuals);
-            let u = self.iterate.at.point[j];
-            let fixed = (u <= 0.0 && gradient > 0.0) || (u >= 1.0 && gradient < 0.0);
-            if fixed || gradient == 0.0 { 0.0 } else { gradient.abs() / (column.norm() * norm) }
-        };
-        let largest = (0..self.jacobian.ncols()).map(cosine).fold(0.0, f64::max);
-        if largest <= ORTHOGONAL { Progress::Converged } else { Progress::Stalled }
-    }
-
-    /// Computes the damped step in the box: coordinates that would leave it are fixed at their bounds, one per pass.
-    fn bounded_step(&self) -> Option<DVector<f64>> {
-        let point = &self.iterate.at.point;
-        let n = point.len();
-        let mut fixed = DVector::<f64>::zeros(n);
-        let mut free = vec![true; n];
-        for _ in 0..=n {
-            let indices: Vec<usize> = (0..n).filter(|&j| free[j]).collect();
-            let mut step = fixed.clone();
-            if !indices.is_empty() {
-                let part = self.jacobian.select_columns(&indices);
-                let target = &self.residuals + &self.jacobian * &fixed;
-                let mut normal = part.transpose() * &part;
-                for (i, &j) in indices.iter().enumerate() {
-                    normal[(i, i)] += self.damping * self.scale[j];
-                }
-                let solved = normal.cholesky()?.solve(&(-(part.transpose() * target)));
-                for (i, &j) in indices.iter().enumerate() {
-                    step[j] = solved[i];
-                }
-            }
-            let outside = |j: usize| (point[j] + step[j] - 1.0).max(-(point[j] + step[j]));
-            let worst = indices.iter().copied().max_by(|&i, &j| outside(i).total_cmp(&outside(j)));
-            match worst.filter(|&j| outside(j) > 0.0) {
-                None => return Some(step),
-                Some(j) => {
-                    free[j] = false;
-                    fixed[j] = if step[j] > 0.0 { 1.0 - point[j] } else { -point[j] };
-                }
-            }
-        }
-        None
+        if self.iterate.largest_cosine() <= ORTHOGONAL { Progress::Converged } else { Progress::Stalled }
     }
 }

@@ -1,0 +1,170 @@
+//! Stationary Gaussian processes as linear state-space models driven by white noise.
+//!
+//! Source: J. Hartikainen, S. Sarkka, Kalman filtering and smoothing solutions to temporal Gaussian process regression models, IEEE
+//! International Workshop on Machine Learning for Signal Processing (2010).
+
+use mops_core::Scalar;
+
+/// Stationary Gaussian process with mean 0 and `D` states, the first of which is its value.
+pub trait Process<S: Scalar, const D: usize> {
+    /// Returns the covariance of the states.
+    fn stationary(&self) -> [[S; D]; D];
+
+    /// Returns the state transition over `dt` seconds.
+    fn transition(&self, dt: f64) -> [[S; D]; D];
+
+    /// Returns the covariance that the driving noise adds to the states over `dt` seconds.
+    fn noise(&self, dt: f64) -> [[S; D]; D];
+}
+
+/// Ornstein-Uhlenbeck process: covariance `deviation^2 exp(-d/length)` at the distance `d` in s.
+#[derive(Debug, Clone, Copy)]
+pub struct OrnsteinUhlenbeck<S> {
+    /// Standard deviation.
+    pub deviation: S,
+    /// Correlation length, s.
+    pub length: S,
+}
+
+impl<S: Scalar> Process<S, 1> for OrnsteinUhlenbeck<S> {
+    fn stationary(&self) -> [[S; 1]; 1] {
+        [[self.deviation * self.deviation]]
+    }
+
+    fn transition(&self, dt: f64) -> [[S; 1]; 1] {
+        [[(S::from(-dt) / self.length).exp()]]
+    }
+
+    fn noise(&self, dt: f64) -> [[S; 1]; 1] {
+        // 1 - exp(-x) = tanh(x/2) (1 + exp(-x)), without cancellation for small x.
+        let x = S::from(2.0 * dt) / self.length;
+        [[self.deviation * self.deviation * (x * 0.5).tanh() * ((-x).exp() + 1.0)]]
+    }
+}
+
+/// Matern-3/2 process: covariance `deviation^2 (1 + a) exp(-a)` with `a = sqrt(3) d/length` at the distance `d` in s. States: value
+/// and rate.
+#[derive(Debug, Clone, Copy)]
+pub struct Matern32<S> {
+    /// Standard deviation.
+    pub deviation: S,
+    /// Correlation length, s.
+    pub length: S,
+}
+
+/// Value of `2 lambda dt` below which the integrals of [`Matern32::noise`] are summed as a series: from there on the closed form
+/// loses less than two bits.
+const SERIES: f64 = 2.0;
+
+/// Terms of the series: at `2 lambda dt = 2` the last one is below 1e-17 of the sum.
+const TERMS: u32 = 28;
+
+impl<S: Scalar> Matern32<S> {
+    fn rate(&self) -> S {
+        S::from(3.0_f64.sqrt()) / self.length
+    }
+
+    /// Returns the integrals of `s^k exp(-2 lambda s)` over `[0, dt]` for `k` = 0, 1, 2.
+    ///
+    /// All terms of the series and of the downward recursion are positive, so that nothing cancels for short steps. Source: NIST
+    /// Digital Library of Mathematical Functions, equations 8.7.1 and 8.8.1 (incomplete gamma function).
+    fn integrals(&self, dt: f64) -> [S; 3] {
+        let twice = self.rate() * 2.0;
+        let x = twice * dt;
+        let decay = (-x).exp();
+        if x.value() >= SERIES {
+            let first = (-decay + 1.0) / twice;
+            let second = (first - decay * dt) / twice;
+            return [first, second, (second * 2.0 - decay * (dt * dt)) / twice];
+        }
+        let mut term = S::from(1.0 / 3.0);
+        let mut sum = term;
+        for j in 1..=TERMS {
+            term = term * x / f64::from(3 + j);
+            sum += term;
+        }
+        let third = sum * decay * (dt * dt * dt);
+        let second = (decay * (dt * dt) + twice * third) * 0.5;
+        [decay * dt + twice * second, second, third]
+    }
+}
+
+impl<S: Scalar> Process<S, 2> for Matern32<S> {
+    fn stationary(&self) -> [[S; 2]; 2] {
+        let (variance, zero) = (self.deviation * self.deviation, S::from(0.0));
+        let rate = self.rate();
+        [[variance, zero], [zero, variance * rate * rate]]
+    }
+
+    fn transition(&self, dt: f64) -> [[S; 2]; 2] {
+        let rate = self.rate();
+        let (x, decay) = (rate * dt, (-(rate * dt)).exp());
+        [[decay * (x + 1.0), decay * dt], [-(decay * rate * x), decay * (-x + 1.0)]]
+    }
+
+    fn noise(&self, dt: f64) -> [[S; 2]; 2] {
+        let rate = self.rate();
+        let density = rate * rate * rate * self.deviation * self.deviation * 4.0;
+        let [i0, i1, i2] = self.integrals(dt);
+        let across = density * (i1 - rate * i2);
+        [[density * i2, across], [across, density * (i0 - rate * i1 * 2.0 + rate * rate * i2)]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mops_core::math;
+
+    use super::*;
+
+    #[test]
+    fn the_noise_keeps_the_stationary_covariance() {
+        for (length, dt) in [(0.7, 0.3), (5.0, 0.01), (0.02, 1.0), (1.0, 0.58)] {
+            let process = Matern32 { deviation: 1.3, length };
+            let (p, f, q) = (process.stationary(), process.transition(dt), process.noise(dt));
+            for a in 0..2 {
+                for b in 0..2 {
+                    let mut sum = q[a][b];
+                    for j in 0..2 {
+                        sum += f[a][j] * p[j][j] * f[b][j];
+                    }
+                    let scale = (p[a][a] * p[b][b]).sqrt();
+                    assert!((sum - p[a][b]).abs() < 4e-15 * scale, "{length} {dt} {a}{b}: {sum} {}", p[a][b]);
+                }
+            }
+            let process = OrnsteinUhlenbeck { deviation: 1.3, length };
+            let (p, f, q) = (process.stationary()[0][0], process.transition(dt)[0][0], process.noise(dt)[0][0]);
+            assert!((f * p * f + q - p).abs() < 4e-15 * p, "{length} {dt}");
+        }
+    }
+
+    #[test]
+    fn the_noise_of_short_steps_has_the_leading_terms_of_its_series() {
+        // With q = 4 lambda^3 tau^2: q dt^3/3, q dt^2/2 and q dt, to first order in lambda dt.
+        let (length, dt) = (3.0_f64, 1e-7);
+        let rate = 3.0_f64.sqrt() / length;
+        let q = 4.0 * rate * rate * rate * 1.69;
+        let noise = Matern32 { deviation: 1.3, length }.noise(dt);
+        let leading = [[q * dt * dt * dt / 3.0, q * dt * dt / 2.0], [q * dt * dt / 2.0, q * dt]];
+        for a in 0..2 {
+            for b in 0..2 {
+                assert!((noise[a][b] / leading[a][b] - 1.0).abs() < 1e-6, "{a}{b}");
+            }
+        }
+        let noise = OrnsteinUhlenbeck { deviation: 1.3, length }.noise(dt)[0][0];
+        assert!((noise / (1.69 * 2.0 * dt / length) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn series_and_closed_form_of_the_integrals_agree_where_they_meet() {
+        let rate = 3.0_f64.sqrt();
+        let at = |x: f64| Matern32 { deviation: 1.0, length: 1.0 }.integrals(x / (2.0 * rate));
+        let [below, above] = [SERIES * (1.0 - 1e-15), SERIES].map(at);
+        for (below, above) in below.iter().zip(above) {
+            assert!((below / above - 1.0).abs() < 1e-14, "{below} {above}");
+        }
+        // Integral of exp(-2 lambda s) over a long time.
+        assert!((at(80.0)[0] - 0.5 / rate).abs() < 1e-15);
+        assert!((math::exp(-80.0)) < 1e-30);
+    }
+}

@@ -1,0 +1,204 @@
+//! Levenberg-Marquardt iteration within bounds: the core of the solver of that name and of the fits of the diagnosis.
+
+use crate::math;
+use nalgebra::{DMatrix, DVector};
+
+/// Iterate of the Levenberg-Marquardt method for a sum of squares `r'r` with bounds:
+/// ```text
+/// (J'J + lambda D^2) d = -J'r,   D^2 the largest diagonal of J'J so far
+/// ```
+/// Bounds are handled by an active set: coordinates that the step would move beyond a bound are fixed there, and the step is
+/// recomputed.
+///
+/// Source: J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978); damping by H. B.
+/// Nielsen, report IMM-REP-1999-05, Technical University of Denmark (1999).
+#[derive(Debug, Clone)]
+pub struct LeastSquares {
+    point: Vec<f64>,
+    bounds: Vec<[f64; 2]>,
+    residuals: DVector<f64>,
+    jacobian: DMatrix<f64>,
+    /// Squared scale of every coordinate.
+    scale: DVector<f64>,
+    damping: f64,
+    damping_growth: f64,
+}
+
+/// Step of [`LeastSquares`].
+#[derive(Debug, Clone)]
+pub struct LeastSquaresStep {
+    /// Point after the step, within the bounds.
+    pub to: Vec<f64>,
+    /// Decrease of the sum of squares that the linear model predicts.
+    pub predicted: f64,
+}
+
+/// Smallest squared scale of a coordinate.
+const LEAST_SCALE: f64 = 1e-30;
+
+/// Ratio of actual to predicted decrease up to which a step is rejected.
+const REJECTED: f64 = 1e-4;
+
+/// Damping beyond which no step can make progress.
+const MOST_DAMPING: f64 = 1e12;
+
+impl LeastSquares {
+    /// Begins at a point within the bounds, one pair for each coordinate.
+    pub fn new(bounds: Vec<[f64; 2]>, point: Vec<f64>, residuals: DVector<f64>, jacobian: DMatrix<f64>) -> Self {
+        let squared = jacobian.column_iter().map(|c| c.norm_squared().max(LEAST_SCALE));
+        let scale = DVector::from_iterator(point.len(), squared);
+        Self { point, bounds, residuals, jacobian, scale, damping: 1e-3, damping_growth: 2.0 }
+    }
+
+    /// Returns the current point.
+    pub fn point(&self) -> &[f64] {
+        &self.point
+    }
+
+    /// Returns the sum of squares at the current point.
+    pub fn sum(&self) -> f64 {
+        self.residuals.norm_squared()
+    }
+
+    /// Returns the residuals at the current point.
+    pub fn residuals(&self) -> &DVector<f64> {
+        &self.residuals
+    }
+
+    /// Returns the derivatives of the residuals at the current point, one column for each coordinate.
+    pub fn jacobian(&self) -> &DMatrix<f64> {
+        &self.jacobian
+    }
+
+    /// Computes the damped step; `None` if the normal equations are singular.
+    pub fn step(&self) -> Option<LeastSquaresStep> {
+        self.step_with(self.damping)
+    }
+
+    /// Computes the step with next to no damping; `None` if the normal equations are singular. Its predicted decrease is the
+    /// distance to the optimum where the problem is nearly linear.
+    pub fn full_step(&self) -> Option<LeastSquaresStep> {
+        self.step_with(1e-12)
+    }
+
+    fn step_with(&self, damping: f64) -> Option<LeastSquaresStep> {
+        let step = self.bounded_step(damping)?;
+        let predicted = self.sum() - (&self.residuals + &self.jacobian * &step).norm_squared();
+        let moved = self.point.iter().zip(&step).zip(&self.bounds);
+        Some(LeastSquaresStep { to: moved.map(|((u, d), b)| (u + d).clamp(b[0], b[1])).collect(), predicted })
+    }
+
+    /// Returns true if a step with this ratio of actual to predicted decrease is good enough to be accepted.
+    pub fn accepts(ratio: f64) -> bool {
+        ratio > REJECTED
+    }
+
+    /// Increases the damping after a step that was not accepted. Returns false if no step can make progress any more.
+    pub fn reject(&mut self) -> bool {
+        self.damping *= self.damping_growth;
+        self.damping_growth *= 2.0;
+        self.damping <= MOST_DAMPING
+    }
+
+    /// Moves to a point; `ratio` is the actual decrease of the sum of squares as a fraction of the predicted one.
+    pub fn accept(&mut self, point: Vec<f64>, residuals: DVector<f64>, jacobian: DMatrix<f64>, ratio: f64) {
+        for (scale, column) in self.scale.iter_mut().zip(jacobian.column_iter()) {
+            *scale = scale.max(column.norm_squared());
+        }
+        (self.point, self.residuals, self.jacobian) = (point, residuals, jacobian);
+        self.damping *= (1.0 - math::powi(2.0 * ratio - 1.0, 3)).max(1.0 / 3.0);
+        self.damping_growth = 2.0;
+    }
+
+    /// Returns the largest cosine of the angle between the residuals and a column of the Jacobian, over the coordinates that
+    /// no bound holds: 0 at an optimum.
+    pub fn largest_cosine(&self) -> f64 {
+        let norm = self.residuals.norm();
+        let cosine = |j: usize| {
+            let column = self.jacobian.column(j);
+            let gradient = column.dot(&self.residuals);
+            let ([low, high], u) = (self.bounds[j], self.point[j]);
+            let fixed = (u <= low && gradient > 0.0) || (u >= high && gradient < 0.0);
+            if fixed || gradient == 0.0 { 0.0 } else { gradient.abs() / (column.norm() * norm) }
+        };
+        (0..self.jacobian.ncols()).map(cosine).fold(0.0, f64::max)
+    }
+
+    /// Computes the damped step in the box: coordinates that would leave it are fixed at their bounds, one per pass.
+    fn bounded_step(&self, damping: f64) -> Option<DVector<f64>> {
+        let (point, n) = (&self.point, self.point.len());
+        let mut fixed = DVector::<f64>::zeros(n);
+        let mut free = vec![true; n];
+        for _ in 0..=n {
+            let indices: Vec<usize> = (0..n).filter(|&j| free[j]).collect();
+            let mut step = fixed.clone();
+            if !indices.is_empty() {
+                let part = self.jacobian.select_columns(&indices);
+                let target = &self.residuals + &self.jacobian * &fixed;
+                let mut normal = part.transpose() * &part;
+                for (i, &j) in indices.iter().enumerate() {
+                    normal[(i, i)] += damping * self.scale[j];
+                }
+                let solved = normal.cholesky()?.solve(&(-(part.transpose() * target)));
+                for (i, &j) in indices.iter().enumerate() {
+                    step[j] = solved[i];
+                }
+            }
+            let outside =
+                |j: usize| (point[j] + step[j] - self.bounds[j][1]).max(self.bounds[j][0] - (point[j] + step[j]));
+            let worst = indices.iter().copied().max_by(|&i, &j| outside(i).total_cmp(&outside(j)));
+            match worst.filter(|&j| outside(j) > 0.0) {
+                None => return Some(step),
+                Some(j) => {
+                    free[j] = false;
+                    fixed[j] = self.bounds[j][usize::from(step[j] > 0.0)] - point[j];
+                }
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rosenbrock's function as a sum of squares: `r = (10 (y - x^2), 1 - x)`.
+    fn rosenbrock(point: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+        let (x, y) = (point[0], point[1]);
+        let residuals = DVector::from_vec(vec![10.0 * (y - x * x), 1.0 - x]);
+        (residuals, DMatrix::from_row_slice(2, 2, &[-20.0 * x, 10.0, -1.0, 0.0]))
+    }
+
+    fn minimum(bounds: [[f64; 2]; 2]) -> LeastSquares {
+        let start = vec![-1.2, 1.0];
+        let (residuals, jacobian) = rosenbrock(&start);
+        let mut iterate = LeastSquares::new(bounds.to_vec(), start, residuals, jacobian);
+        for _ in 0..100 {
+            let step = iterate.step().expect("regular");
+            let (residuals, jacobian) = rosenbrock(&step.to);
+            let ratio = (iterate.sum() - residuals.norm_squared()) / step.predicted;
+            if LeastSquares::accepts(ratio) {
+                iterate.accept(step.to, residuals, jacobian, ratio);
+            } else {
+                iterate.reject();
+            }
+        }
+        iterate
+    }
+
+    #[test]
+    fn the_minimum_of_rosenbrocks_function_is_found() {
+        let found = minimum([[-5.0, 5.0]; 2]);
+        assert!((found.point()[0] - 1.0).abs() < 1e-9 && (found.point()[1] - 1.0).abs() < 1e-9, "{:?}", found.point());
+        assert!(found.full_step().expect("regular").predicted < 1e-15);
+    }
+
+    #[test]
+    fn a_bound_in_front_of_the_minimum_holds_its_coordinate() {
+        // With x at most 0.5: the minimum is at x = 0.5, y = 0.25.
+        let found = minimum([[-5.0, 0.5], [-5.0, 5.0]]);
+        assert!((found.point()[0] - 0.5).abs() < 1e-9 && (found.point()[1] - 0.25).abs() < 1e-9, "{:?}", found.point());
+        assert!(found.largest_cosine() < 1e-9);
+    }
+}
