@@ -132,6 +132,9 @@ impl<M: PlantModel> Simulated<M> {
 
     fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
         let interface = self.of.interface();
+        if !job.case.forces.is_empty() {
+            return Err(Failure::Undefined("external forces need a model with open equations".into()));
+        }
         let plant = self.of.plant(parameters)?;
         let start = plant.start();
         let input =

@@ -6,7 +6,6 @@ use nalgebra::DMatrix;
 
 use super::WithEffects;
 use super::dynamics::Driven;
-use crate::kernel::drive::Drive;
 use crate::kernel::{Sink, Step, integrate};
 
 /// Instant of a simulation with its linearisation `dx' = A dx + B db`, `dy = C dx + D db`. The vector `b` contains the
@@ -45,6 +44,8 @@ struct Look {
     t: f64,
     x: Vec<f64>,
     u: Vec<f64>,
+    /// External forces.
+    w: Vec<f64>,
     contacts: super::contacts::Contacts,
     /// Contact and hysteresis state of each effect.
     effects: Vec<(Option<bool>, Vec<f64>)>,
@@ -66,6 +67,7 @@ impl<'a> Sink<f64, Driven<'a, f64>> for Looks<'_> {
                 t,
                 x: x.clone(),
                 u: dynamics.commanded(t.clamp(step.start, end)),
+                w: dynamics.pushed(t.clamp(step.start, end)),
                 contacts: dynamics.contacts.clone(),
                 effects: dynamics.actors.iter().map(|actor| (actor.closed, actor.memory.clone())).collect(),
             });
@@ -114,7 +116,7 @@ fn moment(tangent: &mut Driven<'_, Dual7>, look: &Look, forces: usize, signals: 
         let all: Vec<Dual7> = look.x.iter().chain(&look.u).chain(&zeros).enumerate().map(seeded).collect();
         let (x, rest) = all.split_at(n);
         let (u, w) = rest.split_at(inputs);
-        tangent.command(u.iter().map(|&u| Drive::held(u)));
+        tangent.command(u.iter().copied(), look.w.iter().map(|&w| w.into()));
         let (dx, outputs) = tangent.look(look.t, x, w, signals);
         for (i, row) in dx.iter().chain(&outputs).enumerate() {
             for j in first..columns.min(first + DIRECTIONS) {

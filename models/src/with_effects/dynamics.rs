@@ -3,7 +3,10 @@
 use std::cell::RefCell;
 
 use mops_core::enclosure::Enclosure;
-use mops_core::{BoundEffect, EventInstant, Failure, Instant, Job, Model, Opening, Plant, PortState, Scalar, Span};
+use mops_core::{
+    BoundEffect, Case, EventInstant, Failure, Instant, Interface, Job, Model, Opening, Plant, Port, PortState, Scalar,
+    Span,
+};
 
 use super::contacts::Contacts;
 use super::{Place, Site, WithEffects};
@@ -132,7 +135,9 @@ pub(super) struct Driven<'a, S> {
     scratch: RefCell<Scratch<S>>,
     /// Sign of each force for which it acts in the forward direction.
     forward: Vec<f64>,
-    /// External forces; used only when the equations are evaluated for linearisation.
+    /// External forces of the case, one for each force of the plant if there are any.
+    external: Vec<Drive<'a, S>>,
+    /// Additional forces; used only when the equations are evaluated for linearisation.
     further: Vec<S>,
     /// Rates of constant inputs: all 0.
     still: Vec<f64>,
@@ -167,6 +172,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         };
         let commands: Vec<_> = commands.map(command).collect();
         let forces = of.forces();
+        let external = external(of, job.case);
         let shows = shown(of, &model.equation_states());
         let touched = |k: usize| actors.iter().any(|a| matches!(a.place.site, Site::Sensor { signal } if signal == k));
         let untouched = (0..shows.len()).map(|k| shows[k].filter(|_| !touched(k))).collect();
@@ -178,6 +184,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         let longest = actors.iter().map(|a| a.acting.longest_step()).fold(f64::INFINITY, f64::min);
         let damped = actors.iter().map(|a| a.acting.damped_step()).fold(f64::INFINITY, f64::min);
         let longest = commands.iter().map(|c| c.drive.longest_step()).fold(longest, f64::min);
+        let longest = external.iter().map(Drive::longest_step).fold(longest, f64::min);
         let longest = longest.min(plant.longest_step());
         Self {
             plant,
@@ -197,6 +204,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             happened: String::new(),
             scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new(), dx: Vec::new() }),
             forward: vec![1.0; forces],
+            external,
             further: Vec::new(),
             still: vec![0.0; of.inputs.len()],
         }
@@ -303,6 +311,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         w.clear();
         w.extend_from_slice(&self.further);
         w.resize(self.forces, S::from(0.0));
+        w.iter_mut().zip(&self.external).for_each(|(w, drive)| *w += drive.at(t));
         for (index, actor) in self.actors.iter().enumerate() {
             let (Site::Joint { w: k, .. } | Site::Process { w: k, .. }) = actor.place.site else { continue };
             if actor.inertial {
@@ -341,9 +350,16 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
-    /// Replaces the commands by constant ones.
-    pub(super) fn command(&mut self, drives: impl Iterator<Item = Drive<'a, S>>) {
-        self.commands = drives.map(|drive| Command { drive, delay: None, begun: 0.0 }).collect();
+    /// Returns the external forces.
+    pub(super) fn pushed(&self, t: f64) -> Vec<S> {
+        self.external.iter().map(|drive| drive.at(t)).collect()
+    }
+
+    /// Replaces commands and external forces by constant ones.
+    pub(super) fn command(&mut self, commands: impl Iterator<Item = S>, forces: impl Iterator<Item = S>) {
+        let command = |value| Command { drive: Drive::held(value), delay: None, begun: 0.0 };
+        self.commands = commands.map(command).collect();
+        self.external = forces.map(Drive::held).collect();
     }
 
     /// Evaluates the rates of all states and the values of signals, with additional forces `further` at the ports.
@@ -451,6 +467,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             let out = command.out(t);
             command.drive.pass_break(out);
         }
+        self.external.iter_mut().for_each(|drive| drive.pass_break(t));
     }
 
     /// Initialises the hysteresis states of actuators from the commands before time 0, in a window of a record.
@@ -524,6 +541,19 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
         self.follow_commands(t);
     }
+}
+
+/// Returns the external forces of a case, one for each force of the plant; empty if there are none.
+fn external<'a, S: Scalar>(of: &Interface, case: &'a Case) -> Vec<Drive<'a, S>> {
+    if case.forces.is_empty() {
+        return Vec::new();
+    }
+    let states = of.ports.iter().filter_map(|port| match port {
+        Port::Process { state, .. } => Some(state),
+        _ => None,
+    });
+    let force = |state: &String| case.forces.iter().find(|(name, _)| name == state).map(|(_, force)| force);
+    states.map(|state| Drive::new(force(state))).collect()
 }
 
 /// Creates the instant of a plant event. The outputs of effects at actuators are taken at that instant; their
@@ -655,7 +685,8 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         // The output of a sensor effect may be rough, so steps end at all samples.
         let smooth = self.smooth;
         let inputs = self.commands.iter().map(|command| command.next_break(t, smooth)).fold(f64::INFINITY, f64::min);
-        let next = self.plant.next_break(t).min(inputs);
+        let forces = self.external.iter().map(|drive| drive.next_break(t)).fold(inputs, f64::min);
+        let next = self.plant.next_break(t).min(forces);
         self.breaks.iter().copied().find(|&at| at > t).map_or(next, |at| at.min(next))
     }
 

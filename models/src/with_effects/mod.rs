@@ -270,7 +270,7 @@ impl Model for WithEffects {
     }
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        if (0..self.placements.len()).any(|i| self.acts(i, job.parameters)) {
+        if !job.case.forces.is_empty() || (0..self.placements.len()).any(|i| self.acts(i, job.parameters)) {
             return self.simulate(job, job.parameters).map(|recording| Analysis::Time(recording.response));
         }
         self.model.analyse(&Job { parameters: &job.parameters[..self.own()], ..*job })
@@ -284,7 +284,7 @@ impl Model for WithEffects {
         if seeds.is_empty() {
             return Some(self.analyse(job).map(|analysis| (analysis, Vec::new())));
         }
-        if (0..self.placements.len()).all(neutral) {
+        if job.case.forces.is_empty() && (0..self.placements.len()).all(neutral) {
             let own: Vec<Vec<f64>> = seeds.iter().map(|seed| seed[..self.own()].to_vec()).collect();
             return self.model.tangents(&Job { parameters: &job.parameters[..self.own()], ..*job }, &own);
         }

@@ -90,6 +90,43 @@ fn neutral_effects_change_no_bit() {
 }
 
 #[test]
+fn an_external_force_acts_as_an_input_at_the_same_place() {
+    let friction = [("coulomb-friction", "joint:x")];
+    let times: Vec<f64> = (0..50).map(|k| f64::from(k) * 0.1).collect();
+    let values = times.iter().map(|t| 6.0 * math::sin(3.0 * t)).collect();
+    let force = Input::Sampled { times, values, hold: Hold::Zero };
+    let pushed = Case { forces: vec![("v".to_owned(), force.clone())], ..Case::default() };
+    let driven = Case { inputs: vec![("u".to_owned(), force)], ..Case::default() };
+    for effects in [&friction[..], &[]] {
+        let model = with(&equations(BLOCK), effects);
+        let parameters = &[2.0, 0.3, 0.7, 2.5][..3 + effects.len()];
+        let seeds = [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]].map(|seed| seed[..parameters.len()].to_vec());
+        let simulated = [&pushed, &driven].map(|case| {
+            let job = Job { case, parameters, signals: &[0, 1], horizon: 4.9 };
+            let (analysis, tangents) = model.tangents(&job, &seeds).expect("it has them").expect("it simulates");
+            let all = std::iter::once(&analysis).chain(&tangents);
+            all.map(|a| ["x", "v"].map(|signal| a.trace(signal).sample(&[1.0, 2.05, 3.3, 4.9]))).collect::<Vec<_>>()
+        });
+        for (a, b) in simulated[0].iter().flatten().flatten().zip(simulated[1].iter().flatten().flatten()) {
+            assert!((a - b).abs() < 1e-9 * (1.0 + b.abs()), "{a} {b}");
+        }
+        let moments = [&pushed, &driven].map(|case| {
+            let job = Job { case, parameters, signals: &[0, 1], horizon: 4.9 };
+            model.along(&job, &[0.55, 2.05]).expect("it simulates")
+        });
+        for (a, b) in moments[0].iter().zip(&moments[1]) {
+            assert!((a.rates[1] - b.rates[1]).abs() < 1e-7, "{:?} {:?}", a.rates, b.rates);
+            // The columns of the input and of the force are equal.
+            assert!((a.b[(1, 0)] - 0.5).abs() < 1e-12 || !effects.is_empty(), "{}", a.b);
+            assert_eq!(a.b[(1, 0)], a.b[(1, 1)]);
+        }
+    }
+    let plain = equations(BLOCK);
+    let job = Job { case: &pushed, parameters: &[2.0, 0.3, 0.7], signals: &[0], horizon: 4.9 };
+    assert!(plain.analyse(&job).is_err(), "a model without effects must not ignore a force");
+}
+
+#[test]
 fn tangents_with_respect_to_effect_parameters_agree_with_differences() {
     let model = with(&equations(BLOCK), &[("coulomb-friction", "joint:x"), ("viscous-friction", "joint:x")]);
     let inputs = vec![("u".to_owned(), Input::Sine { amplitude: 6.0, frequency: 0.4, phase: 0.3, offset: 0.5 })];
