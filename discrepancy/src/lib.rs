@@ -8,6 +8,7 @@ mod candidate;
 mod diagnose;
 mod drawn;
 pub mod error_models;
+pub mod estimation;
 mod family;
 mod fit;
 mod gap;

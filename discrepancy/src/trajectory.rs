@@ -8,6 +8,7 @@ use mops_core::{Failure, Job, Port};
 use mops_models::{Moment, WithEffects};
 use nalgebra::DMatrix;
 
+use crate::error_models::{LinearisedMotion, Measured};
 use crate::fit::{Fit, Point};
 use crate::subject::Series;
 
@@ -125,6 +126,43 @@ impl Trajectory {
     /// Number of inputs.
     pub fn inputs(&self) -> usize {
         self.inputs
+    }
+
+    /// Returns the motion linearised from sample to sample, with forces in units of `nominal`, one for each force of the model;
+    /// `channels` are those of the series.
+    pub fn linearised(&self, nominal: &[f64], channels: &[usize]) -> LinearisedMotion {
+        let (states, forces) = (self.states, nominal.len());
+        let mut knots: Vec<usize> = self.samples.iter().flatten().copied().chain([0]).collect();
+        knots.sort_unstable();
+        knots.dedup();
+        let mut motion = LinearisedMotion { states, forces, ..LinearisedMotion::default() };
+        motion.times = knots.iter().map(|&k| self.knots[k]).collect();
+        motion.measured = vec![Vec::new(); knots.len()];
+        for pair in knots.windows(2) {
+            let mut transition = DMatrix::identity(states, states);
+            let mut gain = DMatrix::zeros(states, forces);
+            for interval in &self.intervals[pair[0]..pair[1]] {
+                let held = DMatrix::from_fn(states, forces, |a, j| {
+                    interval.gains.iter().map(|g| g[(a, self.inputs + j)]).sum::<f64>() * nominal[j]
+                });
+                gain = &interval.transition * gain + held;
+                transition = &interval.transition * transition;
+            }
+            motion.transitions.extend(transition.transpose().iter());
+            motion.gains.extend(gain.transpose().iter());
+        }
+        let (mut residual, row) = (0, states + self.columns);
+        for (series, samples) in self.samples.iter().enumerate() {
+            for (sample, knot) in samples.iter().enumerate() {
+                let of = &self.outputs[series][sample * row..(sample + 1) * row];
+                let direct = of[states + self.inputs..].iter().zip(nominal).flat_map(|(d, nominal)| [d * nominal, 0.0]);
+                let slopes = of[..states].iter().copied().chain(direct).map(|s| s / self.noise[series]).collect();
+                let at = knots.binary_search(knot).expect("samples lie at knots");
+                motion.measured[at].push(Measured { channel: channels[series], residual, slopes });
+                residual += 1;
+            }
+        }
+        motion
     }
 
     /// What a signal at the nodes, in a column (inputs, then forces), adds to the residuals.

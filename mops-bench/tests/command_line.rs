@@ -102,3 +102,47 @@ fn a_wrong_command_line_gets_one_error_and_its_remedy() {
         assert!(text.contains(expected), "{arguments:?}: {text}");
     }
 }
+
+const FALL: &str = r#"
+[study]
+name = "fall"
+task = "diagnosis"
+
+[models.ball.equations]
+states     = { h = "m", v = "m/s" }
+parameters = { g = "m/s^2" }
+der        = { h = "v", v = "-g" }
+
+[tuners]
+g = { start = 9.8, min = 9.7, max = 9.9 }
+
+[experiments.first]
+file     = "fall.csv"
+channels = { h = "h" }
+free     = ["h", "v"]
+"#;
+
+#[test]
+fn sets_of_effects_are_compared_by_evidence() {
+    // A ball with linear drag, dropped from 50 m: h = 50 - (g/d) (t - (1 - exp(-d t))/d), rounded to 1 cm.
+    let folder = tempfile::tempdir().unwrap();
+    let (g, d) = (9.81, 0.4_f64);
+    let height = |t: f64| 50.0 - g / d * (t - (1.0 - (-d * t).exp()) / d);
+    let rows = (0..60).map(|k| f64::from(k) / 20.0).map(|t| format!("{t},{:.2}\n", height(t)));
+    std::fs::write(folder.path().join("fall.csv"), format!("t [s],h [m]\n{}", rows.collect::<String>())).unwrap();
+    let study = folder.path().join("fall.toml");
+    std::fs::write(&study, FALL).unwrap();
+    let sets = ["--set", "viscous-friction@joint:h", "--set", "cubic-drag@joint:h"];
+    let done = bench(&["evidence", study.to_str().unwrap()]).args(sets).output().unwrap();
+    let text = String::from_utf8(done.stdout).unwrap();
+    assert!(done.status.success(), "{text}");
+    let gain = |effect: &str| -> f64 {
+        let line = text.lines().find(|line| line.starts_with(effect)).expect("the set is there");
+        line.rsplit_once('(').unwrap().1.trim_end_matches(')').parse().unwrap()
+    };
+    assert!(gain("viscous-friction") > 5.0 && gain("cubic-drag") < gain("viscous-friction"), "{text}");
+    assert_eq!(text.matches("force error").count(), 3, "{text}");
+    let unknown = bench(&["evidence", study.to_str().unwrap(), "--set", "drag@joint:h"]).output().unwrap();
+    let message = String::from_utf8(unknown.stderr).unwrap();
+    assert!(unknown.status.code() == Some(2) && message.contains("`drag@joint:h` cannot be fitted"), "{message}");
+}

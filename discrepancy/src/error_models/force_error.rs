@@ -4,9 +4,10 @@
 use mops_core::{Dual, Scalar, math};
 
 use super::likelihood::{LN_TWO_PI, Likelihood};
+use super::output_error::matern_penalty;
 use super::process::{Matern32, Process};
 
-/// Motion of a plant over one record, linearised from sample to sample: `x[k+1] = F[k] x[k] + G[k] f[k]`, `r = H x`.
+/// Motion of a plant over one record, linearised from sample to sample: `x[k+1] = F[k] x[k] + G[k] f[k]`, `r = H x + D f`.
 ///
 /// `x` is the deviation of the states, `f[k]` the forces held from sample `k` to the next one, in units of the nominal forces of
 /// their balances, and `r` what they add to the residuals.
@@ -33,7 +34,8 @@ pub struct Measured {
     pub channel: usize,
     /// Index among the residuals of the record.
     pub residual: usize,
-    /// Row of `H`: derivatives of the residual with respect to the states.
+    /// Derivatives of the residual with respect to the states (a row of `H`), then to each force (a row of `D`) and its rate,
+    /// which is 0; without forces that act on the output, those of the states suffice.
     pub slopes: Vec<f64>,
 }
 
@@ -53,11 +55,13 @@ impl LinearisedMotion {
         let mut residuals = vec![0.0; self.measured.iter().map(Vec::len).sum()];
         let mut x = vec![0.0; self.states];
         for (k, measured) in self.measured.iter().enumerate() {
+            let f = &forces[k * self.forces..(k + 1) * self.forces];
             for m in measured {
-                residuals[m.residual] = dot(&m.slopes, &x);
+                let (of_states, of_forces) = m.slopes.split_at(self.states);
+                let direct = of_forces.iter().step_by(2).zip(f).map(|(d, f)| d * f).sum::<f64>();
+                residuals[m.residual] = dot(of_states, &x) + direct;
             }
             if k + 1 < self.times.len() {
-                let f = &forces[k * self.forces..(k + 1) * self.forces];
                 let of_states = self.transition(k).chunks_exact(self.states).map(|row| dot(row, &x));
                 let of_forces = self.gain(k).chunks_exact(self.forces).map(|row| dot(row, f));
                 x = of_states.zip(of_forces).map(|(a, b)| a + b).collect();
@@ -83,23 +87,14 @@ pub struct ForceError {
     pub noise: Vec<f64>,
 }
 
-/// Smoothed forces of a record.
-#[derive(Debug, Clone)]
-pub struct Smoothed {
-    /// Most probable forces at the samples, in nominal forces, those of one sample after those of the other.
-    pub forces: Vec<f64>,
-    /// `K^-1 f`, where `K` is the covariance of all forces `f` beforehand: `f' K^-1 f` is the penalty of the forces.
-    pub dual: Vec<f64>,
-}
-
 impl ForceError {
     /// Returns the log-likelihood of the residuals of a record, with its derivatives with respect to the hyperparameters: the
-    /// logarithms of deviation, length and each noise, in this order.
+    /// logarithms of deviation, length and each noise, in this order; derivatives beyond these are 0.
     ///
     /// # Panics
-    /// `N` is not the number of hyperparameters.
+    /// `N` is less than the number of hyperparameters.
     pub fn likelihood<const N: usize>(&self, motion: &LinearisedMotion, residuals: &[f64]) -> Likelihood<Dual<N>> {
-        assert_eq!(N, 2 + self.noise.len(), "one direction per hyperparameter");
+        assert!(N >= 2 + self.noise.len(), "one direction per hyperparameter");
         let exponential = |value: f64, index| Dual::<N>::variable(math::ln(value), index).exp();
         let process = Matern32 { deviation: exponential(self.deviation, 0), length: exponential(self.length, 1) };
         let noise: Vec<Dual<N>> = self.noise.iter().enumerate().map(|(c, &noise)| exponential(noise, 2 + c)).collect();
@@ -139,11 +134,21 @@ impl ForceError {
         sum
     }
 
-    /// Returns the most probable forces behind the residuals of a record.
+    /// Returns `f' K^-1 f` for forces `f` with the covariance `K` at the samples of a motion: the penalty of the forces.
+    pub fn penalty(&self, motion: &LinearisedMotion, forces: &[f64]) -> f64 {
+        let of = |j: usize| {
+            let values: Vec<f64> = forces.iter().skip(j).step_by(motion.forces).copied().collect();
+            matern_penalty(self.deviation, self.length, &motion.times, &values)
+        };
+        (0..motion.forces).map(of).sum()
+    }
+
+    /// Returns the most probable forces behind the residuals of a record, in nominal forces: those of each sample one after the
+    /// other.
     ///
     /// Source: G. Bierman, Fixed interval smoothing with discrete measurements, International Journal of Control 18 (1973) 65
     /// (modified Bryson-Frazier smoother).
-    pub fn smooth(&self, motion: &LinearisedMotion, residuals: &[f64]) -> Smoothed {
+    pub fn smooth(&self, motion: &LinearisedMotion, residuals: &[f64]) -> Vec<f64> {
         let process = Matern32 { deviation: self.deviation, length: self.length };
         let (states, forces, count) = (motion.states, motion.forces, motion.times.len());
         let size = states + 2 * forces;
@@ -172,7 +177,7 @@ impl ForceError {
                 kernels.push(kernel);
             }
         }
-        let mut smoothed = Smoothed { forces: vec![0.0; count * forces], dual: vec![0.0; count * forces] };
+        let mut smoothed = vec![0.0; count * forces];
         let mut adjoint = vec![0.0; size];
         for k in (0..count).rev() {
             for m in motion.measured[k].iter().rev() {
@@ -182,13 +187,9 @@ impl ForceError {
             }
             let (values, rows) = &predictions[k];
             for j in 0..forces {
-                smoothed.forces[k * forces + j] = values[j] - dot(&rows[j * size..(j + 1) * size], &adjoint);
+                smoothed[k * forces + j] = values[j] - dot(&rows[j * size..(j + 1) * size], &adjoint);
             }
             if k > 0 {
-                for j in 0..forces {
-                    let column = motion.gain(k - 1).iter().skip(j).step_by(forces);
-                    smoothed.dual[(k - 1) * forces + j] = -column.zip(&adjoint).map(|(g, a)| g * a).sum::<f64>();
-                }
                 adjoint = transposed(motion, k - 1, &kernels[k - 1], &adjoint);
             }
         }
@@ -310,7 +311,7 @@ impl<'a, S: Scalar, P: Process<S, 2>> Recursion<'a, S, P> {
     }
 }
 
-/// Returns the sum of products of slopes by the states with the first of `values`.
+/// Returns the sum of products of slopes with the first of `values`.
 #[inline]
 fn weighted<S: Scalar>(slopes: &[f64], values: &[S]) -> S {
     let mut sum = S::from(0.0);

@@ -14,6 +14,6 @@ mod process;
 #[cfg(test)]
 mod tests;
 
-pub use force_error::{ForceError, LinearisedMotion, Measured, Smoothed};
+pub use force_error::{ForceError, LinearisedMotion, Measured};
 pub use likelihood::Likelihood;
 pub use output_error::{Kernel, OutputError};

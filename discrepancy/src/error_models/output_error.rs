@@ -68,6 +68,14 @@ impl OutputError {
     }
 }
 
+/// Returns `f' K^-1 f` for values `f` of a Matern-3/2 process with covariance `K` at these times: the penalty of the values.
+pub(super) fn matern_penalty(deviation: f64, length: f64, times: &[f64], values: &[f64]) -> f64 {
+    let mut penalty = 0.0;
+    let filter = Filter::new(&Matern32 { deviation, length }, 0.0, times);
+    filter.innovations(values, &mut |innovation, variance| penalty += innovation * innovation / variance);
+    penalty
+}
+
 /// Kalman filter of a process observed with white noise, which depends on the sample times alone.
 struct Filter<S, const D: usize> {
     /// State transition to each sample from the one before it.

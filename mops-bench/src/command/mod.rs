@@ -1,6 +1,7 @@
 //! The command line of `mops-bench`.
 
 mod diagnosis;
+mod evidence;
 mod folder;
 mod suite;
 mod tables;
@@ -40,6 +41,8 @@ enum Benchmark {
     ///
     /// Ctrl-C ends the benchmark and keeps the finished cases.
     Diagnosis(diagnosis::Arguments),
+    /// Compare given sets of effects by evidence under three error models, and by their errors on other records.
+    Evidence(evidence::Arguments),
     /// Print the JSON schema of case.json, the format of the cases of `diagnosis --folder`.
     Schema,
     /// Print the Markdown table of figures stored with `--csv`.
@@ -55,6 +58,7 @@ enum Benchmark {
 pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
     let done = match Arguments::parse().benchmark {
         Benchmark::Diagnosis(arguments) => diagnosis::bench(catalogue, &arguments),
+        Benchmark::Evidence(arguments) => evidence::evidence(catalogue, &arguments),
         Benchmark::Schema => print(&crate::diagnosis::schema()).map(|()| ExitCode::SUCCESS),
         Benchmark::Table { file } => suite::markdown(&file),
         Benchmark::Suite(chosen) => suite::bench(catalogue, &chosen),

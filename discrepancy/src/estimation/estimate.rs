@@ -1,0 +1,387 @@
+//! Parameters and initial states under an error model, and the evidence of the model.
+
+use mops_core::{Hold, Input, LeastSquares, Port, math};
+use mops_models::WithEffects;
+use nalgebra::{DMatrix, DVector};
+
+use super::errors::{Channels, ErrorModel, Errors, Fitted, Motion};
+use super::scoring::log_determinant;
+use crate::error_models::ForceError;
+use crate::fit::{Fit, Point, Residuals};
+use crate::trajectory::Trajectory;
+
+/// Prior of an unknown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// Change of the unknown for a change of 1 in the coordinate of the prior.
+    pub stretch: f64,
+    /// Standard deviation in that coordinate.
+    pub deviation: f64,
+    /// Centre of a normal prior in the unit of the unknown; `None` if the density is that at the centre, wherever the unknown
+    /// is.
+    pub centre: Option<f64>,
+    /// True if only one side of the centre is possible, which doubles the density.
+    pub half: bool,
+}
+
+impl Prior {
+    /// Returns the logarithm of the density at a value.
+    fn log(&self, value: f64) -> f64 {
+        let distance = self.centre.map_or(0.0, |centre| (value - centre) / (self.stretch * self.deviation));
+        let doubled = if self.half { math::ln(2.0) } else { 0.0 };
+        -0.5 * distance * distance - math::ln(self.deviation) - 0.5 * math::ln(std::f64::consts::TAU) + doubled
+    }
+}
+
+/// Unknowns of a fit under an error model.
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    /// Parameters and initial states.
+    pub point: Point,
+    /// Error model with its hyperparameters.
+    pub errors: Errors,
+    /// Log-likelihood.
+    pub log_likelihood: f64,
+    /// Logarithm of the evidence; `None` for least squares.
+    pub log_evidence: Option<f64>,
+    /// Standard errors of the shared parameters, in their units; 0 for fixed ones.
+    pub deviations: Vec<f64>,
+    /// True if the decrease that the linear model still predicts is negligible.
+    pub converged: bool,
+}
+
+/// Problem of estimating the unknowns of a fit.
+pub struct Estimation<'a> {
+    /// Fit of an augmented model to records.
+    pub fit: &'a Fit<'a>,
+    /// Its model.
+    pub model: &'a WithEffects,
+    /// Channels of the records.
+    pub channels: Channels,
+    /// Nominal force of each force of the model.
+    pub nominal: Vec<f64>,
+    /// Priors of the shared parameters, then of the initial states of each record.
+    pub priors: Vec<Prior>,
+}
+
+/// Rounds of parameters and hyperparameters, and iterations of the parameters in each.
+const ROUNDS: usize = 8;
+const ITERATIONS: usize = 10;
+
+/// Iterations of least squares.
+const LEAST_SQUARES: usize = 60;
+
+/// Predicted decrease of the sum of squares, relative to its mean per residual, below which a fit has converged.
+const CONVERGED: f64 = 0.01;
+
+/// Gain in log-likelihood, or decrease of a joint penalty, in nats below which rounds end.
+const SETTLED: f64 = 0.05;
+
+/// Iterations of a smoothed motion; trials of a step, and by how much each is shorter than the one before.
+const SMOOTHINGS: usize = 6;
+const TRIALS: usize = 6;
+const SHRINK: f64 = 0.4;
+
+/// Parameters and hyperparameters are fitted in turns.
+impl Estimation<'_> {
+    /// Fits parameters and initial states by least squares.
+    pub fn least_squares(&self, start: Point) -> Option<Estimate> {
+        let found = self.descend(self.fit, &Errors::White, start, LEAST_SQUARES)?;
+        let log_likelihood = -0.5 * (found.iterate.sum() + found.logarithms);
+        Some(Estimate {
+            deviations: vec![0.0; self.fit.globals.len()],
+            point: found.point,
+            errors: Errors::White,
+            log_likelihood,
+            log_evidence: None,
+            converged: found.converged,
+        })
+    }
+
+    /// Fits parameters, initial states and hyperparameters of an error model.
+    pub fn under(&self, kind: ErrorModel, start: Point) -> Option<Estimate> {
+        let mut point = start;
+        let mut best: Option<(f64, Found, Fitted)> = None;
+        let mut errors: Option<Errors> = None;
+        let mut fit = self.fit.clone();
+        for round in 0..ROUNDS {
+            let motions = match kind {
+                ErrorModel::Force => self.motions(&mut fit, &point, errors.as_ref())?,
+                _ => Vec::new(),
+            };
+            let residuals = |fit: &Fit<'_>, motions: &[Motion]| -> Option<Vec<Vec<f64>>> {
+                let all = fit.all(&point)?;
+                let left =
+                    |(r, motion): (&Vec<f64>, &Motion)| r.iter().zip(&motion.response).map(|(r, f)| r - f).collect();
+                Some(if motions.is_empty() { all } else { all.iter().zip(motions).map(left).collect() })
+            };
+            let residuals = residuals(&fit, &motions)?;
+            let thoroughly = round < 2;
+            let fitted =
+                Errors::fit(kind, &self.fit.pieces, &self.channels, &residuals, motions, errors.as_ref(), thoroughly)?;
+            let found = self.descend(&fit, &fitted.errors, point.clone(), ITERATIONS)?;
+            let log = -0.5 * (found.iterate.sum() + found.logarithms);
+            (point, errors) = (found.point.clone(), Some(fitted.errors.clone()));
+            let gain = best.as_ref().map_or(f64::INFINITY, |best| log - best.0);
+            if gain > 0.0 {
+                best = Some((log, found, fitted));
+            }
+            // The first round of a force is along the motion without it.
+            if gain < SETTLED && round > 1 {
+                break;
+            }
+        }
+        let (log, found, fitted) = best?;
+        Some(self.concluded(log, found, fitted))
+    }
+
+    /// Returns the linearised motion of each record under the most probable force, found by Gauss-Newton iterations: simulate with
+    /// the force, linearise there, smooth again. Writes the force to the records of the fit. Without an error model there is no
+    /// force.
+    ///
+    /// Source: B. Bell, The iterated Kalman smoother as a Gauss-Newton method, SIAM J. Optim. 4 (1994) 626.
+    fn motions(&self, fit: &mut Fit<'_>, point: &Point, errors: Option<&Errors>) -> Option<Vec<Motion>> {
+        let (error, before) = match errors {
+            Some(Errors::Force(error, motions)) => (Some(error), Some(motions)),
+            _ => (None, None),
+        };
+        let mut motions = Vec::with_capacity(fit.pieces.len());
+        for piece in 0..fit.pieces.len() {
+            let mut motion = self.linearised(fit, piece, point, before.map(|motions| &motions[piece]))?;
+            if let Some(error) = error {
+                for _ in 0..SMOOTHINGS {
+                    let Some(next) = self.smoothed(fit, piece, point, error, &motion) else { break };
+                    let gain = next.1;
+                    motion = next.0;
+                    if gain < SETTLED {
+                        break;
+                    }
+                }
+            }
+            self.push(fit, piece, &motion);
+            motions.push(motion);
+        }
+        Some(motions)
+    }
+
+    /// Returns a motion with a more probable force, and the decrease of the joint penalty of force and residuals; `None` if none
+    /// is found.
+    fn smoothed(
+        &self,
+        fit: &mut Fit<'_>,
+        piece: usize,
+        point: &Point,
+        error: &ForceError,
+        motion: &Motion,
+    ) -> Option<(Motion, f64)> {
+        self.push(fit, piece, motion);
+        let residuals = fit.residuals(piece, point)?;
+        // The force explains what the model lacks: measured minus simulated.
+        let lacking: Vec<f64> = residuals.iter().zip(&motion.response).map(|(r, f)| f - r).collect();
+        let wanted = error.smooth(&motion.linearised, &lacking);
+        let noise = |residuals: &[f64]| -> f64 {
+            let measured = motion.linearised.measured.iter().flatten();
+            measured.map(|m| math::powi(residuals[m.residual] / error.noise[m.channel], 2)).sum()
+        };
+        let joint = |residuals: &[f64], forces: &[f64]| noise(residuals) + error.penalty(&motion.linearised, forces);
+        let now = joint(&residuals, &motion.forces);
+        let mut share = 1.0;
+        for _ in 0..TRIALS {
+            let forces: Vec<f64> = motion.forces.iter().zip(&wanted).map(|(f, w)| f + share * (w - f)).collect();
+            let trial = Motion { forces, ..motion.clone() };
+            self.push(fit, piece, &trial);
+            if let Some(there) = fit.residuals(piece, point) {
+                let gain = now - joint(&there, &trial.forces);
+                if gain > 0.0 {
+                    return Some((self.linearised(fit, piece, point, Some(&trial))?, gain));
+                }
+            }
+            share *= SHRINK;
+        }
+        None
+    }
+
+    /// Linearises the motion of a record under the force of a motion of this record; `None` means no force.
+    fn linearised(&self, fit: &mut Fit<'_>, piece: usize, point: &Point, force: Option<&Motion>) -> Option<Motion> {
+        match force {
+            Some(motion) => self.push(fit, piece, motion),
+            None => fit.pieces[piece].case.forces.clear(),
+        }
+        let along = Trajectory::new(fit, self.model, piece, point).ok()?;
+        let series = fit.pieces[piece].series.len();
+        let channels: Vec<usize> = (0..series).map(|k| self.channels.of(piece, k)).collect();
+        let linearised = along.linearised(&self.nominal, &channels);
+        let still = || vec![0.0; linearised.times.len() * self.nominal.len()];
+        let forces = force.map_or_else(still, |motion| motion.forces.clone());
+        let response = linearised.response(&forces);
+        Some(Motion { linearised, forces, response })
+    }
+
+    /// Writes the force of a motion to its record, held from sample to sample.
+    fn push(&self, fit: &mut Fit<'_>, piece: usize, motion: &Motion) {
+        let states = self.model.model().interface().ports.iter().filter_map(|port| match port {
+            Port::Process { state, .. } => Some(state.clone()),
+            _ => None,
+        });
+        let force = |(j, state): (usize, String)| {
+            let values = motion.forces.iter().skip(j).step_by(self.nominal.len()).map(|f| f * self.nominal[j]);
+            let times = motion.linearised.times.clone();
+            (state, Input::Sampled { times, values: values.collect(), hold: Hold::Zero })
+        };
+        let is_still = motion.forces.iter().all(|&f| f == 0.0);
+        fit.pieces[piece].case.forces = if is_still { Vec::new() } else { states.enumerate().map(force).collect() };
+    }
+
+    /// Adds the evidence and the standard errors.
+    #[allow(clippy::cast_precision_loss)]
+    fn concluded(&self, log: f64, found: Found, fitted: Fitted) -> Estimate {
+        let jacobian = found.iterate.jacobian();
+        let stretch: Vec<f64> = found.free.iter().zip(&found.scale).map(|(&k, s)| self.priors[k].stretch / s).collect();
+        let mut information = jacobian.transpose() * jacobian;
+        for a in 0..stretch.len() {
+            for b in 0..stretch.len() {
+                information[(a, b)] *= stretch[a] * stretch[b];
+            }
+            let deviation = self.priors[found.free[a]].deviation;
+            information[(a, a)] += 1.0 / (deviation * deviation);
+        }
+        let values = self.values(&found.point);
+        let log_prior: f64 = found.free.iter().map(|&k| self.priors[k].log(values[k])).sum();
+        let count = (found.free.len() + fitted.count) as f64;
+        let log_evidence = log + log_prior + fitted.log_prior + 0.5 * count * math::ln(std::f64::consts::TAU)
+            - 0.5 * log_determinant(&information)
+            - 0.5 * fitted.log_determinant;
+        let mut deviations = vec![0.0; self.fit.globals.len()];
+        if let Some(cholesky) = information.cholesky() {
+            let covariance = cholesky.inverse();
+            for (a, &k) in found.free.iter().enumerate().filter(|(_, k)| **k < self.fit.globals.len()) {
+                deviations[k] = covariance[(a, a)].sqrt() * self.priors[k].stretch;
+            }
+        }
+        Estimate {
+            point: found.point,
+            errors: fitted.errors,
+            log_likelihood: log,
+            log_evidence: Some(log_evidence).filter(|e| e.is_finite()),
+            deviations,
+            converged: found.converged,
+        }
+    }
+
+    /// Returns the values of all unknowns: shared parameters, then initial states of each record.
+    fn values(&self, point: &Point) -> Vec<f64> {
+        point.globals.iter().chain(point.locals.iter().flatten()).copied().collect()
+    }
+
+    fn point(&self, values: &[f64]) -> Point {
+        let mut rest = &values[self.fit.globals.len()..];
+        let mut take = |count: usize| {
+            let (first, others) = rest.split_at(count);
+            rest = others;
+            first.to_vec()
+        };
+        let locals = self.fit.pieces.iter().map(|p| take(p.locals.len())).collect();
+        Point { globals: values[..self.fit.globals.len()].to_vec(), locals }
+    }
+
+    /// Minimises the sum of squares of the whitened residuals in linear, scaled coordinates.
+    fn descend(&self, fit: &Fit<'_>, errors: &Errors, start: Point, iterations: usize) -> Option<Found> {
+        let of_globals = fit.globals.iter().map(|g| (g.bounds, g.scale, !g.is_pinned() && !g.is_stepped()));
+        let of_locals =
+            fit.pieces.iter().flat_map(|p| &p.locals).map(|l| (l.bounds, l.scale, l.bounds[0] < l.bounds[1]));
+        let unknowns: Vec<([f64; 2], f64, bool)> = of_globals.chain(of_locals).collect();
+        let free: Vec<usize> = (0..unknowns.len()).filter(|&k| unknowns[k].2).collect();
+        let mut values = self.values(&start);
+        // Scales of the size of the values keep steps and bounds in proportion.
+        let scale: Vec<f64> = free.iter().map(|&k| positive(unknowns[k].1)).collect();
+        let bounds: Vec<[f64; 2]> = free.iter().zip(&scale).map(|(&k, s)| unknowns[k].0.map(|b| b / s)).collect();
+        let place = |values: &mut [f64], z: &[f64]| {
+            free.iter().zip(z).zip(&scale).for_each(|((&k, z), s)| values[k] = z * s);
+        };
+        let z: Vec<f64> =
+            free.iter().zip(&scale).zip(&bounds).map(|((&k, s), b)| (values[k] / s).clamp(b[0], b[1])).collect();
+        place(&mut values, &z);
+        let (logarithms, residuals, jacobian) =
+            self.whitened(errors, &fit.slopes(&self.point(&values))?, &free, &scale);
+        let mut iterate = LeastSquares::new(bounds, z, residuals, jacobian);
+        #[allow(clippy::cast_precision_loss)]
+        let negligible =
+            |iterate: &LeastSquares| CONVERGED * (iterate.sum() / iterate.residuals().len().max(1) as f64).max(1.0);
+        let mut converged = false;
+        for _ in 0..iterations {
+            let Some(step) = iterate.step() else { if iterate.reject() { continue } else { break } };
+            if step.predicted < negligible(&iterate) {
+                converged = iterate.full_step().is_some_and(|full| full.predicted < negligible(&iterate));
+                if converged {
+                    break;
+                }
+            }
+            let mut trial = values.clone();
+            place(&mut trial, &step.to);
+            let there = fit.slopes(&self.point(&trial)).map(|all| self.whitened(errors, &all, &free, &scale));
+            let sum = there.as_ref().map_or(f64::INFINITY, |(_, residuals, _)| residuals.norm_squared());
+            let ratio = (iterate.sum() - sum) / step.predicted;
+            match there {
+                Some((_, residuals, jacobian)) if LeastSquares::accepts(ratio) => {
+                    values = trial;
+                    iterate.accept(step.to, residuals, jacobian, ratio);
+                }
+                _ if iterate.reject() => {}
+                _ => break,
+            }
+        }
+        Some(Found { point: self.point(&values), iterate, free, scale, logarithms, converged })
+    }
+
+    /// Returns the sum of logarithms of variances, the whitened residuals of all records, and their derivatives by the free
+    /// unknowns.
+    fn whitened(
+        &self,
+        errors: &Errors,
+        all: &[Residuals],
+        free: &[usize],
+        scale: &[f64],
+    ) -> (f64, DVector<f64>, DMatrix<f64>) {
+        let globals = self.fit.globals.len();
+        let count: usize = all.iter().map(|piece| piece.r.len()).sum();
+        let mut residuals = DVector::zeros(count);
+        let mut jacobian = DMatrix::zeros(count, free.len());
+        let (mut logarithms, mut from, mut local) = (0.0, 0, globals);
+        for (index, (piece, found)) in self.fit.pieces.iter().zip(all).enumerate() {
+            let next = local + piece.locals.len();
+            // Free unknowns that move this record, by their position among the free ones.
+            let moving: Vec<usize> =
+                (0..free.len()).filter(|&a| free[a] < globals || (local..next).contains(&free[a])).collect();
+            let column = |a: &usize| {
+                let k = if free[*a] < globals { free[*a] } else { globals + free[*a] - local };
+                found.j[k].iter().map(|slope| slope * scale[*a]).collect::<Vec<f64>>()
+            };
+            let mut columns: Vec<Vec<f64>> =
+                std::iter::once(errors.without_force(index, &found.r)).chain(moving.iter().map(column)).collect();
+            logarithms += errors.whiten(piece, &self.channels, index, &mut columns);
+            residuals.rows_mut(from, found.r.len()).copy_from_slice(&columns[0]);
+            for (a, column) in moving.iter().zip(&columns[1..]) {
+                jacobian.view_mut((from, *a), (column.len(), 1)).copy_from_slice(column);
+            }
+            (from, local) = (from + found.r.len(), next);
+        }
+        (logarithms, residuals, jacobian)
+    }
+}
+
+fn positive(scale: f64) -> f64 {
+    if scale.is_finite() && scale > 0.0 { scale } else { 1.0 }
+}
+
+/// End of a descent.
+struct Found {
+    point: Point,
+    iterate: LeastSquares,
+    free: Vec<usize>,
+    scale: Vec<f64>,
+    logarithms: f64,
+    converged: bool,
+}
+
+#[cfg(test)]
+mod tests;

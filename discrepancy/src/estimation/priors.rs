@@ -1,0 +1,72 @@
+//! Priors of the unknowns of an augmented model, and nominal forces.
+
+use mops_core::{InitialGrid, Port};
+
+use super::estimate::Prior;
+use crate::candidate::Sizes;
+use crate::fit::{Fit, Global, Sets};
+use crate::screen::Scene;
+use crate::subject::{Local, Subject};
+use crate::trace_of::sizes;
+use crate::variant::{Added, Variant};
+
+/// Standard deviation of a declared parameter: in its logarithm where the study looks for that, else in its scale.
+const DECLARED: f64 = 1.5;
+
+/// Standard deviation of an initial state in its scale.
+const START: f64 = 3.0;
+
+/// Standard deviation of a parameter with a null value in its typical size at the place.
+const STRENGTH: f64 = 2.0;
+
+/// Standard deviation of the logarithm of a shape.
+const SHAPE: f64 = 1.0;
+
+/// Standard deviation of a uniform distribution in its width: `1/sqrt(12)`.
+const UNIFORM: f64 = 0.288_675_134_594_812_9;
+
+/// Returns the priors of the shared parameters, then of the initial states of each record.
+pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Added]) -> Vec<Prior> {
+    let at_centre = |stretch, deviation| Prior { stretch, deviation, centre: None, half: false };
+    let declared = |k: usize, global: &Global| {
+        let stretch = if global.log { subject.start()[k].abs() } else { global.scale };
+        at_centre(stretch, DECLARED)
+    };
+    let of_effect = |global: &Global, parameter: usize| {
+        let index =
+            variant.first.iter().rposition(|&first| first <= parameter).expect("parameters of effects come last");
+        let (added, position) = (&added[index], parameter - variant.first[index]);
+        let of = &added.candidate.effect.parameters()[position];
+        match (of.null_value, of.grid) {
+            (Some(null), _) if null.is_finite() => Prior {
+                stretch: added.sizes.of(of.dimension).abs(),
+                deviation: STRENGTH,
+                centre: Some(null),
+                half: of.bounds.contains(&null),
+            },
+            (Some(_), _) | (None, InitialGrid::Within(_) | InitialGrid::Moments(_) | InitialGrid::Frequencies) => {
+                at_centre(width(global, &added.sizes), UNIFORM)
+            }
+            _ => at_centre(added.strengths[position].abs().max(f64::MIN_POSITIVE), SHAPE),
+        }
+    };
+    let shared = fit.globals.iter().map(|global| match global.sets {
+        Sets::Tuner(k) => declared(k, global),
+        Sets::Parameter(parameter) => of_effect(global, parameter),
+    });
+    let start = |local: &Local| at_centre(local.scale, START);
+    shared.chain(fit.pieces.iter().flat_map(|piece| &piece.locals).map(start)).collect()
+}
+
+/// Returns the width of the range in which a level, a time or a frequency lies.
+fn width(global: &Global, sizes: &Sizes) -> f64 {
+    let width = global.bounds[1] - global.bounds[0];
+    if width.is_finite() { width } else { sizes.range[1] - sizes.range[0] }
+}
+
+/// Returns the nominal force of each balance of a model, in the order of its forces.
+pub fn nominal_forces(fit: &Fit<'_>, variant: &Variant, scene: &Scene) -> Vec<f64> {
+    let ports = &variant.model.model().interface().ports;
+    let size = |port| sizes(port, &variant.model, &fit.pieces, &scene.trajectories).map_or(1.0, |sizes| sizes.output);
+    ports.iter().filter(|port| matches!(port, Port::Process { .. })).map(size).collect()
+}

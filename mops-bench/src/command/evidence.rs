@@ -1,0 +1,89 @@
+//! `mops-bench evidence`: given sets of effects, compared by evidence.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use mops::discrepancy::estimation::{ErrorModel, Errors, SetFit, SetOfEffects, compare};
+use mops::terminal::{CommandError, print};
+use mops::{Catalogue, Diagnostic, Study};
+
+/// Arguments of `mops-bench evidence`.
+#[derive(clap::Args)]
+pub(super) struct Arguments {
+    /// Study file with the task diagnosis.
+    study: PathBuf,
+    /// Set of effects, `effect@place` each, joined by `+`; sets with one effect less come first.
+    #[arg(long = "set", value_name = "EFFECTS")]
+    sets: Vec<String>,
+}
+
+/// Runs the command.
+pub(super) fn evidence(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
+    let study = Study::from_file(catalogue, &arguments.study)?;
+    let names = |set: &String| set.split('+').map(|name| name.trim().to_owned()).collect();
+    let sets: Vec<Vec<String>> = arguments.sets.iter().map(names).collect();
+    let compared = compare(&study, &catalogue.effects, &sets).map_err(|error| Diagnostic::new(error.to_string()))?;
+    print(&table(&compared)).map(|()| ExitCode::SUCCESS)
+}
+
+/// Formats sets of effects, the declared model first.
+fn table(sets: &[SetOfEffects]) -> String {
+    let mut text = String::new();
+    let declared = sets.first().map_or(0.0, |set| set.log_evidence);
+    for set in sets {
+        let title = if set.effects.is_empty() { "declared model".to_owned() } else { set.effects.join(" + ") };
+        let gain = set.log_evidence - declared;
+        let _ = writeln!(text, "{title}: log-evidence {:.1} ({gain:+.1})", set.log_evidence);
+        for fit in &set.fits {
+            let _ = writeln!(text, "  {}", line(set, fit));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn line(set: &SetOfEffects, fit: &SetFit) -> String {
+    let mut text = match fit.kind {
+        None => "least squares",
+        Some(ErrorModel::SmoothOutput) => "smooth output error",
+        Some(ErrorModel::RoughOutput) => "rough output error",
+        Some(ErrorModel::Force) => "force error",
+    }
+    .to_owned();
+    let _ = write!(text, ": log-likelihood {:.1}", fit.log_likelihood);
+    if let Some(evidence) = fit.log_evidence {
+        let _ = write!(text, ", log-evidence {evidence:.1}");
+    }
+    match &fit.errors {
+        Errors::White => {}
+        Errors::Output(errors) => {
+            for e in errors {
+                let _ = write!(text, "; deviation {:.3}, length {:.4} s, noise {:.3}", e.deviation, e.length, e.noise);
+            }
+        }
+        Errors::Force(e, _) => {
+            let _ = write!(text, "; deviation {:.4}, length {:.4} s, noise {:.3?}", e.deviation, e.length, e.noise);
+        }
+    }
+    for (name, (value, deviation)) in set.parameters.iter().zip(fit.values.iter().zip(&fit.deviations)) {
+        let _ = write!(text, "; {name} {}", rounded(*value));
+        if *deviation > 0.0 {
+            let _ = write!(text, " +- {}", rounded(*deviation));
+        }
+    }
+    for (role, error) in ["calibration", "selection", "validation"].iter().zip(fit.free_run) {
+        if let Some(error) = error {
+            let _ = write!(text, "; {role} {error:.2} x noise");
+        }
+    }
+    if !fit.converged {
+        text.push_str("; not converged");
+    }
+    text
+}
+
+/// Returns a number rounded to four significant digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
