@@ -13,7 +13,7 @@ use crate::start::usable_start;
 /// (J'J + lambda D^2) d = -J'r,   D^2 the largest diagonal of J'J so far
 /// ```
 /// Bounds are handled by an active set: tuners that the step would move beyond a bound are fixed there, and the step is
-/// recomputed. See [`LeastSquares`].
+/// recomputed.
 ///
 /// The method runs from the initial guess of the study, then from the best points of a sample of the box. It then
 /// restarts around the best point, until two rounds in succession improve it by less than a thousandth.
