@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use mops_core::{Effect, Role, Study, StudyError, math};
 
+use super::curve::FreeCurve;
 use super::errors::{Channels, ErrorModel, Errors};
 use super::estimate::{Estimate, Estimation};
 use super::priors::{nominal_forces, priors};
@@ -45,6 +46,8 @@ pub struct SetFit {
     pub errors: Errors,
     /// Root mean square errors in noises of calibration, selection and validation records, in free run with free initial states.
     pub free_run: [Option<f64>; 3],
+    /// Free curves on top of the fit, the one with the largest gain first; none for least squares.
+    pub curves: Vec<FreeCurve>,
     /// True if the fit converged.
     pub converged: bool,
 }
@@ -188,10 +191,7 @@ fn starts(smaller: &Member<'_>, candidates: &[Candidate], name: &str) -> Option<
 }
 
 /// Fits a model under the error models: from the optimum of least squares, then each from the optima of the others.
-fn under_error_models(subject: &Subject, member: &Member<'_>) -> Vec<(ErrorModel, Estimate)> {
-    let Some(scene) = scene(member) else { return Vec::new() };
-    let nominal = nominal_forces(&member.fit, &member.variant, &scene);
-    let estimation = estimation(subject, &member.fit, &member.variant, &member.added, nominal);
+fn under_error_models(estimation: &Estimation<'_>, member: &Member<'_>) -> Vec<(ErrorModel, Estimate)> {
     let from = |kind: ErrorModel, start: &Estimate| Some((kind, estimation.under(kind, start.point.clone())?));
     let first: Vec<(ErrorModel, Estimate)> =
         ErrorModel::ALL.into_iter().filter_map(|kind| from(kind, &member.least_squares)).collect();
@@ -208,7 +208,11 @@ fn evidence(estimate: &Estimate) -> f64 {
 }
 
 fn compared(subject: &Subject, member: &Member<'_>) -> SetOfEffects {
-    let estimates = under_error_models(subject, member);
+    let nominal = scene(member).map(|scene| nominal_forces(&member.fit, &member.variant, &scene));
+    let is_linearised = nominal.is_some();
+    let estimation = estimation(subject, &member.fit, &member.variant, &member.added, nominal.unwrap_or_default());
+    let estimates = if is_linearised { under_error_models(&estimation, member) } else { Vec::new() };
+    let curves = |kind: Option<ErrorModel>, estimate: &Estimate| kind.and_then(|_| estimation.curves(estimate));
     let name = |sets: Sets| match sets {
         Sets::Tuner(k) => subject.study.tuners()[subject.globals[k]].name.clone(),
         Sets::Parameter(k) => member.fit.model.interface().parameters[k].variable.name.clone(),
@@ -222,6 +226,7 @@ fn compared(subject: &Subject, member: &Member<'_>) -> SetOfEffects {
         errors: estimate.errors.clone(),
         free_run: [Role::Calibration, Role::Selection, Role::Validation]
             .map(|role| free_run(subject, member, &estimate.point, role)),
+        curves: curves(kind, estimate).unwrap_or_default(),
         converged: estimate.converged,
     };
     let least_squares = (None, &member.least_squares);

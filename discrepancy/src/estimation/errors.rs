@@ -83,6 +83,11 @@ impl Channels {
         }
     }
 
+    /// Returns the shortest time between samples over all channels, s.
+    pub fn shortest_step(&self) -> f64 {
+        self.step.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
     /// Returns the channel of a series of a record.
     pub fn of(&self, piece: usize, series: usize) -> usize {
         self.of[piece][series]
@@ -151,6 +156,23 @@ impl Errors {
         }
     }
 
+    /// Returns the error model with the logarithm of its deviations changed.
+    #[must_use]
+    pub fn scaled(&self, by: f64) -> Self {
+        let factor = math::exp(by);
+        match self {
+            Self::White => Self::White,
+            Self::Output(errors) => {
+                let scaled = |e: &OutputError| OutputError { deviation: e.deviation * factor, ..*e };
+                Self::Output(errors.iter().map(scaled).collect())
+            }
+            Self::Force(error, motions) => {
+                let error = ForceError { deviation: error.deviation * factor, ..error.clone() };
+                Self::Force(error, motions.clone())
+            }
+        }
+    }
+
     /// Returns what the residuals of a record would be without the force along which they are linearised, to first order.
     pub fn without_force(&self, index: usize, residuals: &[f64]) -> Vec<f64> {
         match self {
@@ -209,7 +231,7 @@ impl Errors {
             5..=7 => force_score::<7>(x, residuals, &motions),
             _ => force_score::<WIDEST>(x, residuals, &motions),
         };
-        let step = channels.step.iter().copied().fold(f64::INFINITY, f64::min);
+        let step = channels.shortest_step();
         let length = channels.length.iter().copied().fold(0.0, f64::max);
         let lengths = [SHORTEST * step, length].map(math::ln);
         let mut bounds = vec![FORCES.map(math::ln), lengths];

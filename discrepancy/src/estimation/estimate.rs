@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::errors::{Channels, ErrorModel, Errors, Fitted, Motion};
 use super::scoring::log_determinant;
 use crate::error_models::ForceError;
-use crate::fit::{Fit, Point, Residuals};
+use crate::fit::{Fit, Piece, Point, Residuals};
 use crate::trajectory::Trajectory;
 
 /// Prior of an unknown.
@@ -25,6 +25,11 @@ pub struct Prior {
 }
 
 impl Prior {
+    /// Returns the precision in the unit of the unknown.
+    pub fn precision(&self) -> f64 {
+        math::powi(self.stretch * self.deviation, -2)
+    }
+
     /// Returns the logarithm of the density at a value.
     fn log(&self, value: f64) -> f64 {
         let distance = self.centre.map_or(0.0, |centre| (value - centre) / (self.stretch * self.deviation));
@@ -284,13 +289,51 @@ impl Estimation<'_> {
         Point { globals: values[..self.fit.globals.len()].to_vec(), locals }
     }
 
+    /// Returns bounds and scale of all unknowns, and whether each is fitted.
+    fn unknowns(&self) -> Vec<([f64; 2], f64, bool)> {
+        let of_globals = self.fit.globals.iter().map(|g| (g.bounds, g.scale, !g.is_pinned() && !g.is_stepped()));
+        let locals = self.fit.pieces.iter().flat_map(|p| &p.locals);
+        of_globals.chain(locals.map(|l| (l.bounds, l.scale, l.bounds[0] < l.bounds[1]))).collect()
+    }
+
+    /// Returns the indices of the unknowns that are fitted.
+    pub(super) fn free(&self) -> Vec<usize> {
+        self.unknowns().iter().enumerate().filter(|(_, unknown)| unknown.2).map(|(k, _)| k).collect()
+    }
+
+    /// Returns the fit with the force of an error model in its records.
+    pub(super) fn along(&self, errors: &Errors) -> Fit<'_> {
+        let mut fit = self.fit.clone();
+        if let Errors::Force(_, motions) = errors {
+            motions.iter().enumerate().for_each(|(piece, motion)| self.push(&mut fit, piece, motion));
+        }
+        fit
+    }
+
+    /// Returns the derivatives of the residuals of a record by the free unknowns that move it, each with its position among
+    /// the free ones.
+    pub(super) fn moving<'f>(
+        &self,
+        free: &'f [usize],
+        index: usize,
+        found: &'f Residuals,
+    ) -> impl Iterator<Item = (usize, Vec<f64>)> + 'f {
+        let globals = self.fit.globals.len();
+        let count = |piece: &Piece| piece.locals.len();
+        let local = globals + self.fit.pieces[..index].iter().map(count).sum::<usize>();
+        let next = local + count(&self.fit.pieces[index]);
+        let column = move |&k: &usize| {
+            let own = (local..next).contains(&k).then(|| globals + k - local);
+            (k < globals).then_some(k).or(own)
+        };
+        let moves = move |(a, k): (usize, &usize)| Some((a, found.j[column(k)?].clone()));
+        free.iter().enumerate().filter_map(moves)
+    }
+
     /// Minimises the sum of squares of the whitened residuals in linear, scaled coordinates.
     fn descend(&self, fit: &Fit<'_>, errors: &Errors, start: Point, iterations: usize) -> Option<Found> {
-        let of_globals = fit.globals.iter().map(|g| (g.bounds, g.scale, !g.is_pinned() && !g.is_stepped()));
-        let of_locals =
-            fit.pieces.iter().flat_map(|p| &p.locals).map(|l| (l.bounds, l.scale, l.bounds[0] < l.bounds[1]));
-        let unknowns: Vec<([f64; 2], f64, bool)> = of_globals.chain(of_locals).collect();
-        let free: Vec<usize> = (0..unknowns.len()).filter(|&k| unknowns[k].2).collect();
+        let unknowns = self.unknowns();
+        let free = self.free();
         let mut values = self.values(&start);
         // Scales of the size of the values keep steps and bounds in proportion.
         let scale: Vec<f64> = free.iter().map(|&k| positive(unknowns[k].1)).collect();
@@ -342,28 +385,21 @@ impl Estimation<'_> {
         free: &[usize],
         scale: &[f64],
     ) -> (f64, DVector<f64>, DMatrix<f64>) {
-        let globals = self.fit.globals.len();
         let count: usize = all.iter().map(|piece| piece.r.len()).sum();
         let mut residuals = DVector::zeros(count);
         let mut jacobian = DMatrix::zeros(count, free.len());
-        let (mut logarithms, mut from, mut local) = (0.0, 0, globals);
+        let (mut logarithms, mut from) = (0.0, 0);
         for (index, (piece, found)) in self.fit.pieces.iter().zip(all).enumerate() {
-            let next = local + piece.locals.len();
-            // Free unknowns that move this record, by their position among the free ones.
-            let moving: Vec<usize> =
-                (0..free.len()).filter(|&a| free[a] < globals || (local..next).contains(&free[a])).collect();
-            let column = |a: &usize| {
-                let k = if free[*a] < globals { free[*a] } else { globals + free[*a] - local };
-                found.j[k].iter().map(|slope| slope * scale[*a]).collect::<Vec<f64>>()
-            };
-            let mut columns: Vec<Vec<f64>> =
-                std::iter::once(errors.without_force(index, &found.r)).chain(moving.iter().map(column)).collect();
+            let (moving, slopes): (Vec<usize>, Vec<Vec<f64>>) = self.moving(free, index, found).unzip();
+            let mut columns = vec![errors.without_force(index, &found.r)];
+            columns.extend(slopes);
             logarithms += errors.whiten(piece, &self.channels, index, &mut columns);
             residuals.rows_mut(from, found.r.len()).copy_from_slice(&columns[0]);
-            for (a, column) in moving.iter().zip(&columns[1..]) {
-                jacobian.view_mut((from, *a), (column.len(), 1)).copy_from_slice(column);
+            for (&a, column) in moving.iter().zip(&columns[1..]) {
+                let scaled = DVector::from_column_slice(column) * scale[a];
+                jacobian.view_mut((from, a), (column.len(), 1)).copy_from(&scaled);
             }
-            (from, local) = (from + found.r.len(), next);
+            from += found.r.len();
         }
         (logarithms, residuals, jacobian)
     }

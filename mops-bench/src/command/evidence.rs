@@ -8,6 +8,9 @@ use mops::discrepancy::estimation::{ErrorModel, Errors, SetFit, SetOfEffects, co
 use mops::terminal::{CommandError, print};
 use mops::{Catalogue, Diagnostic, Study};
 
+/// Free curves that are printed for each fit.
+const CURVES: usize = 3;
+
 /// Arguments of `mops-bench evidence`.
 #[derive(clap::Args)]
 pub(super) struct Arguments {
@@ -37,6 +40,10 @@ fn table(sets: &[SetOfEffects]) -> String {
         let _ = writeln!(text, "{title}: log-evidence {:.1} ({gain:+.1})", set.log_evidence);
         for fit in &set.fits {
             let _ = writeln!(text, "  {}", line(set, fit));
+            let curves = fit.curves.iter().take(CURVES).map(|c| format!("{} {:+.1}", c.coordinate, c.gain));
+            if !fit.curves.is_empty() {
+                let _ = writeln!(text, "    free curve over: {}", curves.collect::<Vec<_>>().join("; "));
+            }
         }
         text.push('\n');
     }

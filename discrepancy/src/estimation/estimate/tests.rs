@@ -171,3 +171,69 @@ fn the_evidence_does_not_depend_on_the_scales_of_the_search() {
         assert!((a - b).abs() < 1e-2, "{a} {b}");
     });
 }
+
+/// Returns the coordinate of the largest free curve on the declared model, with its gain, under each error model.
+fn largest_curves(subject: &Subject) -> Vec<(String, f64)> {
+    let found = std::cell::RefCell::new(Vec::new());
+    estimate(subject, |estimation, point| {
+        for kind in ErrorModel::ALL {
+            let estimate = estimation.under(kind, point.clone()).expect("it simulates");
+            let curves = estimation.curves(&estimate).expect("it simulates");
+            found.borrow_mut().push((curves[0].coordinate.clone(), curves[0].gain));
+        }
+    });
+    found.into_inner()
+}
+
+/// Gain in nats from which a curve counts.
+const FIRES: f64 = 6.0;
+
+#[test]
+fn no_free_curve_gains_where_nothing_is_missing() {
+    for (coordinate, gain) in largest_curves(&measured(OSCILLATOR, |x| x, |_| 0.0)) {
+        assert!(gain < FIRES, "{coordinate} {gain}");
+    }
+}
+
+#[test]
+fn the_free_curve_of_a_hardening_spring_is_over_the_position() {
+    for (coordinate, gain) in largest_curves(&measured(OSCILLATOR, |x| x + 0.3 * x * x * x, |_| 0.0)) {
+        assert!(coordinate == "position at joint:x" && gain > FIRES, "{coordinate} {gain}");
+    }
+}
+
+#[test]
+fn the_free_curve_of_a_drag_is_over_the_speed() {
+    let [d, k, x, v] = TRUTH;
+    let rates = |_: f64, s: &[f64; 2]| [s[1], -d * s[1] - 0.2 * s[1] * s[1].abs() - k * s[0]];
+    let states = integrated(rates, [x, v], 0.05, 400);
+    let subject = subject(OSCILLATOR, &TRUTH, 2, vec![Record::of_first("x", &states, 0.05, NOISE, "estimates")]);
+    for (coordinate, gain) in largest_curves(&subject) {
+        assert!(coordinate == "speed at joint:x" && gain > FIRES, "{coordinate} {gain}");
+    }
+}
+
+#[test]
+fn a_gain_of_the_input_does_not_stand_for_a_missing_force() {
+    // With all parameters free, the whole plant can be scaled with its input: a carriage with a drag that the model lacks.
+    const CARRIAGE: &str = r#"
+    states     = { x = "m", v = "m/s" }
+    inputs     = { u = "N" }
+    parameters = { m = "kg", d = "N s/m" }
+    der        = { x = "v", v = "m*v' = u - d*v" }
+    "#;
+    let times: Vec<f64> = (0..400).map(|k| f64::from(k) * 0.05).collect();
+    let force = |t: f64| 3.0 * math::sin(0.9 * t) + 2.0 * math::sin(2.3 * t);
+    let values: Vec<f64> = times.iter().map(|&t| force(t + 0.025)).collect();
+    let held = values.clone();
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let rates =
+        move |t: f64, s: &[f64; 2]| [s[1], (held[(t / 0.05) as usize] - 0.5 * s[1] - 0.4 * s[1] * s[1].abs()) / 2.0];
+    let states = integrated(rates, [0.0, 0.0], 0.05, 400);
+    let input = Input::Sampled { times, values, hold: Hold::Zero };
+    let record = Record { inputs: vec![("u", input)], ..Record::of_first("x", &states, 0.05, NOISE, "carriage") };
+    let subject = subject(CARRIAGE, &[2.0, 0.5, 0.0, 0.0], 2, vec![record]);
+    for (coordinate, gain) in largest_curves(&subject) {
+        assert!(coordinate == "speed at joint:x" && gain > FIRES, "{coordinate} {gain}");
+    }
+}

@@ -1,0 +1,358 @@
+//! The free curve: on which coordinate, and at which place, a missing force or a change of an input depends, without a catalogue.
+//!
+//! Over each coordinate a force is a sum of bumps with free weights, over a delayed input a sum of delayed copies. The weights are
+//! small and normal beforehand and are integrated out; so is what parameters and initial states can take up.
+
+use std::f64::consts::TAU;
+
+use mops_core::{Port, Unit, math};
+use mops_models::Moment;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::errors::Errors;
+use super::estimate::{Estimate, Estimation};
+use super::scoring::log_determinant;
+use crate::fit::{Fit, Piece};
+use crate::trace_of::{Spot, spot};
+use crate::trajectory::Trajectory;
+
+/// Bumps over a coordinate, and copies of a delayed input.
+const BUMPS: usize = 6;
+
+/// Columns of a coordinate: the bumps, then the input itself at an input, else 0.
+const COLUMNS: usize = BUMPS + 1;
+
+/// Standard deviation of the gain of an input, beside which curves over that input are judged. A smaller gain together with
+/// smaller parameters of the plant makes every unknown force smaller, and would be taken for a dependence on the input.
+const GAIN: f64 = 1.0;
+
+/// Shares of the visited values that lie below the first and above the last centre.
+const OUTSIDE: f64 = 0.005;
+
+/// Standard deviations of the weights in nominal forces that are tried.
+const DEVIATIONS: [f64; 4] = [0.005, 0.02, 0.06, 0.2];
+
+/// Logarithms by which the deviation of the error model is tried smaller, as the curve may take over what it described.
+const SHRINKS: [f64; 6] = [0.0, -0.5, -1.0, -1.6, -2.3, -3.2];
+
+/// Nats taken off every gain for the choice of the deviations.
+const CHOICE: f64 = 2.3;
+
+/// Turns that an angle must cover to be a coordinate modulo one turn too.
+const TURNS: f64 = 1.5;
+
+/// Gain of a free curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeCurve {
+    /// Coordinate and place, for example `speed at joint:q`.
+    pub coordinate: String,
+    /// Gain in log-evidence, nats, with that for the choice of the deviations taken off.
+    pub gain: f64,
+    /// Centres of the bumps, in the unit of the coordinate; delays of the copies of an input, s.
+    pub centres: Vec<f64>,
+    /// Most probable weights in nominal forces, or in the amplitude of the input.
+    pub weights: Vec<f64>,
+}
+
+/// Coordinate with the places at which the force over it acts.
+struct Coordinate {
+    name: String,
+    value: Value,
+    /// Columns of the linear system with the size of a weight of 1.
+    acts: Vec<(usize, f64)>,
+}
+
+/// Value of a coordinate at an instant.
+enum Value {
+    State(usize),
+    Difference(usize, usize),
+    Angle(usize),
+    Input(usize),
+    /// Delayed input, by its index and its name, with the delay from one copy to the next, s.
+    Delayed(String, f64),
+}
+
+impl Value {
+    fn at(&self, moment: &Moment) -> f64 {
+        match *self {
+            Self::State(k) => moment.x[k],
+            Self::Difference(a, b) => moment.x[a] - moment.x[b],
+            Self::Angle(k) => moment.x[k].rem_euclid(TAU),
+            Self::Input(k) => moment.u[k],
+            Self::Delayed(..) => 0.0,
+        }
+    }
+}
+
+impl Estimation<'_> {
+    /// Returns the free curves on top of an estimate, the one with the largest gain first; `None` if a simulation fails.
+    pub fn curves(&self, estimate: &Estimate) -> Option<Vec<FreeCurve>> {
+        let fit = self.along(&estimate.errors);
+        let slopes = fit.slopes(&estimate.point)?;
+        let trajectory = |piece: usize| Trajectory::new(&fit, self.model, piece, &estimate.point).ok();
+        let trajectories: Vec<Trajectory> = (0..fit.pieces.len()).map(trajectory).collect::<Option<_>>()?;
+        let coordinates = self.coordinates(&fit, &trajectories);
+        let shapes: Vec<Shape> = coordinates.iter().filter_map(|c| Shape::new(c, &trajectories)).collect();
+        let free = self.free();
+        let columns = free.len() + COLUMNS * shapes.len();
+        let records: Vec<Vec<(usize, Vec<f64>)>> = (0..fit.pieces.len())
+            .map(|index| {
+                let mut record = vec![(columns, estimate.errors.without_force(index, &slopes[index].r))];
+                record.extend(self.moving(&free, index, &slopes[index]));
+                for (s, shape) in shapes.iter().enumerate() {
+                    let of = |b: usize| shape.response(b, &trajectories[index], &fit.pieces[index]);
+                    record.extend((0..COLUMNS).map(|b| (free.len() + COLUMNS * s + b, of(b))));
+                }
+                record
+            })
+            .collect();
+        let precision: Vec<f64> = free.iter().map(|&k| self.priors[k].precision()).collect();
+        let grid: Vec<Option<Reduced>> = SHRINKS
+            .par_iter()
+            .map(|&shrink| self.reduced(&fit.pieces, &estimate.errors.scaled(shrink), &records, columns, &precision))
+            .collect();
+        let grid: Vec<Reduced> = grid.into_iter().flatten().collect();
+        let least = |a: &(f64, Vec<f64>), b: &(f64, Vec<f64>)| a.0.total_cmp(&b.0);
+        let gain = |(s, shape): (usize, &Shape)| {
+            let (without, _) = grid.iter().filter_map(|reduced| reduced.with_curve(s, None)).min_by(least)?;
+            let tried = grid.iter().flat_map(|reduced| DEVIATIONS.map(|d| reduced.with_curve(s, Some(d))));
+            let (penalty, mut weights) = tried.flatten().min_by(least)?;
+            weights.truncate(BUMPS);
+            let gain = 0.5 * (without - penalty) - CHOICE;
+            Some(FreeCurve { coordinate: shape.name.clone(), gain, centres: shape.centres.clone(), weights })
+        };
+        let mut curves: Vec<FreeCurve> = shapes.iter().enumerate().filter_map(gain).collect();
+        curves.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        Some(curves)
+    }
+
+    /// Returns the normal equations of all columns under an error model, with the unknowns projected out.
+    fn reduced(
+        &self,
+        pieces: &[Piece],
+        errors: &Errors,
+        records: &[Vec<(usize, Vec<f64>)>],
+        columns: usize,
+        precision: &[f64],
+    ) -> Option<Reduced> {
+        let mut gram = DMatrix::zeros(columns + 1, columns + 1);
+        let mut logarithms = 0.0;
+        for (index, (piece, record)) in pieces.iter().zip(records).enumerate() {
+            let mut white: Vec<Vec<f64>> = record.iter().map(|(_, column)| column.clone()).collect();
+            logarithms += errors.whiten(piece, &self.channels, index, &mut white);
+            let matrix =
+                DMatrix::from_columns(&white.iter().map(|c| DVector::from_column_slice(c)).collect::<Vec<_>>());
+            let part = matrix.transpose() * &matrix;
+            for (a, (at, _)) in record.iter().enumerate() {
+                for (b, (to, _)) in record.iter().enumerate() {
+                    gram[(*at, *to)] += part[(a, b)];
+                }
+            }
+        }
+        let free = precision.len();
+        let mut unknowns = gram.view((0, 0), (free, free)).into_owned();
+        for (k, precision) in precision.iter().enumerate() {
+            unknowns[(k, k)] += precision;
+        }
+        let determinant = log_determinant(&unknowns);
+        let across = gram.view((0, free), (free, columns + 1 - free)).into_owned();
+        let rest = gram.view((free, free), (columns + 1 - free, columns + 1 - free)).into_owned();
+        let rest = rest - across.transpose() * unknowns.cholesky()?.solve(&across);
+        let penalty = logarithms + rest[(rest.nrows() - 1, rest.ncols() - 1)] + determinant;
+        Some(Reduced { rest, penalty })
+    }
+
+    /// Returns all coordinates of the model.
+    fn coordinates(&self, fit: &Fit<'_>, trajectories: &[Trajectory]) -> Vec<Coordinate> {
+        let interface = self.model.model().interface();
+        let states = self.model.model().equation_states();
+        let (inputs, Some(piece)) = (interface.inputs.len(), fit.pieces.first()) else { return Vec::new() };
+        let mut all = Vec::new();
+        // Joints and stores: place, force, and the states over which it acts.
+        let (mut joints, mut stores) = (Vec::new(), Vec::new());
+        for port in &interface.ports {
+            match spot(port, self.model, piece) {
+                Some(Spot::Joint(force, position, speed)) => joints.push((port, force, position, speed)),
+                Some(Spot::Process(force, state)) => stores.push((port, force, state)),
+                Some(Spot::Actuator(input)) => {
+                    let values = || trajectories.iter().flat_map(|t| &t.moments).map(|m| m.u[input]);
+                    let amplitude = deviation(values());
+                    if amplitude > 0.0 {
+                        let acts = || vec![(input, amplitude)];
+                        let name = &interface.inputs[input].name;
+                        all.push(Coordinate {
+                            name: format!("input at {port}"),
+                            value: Value::Input(input),
+                            acts: acts(),
+                        });
+                        let value = Value::Delayed(name.clone(), self.channels.shortest_step());
+                        let acts = vec![(input, 1.0)];
+                        all.push(Coordinate { name: format!("delayed input at {port}"), value, acts });
+                    }
+                }
+                _ => {}
+            }
+        }
+        let own = |force: usize| vec![(inputs + force, self.nominal[force])];
+        let is_angle = |state: usize| states[state].unit == Unit::known("rad");
+        for (port, force, position, speed) in &joints {
+            let mut add = |what: &str, value| {
+                all.push(Coordinate { name: format!("{what} at {port}"), value, acts: own(*force) });
+            };
+            add("speed", Value::State(*speed));
+            add("position", Value::State(*position));
+            if is_angle(*position) {
+                add("position modulo one turn", Value::Angle(*position));
+            }
+        }
+        let is_joint = |force: usize| joints.iter().any(|joint| joint.1 == force);
+        for (port, force, state) in stores.iter().filter(|store| !is_joint(store.1)) {
+            all.push(Coordinate { name: format!("level at {port}"), value: Value::State(*state), acts: own(*force) });
+        }
+        // Between two places of a kind the force acts on one and back on the other.
+        let between = |a: usize, b: usize| {
+            let nominal = self.nominal[a].min(self.nominal[b]);
+            vec![(inputs + a, -nominal), (inputs + b, nominal)]
+        };
+        for (k, (port, force, position, speed)) in joints.iter().enumerate() {
+            for (other, other_force, other_position, other_speed) in &joints[k + 1..] {
+                if states[*position].unit != states[*other_position].unit || same_unit(port, other) == Some(false) {
+                    continue;
+                }
+                let mut add = |what: &str, value| {
+                    let acts = between(*force, *other_force);
+                    all.push(Coordinate { name: format!("{what} between {port} and {other}"), value, acts });
+                };
+                add("deflection", Value::Difference(*position, *other_position));
+                add("rate of deflection", Value::Difference(*speed, *other_speed));
+            }
+        }
+        let stores: Vec<_> = stores.iter().filter(|store| !is_joint(store.1)).collect();
+        for (port, force, state) in &stores {
+            for (other, other_force, other_state) in stores.iter().filter(|other| other.1 != *force) {
+                if states[*state].unit == states[*other_state].unit && same_unit(port, other) != Some(false) {
+                    let (name, value) = (format!("level, flow from {port} to {other}"), Value::State(*state));
+                    all.push(Coordinate { name, value, acts: between(*force, *other_force) });
+                }
+            }
+        }
+        all
+    }
+}
+
+/// Returns whether the forces at two places have one unit, if both are known.
+fn same_unit(a: &Port, b: &Port) -> Option<bool> {
+    let unit = |port: &Port| match port {
+        Port::Joint { unit, .. } | Port::Process { unit, .. } => unit.clone(),
+        _ => None,
+    };
+    Some(unit(a)? == unit(b)?)
+}
+
+#[allow(clippy::cast_precision_loss)]
+fn deviation(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let count = values.clone().count().max(1) as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    (values.map(|v| math::powi(v - mean, 2)).sum::<f64>() / count).sqrt()
+}
+
+/// Bumps over a coordinate.
+struct Shape<'c> {
+    name: String,
+    coordinate: &'c Coordinate,
+    centres: Vec<f64>,
+    /// Standard deviation of a bump.
+    width: f64,
+}
+
+impl<'c> Shape<'c> {
+    /// Places the bumps over the visited values; `None` if the coordinate does not move, or does not cover enough turns.
+    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn new(coordinate: &'c Coordinate, trajectories: &[Trajectory]) -> Option<Self> {
+        let moments = || trajectories.iter().flat_map(|t| &t.moments);
+        let count = BUMPS as f64;
+        let name = coordinate.name.clone();
+        let (centres, width) = match &coordinate.value {
+            Value::Delayed(_, step) => ((0..BUMPS).map(|b| b as f64 * step).collect(), *step),
+            Value::Angle(state) => {
+                let range = |[low, high]: [f64; 2], m: &Moment| [low.min(m.x[*state]), high.max(m.x[*state])];
+                let [low, high] = moments().fold([f64::INFINITY, f64::NEG_INFINITY], range);
+                if high - low < TURNS * TAU {
+                    return None;
+                }
+                ((0..BUMPS).map(|b| b as f64 * TAU / count).collect(), TAU / count)
+            }
+            value => {
+                let mut values: Vec<f64> = moments().map(|m| value.at(m)).collect();
+                values.sort_by(f64::total_cmp);
+                let quantile = |share: f64| values.get((share * (values.len() - 1) as f64).round() as usize).copied();
+                let (low, high) = (quantile(OUTSIDE)?, quantile(1.0 - OUTSIDE)?);
+                let step = (high - low) / (count - 1.0);
+                if !(step > 1e-12 * low.abs().max(high.abs())) {
+                    return None;
+                }
+                ((0..BUMPS).map(|b| low + b as f64 * step).collect(), step)
+            }
+        };
+        Some(Self { name, coordinate, centres, width })
+    }
+
+    /// Returns what a weight of 1 of a column adds to the residuals of a record.
+    fn response(&self, column: usize, trajectory: &Trajectory, piece: &Piece) -> Vec<f64> {
+        let Some(&centre) = self.centres.get(column) else {
+            let input = match &self.coordinate.value {
+                Value::Input(_) | Value::Delayed(..) => self.coordinate.acts[0].0,
+                _ => return vec![0.0; piece.series.iter().map(|s| s.times.len()).sum()],
+            };
+            let signal: Vec<f64> = trajectory.moments.iter().map(|m| m.u[input]).collect();
+            return trajectory.response(input, &signal);
+        };
+        let value = |m: &Moment| match &self.coordinate.value {
+            Value::Delayed(input, _) => piece.case.input(input).map_or(0.0, |input| input.at(m.t - centre)),
+            value => {
+                let mut distance = (value.at(m) - centre).abs();
+                if matches!(value, Value::Angle(_)) {
+                    distance = distance.min(TAU - distance);
+                }
+                math::exp(-0.5 * math::powi(distance / self.width, 2))
+            }
+        };
+        let shape: Vec<f64> = trajectory.moments.iter().map(value).collect();
+        let mut sum: Option<Vec<f64>> = None;
+        for (column, size) in &self.coordinate.acts {
+            let signal: Vec<f64> = shape.iter().map(|s| s * size).collect();
+            let response = trajectory.response(*column, &signal);
+            match &mut sum {
+                None => sum = Some(response),
+                Some(sum) => sum.iter_mut().zip(response).for_each(|(s, r)| *s += r),
+            }
+        }
+        sum.unwrap_or_default()
+    }
+}
+
+/// Normal equations of the curves and the residuals, with the unknowns projected out.
+struct Reduced {
+    rest: DMatrix<f64>,
+    /// Minus twice the log-evidence without a curve, up to a constant.
+    penalty: f64,
+}
+
+impl Reduced {
+    /// Returns minus twice the log-evidence with a curve whose weights have this deviation, none if `None`, and the most probable
+    /// weights. The gain of an input is free in both.
+    fn with_curve(&self, curve: usize, deviation: Option<f64>) -> Option<(f64, Vec<f64>)> {
+        let (at, last) = (COLUMNS * curve, self.rest.nrows() - 1);
+        let deviation = |b: usize| if b == BUMPS { GAIN } else { deviation.unwrap_or(0.0) };
+        let matrix = DMatrix::from_fn(COLUMNS, COLUMNS, |a, b| {
+            let unit = if a == b { 1.0 } else { 0.0 };
+            unit + self.rest[(at + a, at + b)] * deviation(a) * deviation(b)
+        });
+        let pull = DVector::from_fn(COLUMNS, |b, _| self.rest[(at + b, last)] * deviation(b));
+        let determinant = log_determinant(&matrix);
+        let weights = matrix.cholesky()?.solve(&pull);
+        let penalty = self.penalty - pull.dot(&weights) + determinant;
+        penalty.is_finite().then(|| (penalty, weights.iter().enumerate().map(|(b, w)| -w * deviation(b)).collect()))
+    }
+}
