@@ -42,6 +42,8 @@ pub struct SetFit {
     pub values: Vec<f64>,
     /// Their standard errors; 0 for least squares and fixed parameters.
     pub deviations: Vec<f64>,
+    /// Whether each shared parameter is at a bound: it then has no standard error that could be trusted.
+    pub at_bound: Vec<bool>,
     /// Error model with its hyperparameters.
     pub errors: Errors,
     /// Root mean square errors in noises of calibration, selection and validation records, in free run with free initial states.
@@ -223,6 +225,7 @@ fn compared(subject: &Subject, member: &Member<'_>) -> SetOfEffects {
         log_evidence: estimate.log_evidence,
         values: estimate.point.globals.clone(),
         deviations: estimate.deviations.clone(),
+        at_bound: member.fit.globals.iter().zip(&estimate.point.globals).map(|(g, v)| g.bounds.contains(v)).collect(),
         errors: estimate.errors.clone(),
         free_run: [Role::Calibration, Role::Selection, Role::Validation]
             .map(|role| free_run(subject, member, &estimate.point, role)),

@@ -39,6 +39,9 @@ const SHRINKS: [f64; 6] = [0.0, -0.5, -1.0, -1.6, -2.3, -3.2];
 /// Nats taken off every gain for the choice of the deviations.
 const CHOICE: f64 = 2.3;
 
+/// Distance of neighbouring centres, relative to the values, up to which a coordinate does not move: rounding.
+const STILL: f64 = 1e-12;
+
 /// Turns that an angle must cover to be a coordinate modulo one turn too.
 const TURNS: f64 = 1.5;
 
@@ -289,7 +292,7 @@ impl<'c> Shape<'c> {
                 let quantile = |share: f64| values.get((share * (values.len() - 1) as f64).round() as usize).copied();
                 let (low, high) = (quantile(OUTSIDE)?, quantile(1.0 - OUTSIDE)?);
                 let step = (high - low) / (count - 1.0);
-                if !(step > 1e-12 * low.abs().max(high.abs())) {
+                if step.is_nan() || step <= STILL * low.abs().max(high.abs()) {
                     return None;
                 }
                 ((0..BUMPS).map(|b| low + b as f64 * step).collect(), step)

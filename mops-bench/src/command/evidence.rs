@@ -73,10 +73,12 @@ fn line(set: &SetOfEffects, fit: &SetFit) -> String {
             let _ = write!(text, "; deviation {:.4}, length {:.4} s, noise {:.3?}", e.deviation, e.length, e.noise);
         }
     }
-    for (name, (value, deviation)) in set.parameters.iter().zip(fit.values.iter().zip(&fit.deviations)) {
-        let _ = write!(text, "; {name} {}", rounded(*value));
-        if *deviation > 0.0 {
-            let _ = write!(text, " +- {}", rounded(*deviation));
+    for (k, name) in set.parameters.iter().enumerate() {
+        let _ = write!(text, "; {name} {}", rounded(fit.values[k]));
+        if fit.at_bound[k] {
+            text.push_str(" (at its bound)");
+        } else if fit.deviations[k] > 0.0 {
+            let _ = write!(text, " +- {}", rounded(fit.deviations[k]));
         }
     }
     for (role, error) in ["calibration", "selection", "validation"].iter().zip(fit.free_run) {
