@@ -251,7 +251,7 @@ impl<'a, S: Scalar, P: Process<S, 2>> Recursion<'a, S, P> {
         }
     }
 
-    /// Takes up a measured value; returns the variance of its innovation, and leaves its gain in `self.gain`.
+    /// Updates the covariance with a measured value; returns the variance of its innovation, and leaves its gain in `self.gain`.
     fn measure(&mut self, m: &Measured) -> S {
         let size = self.gain.len();
         let noise = self.noise[m.channel];

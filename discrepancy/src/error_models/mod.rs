@@ -1,6 +1,6 @@
-//! Error models of residuals: what a model and its sensors leave, as Gaussian processes with exact likelihoods.
+//! Gaussian-process models of residuals, with exact likelihoods.
 //!
-//! Three of them are rivals, because none describes every recording: a smooth (Matern-3/2) or a rough (Ornstein-Uhlenbeck) error at
+//! Three error models are compared, because none describes every recording: a smooth (Matern-3/2) or a rough (Ornstein-Uhlenbeck) error at
 //! the output of each channel, and a smooth force at the balances of the plant. Each has white noise of the sensors on top, which
 //! is its limit for vanishing deviations. All are Kalman filters, whose effort grows linearly with the number of samples.
 //!

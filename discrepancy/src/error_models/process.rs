@@ -106,7 +106,8 @@ impl<S: Scalar> Process<S, 2> for Matern32<S> {
         let rate = self.rate();
         let density = rate * rate * rate * self.deviation * self.deviation * 4.0;
         let [i0, i1, i2] = self.integrals(dt);
-        let across = density * (i1 - rate * i2);
+        // The integral of s (1 - lambda s) exp(-2 lambda s), whose antiderivative is s^2 exp(-2 lambda s)/2.
+        let across = density * (-(rate * (2.0 * dt))).exp() * (0.5 * dt * dt);
         [[density * i2, across], [across, density * (i0 - rate * i1 * 2.0 + rate * rate * i2)]]
     }
 }

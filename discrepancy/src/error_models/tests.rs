@@ -93,8 +93,8 @@ fn relative(a: f64, b: f64) -> f64 {
 
 // Log-likelihoods of the same series by an independent implementation in Python, computed once: (seed, samples, regular),
 // (deviation, length, noise), Ornstein-Uhlenbeck, Matern-3/2.
-type Published = ((u64, usize, bool), [f64; 3], f64, f64);
-const OUTPUT: [Published; 4] = [
+type Reference = ((u64, usize, bool), [f64; 3], f64, f64);
+const OUTPUT: [Reference; 4] = [
     ((1, 200, true), [1.4, 0.4, 0.3], -194.473_747_499_378_08, -212.215_458_838_753_48),
     ((2, 150, false), [1.4, 0.4, 0.3], -152.744_739_103_288_85, -179.879_771_696_671_07),
     ((3, 200, true), [3.0, 20.0, 0.05], -711.118_401_499_714_8, -19_512.528_782_782_912),
@@ -203,8 +203,8 @@ fn the_information_is_the_covariance_of_the_gradient() {
 }
 
 /// Seed, samples, states, forces, channels; deviation, length, noise of each channel; log-likelihood. See [`OUTPUT`].
-type PublishedForce = (u64, [usize; 4], f64, f64, &'static [f64], f64);
-const FORCE: [PublishedForce; 3] = [
+type ReferenceForce = (u64, [usize; 4], f64, f64, &'static [f64], f64);
+const FORCE: [ReferenceForce; 3] = [
     (11, [120, 2, 1, 1], 1.5, 0.2, &[0.4], -103.134_050_402_033_3),
     (12, [80, 4, 2, 2], 0.7, 0.05, &[0.5, 0.2], -237.477_694_114_054_4),
     (13, [60, 3, 2, 1], 2.0, 3.0, &[0.1], -673.467_121_282_316_5),

@@ -40,9 +40,9 @@ pub struct SetFit {
     pub log_evidence: Option<f64>,
     /// Values of the shared parameters.
     pub values: Vec<f64>,
-    /// Their standard errors; 0 for least squares and fixed parameters.
+    /// Standard errors of the shared parameters; 0 for least squares and fixed parameters.
     pub deviations: Vec<f64>,
-    /// Whether each shared parameter is at a bound: it then has no standard error that could be trusted.
+    /// Whether each shared parameter is at a bound, where its standard error is not valid.
     pub at_bound: Vec<bool>,
     /// Error model with its hyperparameters.
     pub errors: Errors,
@@ -54,8 +54,10 @@ pub struct SetFit {
     pub converged: bool,
 }
 
-/// Multiples of the typical size of an effect from which fits begin besides, and the largest number of shapes at each.
-const STRONGER: [f64; 3] = [0.1, 1.0, 10.0];
+/// Further initial guesses: multiples of the typical size of an effect.
+const MULTIPLES: [f64; 3] = [0.1, 1.0, 10.0];
+
+/// Largest number of combinations of shapes at each multiple.
 const COMBINATIONS: usize = 16;
 
 /// Model with a set of effects, fitted by least squares.
@@ -67,8 +69,8 @@ struct Member<'a> {
     least_squares: Estimate,
 }
 
-/// Fits the declared model and sets of effects, `effect@place` each, to the calibration records of a study. A set is fitted from
-/// each earlier set with one effect less.
+/// Fits the declared model and sets of effects, `effect@place` each, to the calibration records of a study. A set is fitted by
+/// least squares from each earlier set with one effect less.
 ///
 /// # Errors
 /// The study is no diagnosis, a set has no earlier set with one effect less, or a model cannot be simulated.
@@ -91,8 +93,8 @@ pub fn compare(
         let next = members.iter().filter_map(|smaller| larger(&subject, smaller, set, &candidates, &simulations));
         let best = next.max_by(|a, b| a.least_squares.log_likelihood.total_cmp(&b.least_squares.log_likelihood));
         members.push(best.ok_or_else(|| {
-            StudyError::here(format!("`{}` cannot be fitted", set.join(" + ")))
-                .with_help("check the names, `effect@place`, and give the sets with one effect less before it")
+            StudyError::here(format!("cannot fit `{}`", set.join(" + ")))
+                .with_help("check each name (`effect@place`); list every set after a set with one effect less")
         })?);
     }
     Ok(members.iter().map(|member| compared(&subject, member)).collect())
@@ -181,7 +183,7 @@ fn starts(smaller: &Member<'_>, candidates: &[Candidate], name: &str) -> Option<
         all.extend(screened.others.iter().cloned());
         all.extend(added.restarts());
         let bounds = added.candidate.effect.parameters()[0].bounds;
-        for times in STRONGER {
+        for times in MULTIPLES {
             let shapes = added.sizes.combinations(added.candidate.effect.as_ref());
             all.extend(shapes.into_iter().take(COMBINATIONS).map(|mut strengths| {
                 strengths[0] = (strengths[0] * times).clamp(bounds[0], bounds[1]);
@@ -225,7 +227,13 @@ fn compared(subject: &Subject, member: &Member<'_>) -> SetOfEffects {
         log_evidence: estimate.log_evidence,
         values: estimate.point.globals.clone(),
         deviations: estimate.deviations.clone(),
-        at_bound: member.fit.globals.iter().zip(&estimate.point.globals).map(|(g, v)| g.bounds.contains(v)).collect(),
+        at_bound: member
+            .fit
+            .globals
+            .iter()
+            .zip(&estimate.point.globals)
+            .map(|(g, v)| !g.is_pinned() && g.bounds.contains(v))
+            .collect(),
         errors: estimate.errors.clone(),
         free_run: [Role::Calibration, Role::Selection, Role::Validation]
             .map(|role| free_run(subject, member, &estimate.point, role)),
@@ -267,6 +275,9 @@ fn free_run(subject: &Subject, member: &Member<'_>, point: &Point, role: Role) -
 /// Returns the logarithm of the mean of exponentials over all error models; a model without a fit counts as 0.
 fn log_mean(logarithms: &[f64]) -> f64 {
     let most = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if most == f64::NEG_INFINITY {
+        return most;
+    }
     let sum: f64 = logarithms.iter().map(|l| math::exp(l - most)).sum();
     #[allow(clippy::cast_precision_loss)]
     let count = ErrorModel::ALL.len() as f64;

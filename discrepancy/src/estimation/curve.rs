@@ -54,7 +54,7 @@ pub struct FreeCurve {
     pub gain: f64,
     /// Centres of the bumps, in the unit of the coordinate; delays of the copies of an input, s.
     pub centres: Vec<f64>,
-    /// Most probable weights in nominal forces, or in the amplitude of the input.
+    /// Most probable weights: in nominal forces, in amplitudes of the input, or as gains of the delayed copies.
     pub weights: Vec<f64>,
 }
 

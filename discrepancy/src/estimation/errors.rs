@@ -19,7 +19,7 @@ pub enum ErrorModel {
 }
 
 impl ErrorModel {
-    /// All of them.
+    /// All error models.
     pub const ALL: [Self; 3] = [Self::SmoothOutput, Self::RoughOutput, Self::Force];
 }
 
@@ -37,7 +37,7 @@ pub enum Errors {
 /// Motion of a record under a force at its balances.
 #[derive(Debug, Clone, Default)]
 pub struct Motion {
-    /// The motion linearised about that under the force.
+    /// Linearisation about the motion under the force.
     pub linearised: LinearisedMotion,
     /// Force at the samples, in nominal forces.
     pub forces: Vec<f64>,
@@ -94,8 +94,10 @@ impl Channels {
     }
 }
 
-/// Standard deviation of the logarithms of a deviation, and of a noise, beforehand.
+/// Prior standard deviation of the logarithm of a deviation.
 const DEVIATION: f64 = 1.5;
+
+/// Prior standard deviation of the logarithm of a noise level.
 const NOISE: f64 = 1.0;
 
 /// Smallest noise as a share of that of the sensor.
@@ -233,7 +235,7 @@ impl Errors {
         };
         let step = channels.shortest_step();
         let length = channels.length.iter().copied().fold(0.0, f64::max);
-        let lengths = [SHORTEST * step, length].map(math::ln);
+        let lengths = [SHORTEST * step, length.max(2.0 * step)].map(math::ln);
         let mut bounds = vec![FORCES.map(math::ln), lengths];
         bounds.extend(std::iter::repeat_n(noise_bounds(rms(residuals)), channels.count));
         let mut starts: Vec<Vec<f64>> = Vec::new();

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::errors::{Channels, ErrorModel, Errors, Fitted, Motion};
 use super::scoring::log_determinant;
 use crate::error_models::ForceError;
-use crate::fit::{Fit, Piece, Point, Residuals};
+use crate::fit::{Fit, Global, Piece, Point, Residuals};
 use crate::trajectory::Trajectory;
 
 /// Prior of an unknown.
@@ -47,7 +47,7 @@ pub struct Estimate {
     pub errors: Errors,
     /// Log-likelihood.
     pub log_likelihood: f64,
-    /// Logarithm of the evidence; `None` for least squares.
+    /// Logarithm of the evidence; `None` for least squares, and where a parameter has no derivative and therefore no width.
     pub log_evidence: Option<f64>,
     /// Standard errors of the shared parameters, in their units; 0 for fixed ones.
     pub deviations: Vec<f64>,
@@ -59,7 +59,7 @@ pub struct Estimate {
 pub struct Estimation<'a> {
     /// Fit of an augmented model to records.
     pub fit: &'a Fit<'a>,
-    /// Its model.
+    /// Augmented model of the fit.
     pub model: &'a WithEffects,
     /// Channels of the records.
     pub channels: Channels,
@@ -105,6 +105,9 @@ impl Estimation<'_> {
 
     /// Fits parameters, initial states and hyperparameters of an error model.
     pub fn under(&self, kind: ErrorModel, start: Point) -> Option<Estimate> {
+        if kind == ErrorModel::Force && self.nominal.is_empty() {
+            return None;
+        }
         let mut point = start;
         let mut best: Option<(f64, Found, Fitted)> = None;
         let mut errors: Option<Errors> = None;
@@ -128,7 +131,9 @@ impl Estimation<'_> {
             let log = -0.5 * (found.iterate.sum() + found.logarithms);
             (point, errors) = (found.point.clone(), Some(fitted.errors.clone()));
             let gain = best.as_ref().map_or(f64::INFINITY, |best| log - best.0);
-            if gain > 0.0 {
+            // Likelihoods along the motion without the force and along the smoothed one are of different linearisations: the
+            // smoothed one counts.
+            if gain > 0.0 || kind == ErrorModel::Force && round == 1 {
                 best = Some((log, found, fitted));
             }
             // The first round of a force is along the motion without it.
@@ -267,7 +272,8 @@ impl Estimation<'_> {
             point: found.point,
             errors: fitted.errors,
             log_likelihood: log,
-            log_evidence: Some(log_evidence).filter(|e| e.is_finite()),
+            log_evidence: Some(log_evidence)
+                .filter(|e| e.is_finite() && !self.fit.globals.iter().any(Global::is_stepped)),
             deviations,
             converged: found.converged,
         }
@@ -339,7 +345,11 @@ impl Estimation<'_> {
         let scale: Vec<f64> = free.iter().map(|&k| positive(unknowns[k].1)).collect();
         let bounds: Vec<[f64; 2]> = free.iter().zip(&scale).map(|(&k, s)| unknowns[k].0.map(|b| b / s)).collect();
         let place = |values: &mut [f64], z: &[f64]| {
-            free.iter().zip(z).zip(&scale).for_each(|((&k, z), s)| values[k] = z * s);
+            for ((&k, z), s) in free.iter().zip(z).zip(&scale) {
+                // Exactly at a bound, whatever the rounding of its scaled value.
+                let bound = unknowns[k].0.into_iter().find(|bound| *z == bound / s);
+                values[k] = bound.unwrap_or(z * s);
+            }
         };
         let z: Vec<f64> =
             free.iter().zip(&scale).zip(&bounds).map(|((&k, s), b)| (values[k] / s).clamp(b[0], b[1])).collect();
@@ -365,7 +375,7 @@ impl Estimation<'_> {
             let sum = there.as_ref().map_or(f64::INFINITY, |(_, residuals, _)| residuals.norm_squared());
             let ratio = (iterate.sum() - sum) / step.predicted;
             match there {
-                Some((_, residuals, jacobian)) if LeastSquares::accepts(ratio) => {
+                Some((_, residuals, jacobian)) if step.predicted > 0.0 && LeastSquares::accepts(ratio) => {
                     values = trial;
                     iterate.accept(step.to, residuals, jacobian, ratio);
                 }

@@ -62,6 +62,9 @@ pub fn maximise(start: &[f64], bounds: &[[f64; 2]], at: impl Fn(&[f64]) -> Score
         let pull = DVector::from_fn(free.len(), |a, _| score.gradient[free[a]]);
         let Some(step) = damped.cholesky().map(|factor| factor.solve(&pull)) else {
             damping *= 10.0;
+            if damping > MOST_DAMPING {
+                break;
+            }
             continue;
         };
         let mut trial = point.clone();
@@ -71,8 +74,14 @@ pub fn maximise(start: &[f64], bounds: &[[f64; 2]], at: impl Fn(&[f64]) -> Score
         }
         let moved = DVector::from_fn(point.len(), |k, _| trial[k] - point[k]);
         let predicted = score.gradient.dot(&moved) - 0.5 * moved.dot(&(&score.information * &moved));
-        if predicted < SETTLED && damping < 1.0 {
-            break;
+        if predicted < SETTLED {
+            // A step that a bound shortens need not ascend; with more damping it follows the gradient.
+            let is_clipped = free.iter().enumerate().any(|(a, &k)| trial[k] != point[k] + shrink * step[a]);
+            if damping > MOST_DAMPING || damping < 1.0 && !is_clipped {
+                break;
+            }
+            damping *= 10.0;
+            continue;
         }
         let there = at(&trial);
         let gain = there.log - score.log;

@@ -82,6 +82,7 @@ impl WithEffects {
     /// # Errors
     /// The failure of the simulation.
     pub fn along(&self, job: &Job<'_>, times: &[f64]) -> Result<Vec<Moment>, Failure> {
+        self.check_forces(job.case)?;
         let open = self.model.ported().expect("checked on creation");
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, job.parameters)).collect();
         let plant = f64::open(open, &job.parameters[..self.own()])?;

@@ -9,8 +9,8 @@ mod sensors;
 use std::sync::Arc;
 
 use mops_core::{
-    Analysis, Dimension, Failure, InitialGrid, Interface, Job, Model, Opening, Parameter, Placement, Port, Scalar,
-    State, StudyError, Unit, Variable, WithTangents,
+    Analysis, Case, Dimension, Failure, InitialGrid, Interface, Job, Model, Opening, Parameter, Placement, Port,
+    Scalar, State, StudyError, Unit, Variable, WithTangents,
 };
 
 use crate::kernel::{Recording, Tolerance, record, tangents_of, wanted};
@@ -144,7 +144,22 @@ impl WithEffects {
         neutral.is_none_or(|neutral| first.value() != neutral) || first.tangents().iter().any(|&t| t != 0.0)
     }
 
+    /// Checks that each external force of a case acts at a balance of the model.
+    fn check_forces(&self, case: &Case) -> Result<(), Failure> {
+        let is_balance = |name: &String| {
+            let ports = &self.model.interface().ports;
+            ports.iter().any(|port| matches!(port, Port::Process { state, .. } if state == name))
+        };
+        match case.forces.iter().find(|(state, _)| !is_balance(state)) {
+            Some((state, _)) => {
+                Err(Failure::Undefined(format!("no balance of a state `{state}` for an external force")))
+            }
+            None => Ok(()),
+        }
+    }
+
     fn simulate<S: Opening>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+        self.check_forces(job.case)?;
         let open = self.model.ported().expect("checked on creation");
         let plant = S::open(open, &parameters[..self.own()])?;
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, parameters)).collect();

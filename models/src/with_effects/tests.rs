@@ -121,6 +121,9 @@ fn an_external_force_acts_as_an_input_at_the_same_place() {
             assert_eq!(a.b[(1, 0)], a.b[(1, 1)]);
         }
     }
+    let lost = Case { forces: vec![("w".to_owned(), Input::Constant(1.0))], ..Case::default() };
+    let job = Job { case: &lost, parameters: &[2.0, 0.3, 0.7], signals: &[0], horizon: 1.0 };
+    assert!(with(&equations(BLOCK), &[]).analyse(&job).is_err(), "a force at an unknown place must not be ignored");
     let plain = equations(BLOCK);
     let job = Job { case: &pushed, parameters: &[2.0, 0.3, 0.7], signals: &[0], horizon: 4.9 };
     assert!(plain.analyse(&job).is_err(), "a model without effects must not ignore a force");
