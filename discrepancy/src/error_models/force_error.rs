@@ -6,6 +6,7 @@ use mops_core::{Dual, Scalar, math};
 use super::likelihood::{LN_TWO_PI, Likelihood};
 use super::output_error::matern_penalty;
 use super::process::{Matern32, Process};
+use crate::fit::dot;
 
 /// Motion of a plant over one record, linearised from sample to sample: `x[k+1] = F[k] x[k] + G[k] f[k]`, `r = H x + D f`.
 ///
@@ -69,10 +70,6 @@ impl LinearisedMotion {
         }
         residuals
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Random forces, independent Matern-3/2 processes of one deviation and one correlation length, plus white noise of the sensors.

@@ -23,6 +23,13 @@ impl ErrorModel {
     pub const ALL: [Self; 3] = [Self::SmoothOutput, Self::RoughOutput, Self::Force];
 }
 
+impl Motion {
+    /// Returns what residuals would be without the force, to first order.
+    pub fn without_force(&self, residuals: &[f64]) -> Vec<f64> {
+        residuals.iter().zip(&self.response).map(|(r, f)| r - f).collect()
+    }
+}
+
 /// Error model with its hyperparameters. Residuals are in units of the noise of their sensors.
 #[derive(Debug, Clone)]
 pub enum Errors {
@@ -178,7 +185,7 @@ impl Errors {
     /// Returns what the residuals of a record would be without the force along which they are linearised, to first order.
     pub fn without_force(&self, index: usize, residuals: &[f64]) -> Vec<f64> {
         match self {
-            Self::Force(_, motions) => residuals.iter().zip(&motions[index].response).map(|(r, f)| r - f).collect(),
+            Self::Force(_, motions) => motions[index].without_force(residuals),
             _ => residuals.to_vec(),
         }
     }

@@ -117,13 +117,10 @@ impl Estimation<'_> {
                 ErrorModel::Force => self.motions(&mut fit, &point, errors.as_ref())?,
                 _ => Vec::new(),
             };
-            let residuals = |fit: &Fit<'_>, motions: &[Motion]| -> Option<Vec<Vec<f64>>> {
-                let all = fit.all(&point)?;
-                let left =
-                    |(r, motion): (&Vec<f64>, &Motion)| r.iter().zip(&motion.response).map(|(r, f)| r - f).collect();
-                Some(if motions.is_empty() { all } else { all.iter().zip(motions).map(left).collect() })
-            };
-            let residuals = residuals(&fit, &motions)?;
+            let mut residuals = fit.all(&point)?;
+            for (residuals, motion) in residuals.iter_mut().zip(&motions) {
+                *residuals = motion.without_force(residuals);
+            }
             let thoroughly = round < 2;
             let fitted =
                 Errors::fit(kind, &self.fit.pieces, &self.channels, &residuals, motions, errors.as_ref(), thoroughly)?;
