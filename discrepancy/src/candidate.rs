@@ -275,6 +275,11 @@ impl Sizes {
         values.into_iter().filter(inside).collect()
     }
 
+    /// The typical size of a lag or delay: a tenth of the time in which the place moves, or ten samples if that is more, s.
+    pub fn lag(&self) -> f64 {
+        (0.1 * self.time).max(10.0 * self.sample)
+    }
+
     /// The size of finer steps, where samples tell it.
     pub fn quantum_of(&self, samples: &[f64], noise: f64) -> Option<f64> {
         quantum(samples, NOISES_PER_STEP * noise, self.largest() / f64::from(MOST_STEPS))

@@ -31,6 +31,7 @@ mod repaired;
 mod round;
 mod screen;
 mod search;
+pub mod selection;
 mod shapes;
 mod short_term;
 mod stability;

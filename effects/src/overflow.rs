@@ -23,7 +23,8 @@ impl Definition for Overflow {
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::positive("k", "outflow at a level of 1 above the edge", Dimension::OUTPUT),
+        EffectParameter::positive("k", "outflow at a level of 1 above the edge", Dimension::OUTPUT)
+            .restarted_from(&[1.0, 10.0]),
         EffectParameter::shape(
             "level",
             "level of the edge",

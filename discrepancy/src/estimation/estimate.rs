@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::errors::{Channels, ErrorModel, Errors, Fitted, Motion};
 use super::scoring::log_determinant;
 use crate::error_models::ForceError;
-use crate::fit::{Fit, Global, Piece, Point, Residuals};
+use crate::fit::{Fit, Piece, Point, Residuals};
 use crate::trajectory::Trajectory;
 
 /// Prior of an unknown.
@@ -36,6 +36,11 @@ impl Prior {
         let doubled = if self.half { math::ln(2.0) } else { 0.0 };
         -0.5 * distance * distance - math::ln(self.deviation) - 0.5 * math::ln(std::f64::consts::TAU) + doubled
     }
+
+    /// Returns the derivative of the logarithm of the density.
+    fn slope(&self, value: f64) -> f64 {
+        self.centre.map_or(0.0, |centre| (centre - value) * self.precision())
+    }
 }
 
 /// Unknowns of a fit under an error model.
@@ -47,7 +52,7 @@ pub struct Estimate {
     pub errors: Errors,
     /// Log-likelihood.
     pub log_likelihood: f64,
-    /// Logarithm of the evidence; `None` for least squares, and where a parameter has no derivative and therefore no width.
+    /// Logarithm of the evidence; `None` where the hyperparameters are given.
     pub log_evidence: Option<f64>,
     /// Standard errors of the shared parameters, in their units; 0 for fixed ones.
     pub deviations: Vec<f64>,
@@ -67,6 +72,8 @@ pub struct Estimation<'a> {
     pub nominal: Vec<f64>,
     /// Priors of the shared parameters, then of the initial states of each record.
     pub priors: Vec<Prior>,
+    /// Logarithm of the number of combinations of grid values of the parameters that no fit moves: each is as probable.
+    pub log_choices: f64,
 }
 
 /// Rounds of parameters and hyperparameters, and iterations of the parameters in each.
@@ -91,26 +98,32 @@ const SHRINK: f64 = 0.4;
 impl Estimation<'_> {
     /// Fits parameters and initial states by least squares.
     pub fn least_squares(&self, start: Point) -> Option<Estimate> {
-        let found = self.descend(self.fit, &Errors::White, start, LEAST_SQUARES)?;
+        self.with(&Errors::White, start, LEAST_SQUARES)
+    }
+
+    /// Fits parameters and initial states under an error model at the outputs whose hyperparameters are given, in at most so many
+    /// iterations.
+    pub fn with(&self, errors: &Errors, start: Point, iterations: usize) -> Option<Estimate> {
+        let found = self.descend(self.fit, errors, start, iterations)?;
         let log_likelihood = -0.5 * (found.iterate.sum() + found.logarithms);
         Some(Estimate {
             deviations: vec![0.0; self.fit.globals.len()],
             point: found.point,
-            errors: Errors::White,
+            errors: errors.clone(),
             log_likelihood,
             log_evidence: None,
             converged: found.converged,
         })
     }
 
-    /// Fits parameters, initial states and hyperparameters of an error model.
-    pub fn under(&self, kind: ErrorModel, start: Point) -> Option<Estimate> {
+    /// Fits parameters, initial states and hyperparameters of an error model; `before` is one of the kind to start from.
+    pub fn under(&self, kind: ErrorModel, start: Point, before: Option<&Errors>) -> Option<Estimate> {
         if kind == ErrorModel::Force && self.nominal.is_empty() {
             return None;
         }
         let mut point = start;
         let mut best: Option<(f64, Found, Fitted)> = None;
-        let mut errors: Option<Errors> = None;
+        let mut errors: Option<Errors> = before.filter(|errors| !matches!(errors, Errors::Force(..))).cloned();
         let mut fit = self.fit.clone();
         for round in 0..ROUNDS {
             let motions = match kind {
@@ -254,8 +267,16 @@ impl Estimation<'_> {
         }
         let values = self.values(&found.point);
         let log_prior: f64 = found.free.iter().map(|&k| self.priors[k].log(values[k])).sum();
+        // From the maximum of the likelihood to that of the posterior density: `b' I^-1 b/2`, `b` the slope of the prior.
+        let unknowns = self.unknowns();
+        let slope = |&k: &usize| match unknowns[k].0.contains(&values[k]) {
+            true => 0.0,
+            false => self.priors[k].slope(values[k]) * self.priors[k].stretch,
+        };
+        let slope = DVector::from_iterator(found.free.len(), found.free.iter().map(slope));
+        let shift = information.clone().cholesky().map_or(0.0, |factor| 0.5 * slope.dot(&factor.solve(&slope)));
         let count = (found.free.len() + fitted.count) as f64;
-        let log_evidence = log + log_prior + fitted.log_prior + 0.5 * count * math::ln(std::f64::consts::TAU)
+        let log_evidence = log + log_prior + shift - self.log_choices + fitted.log_prior + 0.5 * count * math::ln(std::f64::consts::TAU)
             - 0.5 * log_determinant(&information)
             - 0.5 * fitted.log_determinant;
         let mut deviations = vec![0.0; self.fit.globals.len()];
@@ -269,8 +290,7 @@ impl Estimation<'_> {
             point: found.point,
             errors: fitted.errors,
             log_likelihood: log,
-            log_evidence: Some(log_evidence)
-                .filter(|e| e.is_finite() && !self.fit.globals.iter().any(Global::is_stepped)),
+            log_evidence: Some(log_evidence).filter(|e| e.is_finite()),
             deviations,
             converged: found.converged,
         }
@@ -300,7 +320,7 @@ impl Estimation<'_> {
     }
 
     /// Returns the indices of the unknowns that are fitted.
-    pub(super) fn free(&self) -> Vec<usize> {
+    pub fn free(&self) -> Vec<usize> {
         self.unknowns().iter().enumerate().filter(|(_, unknown)| unknown.2).map(|(k, _)| k).collect()
     }
 
@@ -315,7 +335,7 @@ impl Estimation<'_> {
 
     /// Returns the derivatives of the residuals of a record by the free unknowns that move it, each with its position among
     /// the free ones.
-    pub(super) fn moving<'f>(
+    pub fn moving<'f>(
         &self,
         free: &'f [usize],
         index: usize,

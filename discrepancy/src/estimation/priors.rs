@@ -1,13 +1,13 @@
 //! Priors of the unknowns of an augmented model, and nominal forces.
 
-use mops_core::{InitialGrid, Port};
+use mops_core::{Dimension, InitialGrid, Port, math};
 
 use super::estimate::Prior;
 use crate::candidate::Sizes;
 use crate::fit::{Fit, Global, Sets};
-use crate::screen::Scene;
 use crate::subject::{Local, Subject};
 use crate::trace_of::sizes;
+use crate::trajectory::Trajectory;
 use crate::variant::{Added, Variant};
 
 /// Standard deviation of a declared parameter: in its logarithm where the study looks for that, else in its scale.
@@ -21,6 +21,15 @@ const STRENGTH: f64 = 2.0;
 
 /// Standard deviation of the logarithm of a shape.
 const SHAPE: f64 = 1.0;
+
+/// Standard deviation of the logarithm of a steepness: of a contact or an edge, which data know from below only.
+const STEEPNESS: f64 = 2.0;
+
+/// Standard deviation of a gain without unit.
+const GAIN: f64 = 0.3;
+
+/// Standard deviation of an offset of a sensor as a share of its range.
+const OFFSET: f64 = 0.1;
 
 /// Standard deviation of a uniform distribution in its width: `1/sqrt(12)`.
 const UNIFORM: f64 = 0.288_675_134_594_812_9;
@@ -37,13 +46,21 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
             variant.first.iter().rposition(|&first| first <= parameter).expect("parameters of effects come last");
         let (added, position) = (&added[index], parameter - variant.first[index]);
         let of = &added.candidate.effect.parameters()[position];
+        let is_sensor = matches!(added.candidate.port, Port::Sensor { .. });
+        let about_null = |size: f64, deviation| Prior {
+            stretch: size,
+            deviation,
+            centre: of.null_value,
+            half: of.null_value.is_some_and(|null| of.bounds.contains(&null)),
+        };
         match (of.null_value, of.grid) {
-            (Some(null), _) if null.is_finite() => Prior {
-                stretch: added.sizes.of(of.dimension).abs(),
-                deviation: STRENGTH,
-                centre: Some(null),
-                half: of.bounds.contains(&null),
-            },
+            (Some(_), _) if !of.restarts.is_empty() => at_centre(added.strengths[position].abs(), STEEPNESS),
+            (Some(0.0), _) if of.dimension == Dimension::ONE => about_null(1.0, GAIN),
+            (Some(0.0), _) if is_sensor && of.dimension == Dimension::OUTPUT => {
+                about_null((added.sizes.range[1] - added.sizes.range[0]).max(added.sizes.value), OFFSET)
+            }
+            (Some(0.0), _) if of.dimension == Dimension::TIME => about_null(added.sizes.lag(), 1.0),
+            (Some(null), _) if null.is_finite() => about_null(added.sizes.of(of.dimension).abs(), STRENGTH),
             (Some(_), _) | (None, InitialGrid::Within(_) | InitialGrid::Moments(_) | InitialGrid::Frequencies) => {
                 at_centre(width(global, &added.sizes), UNIFORM)
             }
@@ -65,8 +82,19 @@ fn width(global: &Global, sizes: &Sizes) -> f64 {
 }
 
 /// Returns the nominal force of each balance of a model, in the order of its forces.
-pub fn nominal_forces(fit: &Fit<'_>, variant: &Variant, scene: &Scene) -> Vec<f64> {
+pub fn nominal_forces(fit: &Fit<'_>, variant: &Variant, trajectories: &[Trajectory]) -> Vec<f64> {
     let ports = &variant.model.model().interface().ports;
-    let size = |port| sizes(port, &variant.model, &fit.pieces, &scene.trajectories).map_or(1.0, |sizes| sizes.output);
+    let size = |port| sizes(port, &variant.model, &fit.pieces, trajectories).map_or(1.0, |sizes| sizes.output);
     ports.iter().filter(|port| matches!(port, Port::Process { .. })).map(size).collect()
+}
+
+/// Returns the logarithm of the number of combinations of grid values of the parameters that no fit moves.
+#[allow(clippy::cast_precision_loss)]
+pub fn log_choices(added: &[Added]) -> f64 {
+    let of = |added: &Added| -> f64 {
+        let parameters = added.candidate.effect.parameters().iter();
+        let chosen = parameters.filter(|p| p.fixed || p.grid.jumps());
+        chosen.map(|p| math::ln(added.sizes.values(p.dimension, p.grid, p.bounds).len().max(1) as f64)).sum()
+    };
+    added.iter().map(of).sum()
 }

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use mops::discrepancy::estimation::{ErrorModel, Errors, SetFit, SetOfEffects, compare};
+use mops::discrepancy::estimation::{ErrorModel, Errors};
+use mops::discrepancy::selection::{SetFit, SetOfEffects, compare, select};
 use mops::terminal::{CommandError, print};
 use mops::{Catalogue, Diagnostic, Study};
 
@@ -16,7 +17,8 @@ const CURVES: usize = 3;
 pub(super) struct Arguments {
     /// Study file with the task diagnosis.
     study: PathBuf,
-    /// Set of effects, `effect@place` each, joined by `+`; sets with one effect less come first.
+    /// Set of effects, `effect@place` each, joined by `+`; sets with one effect less come first. Without any set, effects are
+    /// searched.
     #[arg(long = "set", value_name = "EFFECTS")]
     sets: Vec<String>,
 }
@@ -26,18 +28,26 @@ pub(super) fn evidence(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     let study = Study::from_file(catalogue, &arguments.study)?;
     let names = |set: &String| set.split('+').map(|name| name.trim().to_owned()).collect();
     let sets: Vec<Vec<String>> = arguments.sets.iter().map(names).collect();
-    let compared = compare(&study, &catalogue.effects, &sets).map_err(|error| Diagnostic::new(error.to_string()))?;
+    let compared =
+        if sets.is_empty() { select(&study, &catalogue.effects) } else { compare(&study, &catalogue.effects, &sets) };
+    let compared = compared.map_err(|error| Diagnostic::new(error.to_string()))?;
     print(&table(&compared)).map(|()| ExitCode::SUCCESS)
 }
 
 /// Formats sets of effects, the declared model first.
 fn table(sets: &[SetOfEffects]) -> String {
     let mut text = String::new();
-    let declared = sets.first().map_or(0.0, |set| set.log_evidence);
+    let declared = sets.iter().find(|set| set.effects.is_empty()).map_or(0.0, |set| set.log_evidence);
     for set in sets {
         let title = if set.effects.is_empty() { "declared model".to_owned() } else { set.effects.join(" + ") };
         let gain = set.log_evidence - declared;
-        let _ = writeln!(text, "{title}: log-evidence {:.1} ({gain:+.1})", set.log_evidence);
+        let _ = write!(text, "{title}: log-evidence {:.1} ({gain:+.1}), log-odds {:+.1}", set.log_evidence, set.log_odds);
+        let _ = match set.forecasts {
+            Some(true) => write!(text, ", forecasts better"),
+            Some(false) => write!(text, ", forecasts worse"),
+            None => Ok(()),
+        };
+        let _ = writeln!(text, "{}", if set.is_inert { ", inert" } else { "" });
         for fit in &set.fits {
             let _ = writeln!(text, "  {}", line(set, fit));
             let curves = fit.curves.iter().take(CURVES).map(|c| format!("{} {:+.1}", c.coordinate, c.gain));

@@ -1,0 +1,175 @@
+//! Fits of sets of effects: the ladder of starts, and the error models.
+
+use mops_core::{Role, math};
+use rayon::prelude::*;
+
+use super::fitted_set::{FittedSet, Key, Start, evidence};
+use crate::base;
+use crate::candidate::Candidate;
+use crate::estimation::{ErrorModel, Errors, Estimate, Estimation};
+use crate::fit::{Piece, Point};
+use crate::meter::Meter;
+use crate::subject::Subject;
+use crate::variant::problem;
+
+/// Fits sets of effects to the calibration records.
+pub struct Refit<'a> {
+    /// What is diagnosed.
+    pub subject: &'a Subject,
+    /// Candidates that the data cover.
+    pub candidates: Vec<Candidate>,
+    /// Nominal force of each balance along the motion of the baseline.
+    pub nominal: Vec<f64>,
+    /// Counts simulations, and ends them.
+    pub simulations: &'a Meter<'a>,
+}
+
+/// Iterations of a first look, and how many of the best starts go on to the end.
+const LOOK: usize = 8;
+const CONTINUED: usize = 2;
+
+/// Iterations under given hyperparameters.
+const RANKED: usize = 12;
+
+/// Distance of two optima in standard errors from which each is a start for the other's error model.
+const APART: f64 = 0.5;
+
+/// Decrease of log-likelihood, nats, from which a set fits worse than one that it contains.
+const WORSE: f64 = 0.05;
+
+/// Share of its strength with which an effect is added to the optimum of a set that contains it not.
+const FAINT: f64 = 0.05;
+
+impl<'a> Refit<'a> {
+    fn calibration(&self) -> Vec<Piece> {
+        base::pieces(self.subject, |role| role == Role::Calibration)
+    }
+
+    /// Fits a set by least squares: a few iterations from each start, then the best to the end. `None` if all fail.
+    pub fn least_squares(&self, key: &Key, starts: &[Start]) -> Option<FittedSet<'a>> {
+        let first = |start: &Start| self.from(key, start, LOOK);
+        let mut looks: Vec<FittedSet<'a>> = starts.par_iter().filter_map(first).collect();
+        looks.sort_by(|a, b| b.least_squares.log_likelihood.total_cmp(&a.least_squares.log_likelihood));
+        looks.truncate(CONTINUED);
+        let end = |look: FittedSet<'a>| {
+            let least_squares = match look.least_squares.converged {
+                true => look.least_squares.clone(),
+                false => look.estimation(&[]).least_squares(look.least_squares.point.clone())?,
+            };
+            Some(FittedSet { least_squares, ..look })
+        };
+        let ends = looks.into_iter().filter_map(end);
+        ends.max_by(|a, b| a.least_squares.log_likelihood.total_cmp(&b.least_squares.log_likelihood))
+    }
+
+    fn from(&self, key: &Key, start: &Start, iterations: usize) -> Option<FittedSet<'a>> {
+        let Start { tuners, locals, added } = start;
+        let pieces = self.calibration();
+        let (fit, point, variant) =
+            problem(self.subject, added, pieces, tuners, locals.clone(), &[], self.simulations);
+        let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, added, &[]);
+        let least_squares = estimation.with(&Errors::White, point, iterations)?;
+        Some(FittedSet { key: key.clone(), added: added.clone(), fit, variant, least_squares, under: Vec::new() })
+    }
+
+    /// Returns the log-likelihood of a set under error models at the outputs whose hyperparameters are given, the largest of
+    /// those.
+    pub fn rank(&self, set: &FittedSet<'a>, errors: &[Errors]) -> f64 {
+        let estimation = set.estimation(&[]);
+        let of = |errors: &Errors| {
+            let found = estimation.with(errors, set.least_squares.point.clone(), RANKED);
+            found.map_or(f64::NEG_INFINITY, |found| found.log_likelihood)
+        };
+        errors.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Fits a set under all error models, from its optimum by least squares and from those of the other error models, and makes
+    /// sure that it fits no worse than the sets that it contains.
+    pub fn under_error_models(&self, set: &mut FittedSet<'a>, nested: &[&FittedSet<'a>]) {
+        let estimation = set.estimation(&self.nominal);
+        let start = set.least_squares.point.clone();
+        let from = |kind: ErrorModel, start: &Point, before: Option<&Errors>| {
+            Some((kind, estimation.under(kind, start.clone(), before)?))
+        };
+        let errors_of = |kind: ErrorModel| {
+            let estimates = nested.iter().filter_map(|nested| nested.estimate(kind));
+            estimates.max_by(|a, b| evidence(a).total_cmp(&evidence(b))).map(|estimate| &estimate.errors)
+        };
+        let first: Vec<(ErrorModel, Estimate)> =
+            ErrorModel::ALL.par_iter().filter_map(|&kind| from(kind, &start, errors_of(kind))).collect();
+        let best = |kind: ErrorModel| {
+            let own = first.iter().find(|(of, _)| *of == kind).map(|(_, estimate)| estimate);
+            let mut found: Vec<(ErrorModel, Estimate)> = Vec::new();
+            for (_, other) in first.iter().filter(|(of, _)| *of != kind) {
+                if own.is_none_or(|own| are_apart(&estimation, own, other)) {
+                    found.extend(from(kind, &other.point, own.map(|own| &own.errors)));
+                }
+            }
+            let mut best = first.iter().filter(|(of, _)| *of == kind).cloned().chain(found).max_by(|a, b| {
+                evidence(&a.1).total_cmp(&evidence(&b.1))
+            });
+            for smaller in nested {
+                let Some(theirs) = smaller.estimate(kind) else { continue };
+                if best.as_ref().is_some_and(|best| best.1.log_likelihood > theirs.log_likelihood - WORSE) {
+                    continue;
+                }
+                let Some(point) = self.faintly(set, smaller, theirs) else { continue };
+                let again = from(kind, &point, Some(&theirs.errors));
+                if let Some(again) = again {
+                    let is_better = |best: &(ErrorModel, Estimate)| again.1.log_likelihood > best.1.log_likelihood;
+                    if best.as_ref().is_none_or(is_better) {
+                        best = Some(again);
+                    }
+                }
+            }
+            best
+        };
+        set.under = ErrorModel::ALL.par_iter().filter_map(|&kind| best(kind)).collect();
+    }
+
+    /// Returns the optimum of a smaller set with the further effects of a set added faintly.
+    fn faintly(&self, set: &FittedSet<'a>, smaller: &FittedSet<'a>, theirs: &Estimate) -> Option<Point> {
+        let known = smaller.start_at(&theirs.point);
+        let own = set.start_at(&set.least_squares.point);
+        let mut start = Start { added: Vec::new(), ..known.clone() };
+        for added in own.added {
+            let same = known.added.iter().find(|known| known.candidate.is(&added.candidate));
+            let same = same.filter(|same| same_choices(same, &added));
+            start.added.push(same.cloned().unwrap_or_else(|| {
+                let first = &added.candidate.effect.parameters()[0];
+                let mut faint = added.clone();
+                match first.null_value {
+                    Some(null) if null.is_finite() => faint.strengths[0] = null + FAINT * (faint.strengths[0] - null),
+                    Some(_) => faint.strengths[0] /= FAINT,
+                    None => {}
+                }
+                faint.strengths[0] = faint.strengths[0].clamp(first.bounds[0], first.bounds[1]);
+                faint
+            }));
+        }
+        let Start { tuners, locals, added } = start;
+        let (_, point, _) =
+            problem(self.subject, &added, self.calibration(), &tuners, locals, &[], self.simulations);
+        Some(point)
+    }
+}
+
+/// Returns true if the parameters that no fit moves have the same values.
+fn same_choices(a: &crate::variant::Added, b: &crate::variant::Added) -> bool {
+    let parameters = a.candidate.effect.parameters().iter().enumerate();
+    parameters.filter(|(_, p)| p.fixed || p.grid.jumps()).all(|(k, _)| a.strengths[k] == b.strengths[k])
+}
+
+/// Returns true if a shared parameter of two estimates differs by more than a share of its standard error.
+fn are_apart(estimation: &Estimation<'_>, a: &Estimate, b: &Estimate) -> bool {
+    let globals = a.point.globals.iter().zip(&b.point.globals).zip(a.deviations.iter().zip(&b.deviations));
+    let apart = |((x, y), (s, t)): ((&f64, &f64), (&f64, &f64))| (x - y).abs() > APART * s.max(*t);
+    estimation.fit.globals.len() == a.point.globals.len() && globals.into_iter().any(apart)
+}
+
+/// Returns the chance of a count of candidates, in nats for each effect.
+pub fn price(candidates: usize) -> f64 {
+    #[allow(clippy::cast_precision_loss)]
+    let count = candidates.max(1) as f64;
+    math::ln(count)
+}

@@ -1,0 +1,240 @@
+//! Best-first search over sets of effects.
+
+use rayon::prelude::*;
+
+use super::fitted_set::{FittedSet, Key};
+use super::refit::{Refit, price};
+use super::screening::{Scene, Screened, pair_gain};
+use crate::candidate::Candidate;
+use crate::estimation::{ErrorModel, Errors};
+
+/// Candidates that are fitted after a screening: the best by gain under the correlated error models, and by gain in white noise.
+const SINGLES: usize = 8;
+const RAW: usize = 2;
+
+/// Candidates among which pairs are formed, and pairs that are fitted.
+const PAIRED: usize = 60;
+const PAIRS: usize = 10;
+
+/// Sets of an expansion that are fitted under all error models: single effects, pairs.
+const FULL: [usize; 2] = [3, 2];
+
+/// Sets that are expanded at a time, and in all.
+const BEAM: usize = 3;
+const EXPANSIONS: usize = 8;
+
+/// Gain in log-likelihood, nats, below which an effect under every error model does nothing.
+const INERT: f64 = 0.3;
+
+/// Sets that a search has fitted under all error models, the most probable first.
+pub struct Search<'r, 'a> {
+    /// Fits sets.
+    pub refit: &'r Refit<'a>,
+    /// Fitted sets; the declared model is among them.
+    pub sets: Vec<FittedSet<'a>>,
+    /// Largest number of effects of a set.
+    pub most: usize,
+}
+
+impl<'r, 'a> Search<'r, 'a> {
+    /// Begins with the declared model, fitted by least squares.
+    pub fn new(refit: &'r Refit<'a>, mut declared: FittedSet<'a>, most: usize) -> Self {
+        refit.under_error_models(&mut declared, &[]);
+        Self { refit, sets: vec![declared], most }
+    }
+
+    /// Expands the most probable sets until they have all been.
+    pub fn run(&mut self) {
+        let mut expanded: Vec<Key> = Vec::new();
+        while expanded.len() < EXPANSIONS {
+            let best = self.sets.iter().take(BEAM).find(|set| set.key.len() < self.most && !expanded.contains(&set.key));
+            let Some(key) = best.map(|set| set.key.clone()) else { break };
+            self.expand(&key);
+            expanded.push(key);
+        }
+    }
+
+    /// Returns a fitted set.
+    pub fn get(&self, key: &Key) -> Option<&FittedSet<'a>> {
+        self.sets.iter().find(|set| set.key == *key)
+    }
+
+    /// Returns the logarithm of the posterior probability of a set, up to a constant.
+    pub fn log_posterior(&self, set: &FittedSet<'a>) -> f64 {
+        #[allow(clippy::cast_precision_loss)]
+        let size = set.key.len() as f64;
+        set.log_evidence() - size * price(kinds(&self.refit.candidates))
+    }
+
+    /// Returns true if an effect of a set does nothing under every error model.
+    pub fn is_inert(&self, set: &FittedSet<'a>) -> bool {
+        let gain = |smaller: &FittedSet<'a>, kind: ErrorModel| {
+            let (own, theirs) = (set.estimate(kind)?, smaller.estimate(kind)?);
+            Some(own.log_likelihood - theirs.log_likelihood)
+        };
+        let subsets = (0..set.key.len()).filter_map(|k| self.get(&without(&set.key, k)));
+        subsets.into_iter().any(|smaller| {
+            ErrorModel::ALL.into_iter().filter_map(|kind| gain(smaller, kind)).all(|gain| gain < INERT)
+        })
+    }
+
+    /// Fits the sets with one or two effects more, and those with one less.
+    fn expand(&mut self, key: &Key) {
+        let parent = self.get(key).expect("it was fitted").clone();
+        let mut errors = vec![Errors::White];
+        let of = |kind| parent.estimate(kind).map(|estimate| estimate.errors.clone());
+        errors.extend([ErrorModel::SmoothOutput, ErrorModel::RoughOutput].into_iter().filter_map(of));
+        if errors.len() == 1 {
+            return;
+        }
+        let Some(scene) = Scene::new(&parent, &errors) else { return };
+        let all = &self.refit.candidates;
+        let fits = |&index: &usize| parent.added.iter().all(|added| can_be_together(&added.candidate, &all[index]));
+        let wanted: Vec<usize> = (0..all.len()).filter(|index| !key.contains(index)).filter(fits).collect();
+        let screened = scene.screen(all, &wanted);
+        let mut singles: Vec<&Screened> = screened.iter().take(SINGLES).collect();
+        let mut raw: Vec<&Screened> = screened.iter().collect();
+        raw.sort_by(|a, b| b.gains[0].total_cmp(&a.gains[0]));
+        for other in raw.into_iter().take(RAW) {
+            if singles.iter().all(|single| single.index != other.index) {
+                singles.push(other);
+            }
+        }
+        let singles: Vec<Vec<&Screened>> = singles.into_iter().map(|single| vec![single]).collect();
+        let pairs = if key.len() + 2 <= self.most { pairs(&screened, all) } else { Vec::new() };
+        for (news, full) in [singles, pairs].into_iter().zip(FULL) {
+            let fitted = |new: &Vec<&Screened>| {
+                let set = self.larger(&parent, new)?;
+                Some((self.refit.rank(&set, &errors[1..]), set))
+            };
+            let mut ranked: Vec<(f64, FittedSet<'a>)> = news.par_iter().filter_map(fitted).collect();
+            ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+            for (_, set) in ranked.into_iter().take(full) {
+                self.add(set);
+            }
+        }
+        for k in 0..key.len() {
+            self.ensure(&without(key, k));
+        }
+        self.sort();
+    }
+
+    /// Fits a set by least squares that has more effects than another.
+    fn larger(&self, parent: &FittedSet<'a>, new: &[&Screened]) -> Option<FittedSet<'a>> {
+        let mut key = parent.key.clone();
+        key.extend(new.iter().map(|new| new.index));
+        key.sort_unstable();
+        if self.get(&key).is_some() {
+            return None;
+        }
+        let least_squares = parent.start_at(&parent.least_squares.point);
+        let mut starts = Vec::new();
+        let [first, rest @ ..] = new else { return None };
+        let with_rest = |start: super::fitted_set::Start| rest.iter().fold(start, |start, new| start.with(&new.guesses[0]));
+        for guess in &first.guesses {
+            starts.push(with_rest(least_squares.with(guess)));
+            if rest.is_empty() {
+                starts.extend(guess.restarts().iter().map(|again| least_squares.with(again)));
+            }
+        }
+        for (_, estimate) in parent.under.iter().filter(|(kind, _)| *kind == ErrorModel::SmoothOutput) {
+            starts.push(with_rest(parent.start_at(&estimate.point).with(&first.guesses[0])));
+        }
+        self.refit.least_squares(&key, &starts)
+    }
+
+    /// Fits a set from fitted ones with one effect less. Returns false if there are none, or the fits fail.
+    pub fn fit(&mut self, key: &Key) -> bool {
+        let mut best: Option<FittedSet<'a>> = None;
+        for k in 0..key.len() {
+            let Some(parent) = self.get(&without(key, k)) else { continue };
+            let Some(scene) = Scene::new(parent, &[Errors::White]) else { continue };
+            for screened in scene.screen(&self.refit.candidates, &[key[k]]) {
+                let Some(set) = self.larger(parent, &[&screened]) else { continue };
+                let log = |set: &FittedSet<'a>| set.least_squares.log_likelihood;
+                if best.as_ref().is_none_or(|best| log(&set) > log(best)) {
+                    best = Some(set);
+                }
+            }
+        }
+        best.map(|set| self.add(set)).is_some()
+    }
+
+    /// Makes sure that a set is fitted under all error models. Returns false if it cannot be.
+    pub fn ensure(&mut self, key: &Key) -> bool {
+        if self.get(key).is_some() {
+            return true;
+        }
+        let contains = |set: &&FittedSet<'a>| key.iter().all(|k| set.key.contains(k)) && set.key.len() == key.len() + 1;
+        let reduced = |larger: &FittedSet<'a>| {
+            let extra = larger.added.iter().position(|added| {
+                !key.iter().any(|&k| self.refit.candidates[k].is(&added.candidate))
+            })?;
+            Some(larger.start_at(&larger.least_squares.point).without(extra))
+        };
+        let starts: Vec<_> = self.sets.iter().filter(contains).filter_map(reduced).collect();
+        let Some(set) = self.refit.least_squares(key, &starts) else { return false };
+        self.add(set);
+        self.sort();
+        true
+    }
+
+    fn add(&mut self, mut set: FittedSet<'a>) {
+        if self.get(&set.key).is_some() {
+            return;
+        }
+        let contained = |smaller: &&FittedSet<'a>| {
+            smaller.key.len() + 1 == set.key.len() && smaller.key.iter().all(|k| set.key.contains(k))
+        };
+        let mut nested: Vec<&FittedSet<'a>> = self.sets.iter().filter(contained).collect();
+        if nested.is_empty() {
+            nested.extend(self.sets.iter().filter(|smaller| smaller.key.is_empty()));
+        }
+        self.refit.under_error_models(&mut set, &nested);
+        if !set.under.is_empty() {
+            self.sets.push(set);
+        }
+    }
+
+    fn sort(&mut self) {
+        let mut keyed: Vec<(f64, FittedSet<'a>)> = std::mem::take(&mut self.sets)
+            .into_iter()
+            .map(|set| (self.log_posterior(&set), set))
+            .collect();
+        keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
+        self.sets = keyed.into_iter().map(|(_, set)| set).collect();
+    }
+}
+
+/// Returns the best pairs by their normal equations.
+fn pairs<'s>(screened: &'s [Screened], candidates: &[Candidate]) -> Vec<Vec<&'s Screened>> {
+    let among = &screened[..screened.len().min(PAIRED)];
+    let mut all: Vec<(f64, usize, usize)> = (0..among.len())
+        .into_par_iter()
+        .flat_map_iter(|a| (0..a).map(move |b| (a, b)))
+        .filter(|&(a, b)| can_be_together(&candidates[among[a].index], &candidates[among[b].index]))
+        .map(|(a, b)| (pair_gain(&among[a], &among[b]), a, b))
+        .collect();
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    all.into_iter().take(PAIRS).map(|(_, a, b)| vec![&among[b], &among[a]]).collect()
+}
+
+/// Returns true if two candidates may act at once: a joint has one dry friction at most.
+fn can_be_together(a: &Candidate, b: &Candidate) -> bool {
+    !a.is(b) && !(a.port == b.port && a.is_dry_friction() && b.is_dry_friction())
+}
+
+/// Returns a set without one of its effects.
+pub fn without(key: &Key, index: usize) -> Key {
+    let mut smaller = key.clone();
+    smaller.remove(index);
+    smaller
+}
+
+/// Returns the number of candidates that the prior counts: one that acts in a single record counts once for all records.
+fn kinds(candidates: &[Candidate]) -> usize {
+    let same = |a: &Candidate, b: &Candidate| {
+        a.effect.name() == b.effect.name() && a.port == b.port && a.companion == b.companion
+    };
+    (0..candidates.len()).filter(|&k| !candidates[..k].iter().any(|earlier| same(earlier, &candidates[k]))).count()
+}
