@@ -52,7 +52,7 @@ pub struct Estimate {
     pub errors: Errors,
     /// Log-likelihood.
     pub log_likelihood: f64,
-    /// Logarithm of the evidence; `None` where the hyperparameters are given.
+    /// Logarithm of the evidence; `None` if it is not finite.
     pub log_evidence: Option<f64>,
     /// Standard errors of the shared parameters, in their units; 0 for fixed ones.
     pub deviations: Vec<f64>,
@@ -102,18 +102,12 @@ impl Estimation<'_> {
     }
 
     /// Fits parameters and initial states under an error model at the outputs whose hyperparameters are given, in at most so many
-    /// iterations.
+    /// iterations. The evidence is that for these hyperparameters.
     pub fn with(&self, errors: &Errors, start: Point, iterations: usize) -> Option<Estimate> {
         let found = self.descend(self.fit, errors, start, iterations)?;
         let log_likelihood = -0.5 * (found.iterate.sum() + found.logarithms);
-        Some(Estimate {
-            deviations: vec![0.0; self.fit.globals.len()],
-            point: found.point,
-            errors: errors.clone(),
-            log_likelihood,
-            log_evidence: None,
-            converged: found.converged,
-        })
+        let given = Fitted { errors: errors.clone(), count: 0, log_prior: 0.0, log_determinant: 0.0 };
+        Some(self.concluded(log_likelihood, found, given))
     }
 
     /// Fits parameters, initial states and hyperparameters of an error model; `before` is one of the kind to start from.

@@ -72,13 +72,13 @@ impl<'a> Refit<'a> {
         Some(FittedSet { key: key.clone(), added: added.clone(), fit, variant, least_squares, under: Vec::new() })
     }
 
-    /// Returns the log-likelihood of a set under error models at the outputs whose hyperparameters are given, the largest of
-    /// those.
+    /// Returns the logarithm of the evidence of a set under error models at the outputs whose hyperparameters are given, the
+    /// largest of those.
     pub fn rank(&self, set: &FittedSet<'a>, errors: &[Errors]) -> f64 {
         let estimation = set.estimation(&[]);
         let of = |errors: &Errors| {
             let found = estimation.with(errors, set.least_squares.point.clone(), RANKED);
-            found.map_or(f64::NEG_INFINITY, |found| found.log_likelihood)
+            found.map_or(f64::NEG_INFINITY, |found| evidence(&found))
         };
         errors.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
     }
