@@ -181,7 +181,12 @@ impl<const N: usize> Scalar for Dual<N> {
     }
     #[inline]
     fn chain(self, value: f64, derivative: f64) -> Self {
-        Self { value, tangent: self.tangent.map(|d| derivative * d) }
+        // A loop, as the compiler does not inline `map` over arrays.
+        let mut tangent = self.tangent;
+        for t in &mut tangent {
+            *t *= derivative;
+        }
+        Self { value, tangent }
     }
 }
 

@@ -97,13 +97,17 @@ impl ForceError {
         let noise: Vec<Dual<N>> = self.noise.iter().enumerate().map(|(c, &noise)| exponential(noise, 2 + c)).collect();
         let mut likelihood = Likelihood::default();
         let mut state = vec![Dual::from(0.0); motion.states + 2 * motion.forces];
+        let mut next = state.clone();
         Recursion::new(motion, &process, &noise).run(|event| match event {
             Event::Measured(m, gain, variance) => {
                 let innovation = innovation(m, &state, residuals[m.residual]);
                 likelihood.add(innovation, variance);
                 state.iter_mut().zip(gain).for_each(|(x, k)| *x += *k * innovation);
             }
-            Event::Sample(k, kernel) => state = moved(motion, k, kernel, &state),
+            Event::Sample(k, kernel) => {
+                moved(motion, k, kernel, &state, &mut next);
+                std::mem::swap(&mut state, &mut next);
+            }
         });
         likelihood
     }
@@ -113,7 +117,8 @@ impl ForceError {
     pub fn whiten<'a>(&self, motion: &LinearisedMotion, columns: impl Iterator<Item = &'a mut [f64]>) -> f64 {
         let process = Matern32 { deviation: self.deviation, length: self.length };
         let mut columns: Vec<&mut [f64]> = columns.collect();
-        let mut states = vec![vec![0.0; motion.states + 2 * motion.forces]; columns.len()];
+        let mut next = vec![0.0; motion.states + 2 * motion.forces];
+        let mut states = vec![next.clone(); columns.len()];
         let mut sum = 0.0;
         Recursion::new(motion, &process, &self.noise).run(|event| match event {
             Event::Measured(m, gain, variance) => {
@@ -125,7 +130,10 @@ impl ForceError {
                 }
             }
             Event::Sample(k, kernel) => {
-                states.iter_mut().for_each(|state| *state = moved(motion, k, kernel, state));
+                for state in &mut states {
+                    moved(motion, k, kernel, state, &mut next);
+                    state.copy_from_slice(&next);
+                }
             }
         });
         sum
@@ -170,7 +178,8 @@ impl ForceError {
             }
             if k + 1 < count {
                 let kernel = recursion.predict(k);
-                state = moved(motion, k, &kernel, &state);
+                let before = state.clone();
+                moved(motion, k, &kernel, &before, &mut state);
                 kernels.push(kernel);
             }
         }
@@ -214,8 +223,11 @@ struct Recursion<'a, S, P> {
     /// Covariance, row by row: states first, then each force with its rate.
     covariance: Vec<S>,
     gain: Vec<S>,
-    /// Buffer for products with the covariance.
+    /// Buffers: for products with the covariance, and for one of its rows before and after a step.
     product: Vec<S>,
+    row: [Vec<S>; 2],
+    /// Last time from sample to sample, with the transition of a force and the covariance of its noise over it.
+    step: Option<(f64, KernelStep<S>, KernelStep<S>)>,
 }
 
 impl<'a, S: Scalar, P: Process<S, 2>> Recursion<'a, S, P> {
@@ -231,7 +243,9 @@ impl<'a, S: Scalar, P: Process<S, 2>> Recursion<'a, S, P> {
             }
         }
         let noise = noise.iter().map(|&noise| noise * noise).collect();
-        Self { motion, process, noise, covariance, gain: vec![zero; size], product: vec![zero; size * size] }
+        let (gain, product) = (vec![zero; size], vec![zero; size * size]);
+        let row = [gain.clone(), gain.clone()];
+        Self { motion, process, noise, covariance, gain, product, row, step: None }
     }
 
     fn run(mut self, mut on: impl FnMut(Event<'_, S>)) {
@@ -252,9 +266,12 @@ impl<'a, S: Scalar, P: Process<S, 2>> Recursion<'a, S, P> {
     fn measure(&mut self, m: &Measured) -> S {
         let size = self.gain.len();
         let noise = self.noise[m.channel];
-        let across: Vec<S> = self.covariance.chunks_exact(size).map(|row| weighted(&m.slopes, row)).collect();
-        let variance = weighted(&m.slopes, &across) + noise;
-        self.gain.iter_mut().zip(&across).for_each(|(gain, &across)| *gain = across / variance);
+        let [across, lost] = &mut self.row;
+        let rows = self.covariance.chunks_exact(size);
+        across.iter_mut().zip(rows).for_each(|(across, row)| *across = weighted(&m.slopes, row));
+        let variance = weighted(&m.slopes, across) + noise;
+        let precision = S::from(1.0) / variance;
+        self.gain.iter_mut().zip(&*across).for_each(|(gain, &across)| *gain = across * precision);
         for a in 0..size {
             for b in a..size {
                 let value = self.covariance[a * size + b] - self.gain[a] * across[b];
@@ -263,8 +280,8 @@ impl<'a, S: Scalar, P: Process<S, 2>> Recursion<'a, S, P> {
             }
         }
         // Joseph's form corrects what the subtraction lost. Source: R. Bucy, P. Joseph, Filtering for Stochastic Processes (1968).
-        let lost = |row: (usize, &[S])| weighted(&m.slopes, row.1) - noise * self.gain[row.0];
-        let lost: Vec<S> = self.covariance.chunks_exact(size).enumerate().map(lost).collect();
+        let rows = self.covariance.chunks_exact(size).zip(&self.gain);
+        lost.iter_mut().zip(rows).for_each(|(lost, (row, &gain))| *lost = weighted(&m.slopes, row) - noise * gain);
         for a in 0..size {
             for b in a..size {
                 let correction = (lost[a] * self.gain[b] + self.gain[a] * lost[b]) * 0.5;
@@ -280,22 +297,23 @@ impl<'a, S: Scalar, P: Process<S, 2>> Recursion<'a, S, P> {
     fn predict(&mut self, k: usize) -> KernelStep<S> {
         let (states, size) = (self.motion.states, self.gain.len());
         let dt = self.motion.times[k + 1] - self.motion.times[k];
-        let kernel = self.process.transition(dt);
+        let known = self.step.filter(|(of, ..)| *of == dt);
+        let (_, kernel, noise) =
+            *self.step.insert(known.unwrap_or_else(|| (dt, self.process.transition(dt), self.process.noise(dt))));
         // With the transition T of all: first T P, then (T P) T', by columns of the transposed product.
+        let [before, after] = &mut self.row;
         for b in 0..size {
-            let column: Vec<S> = (0..size).map(|a| self.covariance[a * size + b]).collect();
-            let next = moved(self.motion, k, &kernel, &column);
-            self.product[b * size..(b + 1) * size].copy_from_slice(&next);
+            before.iter_mut().enumerate().for_each(|(a, x)| *x = self.covariance[a * size + b]);
+            moved(self.motion, k, &kernel, before, &mut self.product[b * size..(b + 1) * size]);
         }
         for a in 0..size {
-            let row: Vec<S> = (0..size).map(|b| self.product[b * size + a]).collect();
-            let next = moved(self.motion, k, &kernel, &row);
+            before.iter_mut().enumerate().for_each(|(b, x)| *x = self.product[b * size + a]);
+            moved(self.motion, k, &kernel, before, after);
             for b in a..size {
-                self.covariance[a * size + b] = next[b];
-                self.covariance[b * size + a] = next[b];
+                self.covariance[a * size + b] = after[b];
+                self.covariance[b * size + a] = after[b];
             }
         }
-        let noise = self.process.noise(dt);
         for j in 0..self.motion.forces {
             let row = states + 2 * j;
             for a in 0..2 {
@@ -322,22 +340,23 @@ fn innovation<S: Scalar>(m: &Measured, state: &[S], residual: f64) -> S {
     -weighted(&m.slopes, state) + residual
 }
 
-/// Returns states, forces and rates at the sample after `k`.
-fn moved<S: Scalar>(motion: &LinearisedMotion, k: usize, kernel: &KernelStep<S>, x: &[S]) -> Vec<S> {
+/// Writes states, forces and rates at the sample after `k`.
+fn moved<S: Scalar>(motion: &LinearisedMotion, k: usize, kernel: &KernelStep<S>, x: &[S], next: &mut [S]) {
     let (states, forces) = (motion.states, motion.forces);
     let (transition, gain) = (motion.transition(k), motion.gain(k));
-    let mut next = Vec::with_capacity(x.len());
-    for a in 0..states {
+    let (of_states, of_forces) = next.split_at_mut(states);
+    for (a, next) in of_states.iter_mut().enumerate() {
         let mut sum = weighted(&transition[a * states..(a + 1) * states], x);
         for j in 0..forces {
             sum += x[states + 2 * j] * gain[a * forces + j];
         }
-        next.push(sum);
+        *next = sum;
     }
-    for force in x[states..].chunks_exact(2) {
-        next.extend(kernel.iter().map(|row| row[0] * force[0] + row[1] * force[1]));
+    for (force, next) in x[states..].chunks_exact(2).zip(of_forces.chunks_exact_mut(2)) {
+        for (row, next) in kernel.iter().zip(next) {
+            *next = row[0] * force[0] + row[1] * force[1];
+        }
     }
-    next
 }
 
 /// Returns the product of the transposed transition from sample `k` with an adjoint state.

@@ -117,7 +117,7 @@ impl Estimation<'_> {
         }
         let mut point = start;
         let mut best: Option<(f64, Found, Fitted)> = None;
-        let mut errors: Option<Errors> = before.filter(|errors| !matches!(errors, Errors::Force(..))).cloned();
+        let mut errors: Option<Errors> = None;
         let mut fit = self.fit.clone();
         for round in 0..ROUNDS {
             let motions = match kind {
@@ -128,9 +128,9 @@ impl Estimation<'_> {
             for (residuals, motion) in residuals.iter_mut().zip(&motions) {
                 *residuals = motion.without_force(residuals);
             }
-            let thoroughly = round < 2;
-            let fitted =
-                Errors::fit(kind, &self.fit.pieces, &self.channels, &residuals, motions, errors.as_ref(), thoroughly)?;
+            let known = errors.as_ref().or(before);
+            let thoroughly = round == 0;
+            let fitted = Errors::fit(kind, &self.fit.pieces, &self.channels, &residuals, motions, known, thoroughly)?;
             let found = self.descend(&fit, &fitted.errors, point.clone(), ITERATIONS)?;
             let log = -0.5 * (found.iterate.sum() + found.logarithms);
             (point, errors) = (found.point.clone(), Some(fitted.errors.clone()));
