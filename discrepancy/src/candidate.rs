@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use mops_core::math;
 use mops_core::{
-    Dimension, Effect, EffectParameter, InitialGrid, Interface, Placement, Port, PortKind, PortState, Unit,
+    Dimension, Effect, EffectParameter, InitialGrid, Interface, ParameterKind, Placement, Port, PortKind, PortState, Unit,
 };
 
 use crate::gap::Gap;
@@ -155,6 +155,13 @@ const MOST_PERIODS: f64 = 160.0;
 /// How many times the largest multiple tried of its typical size a shape may be, and how many widths beyond a range.
 pub(crate) const FARTHEST_SHAPE: f64 = 10.0;
 
+/// Periods that must be seen of what repeats along a position or in time.
+const PERIODS_SEEN: f64 = 1.5;
+
+/// Samples that an event lasts at least, and the share of a record that it lasts at most.
+const SAMPLES_SEEN: f64 = 3.0;
+const EVENT_SHARE: f64 = 0.25;
+
 /// Sizes tried from one number of steps to the next.
 const PER_STEP: u32 = 4;
 
@@ -228,7 +235,21 @@ impl Sizes {
             }
             _ => [f64::NEG_INFINITY, f64::INFINITY],
         };
+        let [covered_low, covered_high] = self.covered(strength.kind);
+        let (least, most) = (least.max(covered_low), most.min(covered_high));
         if least.max(low) < most.min(high) { [least.max(low), most.min(high)] } else { strength.bounds }
+    }
+
+    /// Smallest and largest value that the records can show: [`PERIODS_SEEN`] of what repeats, an event of at least
+    /// [`SAMPLES_SEEN`] samples and at most [`EVENT_SHARE`] of the record.
+    fn covered(&self, kind: ParameterKind) -> [f64; 2] {
+        let periods = |length: f64| std::f64::consts::TAU * PERIODS_SEEN / length.max(f64::MIN_POSITIVE);
+        match kind {
+            ParameterKind::WaveNumber => [periods(self.range[1] - self.range[0]), f64::INFINITY],
+            ParameterKind::Frequency => [periods(self.record), f64::INFINITY],
+            ParameterKind::Duration => [SAMPLES_SEEN * self.sample, EVENT_SHARE * self.record],
+            _ => [f64::NEG_INFINITY, f64::INFINITY],
+        }
     }
 
     /// The values of a strength that are tried.
@@ -261,7 +282,7 @@ impl Sizes {
             InitialGrid::Plain(values) | InitialGrid::Jumps(values) => values.to_vec(),
             InitialGrid::Frequencies => {
                 let step = std::f64::consts::TAU / (PER_PERIOD * self.record);
-                let highest = (0.5 * std::f64::consts::PI / self.sample).min(PER_PERIOD * MOST_PERIODS * step);
+                let highest = self.highest_frequency();
                 (1..).map(|k| f64::from(k) * step).take_while(|&w| w <= highest).collect()
             }
             InitialGrid::Steps => {
@@ -273,6 +294,11 @@ impl Sizes {
         };
         let inside = |v: &f64| v.is_finite() && *v >= bounds[0] && *v <= bounds[1];
         values.into_iter().filter(inside).collect()
+    }
+
+    /// The highest frequency that is tried: four samples or a share of the record in a period, rad/s.
+    pub fn highest_frequency(&self) -> f64 {
+        (0.5 * std::f64::consts::PI / self.sample).min(std::f64::consts::TAU * MOST_PERIODS / self.record)
     }
 
     /// The typical size of a lag or delay: a tenth of the time in which the place moves, or ten samples if that is more, s.
@@ -297,7 +323,7 @@ impl Sizes {
     /// All combinations of the values tried of an effect's strengths.
     pub fn combinations(&self, effect: &dyn Effect) -> Vec<Vec<f64>> {
         effect.parameters().iter().fold(vec![Vec::new()], |all, strength| {
-            let values = self.values(strength.dimension, strength.grid, strength.bounds);
+            let values = self.values(strength.dimension, strength.grid, self.bounds(strength));
             all.iter().flat_map(|start| values.iter().map(move |&v| [start.as_slice(), &[v]].concat())).collect()
         })
     }

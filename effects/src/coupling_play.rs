@@ -1,6 +1,8 @@
 //! Elastic coupling with backlash.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, DeclaredTerm, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, Pressed};
@@ -31,6 +33,7 @@ impl Definition for CouplingPlay {
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const SECOND_PORT: Option<PortKind> = Some(PortKind::Joint);
     const MUTUAL: bool = true;
+    const MODIFIES: Option<DeclaredTerm> = Some(DeclaredTerm::Spring);
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive(
             "k",

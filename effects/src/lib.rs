@@ -76,13 +76,13 @@ mod wind_gust;
 pub mod prelude {
     pub use crate::{Definition, effect};
     pub use mops_core::{
-        BoundEffect, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+        BoundEffect, DeclaredTerm, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
     };
 }
 
 use std::sync::Arc;
 
-use mops_core::{BoundEffect, Dimension, Dual7, Effect, EffectClass, EffectParameter, PortKind, Scalar};
+use mops_core::{BoundEffect, DeclaredTerm, Dimension, Dual7, Effect, EffectClass, EffectParameter, PortKind, Scalar};
 
 /// Definition of an effect in its file; see [`Effect`] for the meaning of each item.
 pub trait Definition: Send + Sync + 'static {
@@ -116,6 +116,8 @@ pub trait Definition: Send + Sync + 'static {
     const IS_INERTIAL: bool = false;
     /// Value of [`Effect::is_one_off`].
     const IS_ONE_OFF: bool = false;
+    /// Value of [`Effect::modifies`].
+    const MODIFIES: Option<DeclaredTerm> = None;
     /// Value of [`Effect::rarity`].
     const RARITY: u8 = 1;
 
@@ -171,6 +173,9 @@ impl<D: Definition> Effect for Defined<D> {
     }
     fn is_one_off(&self) -> bool {
         D::IS_ONE_OFF
+    }
+    fn modifies(&self) -> Option<DeclaredTerm> {
+        D::MODIFIES
     }
     fn rarity(&self) -> u8 {
         D::RARITY

@@ -1,6 +1,8 @@
 //! Spring with backlash.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, DeclaredTerm, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, clamp};
@@ -25,6 +27,7 @@ impl Definition for SpringPlay {
     const CLASS: EffectClass = EffectClass::Elastic;
     const FORM_OF: Option<&'static str> = Some("backlash");
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const MODIFIES: Option<DeclaredTerm> = Some(DeclaredTerm::Spring);
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive(
             "k",

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use mops_core::{Dimension, EffectParameter, InitialGrid, Scalar};
+use mops_core::{Dimension, EffectParameter, InitialGrid, ParameterKind, Scalar};
 
 /// Bounds of a parameter that may be any number.
 pub(super) const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
@@ -15,6 +15,7 @@ pub(super) const NOT_NEGATIVE: [f64; 2] = [0.0, f64::INFINITY];
 pub(super) const fn phase() -> EffectParameter {
     let quarters = InitialGrid::Plain(&[-FRAC_PI_2, 0.0, FRAC_PI_2, PI]);
     EffectParameter::shape("phase", "phase of the sine, rad", Dimension::ONE, [-3.0 * PI, 3.0 * PI], quarters)
+        .of_kind(ParameterKind::Phase)
 }
 
 /// Source of [`radiated`] and [`emission`].
@@ -100,6 +101,7 @@ pub(super) fn power<S: Scalar>(x: S, exponent: S) -> S {
 /// Returns the parameter for a start time in an experiment, s, with initial values at these fractions of the record.
 pub(super) const fn from(shares: &'static [f64]) -> EffectParameter {
     EffectParameter::shape("from", "start", Dimension::TIME, NOT_NEGATIVE, InitialGrid::Moments(shares))
+        .of_kind(ParameterKind::Instant)
 }
 
 /// Fractions of a record for the initial values of the start of a parameter step.
@@ -111,12 +113,14 @@ pub(super) const STEPS_LAST: &[f64] = &[0.03, 0.12];
 /// Returns the parameter for a duration, s, with initial values at these fractions of the record.
 pub(super) const fn length(shares: &'static [f64]) -> EffectParameter {
     EffectParameter::shape("length", "duration", Dimension::TIME, NOT_NEGATIVE, InitialGrid::Moments(shares))
+        .of_kind(ParameterKind::Duration)
 }
 
 /// Returns the parameter for a wave number along a position.
 pub(super) const fn waves(trials: InitialGrid) -> EffectParameter {
     let about = "wave number: 2 pi divided by the period; for an angle, the number of periods per turn";
     EffectParameter::shape("n", about, Dimension::ONE.over(Dimension::POSITION), NOT_NEGATIVE, trials)
+        .of_kind(ParameterKind::WaveNumber)
 }
 
 /// Time span with the parameters [`from`] and [`length`].

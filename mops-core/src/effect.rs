@@ -198,6 +198,37 @@ impl InitialGrid {
     }
 }
 
+/// Kind of an effect parameter. It decides which values are plausible before data are seen, and what data must show for the
+/// parameter to be identifiable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ParameterKind {
+    /// Magnitude; the effect vanishes at its null value.
+    Strength,
+    /// Magnitude of a contact or an edge, of which data often show only that it is large.
+    Steepness,
+    /// Shape, such as an exponent or a characteristic speed.
+    Shape,
+    /// Value in the range visited at the place, such as the level of an edge.
+    Level,
+    /// Angle of a periodic function.
+    Phase,
+    /// Wave number along a position: 2 pi divided by the period.
+    WaveNumber,
+    /// Angular frequency.
+    Frequency,
+    /// Time in an experiment.
+    Instant,
+    /// Duration of an event.
+    Duration,
+}
+
+/// Term of the declared model that an effect modifies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DeclaredTerm {
+    /// Force that depends on the position of the joint or, for an effect between two joints, on that of the other.
+    Spring,
+}
+
 /// Scope of an effect parameter: the plant or a single experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
@@ -214,6 +245,8 @@ pub struct EffectParameter {
     pub name: &'static str,
     /// Description in one line.
     pub about: &'static str,
+    /// Kind.
+    pub kind: ParameterKind,
     /// Unit.
     pub dimension: Dimension,
     /// Null value, 0 or infinity, at which the effect vanishes; `None` for a shape parameter.
@@ -237,6 +270,7 @@ impl EffectParameter {
         Self {
             name,
             about,
+            kind: ParameterKind::Strength,
             dimension,
             null_value: Some(0.0),
             bounds: [0.0, f64::INFINITY],
@@ -260,7 +294,19 @@ impl EffectParameter {
         bounds: [f64; 2],
         grid: InitialGrid,
     ) -> Self {
-        Self { bounds, grid, null_value: None, ..Self::positive(name, about, dimension) }
+        let kind = match grid {
+            InitialGrid::Within(_) | InitialGrid::WithinAndGap(_) | InitialGrid::WithinSize(_) => ParameterKind::Level,
+            InitialGrid::Frequencies => ParameterKind::Frequency,
+            _ => ParameterKind::Shape,
+        };
+        Self { kind, bounds, grid, null_value: None, ..Self::positive(name, about, dimension) }
+    }
+
+    /// Sets another kind.
+    #[must_use]
+    pub const fn of_kind(mut self, kind: ParameterKind) -> Self {
+        self.kind = kind;
+        self
     }
 
     /// Sets another initial grid.
@@ -292,9 +338,11 @@ impl EffectParameter {
         self
     }
 
-    /// Sets the multiples of the typical size from which a stuck fit is restarted.
+    /// Makes the parameter the steepness of a contact or an edge, with the multiples of the typical size from which a stuck fit
+    /// is restarted.
     #[must_use]
     pub const fn restarted_from(mut self, multiples: &'static [f64]) -> Self {
+        self.kind = ParameterKind::Steepness;
         self.restarts = multiples;
         self
     }
@@ -465,6 +513,11 @@ pub trait Effect: Send + Sync {
     /// Returns true if the effect occurs once, in one experiment.
     fn is_one_off(&self) -> bool {
         false
+    }
+
+    /// Returns the term of the declared model that the effect modifies; without that term it cannot act.
+    fn modifies(&self) -> Option<DeclaredTerm> {
+        None
     }
 
     /// Returns the rarity of the effect. Between effects that explain the data equally well, the smaller number is more

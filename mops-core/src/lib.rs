@@ -67,7 +67,8 @@ pub use demand::{Demand, Scaled};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use differences::Differences;
 pub use effect::{
-    BoundEffect, Dimension, DryFriction, Effect, EffectClass, EffectParameter, InitialGrid, Placement, PortKind,
+    BoundEffect, DeclaredTerm, Dimension, DryFriction, Effect, EffectClass, EffectParameter, InitialGrid, ParameterKind,
+    Placement, PortKind,
     PortState, Scope,
 };
 pub use evaluation::{Evaluation, FEASIBLE, Merit, Objective, Reading};

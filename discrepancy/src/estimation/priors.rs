@@ -1,9 +1,10 @@
 //! Priors of the unknowns of an augmented model, and nominal forces.
 
-use mops_core::{Dimension, InitialGrid, Port, math};
+use std::f64::consts::TAU;
+
+use mops_core::{Dimension, ParameterKind, Port, math};
 
 use super::estimate::Prior;
-use crate::candidate::Sizes;
 use crate::fit::{Fit, Global, Sets};
 use crate::subject::{Local, Subject};
 use crate::trace_of::sizes;
@@ -41,7 +42,7 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
         let stretch = if global.log { subject.start()[k].abs() } else { global.scale };
         at_centre(stretch, DECLARED)
     };
-    let of_effect = |global: &Global, parameter: usize| {
+    let of_effect = |parameter: usize| {
         let index =
             variant.first.iter().rposition(|&first| first <= parameter).expect("parameters of effects come last");
         let (added, position) = (&added[index], parameter - variant.first[index]);
@@ -53,32 +54,31 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
             centre: of.null_value,
             half: of.null_value.is_some_and(|null| of.bounds.contains(&null)),
         };
-        match (of.null_value, of.grid) {
-            (Some(_), _) if !of.restarts.is_empty() => at_centre(added.strengths[position].abs(), STEEPNESS),
-            (Some(0.0), _) if of.dimension == Dimension::ONE => about_null(1.0, GAIN),
-            (Some(0.0), _) if is_sensor && of.dimension == Dimension::OUTPUT => {
-                about_null((added.sizes.range[1] - added.sizes.range[0]).max(added.sizes.value), OFFSET)
+        let typical = || added.strengths[position].abs().max(f64::MIN_POSITIVE);
+        match of.kind {
+            ParameterKind::Steepness => at_centre(typical(), STEEPNESS),
+            ParameterKind::Strength if of.null_value == Some(0.0) => match of.dimension {
+                Dimension::ONE => about_null(1.0, GAIN),
+                Dimension::TIME => about_null(added.sizes.lag(), 1.0),
+                Dimension::OUTPUT if is_sensor => about_null(added.sizes.range[1] - added.sizes.range[0], OFFSET),
+                dimension => about_null(added.sizes.of(dimension).abs(), STRENGTH),
+            },
+            ParameterKind::Phase => at_centre(TAU, UNIFORM),
+            ParameterKind::Instant => at_centre(added.sizes.record, UNIFORM),
+            ParameterKind::Frequency => at_centre(added.sizes.highest_frequency(), UNIFORM),
+            // A limit that vanishes at infinity lies somewhere in the range, too.
+            ParameterKind::Level | ParameterKind::Strength => {
+                at_centre(added.sizes.range[1] - added.sizes.range[0], UNIFORM)
             }
-            (Some(0.0), _) if of.dimension == Dimension::TIME => about_null(added.sizes.lag(), 1.0),
-            (Some(null), _) if null.is_finite() => about_null(added.sizes.of(of.dimension).abs(), STRENGTH),
-            (Some(_), _) | (None, InitialGrid::Within(_) | InitialGrid::Moments(_) | InitialGrid::Frequencies) => {
-                at_centre(width(global, &added.sizes), UNIFORM)
-            }
-            _ => at_centre(added.strengths[position].abs().max(f64::MIN_POSITIVE), SHAPE),
+            ParameterKind::Shape | ParameterKind::WaveNumber | ParameterKind::Duration => at_centre(typical(), SHAPE),
         }
     };
     let shared = fit.globals.iter().map(|global| match global.sets {
         Sets::Tuner(k) => declared(k, global),
-        Sets::Parameter(parameter) => of_effect(global, parameter),
+        Sets::Parameter(parameter) => of_effect(parameter),
     });
     let start = |local: &Local| at_centre(local.scale, START);
     shared.chain(fit.pieces.iter().flat_map(|piece| &piece.locals).map(start)).collect()
-}
-
-/// Returns the width of the range in which a level, a time or a frequency lies.
-fn width(global: &Global, sizes: &Sizes) -> f64 {
-    let width = global.bounds[1] - global.bounds[0];
-    if width.is_finite() { width } else { sizes.range[1] - sizes.range[0] }
 }
 
 /// Returns the nominal force of each balance of a model, in the order of its forces.

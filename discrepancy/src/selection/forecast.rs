@@ -1,61 +1,105 @@
-//! The forecast rule: a set must forecast other records better than the declared model and than every set with one effect less.
+//! The forecast rule: a set must forecast better than the declared model and than every set with one effect less.
 
 use std::collections::HashMap;
 
 use mops_core::Role;
 
-use super::fitted_set::{FittedSet, Key};
+use super::fitted_set::{FittedSet, Key, estimation};
 use super::search::{Search, without};
 use crate::base;
 use crate::estimation::ErrorModel;
 use crate::fit::{Piece, Point};
 use crate::variant::problem;
 
-/// Whose parameters forecast.
+/// What is forecast, with whose parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Parameters {
-    /// Those of least squares.
+pub enum Forecast {
+    /// Other records, with the parameters of least squares.
     LeastSquares,
-    /// Those under the smooth output error.
+    /// Other records, with the parameters under the smooth output error.
     SmoothOutput,
+    /// The ends of the calibration records, with the parameters of least squares for their beginnings.
+    RunOn,
 }
 
+/// Share of a calibration record that parameters are fitted to where its end is forecast.
+const BEGINNING: f64 = 0.6;
+
 /// Forecasts, each computed once.
-#[derive(Default)]
 pub struct Forecasts {
-    known: HashMap<(Key, Parameters, bool), Option<f64>>,
+    kinds: Vec<Forecast>,
+    known: HashMap<(Key, Forecast), Option<f64>>,
 }
 
 impl Forecasts {
-    /// Returns true if a set forecasts the records of role selection better than the declared model and every set with one effect
-    /// less, with the parameters of least squares and with those under the smooth output error.
+    /// Forecasts other records if there are any, else the ends of the calibration records.
+    pub fn new(has_selection: bool) -> Self {
+        let kinds = match has_selection {
+            true => vec![Forecast::LeastSquares, Forecast::SmoothOutput],
+            false => vec![Forecast::RunOn],
+        };
+        Self { kinds, known: HashMap::new() }
+    }
+
+    /// Returns true if other records are forecast.
+    pub fn are_of_other_records(&self) -> bool {
+        self.kinds.len() > 1
+    }
+
+    /// Returns true if a set forecasts better than the declared model and than every set with one effect less, with the
+    /// parameters of each kind.
     pub fn passes(&mut self, search: &mut Search<'_, '_>, key: &Key) -> bool {
-        let mut rivals: Vec<Key> = (0..key.len()).map(|k| without(key, k)).collect();
-        if key.len() > 1 {
-            rivals.push(Vec::new());
-        }
-        rivals.iter().all(|rival| {
-            search.ensure(rival)
-                && [Parameters::LeastSquares, Parameters::SmoothOutput].into_iter().all(|parameters| {
-                    let own = self.of(search, key, parameters, Role::Selection);
-                    let theirs = self.of(search, rival, parameters, Role::Selection);
+        Self::rivals(key).into_iter().all(|rival| {
+            search.ensure(&rival)
+                && self.kinds.clone().into_iter().all(|kind| {
+                    let own = self.error(search, key, kind);
+                    let theirs = self.error(search, &rival, kind);
                     own.is_some_and(|own| theirs.is_none_or(|theirs| own < theirs))
                 })
         })
     }
 
-    /// Returns the mean square error in noises of the free run of the records of a role, with free initial states; `None` if there
-    /// are no such records, or a simulation fails.
-    pub fn of(&mut self, search: &Search<'_, '_>, key: &Key, parameters: Parameters, role: Role) -> Option<f64> {
-        *self.known.entry((key.clone(), parameters, role == Role::Selection)).or_insert_with(|| {
+    /// Returns the smallest share of the mean square error above noise of a set with one effect less that a set removes.
+    pub fn share(&mut self, search: &mut Search<'_, '_>, key: &Key) -> Option<f64> {
+        let kind = self.kinds[0];
+        let own = self.error(search, key, kind)?;
+        let rivals = Self::rivals(key).into_iter();
+        let shares = rivals.filter_map(|rival| Some(share(own, self.error(search, &rival, kind)?)));
+        shares.min_by(f64::total_cmp)
+    }
+
+    /// Returns the share of the mean square error of the declared model above noise that a set removes.
+    pub fn share_of_declared(&mut self, search: &Search<'_, '_>, key: &Key) -> Option<f64> {
+        let kind = self.kinds[0];
+        Some(share(self.error(search, key, kind)?, self.error(search, &Vec::new(), kind)?))
+    }
+
+    /// Returns the sets with one effect less, and the declared model.
+    fn rivals(key: &Key) -> Vec<Key> {
+        let mut rivals: Vec<Key> = (0..key.len()).map(|k| without(key, k)).collect();
+        if key.len() > 1 {
+            rivals.push(Vec::new());
+        }
+        rivals
+    }
+
+    /// Returns the mean square error of a forecast in noises; `None` if it fails.
+    fn error(&mut self, search: &Search<'_, '_>, key: &Key, kind: Forecast) -> Option<f64> {
+        *self.known.entry((key.clone(), kind)).or_insert_with(|| {
             let set = search.get(key)?;
-            let point = match parameters {
-                Parameters::LeastSquares => &set.least_squares.point,
-                Parameters::SmoothOutput => &set.estimate(ErrorModel::SmoothOutput)?.point,
-            };
-            free_run(set, point, base::pieces(set.fit.subject, |r| r == role))
+            let others = || base::pieces(set.fit.subject, |role| role == Role::Selection);
+            match kind {
+                Forecast::LeastSquares => free_run(set, &set.least_squares.point, others()),
+                Forecast::SmoothOutput => free_run(set, &set.estimate(ErrorModel::SmoothOutput)?.point, others()),
+                Forecast::RunOn => run_on(set),
+            }
         })
     }
+}
+
+/// Returns the share of a mean square error above noise that is removed.
+fn share(own: f64, theirs: f64) -> f64 {
+    1.0 - (own - 1.0) / (theirs - 1.0).max(f64::MIN_POSITIVE)
 }
 
 /// Returns the mean square error in noises of records, with the parameters of a point and free initial states.
@@ -71,9 +115,35 @@ pub fn free_run(set: &FittedSet<'_>, point: &Point, pieces: Vec<Piece>) -> Optio
     for (global, value) in fit.globals.iter_mut().zip(&mut point.globals) {
         global.bounds = [*value; 2];
     }
-    let found = super::fitted_set::estimation(subject, &fit, &variant, &start.added, &[]).least_squares(point)?;
+    let found = estimation(subject, &fit, &variant, &start.added, &[]).least_squares(point)?;
     let residuals = fit.all(&found.point)?;
-    #[allow(clippy::cast_precision_loss)]
-    let count = residuals.iter().map(Vec::len).sum::<usize>() as f64;
-    Some(residuals.iter().flatten().map(|r| r * r).sum::<f64>() / count)
+    mean_square(residuals.iter().flatten().copied())
+}
+
+/// Returns the mean square error in noises at the ends of the calibration records, run on from least squares on their beginnings.
+fn run_on(set: &FittedSet<'_>) -> Option<f64> {
+    let mut beginning = set.fit.clone();
+    let ends: Vec<f64> = beginning.pieces.iter().map(|piece| BEGINNING * piece.horizon).collect();
+    for (piece, &end) in beginning.pieces.iter_mut().zip(&ends) {
+        for series in &mut piece.series {
+            let count = series.times.partition_point(|&t| t <= end);
+            series.times.truncate(count);
+            series.values.truncate(count);
+        }
+        piece.horizon = end;
+    }
+    let fitted = estimation(set.fit.subject, &beginning, &set.variant, &set.added, &[])
+        .least_squares(set.least_squares.point.clone())?;
+    let mut errors = Vec::new();
+    for ((index, piece), end) in set.fit.pieces.iter().enumerate().zip(&ends) {
+        let residuals = set.fit.residuals(index, &fitted.point)?;
+        let times = piece.series.iter().flat_map(|series| &series.times);
+        errors.extend(residuals.into_iter().zip(times).filter(|(_, t)| *t > end).map(|(r, _)| r));
+    }
+    mean_square(errors.into_iter())
+}
+
+fn mean_square(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value * value, count + 1.0));
+    (count > 0.0).then_some(sum / count)
 }

@@ -1,10 +1,13 @@
 //! Which effects a model lacks: sets of effects, fitted under the error models, compared by evidence and by forecast.
 
+mod coverage;
 mod fitted_set;
 mod forecast;
 mod report;
 mod screening;
 mod search;
+mod verdict;
 mod refit;
 
-pub use report::{SetFit, SetOfEffects, compare, select};
+pub use report::{Selection, SetFit, SetOfEffects, compare, select};
+pub use verdict::{Entry, Verdict};

@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use mops_core::{Effect, Role, Study, StudyError};
 
+use super::coverage::is_covered;
 use super::fitted_set::{FittedSet, Key, Start, name};
 use super::forecast::{Forecasts, free_run};
 use super::refit::Refit;
 use super::search::Search;
+use super::verdict::{Verdict, decide};
 use crate::base;
 use crate::estimation::{ErrorModel, Errors, Estimate, FreeCurve, nominal_forces};
 use crate::fit::Sets;
@@ -68,7 +70,7 @@ pub fn compare(
     study: &Study,
     effects: &[Arc<dyn Effect>],
     sets: &[Vec<String>],
-) -> Result<Vec<SetOfEffects>, StudyError> {
+) -> Result<Selection, StudyError> {
     with_search(study, effects, |search| {
         for set in sets {
             let of = |wanted: &String| {
@@ -94,18 +96,31 @@ pub fn compare(
 ///
 /// # Errors
 /// The study is no diagnosis, or the declared model cannot be simulated.
-pub fn select(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<Vec<SetOfEffects>, StudyError> {
+pub fn select(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<Selection, StudyError> {
     with_search(study, effects, |search| {
         search.run();
         Ok(())
     })
 }
 
+/// Sets of effects, and what follows from them.
+#[derive(Debug, Clone)]
+pub struct Selection {
+    /// Sets that were fitted under all error models.
+    pub sets: Vec<SetOfEffects>,
+    /// Verdict.
+    pub verdict: Verdict,
+    /// Names of the effects of the verdict.
+    pub found: Vec<String>,
+    /// Number of simulations.
+    pub simulations: usize,
+}
+
 fn with_search(
     study: &Study,
     effects: &[Arc<dyn Effect>],
     fit: impl FnOnce(&mut Search<'_, '_>) -> Result<(), StudyError>,
-) -> Result<Vec<SetOfEffects>, StudyError> {
+) -> Result<Selection, StudyError> {
     let subject = Subject::new(study)?;
     let simulations = Meter::new(&());
     let failed = || StudyError::here("the model cannot be simulated near its initial guesses");
@@ -124,15 +139,16 @@ fn with_search(
     let trajectories: Vec<Trajectory> =
         (0..declared.fit.pieces.len()).map(|piece| along(piece).ok()).collect::<Option<_>>().ok_or_else(failed)?;
     refit.nominal = nominal_forces(&declared.fit, &declared.variant, &trajectories);
+    refit.candidates.retain(|candidate| {
+        is_covered(candidate, &declared.variant.model, &declared.fit.pieces, &trajectories)
+    });
     let mut search = Search::new(&refit, declared, study.tasks().diagnosis.max_effects);
     fit(&mut search)?;
-    let mut forecasts = Forecasts::default();
+    let mut forecasts = Forecasts::new(subject.measurements.iter().any(|m| m.role == Role::Selection));
+    let verdict = decide(&mut search, &mut forecasts);
     let keys: Vec<Key> = search.sets.iter().map(|set| set.key.clone()).collect();
-    let has_selection = subject.measurements.iter().any(|m| m.role == Role::Selection);
-    let passes: Vec<Option<bool>> = keys
-        .iter()
-        .map(|key| (has_selection && !key.is_empty()).then(|| forecasts.passes(&mut search, key)))
-        .collect();
+    let passes: Vec<Option<bool>> =
+        keys.iter().map(|key| (!key.is_empty()).then(|| forecasts.passes(&mut search, key))).collect();
     let declared = search.log_posterior(search.get(&Vec::new()).expect("it was fitted first"));
     let shown = keys.iter().zip(passes).filter_map(|(key, passes)| {
         let set = search.get(key)?;
@@ -143,7 +159,12 @@ fn with_search(
             ..shown(&subject, set, &refit.nominal)
         })
     });
-    Ok(shown.collect())
+    Ok(Selection {
+        sets: shown.collect(),
+        found: verdict.set.iter().map(|&k| name(&refit.candidates[k], &subject)).collect(),
+        verdict,
+        simulations: simulations.count(),
+    })
 }
 
 fn shown(subject: &Subject, set: &FittedSet<'_>, nominal: &[f64]) -> SetOfEffects {

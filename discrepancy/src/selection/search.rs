@@ -17,11 +17,21 @@ const PAIRED: usize = 60;
 const PAIRS: usize = 10;
 
 /// Sets of an expansion that are fitted under all error models: single effects, pairs.
-const FULL: [usize; 2] = [3, 2];
+const FULL: [usize; 2] = [4, 3];
+
+/// Effects of the same class at the same place that are fitted in place of one, and of them under all error models.
+const SWAPS: usize = 8;
+const FULL_SWAPS: usize = 2;
+
+/// Gain in log-likelihood, nats, that a pair must bring for each of its parameters beyond two to be fitted before another one.
+const PER_PARAMETER: f64 = 3.0;
 
 /// Sets that are expanded at a time, and in all.
 const BEAM: usize = 3;
 const EXPANSIONS: usize = 8;
+
+/// Most probable sets whose effects are exchanged for others of their class, one after the other.
+const POLISHED: usize = 3;
 
 /// Gain in log-likelihood, nats, below which an effect under every error model does nothing.
 const INERT: f64 = 0.3;
@@ -52,6 +62,15 @@ impl<'r, 'a> Search<'r, 'a> {
             self.expand(&key);
             expanded.push(key);
         }
+        let mut swapped: Vec<Key> = Vec::new();
+        while swapped.len() < POLISHED {
+            let Some(key) = self.sets.first().map(|set| set.key.clone()) else { break };
+            if swapped.contains(&key) {
+                break;
+            }
+            self.swap(&key);
+            swapped.push(key);
+        }
     }
 
     /// Returns a fitted set.
@@ -81,9 +100,7 @@ impl<'r, 'a> Search<'r, 'a> {
     /// Fits the sets with one or two effects more, and those with one less.
     fn expand(&mut self, key: &Key) {
         let parent = self.get(key).expect("it was fitted").clone();
-        let mut errors = vec![Errors::White];
-        let of = |kind| parent.estimate(kind).map(|estimate| estimate.errors.clone());
-        errors.extend([ErrorModel::SmoothOutput, ErrorModel::RoughOutput].into_iter().filter_map(of));
+        let errors = output_errors(&parent);
         if errors.len() == 1 {
             return;
         }
@@ -102,21 +119,51 @@ impl<'r, 'a> Search<'r, 'a> {
         }
         let singles: Vec<Vec<&Screened>> = singles.into_iter().map(|single| vec![single]).collect();
         let pairs = if key.len() + 2 <= self.most { pairs(&screened, all) } else { Vec::new() };
-        for (news, full) in [singles, pairs].into_iter().zip(FULL) {
-            let fitted = |new: &Vec<&Screened>| {
-                let set = self.larger(&parent, new)?;
-                Some((self.refit.rank(&set, &errors[1..]), set))
-            };
-            let mut ranked: Vec<(f64, FittedSet<'a>)> = news.par_iter().filter_map(fitted).collect();
-            ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-            for (_, set) in ranked.into_iter().take(full) {
-                self.add(set);
-            }
+        for (new, full) in [singles, pairs].into_iter().zip(FULL) {
+            self.fit_best(&parent, new, &errors, full);
         }
         for k in 0..key.len() {
             self.ensure(&without(key, k));
         }
         self.sort();
+    }
+
+    /// Fits the sets in which an effect is exchanged for another of its class at its place.
+    fn swap(&mut self, key: &Key) {
+        let Some(errors) = self.get(key).map(output_errors) else { return };
+        for k in 0..key.len() {
+            let smaller = without(key, k);
+            if !self.ensure(&smaller) {
+                continue;
+            }
+            let parent = self.get(&smaller).expect("it was fitted").clone();
+            let all = &self.refit.candidates;
+            let alike = |&index: &usize| {
+                let (this, other) = (&all[key[k]], &all[index]);
+                this.effect.class() == other.effect.class() && this.port == other.port && !key.contains(&index)
+            };
+            let fits = |&index: &usize| parent.added.iter().all(|added| can_be_together(&added.candidate, &all[index]));
+            let wanted: Vec<usize> = (0..all.len()).filter(alike).filter(fits).collect();
+            let known = output_errors(&parent);
+            let Some(scene) = Scene::new(&parent, &known) else { continue };
+            let screened = scene.screen(all, &wanted);
+            let singles = screened.iter().take(SWAPS).map(|single| vec![single]).collect();
+            self.fit_best(&parent, singles, &errors, FULL_SWAPS);
+        }
+        self.sort();
+    }
+
+    /// Fits sets with more effects by least squares, and those of highest evidence under given errors under all error models.
+    fn fit_best(&mut self, parent: &FittedSet<'a>, new: Vec<Vec<&Screened>>, errors: &[Errors], full: usize) {
+        let fitted = |new: &Vec<&Screened>| {
+            let set = self.larger(parent, new)?;
+            Some((self.refit.rank(&set, &errors[1..]), set))
+        };
+        let mut ranked: Vec<(f64, FittedSet<'a>)> = new.par_iter().filter_map(fitted).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for (_, set) in ranked.into_iter().take(full) {
+            self.add(set);
+        }
     }
 
     /// Fits a set by least squares that has more effects than another.
@@ -206,14 +253,26 @@ impl<'r, 'a> Search<'r, 'a> {
     }
 }
 
+/// Returns white noise, and the error models of a set at the outputs.
+fn output_errors(set: &FittedSet<'_>) -> Vec<Errors> {
+    let of = |kind| set.estimate(kind).map(|estimate| estimate.errors.clone());
+    let fitted = [ErrorModel::SmoothOutput, ErrorModel::RoughOutput].into_iter().filter_map(of);
+    [Errors::White].into_iter().chain(fitted).collect()
+}
+
 /// Returns the best pairs by their normal equations.
 fn pairs<'s>(screened: &'s [Screened], candidates: &[Candidate]) -> Vec<Vec<&'s Screened>> {
     let among = &screened[..screened.len().min(PAIRED)];
+    #[allow(clippy::cast_precision_loss)]
+    let further = |a: usize, b: usize| {
+        let count = |k: usize| candidates[among[k].index].effect.parameters().len();
+        (count(a) + count(b) - 2) as f64
+    };
     let mut all: Vec<(f64, usize, usize)> = (0..among.len())
         .into_par_iter()
         .flat_map_iter(|a| (0..a).map(move |b| (a, b)))
         .filter(|&(a, b)| can_be_together(&candidates[among[a].index], &candidates[among[b].index]))
-        .map(|(a, b)| (pair_gain(&among[a], &among[b]), a, b))
+        .map(|(a, b)| (pair_gain(&among[a], &among[b]) - PER_PARAMETER * further(a, b), a, b))
         .collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     all.into_iter().take(PAIRS).map(|(_, a, b)| vec![&among[b], &among[a]]).collect()

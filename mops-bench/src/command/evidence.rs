@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use mops::discrepancy::estimation::{ErrorModel, Errors};
-use mops::discrepancy::selection::{SetFit, SetOfEffects, compare, select};
+use mops::discrepancy::selection::{Selection, SetFit, SetOfEffects, compare, select};
 use mops::terminal::{CommandError, print};
 use mops::{Catalogue, Diagnostic, Study};
 
@@ -34,9 +34,36 @@ pub(super) fn evidence(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     print(&table(&compared)).map(|()| ExitCode::SUCCESS)
 }
 
+/// Formats the verdict.
+fn verdict(selection: &Selection) -> String {
+    let verdict = &selection.verdict;
+    let mut text = match (verdict.is_effect, verdict.set.is_empty()) {
+        (true, _) => format!("effect: {}\n", selection.found.join(" + ")),
+        (false, true) => "nothing claimed\n".to_owned(),
+        (false, false) => format!("nothing claimed; best description: {}\n", selection.found.join(" + ")),
+    };
+    for (entry, probability) in &verdict.entries {
+        let _ = writeln!(text, "  {} at {}: {:.3}", entry.class, entry.place, probability);
+    }
+    let _ = write!(text, "  declared model {:.3}; lack of fit {:.1} nats", verdict.nothing, verdict.lack_of_fit);
+    if let Some(share) = verdict.share {
+        let _ = write!(text, "; share of the forecast error {share:.3}");
+    }
+    let _ = writeln!(text, "; {}first by evidence", if verdict.is_first { "" } else { "not " });
+    let curve = |curve: &Option<mops::discrepancy::estimation::FreeCurve>| {
+        curve.as_ref().map_or("none".to_owned(), |c| format!("{} {:+.1}", c.coordinate, c.gain))
+    };
+    let [likeliest, smooth] = &verdict.declared;
+    let _ = writeln!(text, "  curve on the declared model: {} (smooth output error: {})", curve(likeliest), curve(smooth));
+    let _ = writeln!(text, "  curve on top of the set: {}", curve(&verdict.remaining));
+    let _ = writeln!(text, "  {} simulations\n", selection.simulations);
+    text
+}
+
 /// Formats sets of effects, the declared model first.
-fn table(sets: &[SetOfEffects]) -> String {
-    let mut text = String::new();
+fn table(selection: &Selection) -> String {
+    let sets = &selection.sets;
+    let mut text = verdict(selection);
     let declared = sets.iter().find(|set| set.effects.is_empty()).map_or(0.0, |set| set.log_evidence);
     for set in sets {
         let title = if set.effects.is_empty() { "declared model".to_owned() } else { set.effects.join(" + ") };

@@ -1,0 +1,74 @@
+//! Which candidates the records can tell at all, decided before any of them is fitted.
+
+use mops_core::{DeclaredTerm, InitialGrid, Port};
+use mops_models::WithEffects;
+
+use crate::candidate::Candidate;
+use crate::fit::Piece;
+use crate::quantum::quantum;
+use crate::trace_of::{Spot, spot};
+use crate::trajectory::Trajectory;
+
+/// Share of the nominal acceleration that a declared spring must have.
+const SPRING: f64 = 1e-3;
+
+/// Noises from which steps of samples are visible.
+const VISIBLE: f64 = 2.0;
+
+/// Samples within so many noises of the extreme value that a limit of a sensor must show.
+const TOUCHED: usize = 3;
+const NEAR_LIMIT: f64 = 2.0;
+
+/// Returns true if the records show what a candidate needs: the term of the declared model that it modifies, a limit that was
+/// touched, visible steps.
+pub fn is_covered(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> bool {
+    let modifies = candidate.effect.modifies();
+    if modifies == Some(DeclaredTerm::Spring) && !has_spring(candidate, model, pieces, along) {
+        return false;
+    }
+    if !matches!(candidate.port, Port::Sensor { .. }) {
+        return true;
+    }
+    let first = &candidate.effect.parameters()[0];
+    match first.grid {
+        _ if first.null_value == Some(f64::INFINITY) => any_series(candidate, model, pieces, touches_limit),
+        InitialGrid::Steps => any_series(candidate, model, pieces, |values, noise| {
+            let largest = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+            quantum(values, VISIBLE * noise, largest).is_some()
+        }),
+        _ => true,
+    }
+}
+
+/// Returns true if the declared force at a joint depends on its position, or on that of the companion.
+fn has_spring(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> bool {
+    let Some(piece) = pieces.first() else { return false };
+    let Some(Spot::Joint(_, position, speed)) = spot(&candidate.port, model, piece) else { return false };
+    let coordinate = match candidate.companion.as_ref().and_then(|port| spot(port, model, piece)) {
+        Some(Spot::Joint(_, other, _)) => other,
+        _ => position,
+    };
+    let moments = || along.iter().flat_map(|trajectory| &trajectory.moments);
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0_f64, |most, v| most.max(v.abs()));
+    let acceleration = largest(&mut moments().map(|m| m.rates[speed]));
+    let spring = largest(&mut moments().map(|m| m.a[(speed, coordinate)] * m.x[position]));
+    spring > SPRING * acceleration
+}
+
+fn touches_limit(values: &[f64], noise: f64) -> bool {
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let count = |limit: f64| values.iter().filter(|v| (*v - limit).abs() < NEAR_LIMIT * noise).count();
+    count(low) >= TOUCHED || count(high) >= TOUCHED
+}
+
+fn any_series(
+    candidate: &Candidate,
+    model: &WithEffects,
+    pieces: &[Piece],
+    shows: impl Fn(&[f64], f64) -> bool,
+) -> bool {
+    pieces.iter().any(|piece| match spot(&candidate.port, model, piece) {
+        Some(Spot::Sensor(series)) => shows(&piece.series[series].values, piece.series[series].noise),
+        _ => false,
+    })
+}
