@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use mops_core::math;
 use mops_core::{
-    Dimension, Effect, EffectParameter, InitialGrid, Interface, ParameterKind, Placement, Port, PortKind, PortState, Unit,
+    Dimension, Effect, EffectParameter, InitialGrid, Interface, ParameterKind, Placement, Port, PortKind, PortState,
+    Unit,
 };
 
 use crate::gap::Gap;

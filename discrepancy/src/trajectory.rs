@@ -43,6 +43,8 @@ pub struct Trajectory {
     inputs: usize,
     /// Signs with which forces act forward.
     pub forward: Vec<f64>,
+    /// Rate that a unit force at each balance adds to its state at the beginning.
+    pub mobilities: Vec<f64>,
 }
 
 /// Shares of an interval at which its Gauss nodes lie: `1/2 -+ sqrt(3)/6`.
@@ -106,6 +108,7 @@ impl Trajectory {
         });
         Ok(Self {
             forward: forward.collect(),
+            mobilities: model.mobilities(&job)?,
             noise: p.series.iter().map(|s| s.noise).collect(),
             outputs,
             states: moments.first().map_or(0, |m| m.x.len()),
@@ -128,10 +131,11 @@ impl Trajectory {
         self.inputs
     }
 
-    /// Returns the motion linearised from sample to sample, with forces in units of `nominal`, one for each force of the model;
-    /// `channels` are those of the series.
+    /// Returns the motion linearised from sample to sample, with forces in units of those that add the `nominal` rates at the
+    /// beginning, one for each force of the model; `channels` are those of the series.
     pub fn linearised(&self, nominal: &[f64], channels: &[usize]) -> LinearisedMotion {
         let (states, forces) = (self.states, nominal.len());
+        let nominal: Vec<f64> = nominal.iter().zip(&self.mobilities).map(|(rate, mobility)| rate / mobility).collect();
         let mut knots: Vec<usize> = self.samples.iter().flatten().copied().chain([0]).collect();
         knots.sort_unstable();
         knots.dedup();
@@ -155,7 +159,7 @@ impl Trajectory {
         for (series, samples) in self.samples.iter().enumerate() {
             for (sample, knot) in samples.iter().enumerate() {
                 let of = &self.outputs[series][sample * row..(sample + 1) * row];
-                let direct = of[states + self.inputs..].iter().zip(nominal).flat_map(|(d, nominal)| [d * nominal, 0.0]);
+                let direct = of[states + self.inputs..].iter().zip(&nominal).flat_map(|(d, nominal)| [d * nominal, 0.0]);
                 let slopes = of[..states].iter().copied().chain(direct).map(|s| s / self.noise[series]).collect();
                 let at = knots.binary_search(knot).expect("samples lie at knots");
                 motion.measured[at].push(Measured { channel: channels[series], residual, slopes });

@@ -1,6 +1,8 @@
 //! First-order actuator.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::damped;
@@ -19,6 +21,7 @@ impl Definition for ActuatorLag {
     const FORMULA: &'static str = "z, z' = (u - z)/tau";
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 5-2";
     const CLASS: EffectClass = EffectClass::DelayLike;
+    const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Lag);
     const PORTS: &'static [PortKind] = &[PortKind::Actuator];
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("tau", "time constant", Dimension::TIME)

@@ -1,6 +1,8 @@
 //! Coulomb friction.
 
-use mops_core::{BoundEffect, Dimension, DryFriction, EffectClass, EffectParameter, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Characteristic, Dimension, DryFriction, EffectClass, EffectParameter, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 
@@ -20,6 +22,7 @@ impl Definition for CoulombFriction {
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and \
                                   compensation methods for the control of machines with friction, Automatica 30 (1994), section 2.1";
     const CLASS: EffectClass = EffectClass::Dissipative;
+    const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("c", "friction force", Dimension::OUTPUT)];

@@ -1,6 +1,8 @@
 //! Dry friction with elastic presliding.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 
@@ -20,6 +22,7 @@ impl Definition for DahlFriction {
     const SOURCE: &'static str =
         "P. R. Dahl, A solid friction model, report TOR-0158(3107-18)-1, The Aerospace Corporation (1968)";
     const CLASS: EffectClass = EffectClass::Dissipative;
+    const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("c", "friction force", Dimension::OUTPUT),

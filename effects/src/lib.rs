@@ -76,13 +76,16 @@ mod wind_gust;
 pub mod prelude {
     pub use crate::{Definition, effect};
     pub use mops_core::{
-        BoundEffect, DeclaredTerm, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+        BoundEffect, Characteristic, DeclaredTerm, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid,
+        PortKind, PortState, Scalar,
     };
 }
 
 use std::sync::Arc;
 
-use mops_core::{BoundEffect, DeclaredTerm, Dimension, Dual7, Effect, EffectClass, EffectParameter, PortKind, Scalar};
+use mops_core::{
+    BoundEffect, Characteristic, DeclaredTerm, Dimension, Dual7, Effect, EffectClass, EffectParameter, PortKind, Scalar,
+};
 
 /// Definition of an effect in its file; see [`Effect`] for the meaning of each item.
 pub trait Definition: Send + Sync + 'static {
@@ -116,6 +119,8 @@ pub trait Definition: Send + Sync + 'static {
     const IS_INERTIAL: bool = false;
     /// Value of [`Effect::is_one_off`].
     const IS_ONE_OFF: bool = false;
+    /// Value of [`Effect::characteristic`].
+    const CHARACTERISTIC: Option<Characteristic> = None;
     /// Value of [`Effect::modifies`].
     const MODIFIES: Option<DeclaredTerm> = None;
     /// Value of [`Effect::rarity`].
@@ -173,6 +178,9 @@ impl<D: Definition> Effect for Defined<D> {
     }
     fn is_one_off(&self) -> bool {
         D::IS_ONE_OFF
+    }
+    fn characteristic(&self) -> Option<Characteristic> {
+        D::CHARACTERISTIC
     }
     fn modifies(&self) -> Option<DeclaredTerm> {
         D::MODIFIES

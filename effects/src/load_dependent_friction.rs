@@ -1,6 +1,8 @@
 //! Dry friction proportional to the transmitted load.
 
-use mops_core::{BoundEffect, Dimension, DryFriction, EffectClass, EffectParameter, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Characteristic, Dimension, DryFriction, EffectClass, EffectParameter, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 
@@ -22,6 +24,7 @@ impl Definition for LoadDependentFriction {
                                   identification of load and temperature effects, Journal of Dynamic Systems, \
                                   Measurement, and Control 134 (2012)";
     const CLASS: EffectClass = EffectClass::Dissipative;
+    const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const SECOND_PORT: Option<PortKind> = Some(PortKind::Actuator);
     const PARAMETERS: &'static [EffectParameter] =

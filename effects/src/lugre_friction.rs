@@ -1,6 +1,8 @@
 //! Dry friction of elastic bristles that slip.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
@@ -24,6 +26,7 @@ impl Definition for LugreFriction {
     const SOURCE: &'static str = "C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, A new model for control \
                                   of systems with friction, IEEE Transactions on Automatic Control 40 (1995)";
     const CLASS: EffectClass = EffectClass::Dissipative;
+    const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("c", "friction force at high speed", Dimension::OUTPUT),

@@ -1,7 +1,8 @@
 //! Dry friction that depends on the position.
 
 use mops_core::{
-    BoundEffect, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+    BoundEffect, Characteristic, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind,
+    PortState, Scalar,
 };
 
 use super::Definition;
@@ -28,6 +29,7 @@ impl Definition for PositionDependentFriction {
                                   tools and compensation methods for the control of machines with friction, Automatica \
                                   30 (1994), section 2";
     const CLASS: EffectClass = EffectClass::Dissipative;
+    const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("c", "mean friction force", Dimension::OUTPUT),

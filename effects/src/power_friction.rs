@@ -1,6 +1,8 @@
 //! Friction proportional to a power of the speed.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::{power, sign};
@@ -21,6 +23,7 @@ impl Definition for PowerFriction {
     const FORMULA: &'static str = "-c |v|^p sgn(v)";
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 3";
     const CLASS: EffectClass = EffectClass::Dissipative;
+    const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("c", "force at a speed of 1", Dimension::OUTPUT),

@@ -1,6 +1,8 @@
 //! Second-order actuator or sensor.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::damped;
@@ -20,6 +22,7 @@ impl Definition for SecondOrderLag {
     const FORMULA: &'static str = "z, tau^2 z'' + 2 d tau z' + z = u";
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), section 5-3";
     const CLASS: EffectClass = EffectClass::DelayLike;
+    const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Lag);
     const PORTS: &'static [PortKind] = &[PortKind::Actuator, PortKind::Sensor];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("tau", "inverse of the natural frequency", Dimension::TIME)

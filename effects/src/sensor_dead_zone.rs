@@ -1,6 +1,8 @@
 //! Dead zone of a sensor.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::{ANY, clamp};
@@ -22,6 +24,7 @@ impl Definition for SensorDeadZone {
     const SOURCE: &'static str = "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor \
                                   Nonlinearities (Wiley 1996), chapter 2";
     const CLASS: EffectClass = EffectClass::Gain;
+    const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::DeadBand);
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("width", "largest change that is not measured", Dimension::VALUE)

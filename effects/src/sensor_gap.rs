@@ -1,6 +1,8 @@
 //! Potentiometer with a gap.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::ANY;
@@ -21,6 +23,7 @@ impl Definition for SensorGap {
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Gain;
     const FORM_OF: Option<&'static str> = Some("sensor-dead-zone");
+    const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::DeadBand);
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("width", "half the width of the gap", Dimension::VALUE)

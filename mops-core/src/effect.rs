@@ -229,6 +229,17 @@ pub enum DeclaredTerm {
     Spring,
 }
 
+/// Characteristic that a place has once at most: effects of one characteristic exclude each other there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Characteristic {
+    /// Friction at and about rest.
+    Friction,
+    /// Lag of an actuator or a sensor.
+    Lag,
+    /// Dead band of a sensor.
+    DeadBand,
+}
+
 /// Scope of an effect parameter: the plant or a single experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
@@ -513,6 +524,11 @@ pub trait Effect: Send + Sync {
     /// Returns true if the effect occurs once, in one experiment.
     fn is_one_off(&self) -> bool {
         false
+    }
+
+    /// Returns the characteristic of a place that the effect is; a place has each once at most.
+    fn characteristic(&self) -> Option<Characteristic> {
+        None
     }
 
     /// Returns the term of the declared model that the effect modifies; without that term it cannot act.

@@ -67,9 +67,8 @@ pub use demand::{Demand, Scaled};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use differences::Differences;
 pub use effect::{
-    BoundEffect, DeclaredTerm, Dimension, DryFriction, Effect, EffectClass, EffectParameter, InitialGrid, ParameterKind,
-    Placement, PortKind,
-    PortState, Scope,
+    BoundEffect, Characteristic, DeclaredTerm, Dimension, DryFriction, Effect, EffectClass, EffectParameter,
+    InitialGrid, ParameterKind, Placement, PortKind, PortState, Scope,
 };
 pub use evaluation::{Evaluation, FEASIBLE, Merit, Objective, Reading};
 pub use evaluator::Evaluator;

@@ -92,7 +92,8 @@ impl Estimation<'_> {
     /// Returns the free curves on top of an estimate, the one with the largest gain first; `None` if a simulation fails.
     pub fn curves(&self, estimate: &Estimate) -> Option<Vec<FreeCurve>> {
         let fit = self.along(&estimate.errors);
-        let slopes = fit.slopes(&estimate.point)?;
+        let mut slopes = fit.slopes(&estimate.point)?;
+        estimate.errors.take_force_out_of(&mut slopes);
         let trajectory = |piece: usize| Trajectory::new(&fit, self.model, piece, &estimate.point).ok();
         let trajectories: Vec<Trajectory> = (0..fit.pieces.len()).map(trajectory).collect::<Option<_>>()?;
         let coordinates = self.coordinates(&fit, &trajectories);
@@ -101,7 +102,7 @@ impl Estimation<'_> {
         let columns = free.len() + COLUMNS * shapes.len();
         let records: Vec<Vec<(usize, Vec<f64>)>> = (0..fit.pieces.len())
             .map(|index| {
-                let mut record = vec![(columns, estimate.errors.without_force(index, &slopes[index].r))];
+                let mut record = vec![(columns, slopes[index].r.clone())];
                 record.extend(self.moving(&free, index, &slopes[index]));
                 for (s, shape) in shapes.iter().enumerate() {
                     let of = |b: usize| shape.response(b, &trajectories[index], &fit.pieces[index]);
@@ -197,7 +198,9 @@ impl Estimation<'_> {
                 _ => {}
             }
         }
-        let own = |force: usize| vec![(inputs + force, self.nominal[force])];
+        let mobilities = trajectories.first().map_or(&[][..], |t| &t.mobilities);
+        let nominal = |force: usize| (self.nominal[force] / mobilities[force]).abs();
+        let own = |force: usize| vec![(inputs + force, nominal(force))];
         let is_angle = |state: usize| states[state].unit == Unit::known("rad");
         for (port, force, position, speed) in &joints {
             let mut add = |what: &str, value| {
@@ -215,7 +218,7 @@ impl Estimation<'_> {
         }
         // Between two places of a kind the force acts on one and back on the other.
         let between = |a: usize, b: usize| {
-            let nominal = self.nominal[a].min(self.nominal[b]);
+            let nominal = nominal(a).min(nominal(b));
             vec![(inputs + a, -nominal), (inputs + b, nominal)]
         };
         for (k, (port, force, position, speed)) in joints.iter().enumerate() {

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::scoring::{Maximum, Score, maximise};
 use crate::error_models::{ForceError, Kernel, LinearisedMotion, OutputError};
-use crate::fit::Piece;
+use crate::fit::{Piece, Residuals};
 
 /// Kind of an error model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,6 +24,11 @@ impl ErrorModel {
 }
 
 impl Motion {
+    /// Returns true if there is no force.
+    pub fn is_still(&self) -> bool {
+        self.forces.iter().all(|&force| force == 0.0)
+    }
+
     /// Returns what residuals would be without the force, to first order.
     pub fn without_force(&self, residuals: &[f64]) -> Vec<f64> {
         residuals.iter().zip(&self.response).map(|(r, f)| r - f).collect()
@@ -182,16 +187,16 @@ impl Errors {
         }
     }
 
-    /// Returns what the residuals of a record would be without the force along which they are linearised, to first order.
-    pub fn without_force(&self, index: usize, residuals: &[f64]) -> Vec<f64> {
-        match self {
-            Self::Force(_, motions) => motions[index].without_force(residuals),
-            _ => residuals.to_vec(),
+    /// Takes the responses to the force along which the records are linearised out of their residuals.
+    pub fn take_force_out_of(&self, all: &mut [Residuals]) {
+        let Self::Force(_, motions) = self else { return };
+        for (found, motion) in all.iter_mut().zip(motions) {
+            found.r = motion.without_force(&found.r);
         }
     }
 
     /// Fits the hyperparameters of a kind to residuals of all records, from `before` and, where `thoroughly`, from both ends of
-    /// the correlation length. `motions` are needed for a force, and residuals are then those of [`Errors::without_force`].
+    /// the correlation length. `motions` are needed for a force, and residuals are then those without it.
     pub fn fit(
         kind: ErrorModel,
         pieces: &[Piece],

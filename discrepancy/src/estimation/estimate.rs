@@ -37,10 +37,6 @@ impl Prior {
         -0.5 * distance * distance - math::ln(self.deviation) - 0.5 * math::ln(std::f64::consts::TAU) + doubled
     }
 
-    /// Returns the derivative of the logarithm of the density.
-    fn slope(&self, value: f64) -> f64 {
-        self.centre.map_or(0.0, |centre| (centre - value) * self.precision())
-    }
 }
 
 /// Unknowns of a fit under an error model.
@@ -68,7 +64,7 @@ pub struct Estimation<'a> {
     pub model: &'a WithEffects,
     /// Channels of the records.
     pub channels: Channels,
-    /// Nominal force of each force of the model.
+    /// Nominal rate of the balance of each force of the model.
     pub nominal: Vec<f64>,
     /// Priors of the shared parameters, then of the initial states of each record.
     pub priors: Vec<Prior>,
@@ -105,7 +101,7 @@ impl Estimation<'_> {
     /// iterations. The evidence is that for these hyperparameters.
     pub fn with(&self, errors: &Errors, start: Point, iterations: usize) -> Option<Estimate> {
         let found = self.descend(self.fit, errors, start, iterations)?;
-        let log_likelihood = -0.5 * (found.iterate.sum() + found.logarithms);
+        let log_likelihood = found.log_likelihood();
         let given = Fitted { errors: errors.clone(), count: 0, log_prior: 0.0, log_determinant: 0.0 };
         Some(self.concluded(log_likelihood, found, given))
     }
@@ -115,10 +111,13 @@ impl Estimation<'_> {
         if kind == ErrorModel::Force && self.nominal.is_empty() {
             return None;
         }
-        let mut point = start;
-        let mut best: Option<(f64, Found, Fitted)> = None;
-        let mut errors: Option<Errors> = None;
         let mut fit = self.fit.clone();
+        let mut point = start;
+        // Where the likelihood is largest so far. That of a force counts along the motion that it has smoothed, not along the
+        // first one without it.
+        let mut best: Option<(f64, Point, Fitted)> = None;
+        let mut errors: Option<Errors> = None;
+        let mut trials = 0;
         for round in 0..ROUNDS {
             let motions = match kind {
                 ErrorModel::Force => self.motions(&mut fit, &point, errors.as_ref())?,
@@ -132,21 +131,25 @@ impl Estimation<'_> {
             let thoroughly = round == 0;
             let fitted = Errors::fit(kind, &self.fit.pieces, &self.channels, &residuals, motions, known, thoroughly)?;
             let found = self.descend(&fit, &fitted.errors, point.clone(), ITERATIONS)?;
-            let log = -0.5 * (found.iterate.sum() + found.logarithms);
-            (point, errors) = (found.point.clone(), Some(fitted.errors.clone()));
-            let gain = best.as_ref().map_or(f64::INFINITY, |best| log - best.0);
-            // Likelihoods along the motion without the force and along the smoothed one are of different linearisations: the
-            // smoothed one counts.
-            if gain > 0.0 || kind == ErrorModel::Force && round == 1 {
-                best = Some((log, found, fitted));
+            let is_first = round == usize::from(kind == ErrorModel::Force);
+            let gain = best.as_ref().filter(|_| !is_first).map_or(f64::INFINITY, |best| found.first - best.0);
+            if gain > 0.0 {
+                errors = Some(fitted.errors.clone());
+                best = Some((found.first, point, fitted));
+                (point, trials) = (found.point, 0);
+            } else {
+                // The linear model was left: back towards the best point.
+                let (_, known, _) = best.as_ref()?;
+                point = between(known, &point, SHRINK);
+                trials += 1;
             }
-            // The first round of a force is along the motion without it.
-            if gain < SETTLED && round > 1 {
+            if gain.abs() < SETTLED && round > 1 || trials > TRIALS {
                 break;
             }
         }
-        let (log, found, fitted) = best?;
-        Some(self.concluded(log, found, fitted))
+        let (_, point, fitted) = best?;
+        let found = self.descend(&self.along(&fitted.errors), &fitted.errors, point, 0)?;
+        Some(self.concluded(found.log_likelihood(), found, fitted))
     }
 
     /// Returns the linearised motion of each record under the most probable force, found by Gauss-Newton iterations: simulate with
@@ -219,7 +222,7 @@ impl Estimation<'_> {
     fn linearised(&self, fit: &mut Fit<'_>, piece: usize, point: &Point, force: Option<&Motion>) -> Option<Motion> {
         match force {
             Some(motion) => self.push(fit, piece, motion),
-            None => fit.pieces[piece].case.forces.clear(),
+            None => fit.pieces[piece].case.disturbances.clear(),
         }
         let along = Trajectory::new(fit, self.model, piece, point).ok()?;
         let series = fit.pieces[piece].series.len();
@@ -242,14 +245,13 @@ impl Estimation<'_> {
             let times = motion.linearised.times.clone();
             (state, Input::Sampled { times, values: values.collect(), hold: Hold::Zero })
         };
-        let is_still = motion.forces.iter().all(|&f| f == 0.0);
-        fit.pieces[piece].case.forces = if is_still { Vec::new() } else { states.enumerate().map(force).collect() };
+        fit.pieces[piece].case.disturbances = if motion.is_still() { Vec::new() } else { states.enumerate().map(force).collect() };
     }
 
     /// Adds the evidence and the standard errors.
     #[allow(clippy::cast_precision_loss)]
     fn concluded(&self, log: f64, found: Found, fitted: Fitted) -> Estimate {
-        let jacobian = found.iterate.jacobian();
+        let jacobian = found.iterate.jacobian().rows(0, found.samples);
         let stretch: Vec<f64> = found.free.iter().zip(&found.scale).map(|(&k, s)| self.priors[k].stretch / s).collect();
         let mut information = jacobian.transpose() * jacobian;
         for a in 0..stretch.len() {
@@ -261,16 +263,8 @@ impl Estimation<'_> {
         }
         let values = self.values(&found.point);
         let log_prior: f64 = found.free.iter().map(|&k| self.priors[k].log(values[k])).sum();
-        // From the maximum of the likelihood to that of the posterior density: `b' I^-1 b/2`, `b` the slope of the prior.
-        let unknowns = self.unknowns();
-        let slope = |&k: &usize| match unknowns[k].0.contains(&values[k]) {
-            true => 0.0,
-            false => self.priors[k].slope(values[k]) * self.priors[k].stretch,
-        };
-        let slope = DVector::from_iterator(found.free.len(), found.free.iter().map(slope));
-        let shift = information.clone().cholesky().map_or(0.0, |factor| 0.5 * slope.dot(&factor.solve(&slope)));
         let count = (found.free.len() + fitted.count) as f64;
-        let log_evidence = log + log_prior + shift - self.log_choices + fitted.log_prior + 0.5 * count * math::ln(std::f64::consts::TAU)
+        let log_evidence = log + log_prior - self.log_choices + fitted.log_prior + 0.5 * count * math::ln(std::f64::consts::TAU)
             - 0.5 * log_determinant(&information)
             - 0.5 * fitted.log_determinant;
         let mut deviations = vec![0.0; self.fit.globals.len()];
@@ -347,7 +341,8 @@ impl Estimation<'_> {
         free.iter().enumerate().filter_map(moves)
     }
 
-    /// Minimises the sum of squares of the whitened residuals in linear, scaled coordinates.
+    /// Minimises the sum of squares of the whitened residuals in linear, scaled coordinates, with that of the distances of unknowns
+    /// from the centres of their priors.
     fn descend(&self, fit: &Fit<'_>, errors: &Errors, start: Point, iterations: usize) -> Option<Found> {
         let unknowns = self.unknowns();
         let free = self.free();
@@ -365,24 +360,44 @@ impl Estimation<'_> {
         let z: Vec<f64> =
             free.iter().zip(&scale).zip(&bounds).map(|((&k, s), b)| (values[k] / s).clamp(b[0], b[1])).collect();
         place(&mut values, &z);
-        let (logarithms, residuals, jacobian) =
-            self.whitened(errors, &fit.slopes(&self.point(&values))?, &free, &scale);
+        // Unknowns about whose value something is known; least squares is without priors.
+        let known: Vec<(usize, Prior)> = match errors {
+            Errors::White => Vec::new(),
+            _ => free.iter().map(|&k| self.priors[k]).enumerate().filter(|(_, p)| p.centre.is_some()).collect(),
+        };
+        let whitened = |values: &[f64]| {
+            let mut all = fit.slopes(&self.point(values))?;
+            errors.take_force_out_of(&mut all);
+            let (logarithms, mut residuals, mut jacobian) = self.whitened(errors, &all, &free, &scale);
+            let samples = residuals.len();
+            residuals = residuals.resize_vertically(samples + known.len(), 0.0);
+            jacobian = jacobian.resize_vertically(samples + known.len(), 0.0);
+            for (row, (a, prior)) in known.iter().enumerate() {
+                let width = prior.stretch * prior.deviation;
+                residuals[samples + row] = (values[free[*a]] - prior.centre.unwrap_or(0.0)) / width;
+                jacobian[(samples + row, *a)] = scale[*a] / width;
+            }
+            Some((logarithms, residuals, jacobian))
+        };
+        let (logarithms, residuals, jacobian) = whitened(&values)?;
+        let samples = residuals.len() - known.len();
         let mut iterate = LeastSquares::new(bounds, z, residuals, jacobian);
         #[allow(clippy::cast_precision_loss)]
         let negligible =
             |iterate: &LeastSquares| CONVERGED * (iterate.sum() / iterate.residuals().len().max(1) as f64).max(1.0);
-        let mut converged = false;
+        let log = |iterate: &LeastSquares| -0.5 * (iterate.sum() + logarithms);
+        let first = log(&iterate);
+        let is_converged = |iterate: &LeastSquares| {
+            iterate.full_step().is_some_and(|full| full.predicted < negligible(iterate))
+        };
         for _ in 0..iterations {
             let Some(step) = iterate.step() else { if iterate.reject() { continue } else { break } };
-            if step.predicted < negligible(&iterate) {
-                converged = iterate.full_step().is_some_and(|full| full.predicted < negligible(&iterate));
-                if converged {
-                    break;
-                }
+            if step.predicted < negligible(&iterate) && is_converged(&iterate) {
+                break;
             }
             let mut trial = values.clone();
             place(&mut trial, &step.to);
-            let there = fit.slopes(&self.point(&trial)).map(|all| self.whitened(errors, &all, &free, &scale));
+            let there = whitened(&trial);
             let sum = there.as_ref().map_or(f64::INFINITY, |(_, residuals, _)| residuals.norm_squared());
             let ratio = (iterate.sum() - sum) / step.predicted;
             match there {
@@ -394,7 +409,8 @@ impl Estimation<'_> {
                 _ => break,
             }
         }
-        Some(Found { point: self.point(&values), iterate, free, scale, logarithms, converged })
+        let converged = is_converged(&iterate);
+        Some(Found { point: self.point(&values), iterate, free, scale, logarithms, samples, first, converged })
     }
 
     /// Returns the sum of logarithms of variances, the whitened residuals of all records, and their derivatives by the free
@@ -412,7 +428,7 @@ impl Estimation<'_> {
         let (mut logarithms, mut from) = (0.0, 0);
         for (index, (piece, found)) in self.fit.pieces.iter().zip(all).enumerate() {
             let (moving, slopes): (Vec<usize>, Vec<Vec<f64>>) = self.moving(free, index, found).unzip();
-            let mut columns = vec![errors.without_force(index, &found.r)];
+            let mut columns = vec![found.r.clone()];
             columns.extend(slopes);
             logarithms += errors.whiten(piece, &self.channels, index, &mut columns);
             residuals.rows_mut(from, found.r.len()).copy_from_slice(&columns[0]);
@@ -426,6 +442,13 @@ impl Estimation<'_> {
     }
 }
 
+/// Returns a point between two, at a share of the way.
+fn between(from: &Point, to: &Point, share: f64) -> Point {
+    let mix = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect::<Vec<f64>>();
+    let locals = from.locals.iter().zip(&to.locals).map(|(a, b)| mix(a, b)).collect();
+    Point { globals: mix(&from.globals, &to.globals), locals }
+}
+
 fn positive(scale: f64) -> f64 {
     if scale.is_finite() && scale > 0.0 { scale } else { 1.0 }
 }
@@ -437,7 +460,17 @@ struct Found {
     free: Vec<usize>,
     scale: Vec<f64>,
     logarithms: f64,
+    /// Number of residuals, which the rows of the priors follow.
+    samples: usize,
+    /// Log-likelihood at the start, plus the logarithm of the density of the priors with a centre up to a constant.
+    first: f64,
     converged: bool,
+}
+
+impl Found {
+    fn log_likelihood(&self) -> f64 {
+        -0.5 * (self.iterate.residuals().rows(0, self.samples).norm_squared() + self.logarithms)
+    }
 }
 
 #[cfg(test)]

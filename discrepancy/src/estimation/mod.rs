@@ -9,4 +9,4 @@ mod scoring;
 pub use curve::FreeCurve;
 pub use errors::{Channels, ErrorModel, Errors, Motion};
 pub use estimate::{Estimate, Estimation};
-pub(crate) use priors::{log_choices, nominal_forces, priors};
+pub(crate) use priors::{log_choices, nominal_rates, priors};

@@ -1,4 +1,4 @@
-//! Priors of the unknowns of an augmented model, and nominal forces.
+//! Priors of the unknowns of an augmented model, and nominal rates.
 
 use std::f64::consts::TAU;
 
@@ -7,7 +7,6 @@ use mops_core::{Dimension, ParameterKind, Port, math};
 use super::estimate::Prior;
 use crate::fit::{Fit, Global, Sets};
 use crate::subject::{Local, Subject};
-use crate::trace_of::sizes;
 use crate::trajectory::Trajectory;
 use crate::variant::{Added, Variant};
 
@@ -81,11 +80,21 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
     shared.chain(fit.pieces.iter().flat_map(|piece| &piece.locals).map(start)).collect()
 }
 
-/// Returns the nominal force of each balance of a model, in the order of its forces.
-pub fn nominal_forces(fit: &Fit<'_>, variant: &Variant, trajectories: &[Trajectory]) -> Vec<f64> {
+/// Returns the nominal rate of each balance of a model, in the order of its forces: the root mean square along the motion.
+#[allow(clippy::cast_precision_loss)]
+pub fn nominal_rates(variant: &Variant, trajectories: &[Trajectory]) -> Vec<f64> {
     let ports = &variant.model.model().interface().ports;
-    let size = |port| sizes(port, &variant.model, &fit.pieces, trajectories).map_or(1.0, |sizes| sizes.output);
-    ports.iter().filter(|port| matches!(port, Port::Process { .. })).map(size).collect()
+    let states = variant.model.model().equation_states();
+    let balances = ports.iter().filter_map(|port| match port {
+        Port::Process { state, .. } => states.iter().position(|s| s.name == *state),
+        _ => None,
+    });
+    let rms = |state: usize| {
+        let squares: Vec<f64> =
+            trajectories.iter().flat_map(|t| &t.moments).map(|m| m.rates[state] * m.rates[state]).collect();
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    };
+    balances.map(rms).map(|rate| if rate > 0.0 { rate } else { 1.0 }).collect()
 }
 
 /// Returns the logarithm of the number of combinations of grid values of the parameters that no fit moves.

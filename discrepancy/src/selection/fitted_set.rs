@@ -58,7 +58,7 @@ pub struct FittedSet<'a> {
 }
 
 impl FittedSet<'_> {
-    /// Returns the estimation problem, with the nominal forces of the baseline.
+    /// Returns the estimation problem, with the nominal rates of the baseline.
     pub fn estimation(&self, nominal: &[f64]) -> Estimation<'_> {
         estimation(self.fit.subject, &self.fit, &self.variant, &self.added, nominal)
     }

@@ -3,11 +3,11 @@
 mod coverage;
 mod fitted_set;
 mod forecast;
+mod refit;
 mod report;
 mod screening;
 mod search;
 mod verdict;
-mod refit;
 
 pub use report::{Selection, SetFit, SetOfEffects, compare, select};
 pub use verdict::{Entry, Verdict};

@@ -18,7 +18,7 @@ pub struct Refit<'a> {
     pub subject: &'a Subject,
     /// Candidates that the data cover.
     pub candidates: Vec<Candidate>,
-    /// Nominal force of each balance along the motion of the baseline.
+    /// Nominal rate of each balance along the motion of the baseline.
     pub nominal: Vec<f64>,
     /// Counts simulations, and ends them.
     pub simulations: &'a Meter<'a>,
@@ -35,7 +35,7 @@ const RANKED: usize = 12;
 const APART: f64 = 0.5;
 
 /// Decrease of log-likelihood, nats, from which a set fits worse than one that it contains.
-const WORSE: f64 = 0.05;
+const WORSE: f64 = 0.5;
 
 /// Share of its strength with which an effect is added to the optimum of a set that contains it not.
 const FAINT: f64 = 0.05;
@@ -65,8 +65,7 @@ impl<'a> Refit<'a> {
     fn from(&self, key: &Key, start: &Start, iterations: usize) -> Option<FittedSet<'a>> {
         let Start { tuners, locals, added } = start;
         let pieces = self.calibration();
-        let (fit, point, variant) =
-            problem(self.subject, added, pieces, tuners, locals.clone(), &[], self.simulations);
+        let (fit, point, variant) = problem(self.subject, added, pieces, tuners, locals.clone(), &[], self.simulations);
         let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, added, &[]);
         let least_squares = estimation.with(&Errors::White, point, iterations)?;
         Some(FittedSet { key: key.clone(), added: added.clone(), fit, variant, least_squares, under: Vec::new() })
@@ -105,9 +104,12 @@ impl<'a> Refit<'a> {
                     found.extend(from(kind, &other.point, own.map(|own| &own.errors)));
                 }
             }
-            let mut best = first.iter().filter(|(of, _)| *of == kind).cloned().chain(found).max_by(|a, b| {
-                evidence(&a.1).total_cmp(&evidence(&b.1))
-            });
+            let mut best = first
+                .iter()
+                .filter(|(of, _)| *of == kind)
+                .cloned()
+                .chain(found)
+                .max_by(|a, b| evidence(&a.1).total_cmp(&evidence(&b.1)));
             for smaller in nested {
                 let Some(theirs) = smaller.estimate(kind) else { continue };
                 if best.as_ref().is_some_and(|best| best.1.log_likelihood > theirs.log_likelihood - WORSE) {
@@ -148,8 +150,7 @@ impl<'a> Refit<'a> {
             }));
         }
         let Start { tuners, locals, added } = start;
-        let (_, point, _) =
-            problem(self.subject, &added, self.calibration(), &tuners, locals, &[], self.simulations);
+        let (_, point, _) = problem(self.subject, &added, self.calibration(), &tuners, locals, &[], self.simulations);
         Some(point)
     }
 }

@@ -11,7 +11,7 @@ use super::refit::Refit;
 use super::search::Search;
 use super::verdict::{Verdict, decide};
 use crate::base;
-use crate::estimation::{ErrorModel, Errors, Estimate, FreeCurve, nominal_forces};
+use crate::estimation::{ErrorModel, Errors, Estimate, FreeCurve, nominal_rates};
 use crate::fit::Sets;
 use crate::meter::Meter;
 use crate::subject::Subject;
@@ -66,11 +66,7 @@ pub struct SetFit {
 ///
 /// # Errors
 /// The study is no diagnosis, a set has no earlier set with one effect less, or a model cannot be simulated.
-pub fn compare(
-    study: &Study,
-    effects: &[Arc<dyn Effect>],
-    sets: &[Vec<String>],
-) -> Result<Selection, StudyError> {
+pub fn compare(study: &Study, effects: &[Arc<dyn Effect>], sets: &[Vec<String>]) -> Result<Selection, StudyError> {
     with_search(study, effects, |search| {
         for set in sets {
             let of = |wanted: &String| {
@@ -97,7 +93,9 @@ pub fn compare(
 /// # Errors
 /// The study is no diagnosis, or the declared model cannot be simulated.
 pub fn select(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<Selection, StudyError> {
-    with_search(study, effects, |search| {
+    let tried = |effect: &&Arc<dyn Effect>| study.tasks().diagnosis.tries(effect.name());
+    let effects: Vec<Arc<dyn Effect>> = effects.iter().filter(tried).cloned().collect();
+    with_search(study, &effects, |search| {
         search.run();
         Ok(())
     })
@@ -126,8 +124,7 @@ fn with_search(
     let failed = || StudyError::here("the model cannot be simulated near its initial guesses");
     let baseline = base::fit(&subject, study.seed(), &simulations).ok_or_else(failed)?;
     subject.take_pace(&baseline.point.globals);
-    let start =
-        Start { tuners: baseline.point.globals, locals: baseline.point.locals, added: Vec::new() };
+    let start = Start { tuners: baseline.point.globals, locals: baseline.point.locals, added: Vec::new() };
     let mut refit = Refit {
         subject: &subject,
         candidates: subject.candidates(effects),
@@ -138,10 +135,10 @@ fn with_search(
     let along = |piece| Trajectory::new(&declared.fit, &declared.variant.model, piece, &declared.least_squares.point);
     let trajectories: Vec<Trajectory> =
         (0..declared.fit.pieces.len()).map(|piece| along(piece).ok()).collect::<Option<_>>().ok_or_else(failed)?;
-    refit.nominal = nominal_forces(&declared.fit, &declared.variant, &trajectories);
-    refit.candidates.retain(|candidate| {
-        is_covered(candidate, &declared.variant.model, &declared.fit.pieces, &trajectories)
-    });
+    refit.nominal = nominal_rates(&declared.variant, &trajectories);
+    refit
+        .candidates
+        .retain(|candidate| is_covered(candidate, &declared.variant.model, &declared.fit.pieces, &trajectories));
     let mut search = Search::new(&refit, declared, study.tasks().diagnosis.max_effects);
     fit(&mut search)?;
     let mut forecasts = Forecasts::new(subject.measurements.iter().any(|m| m.role == Role::Selection));

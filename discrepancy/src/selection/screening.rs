@@ -87,10 +87,8 @@ impl<'s> Scene<'s> {
             let mut columns = vec![vec![0.0; total]; free.len() + 1];
             for (index, piece) in slopes.iter().enumerate() {
                 let range = begins[index]..begins[index + 1];
-                let (at, mut parts): (Vec<usize>, Vec<Vec<f64>>) = estimation
-                    .moving(&free, index, piece)
-                    .chain([(free.len(), piece.r.clone())])
-                    .unzip();
+                let (at, mut parts): (Vec<usize>, Vec<Vec<f64>>) =
+                    estimation.moving(&free, index, piece).chain([(free.len(), piece.r.clone())]).unzip();
                 errors.whiten(&fit.pieces[index], &channels, index, &mut parts);
                 for (at, part) in at.into_iter().zip(parts) {
                     columns[at][range.clone()].copy_from_slice(&part);
@@ -145,10 +143,8 @@ impl<'s> Scene<'s> {
         // Guesses, each the best of its fixed parameters: gains, score, strengths, those of each piece, directions.
         let mut found: Vec<Screened> = Vec::new();
         for group in combinations.chunk_by(|a, b| !own.is_empty() && shared(a) == shared(b)) {
-            let traces: Vec<Vec<(&Vec<f64>, Vec<f64>)>> = views
-                .iter()
-                .map(|view| group.iter().filter_map(|s| Some((s, view.trace(s)?))).collect())
-                .collect();
+            let traces: Vec<Vec<(&Vec<f64>, Vec<f64>)>> =
+                views.iter().map(|view| group.iter().filter_map(|s| Some((s, view.trace(s)?))).collect()).collect();
             let mut gains = Vec::new();
             let mut directions = Vec::new();
             let mut factors = Vec::new();

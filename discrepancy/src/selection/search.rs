@@ -57,7 +57,8 @@ impl<'r, 'a> Search<'r, 'a> {
     pub fn run(&mut self) {
         let mut expanded: Vec<Key> = Vec::new();
         while expanded.len() < EXPANSIONS {
-            let best = self.sets.iter().take(BEAM).find(|set| set.key.len() < self.most && !expanded.contains(&set.key));
+            let best =
+                self.sets.iter().take(BEAM).find(|set| set.key.len() < self.most && !expanded.contains(&set.key));
             let Some(key) = best.map(|set| set.key.clone()) else { break };
             self.expand(&key);
             expanded.push(key);
@@ -92,9 +93,9 @@ impl<'r, 'a> Search<'r, 'a> {
             Some(own.log_likelihood - theirs.log_likelihood)
         };
         let subsets = (0..set.key.len()).filter_map(|k| self.get(&without(&set.key, k)));
-        subsets.into_iter().any(|smaller| {
-            ErrorModel::ALL.into_iter().filter_map(|kind| gain(smaller, kind)).all(|gain| gain < INERT)
-        })
+        subsets
+            .into_iter()
+            .any(|smaller| ErrorModel::ALL.into_iter().filter_map(|kind| gain(smaller, kind)).all(|gain| gain < INERT))
     }
 
     /// Fits the sets with one or two effects more, and those with one less.
@@ -177,7 +178,8 @@ impl<'r, 'a> Search<'r, 'a> {
         let least_squares = parent.start_at(&parent.least_squares.point);
         let mut starts = Vec::new();
         let [first, rest @ ..] = new else { return None };
-        let with_rest = |start: super::fitted_set::Start| rest.iter().fold(start, |start, new| start.with(&new.guesses[0]));
+        let with_rest =
+            |start: super::fitted_set::Start| rest.iter().fold(start, |start, new| start.with(&new.guesses[0]));
         for guess in &first.guesses {
             starts.push(with_rest(least_squares.with(guess)));
             if rest.is_empty() {
@@ -214,9 +216,10 @@ impl<'r, 'a> Search<'r, 'a> {
         }
         let contains = |set: &&FittedSet<'a>| key.iter().all(|k| set.key.contains(k)) && set.key.len() == key.len() + 1;
         let reduced = |larger: &FittedSet<'a>| {
-            let extra = larger.added.iter().position(|added| {
-                !key.iter().any(|&k| self.refit.candidates[k].is(&added.candidate))
-            })?;
+            let extra = larger
+                .added
+                .iter()
+                .position(|added| !key.iter().any(|&k| self.refit.candidates[k].is(&added.candidate)))?;
             Some(larger.start_at(&larger.least_squares.point).without(extra))
         };
         let starts: Vec<_> = self.sets.iter().filter(contains).filter_map(reduced).collect();
@@ -244,10 +247,8 @@ impl<'r, 'a> Search<'r, 'a> {
     }
 
     fn sort(&mut self) {
-        let mut keyed: Vec<(f64, FittedSet<'a>)> = std::mem::take(&mut self.sets)
-            .into_iter()
-            .map(|set| (self.log_posterior(&set), set))
-            .collect();
+        let mut keyed: Vec<(f64, FittedSet<'a>)> =
+            std::mem::take(&mut self.sets).into_iter().map(|set| (self.log_posterior(&set), set)).collect();
         keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
         self.sets = keyed.into_iter().map(|(_, set)| set).collect();
     }
@@ -278,9 +279,10 @@ fn pairs<'s>(screened: &'s [Screened], candidates: &[Candidate]) -> Vec<Vec<&'s 
     all.into_iter().take(PAIRS).map(|(_, a, b)| vec![&among[b], &among[a]]).collect()
 }
 
-/// Returns true if two candidates may act at once: a joint has one dry friction at most.
+/// Returns true if two candidates may act at once: a place has each characteristic once at most.
 fn can_be_together(a: &Candidate, b: &Candidate) -> bool {
-    !a.is(b) && !(a.port == b.port && a.is_dry_friction() && b.is_dry_friction())
+    let excludes = || a.effect.characteristic().is_some_and(|of| b.effect.characteristic() == Some(of));
+    !a.is(b) && !(a.port == b.port && excludes())
 }
 
 /// Returns a set without one of its effects.

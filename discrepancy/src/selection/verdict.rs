@@ -68,7 +68,8 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
     let passed: Vec<Key> = above.iter().filter(|key| forecasts.passes(search, key)).cloned().collect();
     let set = passed.first().cloned().unwrap_or_default();
     // Posterior over the declared model and all sets that passed.
-    let weight = |key: &Key| math::exp(search.get(key).map_or(f64::NEG_INFINITY, |set| search.log_posterior(set)) - declared);
+    let weight =
+        |key: &Key| math::exp(search.get(key).map_or(f64::NEG_INFINITY, |set| search.log_posterior(set)) - declared);
     let total: f64 = 1.0 + passed.iter().map(weight).sum::<f64>();
     let mut by_entry: BTreeMap<Entry, f64> = BTreeMap::new();
     for key in &passed {

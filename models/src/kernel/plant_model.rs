@@ -132,7 +132,7 @@ impl<M: PlantModel> Simulated<M> {
 
     fn simulate<S: Scalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
         let interface = self.of.interface();
-        if !job.case.forces.is_empty() {
+        if !job.case.disturbances.is_empty() {
             return Err(Failure::Undefined("external forces need a model with open equations".into()));
         }
         let plant = self.of.plant(parameters)?;

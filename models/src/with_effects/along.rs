@@ -67,7 +67,7 @@ impl<'a> Sink<f64, Driven<'a, f64>> for Looks<'_> {
                 t,
                 x: x.clone(),
                 u: dynamics.commanded(t.clamp(step.start, end)),
-                w: dynamics.pushed(t.clamp(step.start, end)),
+                w: dynamics.disturbed(t.clamp(step.start, end)),
                 contacts: dynamics.contacts.clone(),
                 effects: dynamics.actors.iter().map(|actor| (actor.closed, actor.memory.clone())).collect(),
             });
@@ -82,7 +82,7 @@ impl WithEffects {
     /// # Errors
     /// The failure of the simulation.
     pub fn along(&self, job: &Job<'_>, times: &[f64]) -> Result<Vec<Moment>, Failure> {
-        self.check_forces(job.case)?;
+        self.check_disturbances(job.case)?;
         let open = self.model.ported().expect("checked on creation");
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, job.parameters)).collect();
         let plant = f64::open(open, &job.parameters[..self.own()])?;
@@ -99,6 +99,20 @@ impl WithEffects {
         tangent.start(&parameters)?;
         let forces = self.model.interface().forces();
         Ok(looks.found.iter().map(|look| moment(&mut tangent, look, forces, job.signals)).collect())
+    }
+}
+
+impl WithEffects {
+    /// Returns the rate that a unit force at each balance adds to its state at the beginning of a simulation.
+    ///
+    /// # Errors
+    /// The model cannot start.
+    pub fn mobilities(&self, job: &Job<'_>) -> Result<Vec<f64>, Failure> {
+        let open = self.model.ported().expect("checked on creation");
+        let plant = f64::open(open, &job.parameters[..self.own()])?;
+        let mut dynamics = self.driven(plant, &[], job, job.parameters);
+        dynamics.start(job.parameters)?;
+        Ok(dynamics.mobilities())
     }
 }
 

@@ -135,8 +135,12 @@ pub(super) struct Driven<'a, S> {
     scratch: RefCell<Scratch<S>>,
     /// Sign of each force for which it acts in the forward direction.
     forward: Vec<f64>,
-    /// External forces of the case, one for each force of the plant if there are any.
-    external: Vec<Drive<'a, S>>,
+    /// State whose equation contains each force of the plant.
+    balances: Vec<usize>,
+    /// Disturbances of the case, one for each force of the plant if there are any.
+    disturbances: Vec<Drive<'a, S>>,
+    /// Force for each unit of a disturbance.
+    force_per_rate: Vec<S>,
     /// Additional forces; used only when the equations are evaluated for linearisation.
     further: Vec<S>,
     /// Rates of constant inputs: all 0.
@@ -172,8 +176,9 @@ impl<'a, S: Opening> Driven<'a, S> {
         };
         let commands: Vec<_> = commands.map(command).collect();
         let forces = of.forces();
-        let external = external(of, job.case);
-        let shows = shown(of, &model.equation_states());
+        let disturbances = disturbances(of, job.case);
+        let states = model.equation_states();
+        let shows = shown(of, &states);
         let touched = |k: usize| actors.iter().any(|a| matches!(a.place.site, Site::Sensor { signal } if signal == k));
         let untouched = (0..shows.len()).map(|k| shows[k].filter(|_| !touched(k))).collect();
         let smooth = !actors.iter().any(|a| matches!(a.place.site, Site::Sensor { .. }));
@@ -184,7 +189,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         let longest = actors.iter().map(|a| a.acting.longest_step()).fold(f64::INFINITY, f64::min);
         let damped = actors.iter().map(|a| a.acting.damped_step()).fold(f64::INFINITY, f64::min);
         let longest = commands.iter().map(|c| c.drive.longest_step()).fold(longest, f64::min);
-        let longest = external.iter().map(Drive::longest_step).fold(longest, f64::min);
+        let longest = disturbances.iter().map(Drive::longest_step).fold(longest, f64::min);
         let longest = longest.min(plant.longest_step());
         Self {
             plant,
@@ -204,7 +209,9 @@ impl<'a, S: Opening> Driven<'a, S> {
             happened: String::new(),
             scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new(), dx: Vec::new() }),
             forward: vec![1.0; forces],
-            external,
+            balances: balances(of).filter_map(|state| states.iter().position(|s| s.name == *state)).collect(),
+            disturbances,
+            force_per_rate: Vec::new(),
             further: Vec::new(),
             still: vec![0.0; of.inputs.len()],
         }
@@ -216,21 +223,17 @@ impl<'a, S: Opening> Driven<'a, S> {
         let total = self.actors.last().map_or(self.own, |a| a.z.0 + a.z.1);
         x.resize(total, S::from(0.0));
         let u: Vec<S> = self.commands.iter().map(|c| c.at(0.0)).collect();
-        let mut w = vec![S::from(0.0); self.forces];
-        let mut rates = [vec![S::from(0.0); self.own], vec![S::from(0.0); self.own]];
+        let w = vec![S::from(0.0); self.forces];
         self.plant.settle(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w });
-        self.plant.rates(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w }, &mut rates[0]);
         let sites = self.actors.iter().flat_map(|actor| [Some(actor.place.site), actor.place.companion]);
         for site in sites.flatten() {
             let (Site::Joint { w: k, velocity: state, .. } | Site::Process { w: k, state }) = site else {
                 continue;
             };
-            w[k] = S::from(1.0);
-            self.plant.rates(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w }, &mut rates[1]);
-            w[k] = S::from(0.0);
-            let gain = (rates[1][state] - rates[0][state]).value();
-            self.forward[k] = if gain < 0.0 { -1.0 } else { 1.0 };
+            self.forward[k] = if self.mobility(&x, &u, k, state).value() < 0.0 { -1.0 } else { 1.0 };
         }
+        let force_per_rate = |k: usize| S::from(1.0) / self.mobility(&x, &u, k, self.balances[k]);
+        self.force_per_rate = (0..self.disturbances.len()).map(force_per_rate).collect();
         for index in 0..self.actors.len() {
             let actor = &self.actors[index];
             let (first, count) = actor.z;
@@ -311,7 +314,9 @@ impl<'a, S: Opening> Driven<'a, S> {
         w.clear();
         w.extend_from_slice(&self.further);
         w.resize(self.forces, S::from(0.0));
-        w.iter_mut().zip(&self.external).for_each(|(w, drive)| *w += drive.at(t));
+        for ((w, drive), &unit) in w.iter_mut().zip(&self.disturbances).zip(&self.force_per_rate) {
+            *w += unit * drive.at(t);
+        }
         for (index, actor) in self.actors.iter().enumerate() {
             let (Site::Joint { w: k, .. } | Site::Process { w: k, .. }) = actor.place.site else { continue };
             if actor.inertial {
@@ -329,6 +334,24 @@ impl<'a, S: Opening> Driven<'a, S> {
                 w[k] -= against * (direction * self.forward[k]);
             }
         }
+    }
+
+    /// Returns the rate that a unit force adds to a state at the beginning.
+    fn mobility(&self, x: &[S], u: &[S], force: usize, state: usize) -> S {
+        let rate = |unit: f64| {
+            let (mut w, mut rates) = (vec![S::from(0.0); self.forces], vec![S::from(0.0); self.own]);
+            w[force] = S::from(unit);
+            self.plant.rates(&Instant { t: 0.0, x: &x[..self.own], u, w: &w }, &mut rates);
+            rates[state]
+        };
+        rate(1.0) - rate(0.0)
+    }
+
+    /// Returns the rate that a unit force at each balance adds to its state at the beginning.
+    pub(super) fn mobilities(&self) -> Vec<f64> {
+        let x = self.plant.start();
+        let u: Vec<S> = self.commands.iter().map(|c| c.at(0.0)).collect();
+        self.balances.iter().enumerate().map(|(k, &state)| self.mobility(&x, &u, k, state).value()).collect()
     }
 
     /// Returns the number of states, including those of the effects.
@@ -350,16 +373,16 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
-    /// Returns the external forces.
-    pub(super) fn pushed(&self, t: f64) -> Vec<S> {
-        self.external.iter().map(|drive| drive.at(t)).collect()
+    /// Returns the disturbances.
+    pub(super) fn disturbed(&self, t: f64) -> Vec<S> {
+        self.disturbances.iter().map(|drive| drive.at(t)).collect()
     }
 
-    /// Replaces commands and external forces by constant ones.
-    pub(super) fn command(&mut self, commands: impl Iterator<Item = S>, forces: impl Iterator<Item = S>) {
+    /// Replaces commands and disturbances by constant ones.
+    pub(super) fn command(&mut self, commands: impl Iterator<Item = S>, disturbances: impl Iterator<Item = S>) {
         let command = |value| Command { drive: Drive::held(value), delay: None, begun: 0.0 };
         self.commands = commands.map(command).collect();
-        self.external = forces.map(Drive::held).collect();
+        self.disturbances = disturbances.map(Drive::held).collect();
     }
 
     /// Evaluates the rates of all states and the values of signals, with additional forces `further` at the ports.
@@ -467,7 +490,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             let out = command.out(t);
             command.drive.pass_break(out);
         }
-        self.external.iter_mut().for_each(|drive| drive.pass_break(t));
+        self.disturbances.iter_mut().for_each(|drive| drive.pass_break(t));
     }
 
     /// Initialises the hysteresis states of actuators from the commands before time 0, in a window of a record.
@@ -543,17 +566,21 @@ impl<'a, S: Opening> Driven<'a, S> {
     }
 }
 
-/// Returns the external forces of a case, one for each force of the plant; empty if there are none.
-fn external<'a, S: Scalar>(of: &Interface, case: &'a Case) -> Vec<Drive<'a, S>> {
-    if case.forces.is_empty() {
-        return Vec::new();
-    }
-    let states = of.ports.iter().filter_map(|port| match port {
+/// Returns the names of the states whose equations contain a force, in the order of the forces.
+fn balances(of: &Interface) -> impl Iterator<Item = &String> {
+    of.ports.iter().filter_map(|port| match port {
         Port::Process { state, .. } => Some(state),
         _ => None,
-    });
-    let force = |state: &String| case.forces.iter().find(|(name, _)| name == state).map(|(_, force)| force);
-    states.map(|state| Drive::new(force(state))).collect()
+    })
+}
+
+/// Returns the disturbances of a case, one for each force of the plant; empty if there are none.
+fn disturbances<'a, S: Scalar>(of: &Interface, case: &'a Case) -> Vec<Drive<'a, S>> {
+    if case.disturbances.is_empty() {
+        return Vec::new();
+    }
+    let of_state = |state: &String| case.disturbances.iter().find(|(name, _)| name == state).map(|(_, of)| of);
+    balances(of).map(|state| Drive::new(of_state(state))).collect()
 }
 
 /// Creates the instant of a plant event. The outputs of effects at actuators are taken at that instant; their
@@ -685,7 +712,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         // The output of a sensor effect may be rough, so steps end at all samples.
         let smooth = self.smooth;
         let inputs = self.commands.iter().map(|command| command.next_break(t, smooth)).fold(f64::INFINITY, f64::min);
-        let forces = self.external.iter().map(|drive| drive.next_break(t)).fold(inputs, f64::min);
+        let forces = self.disturbances.iter().map(|drive| drive.next_break(t)).fold(inputs, f64::min);
         let next = self.plant.next_break(t).min(forces);
         self.breaks.iter().copied().find(|&at| at > t).map_or(next, |at| at.min(next))
     }

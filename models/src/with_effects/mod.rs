@@ -144,22 +144,22 @@ impl WithEffects {
         neutral.is_none_or(|neutral| first.value() != neutral) || first.tangents().iter().any(|&t| t != 0.0)
     }
 
-    /// Checks that each external force of a case acts at a balance of the model.
-    fn check_forces(&self, case: &Case) -> Result<(), Failure> {
+    /// Checks that each disturbance of a case acts at a balance of the model.
+    fn check_disturbances(&self, case: &Case) -> Result<(), Failure> {
         let is_balance = |name: &String| {
             let ports = &self.model.interface().ports;
             ports.iter().any(|port| matches!(port, Port::Process { state, .. } if state == name))
         };
-        match case.forces.iter().find(|(state, _)| !is_balance(state)) {
+        match case.disturbances.iter().find(|(state, _)| !is_balance(state)) {
             Some((state, _)) => {
-                Err(Failure::Undefined(format!("no balance of a state `{state}` for an external force")))
+                Err(Failure::Undefined(format!("no balance of a state `{state}` for a disturbance")))
             }
             None => Ok(()),
         }
     }
 
     fn simulate<S: Opening>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
-        self.check_forces(job.case)?;
+        self.check_disturbances(job.case)?;
         let open = self.model.ported().expect("checked on creation");
         let plant = S::open(open, &parameters[..self.own()])?;
         let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, parameters)).collect();
@@ -285,7 +285,7 @@ impl Model for WithEffects {
     }
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        if !job.case.forces.is_empty() || (0..self.placements.len()).any(|i| self.acts(i, job.parameters)) {
+        if !job.case.disturbances.is_empty() || (0..self.placements.len()).any(|i| self.acts(i, job.parameters)) {
             return self.simulate(job, job.parameters).map(|recording| Analysis::Time(recording.response));
         }
         self.model.analyse(&Job { parameters: &job.parameters[..self.own()], ..*job })
@@ -299,7 +299,7 @@ impl Model for WithEffects {
         if seeds.is_empty() {
             return Some(self.analyse(job).map(|analysis| (analysis, Vec::new())));
         }
-        if job.case.forces.is_empty() && (0..self.placements.len()).all(neutral) {
+        if job.case.disturbances.is_empty() && (0..self.placements.len()).all(neutral) {
             let own: Vec<Vec<f64>> = seeds.iter().map(|seed| seed[..self.own()].to_vec()).collect();
             return self.model.tangents(&Job { parameters: &job.parameters[..self.own()], ..*job }, &own);
         }

@@ -54,7 +54,8 @@ fn verdict(selection: &Selection) -> String {
         curve.as_ref().map_or("none".to_owned(), |c| format!("{} {:+.1}", c.coordinate, c.gain))
     };
     let [likeliest, smooth] = &verdict.declared;
-    let _ = writeln!(text, "  curve on the declared model: {} (smooth output error: {})", curve(likeliest), curve(smooth));
+    let _ =
+        writeln!(text, "  curve on the declared model: {} (smooth output error: {})", curve(likeliest), curve(smooth));
     let _ = writeln!(text, "  curve on top of the set: {}", curve(&verdict.remaining));
     let _ = writeln!(text, "  {} simulations\n", selection.simulations);
     text
@@ -68,7 +69,8 @@ fn table(selection: &Selection) -> String {
     for set in sets {
         let title = if set.effects.is_empty() { "declared model".to_owned() } else { set.effects.join(" + ") };
         let gain = set.log_evidence - declared;
-        let _ = write!(text, "{title}: log-evidence {:.1} ({gain:+.1}), log-odds {:+.1}", set.log_evidence, set.log_odds);
+        let _ =
+            write!(text, "{title}: log-evidence {:.1} ({gain:+.1}), log-odds {:+.1}", set.log_evidence, set.log_odds);
         let _ = match set.forecasts {
             Some(true) => write!(text, ", forecasts better"),
             Some(false) => write!(text, ", forecasts worse"),

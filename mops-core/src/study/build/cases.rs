@@ -41,7 +41,7 @@ pub(super) fn build_case(draft: &CaseBuilder, models: &Models, warnings: &mut Ve
         name: draft.name.clone(),
         parameters,
         inputs,
-        forces: Vec::new(),
+        disturbances: Vec::new(),
         experiment,
         horizon,
         begins: 0.0,
