@@ -75,8 +75,18 @@ impl Trajectory {
             knots.extend((1..=parts).map(|k| pair[0] + (pair[1] - pair[0]) * k as f64 / parts as f64));
         }
         let moments = if parts == 1 { coarse } else { model.along(&job, &Self::nodes(&knots))? };
-        let intervals =
+        let mut intervals: Vec<Interval> =
             knots.windows(2).zip(moments.chunks(2)).map(|(ends, m)| interval(ends[1] - ends[0], m)).collect();
+        for (k, interval) in intervals.iter_mut().enumerate() {
+            // A switch between the nodes of an interval counts from its end on, one before its first node from its beginning on.
+            if let Some(jump) = jump(&moments[2 * k], &moments[2 * k + 1]) {
+                interval.transition = &jump * &interval.transition;
+                interval.gains[0] = &jump * &interval.gains[0];
+            }
+            if let Some(jump) = k.checked_sub(1).and_then(|before| jump(&moments[2 * before + 1], &moments[2 * k])) {
+                interval.transition = &interval.transition * jump;
+            }
+        }
         let place = |t: f64| sampled.partition_point(|&s| s < t - 1e-9 * (1.0 + t.abs())) * parts;
         let samples: Vec<Vec<usize>> = p.series.iter().map(|s| s.times.iter().map(|&t| place(t)).collect()).collect();
         let row = |s: &Series| signals.iter().position(|&k| k == s.signal).expect("it is asked for");
@@ -247,6 +257,29 @@ fn interval(h: f64, moments: &[Moment]) -> Interval {
         exponential(&(along * left)) * &moments[k].b * (0.5 * h)
     });
     Interval { transition, gains }
+}
+
+/// Returns the jump of small deviations of the states where a joint with dry friction comes to rest or turns between two nodes: with
+/// rates `f-` before, `f+` after and the event `v = 0`, `I + (f+ - f-) e_v'/(e_v' f-)`. `None` if no joint does.
+///
+/// Source: M. di Bernardo, C. Budd, A. Champneys, P. Kowalczyk, Piecewise-smooth Dynamical Systems (Springer 2008), section 2.5.
+fn jump(before: &Moment, after: &Moment) -> Option<DMatrix<f64>> {
+    let mut all: Option<DMatrix<f64>> = None;
+    for ((velocity, was), (_, is)) in before.directions.iter().zip(&after.directions) {
+        let deceleration = before.rates[*velocity];
+        if was == is || *was == 0.0 || deceleration == 0.0 {
+            continue;
+        }
+        let states = before.rates.len();
+        let mut jump = DMatrix::<f64>::identity(states, states);
+        for i in 0..states {
+            jump[(i, *velocity)] += (after.rates[i] - before.rates[i]) / deceleration;
+        }
+        // What came to rest between the nodes and left again does not remember its speed.
+        jump[(*velocity, *velocity)] = jump[(*velocity, *velocity)].max(0.0);
+        all = Some(all.map_or_else(|| jump.clone(), |all| &jump * all));
+    }
+    all
 }
 
 /// `exp(M)` by its series after halving.

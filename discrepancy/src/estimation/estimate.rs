@@ -86,7 +86,7 @@ const CONVERGED: f64 = 0.01;
 const SETTLED: f64 = 0.05;
 
 /// Iterations of a smoothed motion; trials of a step, and by how much each is shorter than the one before.
-const SMOOTHINGS: usize = 6;
+const SMOOTHINGS: usize = 12;
 const TRIALS: usize = 6;
 const SHRINK: f64 = 0.4;
 

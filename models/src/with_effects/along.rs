@@ -22,7 +22,10 @@ pub struct Moment {
     pub u: Vec<f64>,
     /// Requested signals.
     pub y: Vec<f64>,
-    /// State matrix `A`.
+    /// Joints with dry friction: the speed as a state, and 1 if the joint slides forward, -1 if backward, 0 if it is stuck.
+    pub directions: Vec<(usize, f64)>,
+    /// State matrix `A`. A stuck joint creeps: it slides with a friction proportional to the speed that reaches the largest
+    /// holding force at a hundredth of its typical speed. A joint that takes no force could never break loose.
     pub a: DMatrix<f64>,
     /// Input matrix `B`.
     pub b: DMatrix<f64>,
@@ -98,7 +101,14 @@ impl WithEffects {
         let mut tangent = self.driven(plant, &acting, job, &parameters);
         tangent.start(&parameters)?;
         let forces = self.model.interface().forces();
-        Ok(looks.found.iter().map(|look| moment(&mut tangent, look, forces, job.signals)).collect())
+        let looks = looks.found;
+        let typical = |state: usize| {
+            #[allow(clippy::cast_precision_loss)]
+            let count = looks.len().max(1) as f64;
+            (looks.iter().map(|look| look.x[state] * look.x[state]).sum::<f64>() / count).sqrt()
+        };
+        let speeds: Vec<f64> = (0..dynamics.size()).map(typical).collect();
+        Ok(looks.iter().map(|look| moment(&mut tangent, look, &speeds, forces, job.signals)).collect())
     }
 }
 
@@ -116,12 +126,29 @@ impl WithEffects {
     }
 }
 
-fn moment(tangent: &mut Driven<'_, Dual7>, look: &Look, forces: usize, signals: &[usize]) -> Moment {
+/// Share of its typical speed at which a stuck joint creeps under the largest force that holds it.
+const CREEP: f64 = 0.01;
+
+fn moment(
+    tangent: &mut Driven<'_, Dual7>,
+    look: &Look,
+    speeds: &[f64],
+    forces: usize,
+    signals: &[usize],
+) -> Moment {
     let (n, inputs) = (look.x.len(), look.u.len());
     let columns = n + inputs + forces;
     let mut slopes = DMatrix::zeros(n + signals.len(), columns);
     let (mut rates, mut y) = (vec![0.0; n], vec![0.0; signals.len()]);
+    let constant = |values: &[f64]| values.iter().map(|&v| Dual7::from(v)).collect::<Vec<_>>();
     tangent.take(&look.contacts, &look.effects);
+    let directions = look.contacts.directions();
+    let held = tangent.holding(look.t, &constant(&look.x), &constant(&look.u));
+    let held_rates = (!held.is_empty()).then(|| {
+        tangent.command(look.u.iter().map(|&u| u.into()), look.w.iter().map(|&w| w.into()));
+        tangent.look(look.t, &constant(&look.x), &constant(&vec![0.0; forces]), &[]).0
+    });
+    tangent.take(&look.contacts.sliding(), &look.effects);
     for first in (0..columns).step_by(DIRECTIONS) {
         let seeded = |(j, &value): (usize, &f64)| {
             let direction = j.wrapping_sub(first);
@@ -141,8 +168,22 @@ fn moment(tangent: &mut Driven<'_, Dual7>, look: &Look, forces: usize, signals: 
         rates.iter_mut().zip(&dx).for_each(|(r, d)| *r = d.value());
         y.iter_mut().zip(&outputs).for_each(|(y, o)| *y = o.value());
     }
+    if let Some(held_rates) = held_rates {
+        rates.iter_mut().zip(&held_rates).for_each(|(r, d)| *r = d.value());
+    }
+    for (w, velocity, most) in held {
+        let slope = most / (CREEP * speeds[velocity]);
+        if slope.is_finite() {
+            let forward = tangent.forward(w);
+            for i in 0..n {
+                let creep = slope * forward * slopes[(i, n + inputs + w)];
+                slopes[(i, velocity)] -= creep;
+            }
+        }
+    }
     Moment {
         t: look.t,
+        directions,
         x: look.x.clone(),
         rates,
         u: look.u.clone(),

@@ -40,6 +40,21 @@ impl Contacts {
         self.joints.iter().any(|joint| joint.contact == Contact::Stuck)
     }
 
+    /// Returns for each joint its speed, as a state, and its direction: 1 if it slides forward, -1 if backward, 0 if it is stuck.
+    pub(super) fn directions(&self) -> Vec<(usize, f64)> {
+        let direction = |joint: &Joint| if joint.contact == Contact::Stuck { 0.0 } else { joint.contact.sign() };
+        self.joints.iter().map(|joint| (joint.velocity, direction(joint))).collect()
+    }
+
+    /// Returns the contacts with every stuck joint sliding forward.
+    pub(super) fn sliding(&self) -> Self {
+        let slide = |joint: &Joint| match joint.contact {
+            Contact::Stuck => Joint { contact: Contact::Forward, ..*joint },
+            _ => *joint,
+        };
+        Self { joints: self.joints.iter().map(slide).collect() }
+    }
+
     /// Returns 1 if the joint of this effect slides forward, -1 if backward; `None` if it is stuck or has no dry
     /// friction.
     pub(super) fn direction(&self, actor: usize) -> Option<f64> {
@@ -91,6 +106,16 @@ impl<S: Opening> Driven<'_, S> {
         // A backward friction force is limited by the friction against forward motion.
         let friction = self.friction(joint.actor, t, x, u);
         friction.limit[usize::from(held.value() > 0.0)] - held.abs()
+    }
+
+    /// Returns for each stuck joint its force, its speed as a state, and the largest force that holds it.
+    pub(super) fn holding(&self, t: f64, x: &[S], u: &[S]) -> Vec<(usize, usize, f64)> {
+        let stuck = self.contacts.joints.iter().filter(|joint| joint.contact == Contact::Stuck);
+        let most = |joint: &Joint| {
+            let limit = self.friction(joint.actor, t, x, u).limit;
+            limit[0].value().max(limit[1].value())
+        };
+        stuck.map(|joint| (joint.w, joint.velocity, most(joint))).collect()
     }
 
     /// Switches a contact after its guard became negative. Returns true if the joint is now stuck.
