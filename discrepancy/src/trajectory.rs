@@ -169,7 +169,8 @@ impl Trajectory {
         for (series, samples) in self.samples.iter().enumerate() {
             for (sample, knot) in samples.iter().enumerate() {
                 let of = &self.outputs[series][sample * row..(sample + 1) * row];
-                let direct = of[states + self.inputs..].iter().zip(&nominal).flat_map(|(d, nominal)| [d * nominal, 0.0]);
+                let direct =
+                    of[states + self.inputs..].iter().zip(&nominal).flat_map(|(d, nominal)| [d * nominal, 0.0]);
                 let slopes = of[..states].iter().copied().chain(direct).map(|s| s / self.noise[series]).collect();
                 let at = knots.binary_search(knot).expect("samples lie at knots");
                 motion.measured[at].push(Measured { channel: channels[series], residual, slopes });
@@ -265,18 +266,20 @@ fn interval(h: f64, moments: &[Moment]) -> Interval {
 /// Source: M. di Bernardo, C. Budd, A. Champneys, P. Kowalczyk, Piecewise-smooth Dynamical Systems (Springer 2008), section 2.5.
 fn jump(before: &Moment, after: &Moment) -> Option<DMatrix<f64>> {
     let mut all: Option<DMatrix<f64>> = None;
-    for ((velocity, was), (_, is)) in before.directions.iter().zip(&after.directions) {
-        let deceleration = before.rates[*velocity];
-        if was == is || *was == 0.0 || deceleration == 0.0 {
+    for (was, is) in before.sliding.iter().zip(&after.sliding) {
+        let (velocity, states) = (was.velocity, before.rates.len());
+        let deceleration = before.rates[velocity];
+        let mut jump = DMatrix::<f64>::identity(states, states);
+        if is.rests > was.rests {
+            // What has come to rest does not remember its speed.
+            jump[(velocity, velocity)] = 0.0;
+        } else if was.direction * is.direction < 0.0 && deceleration != 0.0 {
+            for i in 0..states {
+                jump[(i, velocity)] += (after.rates[i] - before.rates[i]) / deceleration;
+            }
+        } else {
             continue;
         }
-        let states = before.rates.len();
-        let mut jump = DMatrix::<f64>::identity(states, states);
-        for i in 0..states {
-            jump[(i, *velocity)] += (after.rates[i] - before.rates[i]) / deceleration;
-        }
-        // What came to rest between the nodes and left again does not remember its speed.
-        jump[(*velocity, *velocity)] = jump[(*velocity, *velocity)].max(0.0);
         all = Some(all.map_or_else(|| jump.clone(), |all| &jump * all));
     }
     all

@@ -36,7 +36,6 @@ impl Prior {
         let doubled = if self.half { math::ln(2.0) } else { 0.0 };
         -0.5 * distance * distance - math::ln(self.deviation) - 0.5 * math::ln(std::f64::consts::TAU) + doubled
     }
-
 }
 
 /// Unknowns of a fit under an error model.
@@ -245,7 +244,8 @@ impl Estimation<'_> {
             let times = motion.linearised.times.clone();
             (state, Input::Sampled { times, values: values.collect(), hold: Hold::Zero })
         };
-        fit.pieces[piece].case.disturbances = if motion.is_still() { Vec::new() } else { states.enumerate().map(force).collect() };
+        fit.pieces[piece].case.disturbances =
+            if motion.is_still() { Vec::new() } else { states.enumerate().map(force).collect() };
     }
 
     /// Adds the evidence and the standard errors.
@@ -264,9 +264,10 @@ impl Estimation<'_> {
         let values = self.values(&found.point);
         let log_prior: f64 = found.free.iter().map(|&k| self.priors[k].log(values[k])).sum();
         let count = (found.free.len() + fitted.count) as f64;
-        let log_evidence = log + log_prior - self.log_choices + fitted.log_prior + 0.5 * count * math::ln(std::f64::consts::TAU)
-            - 0.5 * log_determinant(&information)
-            - 0.5 * fitted.log_determinant;
+        let log_evidence =
+            log + log_prior - self.log_choices + fitted.log_prior + 0.5 * count * math::ln(std::f64::consts::TAU)
+                - 0.5 * log_determinant(&information)
+                - 0.5 * fitted.log_determinant;
         let mut deviations = vec![0.0; self.fit.globals.len()];
         if let Some(cholesky) = information.cholesky() {
             let covariance = cholesky.inverse();
@@ -387,9 +388,8 @@ impl Estimation<'_> {
             |iterate: &LeastSquares| CONVERGED * (iterate.sum() / iterate.residuals().len().max(1) as f64).max(1.0);
         let log = |iterate: &LeastSquares| -0.5 * (iterate.sum() + logarithms);
         let first = log(&iterate);
-        let is_converged = |iterate: &LeastSquares| {
-            iterate.full_step().is_some_and(|full| full.predicted < negligible(iterate))
-        };
+        let is_converged =
+            |iterate: &LeastSquares| iterate.full_step().is_some_and(|full| full.predicted < negligible(iterate));
         for _ in 0..iterations {
             let Some(step) = iterate.step() else { if iterate.reject() { continue } else { break } };
             if step.predicted < negligible(&iterate) && is_converged(&iterate) {

@@ -22,10 +22,10 @@ pub struct Moment {
     pub u: Vec<f64>,
     /// Requested signals.
     pub y: Vec<f64>,
-    /// Joints with dry friction: the speed as a state, and 1 if the joint slides forward, -1 if backward, 0 if it is stuck.
-    pub directions: Vec<(usize, f64)>,
+    /// Joints with dry friction.
+    pub sliding: Vec<Sliding>,
     /// State matrix `A`. A stuck joint creeps: it slides with a friction proportional to the speed that reaches the largest
-    /// holding force at a hundredth of its typical speed. A joint that takes no force could never break loose.
+    /// holding force at 1e-4 of its typical speed. A joint that takes no force could never break loose.
     pub a: DMatrix<f64>,
     /// Input matrix `B`.
     pub b: DMatrix<f64>,
@@ -35,11 +35,23 @@ pub struct Moment {
     pub d: DMatrix<f64>,
 }
 
+/// Joint with dry friction at an instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Sliding {
+    /// Speed, as a state.
+    pub velocity: usize,
+    /// 1 if the joint slides forward, -1 if backward, 0 if it is stuck.
+    pub direction: f64,
+    /// How many times it has come to rest so far.
+    pub rests: usize,
+}
+
 /// States at chosen times, with the mode of the step.
 struct Looks<'t> {
     times: &'t [f64],
     cancellation: &'t Cancellation,
     next: usize,
+    sliding: Vec<Sliding>,
     found: Vec<Look>,
 }
 
@@ -50,6 +62,7 @@ struct Look {
     /// External forces.
     w: Vec<f64>,
     contacts: super::contacts::Contacts,
+    sliding: Vec<Sliding>,
     /// Contact and hysteresis state of each effect.
     effects: Vec<(Option<bool>, Vec<f64>)>,
 }
@@ -61,6 +74,13 @@ impl<'a> Sink<f64, Driven<'a, f64>> for Looks<'_> {
 
     fn step(&mut self, step: &Step<f64>, dynamics: &Driven<'a, f64>) {
         let end = step.start + step.taken;
+        let before = std::mem::take(&mut self.sliding);
+        let now = dynamics.contacts.directions().enumerate().map(|(k, (velocity, direction))| {
+            let rests =
+                before.get(k).map_or(0, |was| was.rests + usize::from(direction == 0.0 && was.direction != 0.0));
+            Sliding { velocity, direction, rests }
+        });
+        self.sliding = now.collect();
         let mut x = vec![0.0; dynamics.size()];
         while self.next < self.times.len() && self.times[self.next] <= end + 1e-9 * (1.0 + end.abs()) {
             let t = self.times[self.next];
@@ -72,6 +92,7 @@ impl<'a> Sink<f64, Driven<'a, f64>> for Looks<'_> {
                 u: dynamics.commanded(t.clamp(step.start, end)),
                 w: dynamics.disturbed(t.clamp(step.start, end)),
                 contacts: dynamics.contacts.clone(),
+                sliding: self.sliding.clone(),
                 effects: dynamics.actors.iter().map(|actor| (actor.closed, actor.memory.clone())).collect(),
             });
             self.next += 1;
@@ -91,8 +112,13 @@ impl WithEffects {
         let plant = f64::open(open, &job.parameters[..self.own()])?;
         let mut dynamics = self.driven(plant, &acting, job, job.parameters);
         let start = dynamics.start(job.parameters)?;
-        let mut looks =
-            Looks { times, cancellation: &job.case.cancellation, next: 0, found: Vec::with_capacity(times.len()) };
+        let mut looks = Looks {
+            times,
+            cancellation: &job.case.cancellation,
+            next: 0,
+            sliding: Vec::new(),
+            found: Vec::with_capacity(times.len()),
+        };
         let end = times.last().copied().unwrap_or(job.horizon).max(job.horizon);
         integrate(&mut dynamics, 0.0, end, &start, &self.tolerance(open), &mut looks)?;
 
@@ -127,22 +153,15 @@ impl WithEffects {
 }
 
 /// Share of its typical speed at which a stuck joint creeps under the largest force that holds it.
-const CREEP: f64 = 0.01;
+const CREEP: f64 = 1e-4;
 
-fn moment(
-    tangent: &mut Driven<'_, Dual7>,
-    look: &Look,
-    speeds: &[f64],
-    forces: usize,
-    signals: &[usize],
-) -> Moment {
+fn moment(tangent: &mut Driven<'_, Dual7>, look: &Look, speeds: &[f64], forces: usize, signals: &[usize]) -> Moment {
     let (n, inputs) = (look.x.len(), look.u.len());
     let columns = n + inputs + forces;
     let mut slopes = DMatrix::zeros(n + signals.len(), columns);
     let (mut rates, mut y) = (vec![0.0; n], vec![0.0; signals.len()]);
     let constant = |values: &[f64]| values.iter().map(|&v| Dual7::from(v)).collect::<Vec<_>>();
     tangent.take(&look.contacts, &look.effects);
-    let directions = look.contacts.directions();
     let held = tangent.holding(look.t, &constant(&look.x), &constant(&look.u));
     let held_rates = (!held.is_empty()).then(|| {
         tangent.command(look.u.iter().map(|&u| u.into()), look.w.iter().map(|&w| w.into()));
@@ -183,7 +202,7 @@ fn moment(
     }
     Moment {
         t: look.t,
-        directions,
+        sliding: look.sliding.clone(),
         x: look.x.clone(),
         rates,
         u: look.u.clone(),

@@ -41,9 +41,9 @@ impl Contacts {
     }
 
     /// Returns for each joint its speed, as a state, and its direction: 1 if it slides forward, -1 if backward, 0 if it is stuck.
-    pub(super) fn directions(&self) -> Vec<(usize, f64)> {
+    pub(super) fn directions(&self) -> impl Iterator<Item = (usize, f64)> {
         let direction = |joint: &Joint| if joint.contact == Contact::Stuck { 0.0 } else { joint.contact.sign() };
-        self.joints.iter().map(|joint| (joint.velocity, direction(joint))).collect()
+        self.joints.iter().map(move |joint| (joint.velocity, direction(joint)))
     }
 
     /// Returns the contacts with every stuck joint sliding forward.

@@ -14,7 +14,7 @@ use mops_core::{
 };
 
 use crate::kernel::{Recording, Tolerance, record, tangents_of, wanted};
-pub use along::Moment;
+pub use along::{Moment, Sliding};
 
 /// Model with effects.
 ///
@@ -151,9 +151,7 @@ impl WithEffects {
             ports.iter().any(|port| matches!(port, Port::Process { state, .. } if state == name))
         };
         match case.disturbances.iter().find(|(state, _)| !is_balance(state)) {
-            Some((state, _)) => {
-                Err(Failure::Undefined(format!("no balance of a state `{state}` for a disturbance")))
-            }
+            Some((state, _)) => Err(Failure::Undefined(format!("no balance of a state `{state}` for a disturbance"))),
             None => Ok(()),
         }
     }
