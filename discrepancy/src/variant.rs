@@ -111,7 +111,7 @@ pub struct Variant {
 
 /// Steps of a simulation beyond which a candidate is too stiff to be worth it: so many for each sample, so many times those of the
 /// declared model, and a few more.
-const STEPS_PER_SAMPLE: f64 = 20.0;
+const STEPS_PER_SAMPLE: f64 = 6.0;
 const TIMES_DECLARED: f64 = 3.0;
 const FEW_STEPS: f64 = 1000.0;
 

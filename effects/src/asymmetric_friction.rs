@@ -25,6 +25,8 @@ impl Definition for AsymmetricFriction {
                                   tools and compensation methods for the control of machines with friction, Automatica \
                                   30 (1994), section 2";
     const CLASS: EffectClass = EffectClass::Dissipative;
+    // Coulomb friction and a constant force.
+    const IS_SUM: bool = true;
     const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const PARAMETERS: &'static [EffectParameter] = &[

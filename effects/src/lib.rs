@@ -119,6 +119,8 @@ pub trait Definition: Send + Sync + 'static {
     const IS_INERTIAL: bool = false;
     /// Value of [`Effect::is_one_off`].
     const IS_ONE_OFF: bool = false;
+    /// Value of [`Effect::is_sum`].
+    const IS_SUM: bool = false;
     /// Value of [`Effect::characteristic`].
     const CHARACTERISTIC: Option<Characteristic> = None;
     /// Value of [`Effect::modifies`].
@@ -178,6 +180,9 @@ impl<D: Definition> Effect for Defined<D> {
     }
     fn is_one_off(&self) -> bool {
         D::IS_ONE_OFF
+    }
+    fn is_sum(&self) -> bool {
+        D::IS_SUM
     }
     fn characteristic(&self) -> Option<Characteristic> {
         D::CHARACTERISTIC

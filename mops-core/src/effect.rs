@@ -526,6 +526,12 @@ pub trait Effect: Send + Sync {
         false
     }
 
+    /// Returns true if the effect is an exact sum of other effects of the catalogue. A diagnosis then looks for these, so that
+    /// one model has one name.
+    fn is_sum(&self) -> bool {
+        false
+    }
+
     /// Returns the characteristic of a place that the effect is; a place has each once at most.
     fn characteristic(&self) -> Option<Characteristic> {
         None

@@ -22,6 +22,9 @@ const NEAR_LIMIT: f64 = 2.0;
 /// Returns true if the records show what a candidate needs: the term of the declared model that it modifies, a limit that was
 /// touched, visible steps.
 pub fn is_covered(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> bool {
+    if candidate.effect.is_sum() {
+        return false;
+    }
     let modifies = candidate.effect.modifies();
     if modifies == Some(DeclaredTerm::Spring) && !has_spring(candidate, model, pieces, along) {
         return false;

@@ -25,14 +25,17 @@ pub struct Refit<'a> {
 }
 
 /// Iterations of a first look, and how many of the best starts go on to the end.
-const LOOK: usize = 8;
-const CONTINUED: usize = 2;
+const LOOK: usize = 5;
+const CONTINUED: usize = 1;
 
 /// Iterations under given hyperparameters.
 const RANKED: usize = 12;
 
 /// Distance of two optima in standard errors from which each is a start for the other's error model.
 const APART: f64 = 0.5;
+
+/// Evidence, nats, below the best from which a set is not fitted under the force error.
+const HOPELESS: f64 = 15.0;
 
 /// Decrease of log-likelihood, nats, from which a set fits worse than one that it contains.
 const WORSE: f64 = 0.5;
@@ -84,7 +87,9 @@ impl<'a> Refit<'a> {
 
     /// Fits a set under all error models, from its optimum by least squares and from those of the other error models, and makes
     /// sure that it fits no worse than the sets that it contains.
-    pub fn under_error_models(&self, set: &mut FittedSet<'a>, nested: &[&FittedSet<'a>]) {
+    /// The force error, which costs most, is left out if even with the most that it has gained so far over the others the evidence
+    /// would stay far below `best`.
+    pub fn under_error_models(&self, set: &mut FittedSet<'a>, nested: &[&FittedSet<'a>], best: f64) {
         let estimation = set.estimation(&self.nominal);
         let start = set.least_squares.point.clone();
         let from = |kind: ErrorModel, start: &Point, before: Option<&Errors>| {
@@ -94,12 +99,26 @@ impl<'a> Refit<'a> {
             let estimates = nested.iter().filter_map(|nested| nested.estimate(kind));
             estimates.max_by(|a, b| evidence(a).total_cmp(&evidence(b))).map(|estimate| &estimate.errors)
         };
-        let first: Vec<(ErrorModel, Estimate)> =
-            ErrorModel::ALL.par_iter().filter_map(|&kind| from(kind, &start, errors_of(kind))).collect();
+        let outputs = [ErrorModel::SmoothOutput, ErrorModel::RoughOutput];
+        let mut first: Vec<(ErrorModel, Estimate)> =
+            outputs.par_iter().filter_map(|&kind| from(kind, &start, errors_of(kind))).collect();
+        // A force costs most: from the optimum under the smooth output error only, which is nearest to its own.
+        let smooth = first.iter().find(|(kind, _)| *kind == ErrorModel::SmoothOutput);
+        let near = smooth.map_or(&start, |(_, estimate)| &estimate.point).clone();
+        let at_output = |estimates: &[(ErrorModel, Estimate)]| {
+            let outputs = estimates.iter().filter(|(kind, _)| *kind != ErrorModel::Force);
+            outputs.map(|(_, estimate)| evidence(estimate)).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let advantage =
+            |nested: &&FittedSet<'a>| Some(evidence(nested.estimate(ErrorModel::Force)?) - at_output(&nested.under));
+        let advantage = nested.iter().filter_map(advantage).fold(0.0, f64::max);
+        if at_output(&first) + advantage > best - HOPELESS {
+            first.extend(from(ErrorModel::Force, &near, errors_of(ErrorModel::Force)));
+        }
         let best = |kind: ErrorModel| {
             let own = first.iter().find(|(of, _)| *of == kind).map(|(_, estimate)| estimate);
             let mut found: Vec<(ErrorModel, Estimate)> = Vec::new();
-            for (_, other) in first.iter().filter(|(of, _)| *of != kind) {
+            for (_, other) in first.iter().filter(|(of, _)| *of != kind && kind != ErrorModel::Force) {
                 if own.is_none_or(|own| are_apart(&estimation, own, other)) {
                     found.extend(from(kind, &other.point, own.map(|own| &own.errors)));
                 }
@@ -126,7 +145,14 @@ impl<'a> Refit<'a> {
             }
             best
         };
-        set.under = ErrorModel::ALL.par_iter().filter_map(|&kind| best(kind)).collect();
+        let kinds: Vec<ErrorModel> = first.iter().map(|(kind, _)| *kind).collect();
+        let under: Vec<(ErrorModel, Estimate)> = kinds.par_iter().filter_map(|&kind| best(kind)).collect();
+        // Correlated errors are more patient with a poor start than least squares is.
+        let likeliest = under.iter().max_by(|a, b| evidence(&a.1).total_cmp(&evidence(&b.1)));
+        let again = likeliest.and_then(|(_, likeliest)| estimation.least_squares(likeliest.point.clone()));
+        let again = again.filter(|again| again.log_likelihood > set.least_squares.log_likelihood);
+        set.under = under;
+        set.least_squares = again.unwrap_or_else(|| set.least_squares.clone());
     }
 
     /// Returns the optimum of a smaller set with the further effects of a set added faintly.

@@ -114,6 +114,10 @@ pub struct Selection {
     pub simulations: usize,
 }
 
+/// Sets that are shown, and how many of the first with errors and curves.
+const SHOWN: usize = 12;
+const IN_FULL: usize = 2;
+
 fn with_search(
     study: &Study,
     effects: &[Arc<dyn Effect>],
@@ -143,17 +147,18 @@ fn with_search(
     fit(&mut search)?;
     let mut forecasts = Forecasts::new(subject.measurements.iter().any(|m| m.role == Role::Selection));
     let verdict = decide(&mut search, &mut forecasts);
-    let keys: Vec<Key> = search.sets.iter().map(|set| set.key.clone()).collect();
+    let keys: Vec<Key> = search.sets.iter().map(|set| set.key.clone()).take(SHOWN).collect();
     let passes: Vec<Option<bool>> =
         keys.iter().map(|key| (!key.is_empty()).then(|| forecasts.passes(&mut search, key))).collect();
     let declared = search.log_posterior(search.get(&Vec::new()).expect("it was fitted first"));
-    let shown = keys.iter().zip(passes).filter_map(|(key, passes)| {
+    // All is computed of the declared model and of the first sets.
+    let shown = keys.iter().zip(passes).enumerate().filter_map(|(rank, (key, passes))| {
         let set = search.get(key)?;
         Some(SetOfEffects {
             log_odds: search.log_posterior(set) - declared,
             forecasts: passes,
             is_inert: search.is_inert(set),
-            ..shown(&subject, set, &refit.nominal)
+            ..shown(&subject, set, &refit.nominal, rank < IN_FULL || key.is_empty() || *key == verdict.set)
         })
     });
     Ok(Selection {
@@ -164,7 +169,7 @@ fn with_search(
     })
 }
 
-fn shown(subject: &Subject, set: &FittedSet<'_>, nominal: &[f64]) -> SetOfEffects {
+fn shown(subject: &Subject, set: &FittedSet<'_>, nominal: &[f64], in_full: bool) -> SetOfEffects {
     let estimation = set.estimation(nominal);
     let name_of = |sets: Sets| match sets {
         Sets::Tuner(k) => subject.study.tuners()[subject.globals[k]].name.clone(),
@@ -185,10 +190,10 @@ fn shown(subject: &Subject, set: &FittedSet<'_>, nominal: &[f64]) -> SetOfEffect
             .collect(),
         errors: estimate.errors.clone(),
         free_run: [Role::Calibration, Role::Selection, Role::Validation].map(|role| {
-            let pieces = base::pieces(subject, |r| r == role);
+            let pieces = base::pieces(subject, |r| in_full && r == role);
             free_run(set, &estimate.point, pieces).map(f64::sqrt)
         }),
-        curves: kind.and_then(|_| estimation.curves(estimate)).unwrap_or_default(),
+        curves: kind.filter(|_| in_full).and_then(|_| estimation.curves(estimate)).unwrap_or_default(),
         converged: estimate.converged,
     };
     let least_squares = (None, &set.least_squares);

@@ -1,5 +1,6 @@
 //! Best-first search over sets of effects.
 
+use mops_core::EffectClass;
 use rayon::prelude::*;
 
 use super::fitted_set::{FittedSet, Key};
@@ -28,10 +29,16 @@ const PER_PARAMETER: f64 = 3.0;
 
 /// Sets that are expanded at a time, and in all.
 const BEAM: usize = 3;
-const EXPANSIONS: usize = 8;
+const EXPANSIONS: usize = 5;
+
+/// Logarithm of the posterior probability relative to the first set below which a set is not expanded.
+const BEHIND: f64 = 6.0;
 
 /// Most probable sets whose effects are exchanged for others of their class, one after the other.
 const POLISHED: usize = 3;
+
+/// Multiple of its first-order gain that a candidate may turn out to gain.
+const ALLOWANCE: f64 = 1.5;
 
 /// Gain in log-likelihood, nats, below which an effect under every error model does nothing.
 const INERT: f64 = 0.3;
@@ -49,19 +56,23 @@ pub struct Search<'r, 'a> {
 impl<'r, 'a> Search<'r, 'a> {
     /// Begins with the declared model, fitted by least squares.
     pub fn new(refit: &'r Refit<'a>, mut declared: FittedSet<'a>, most: usize) -> Self {
-        refit.under_error_models(&mut declared, &[]);
+        refit.under_error_models(&mut declared, &[], f64::NEG_INFINITY);
         Self { refit, sets: vec![declared], most }
     }
 
     /// Expands the most probable sets until they have all been.
     pub fn run(&mut self) {
-        let mut expanded: Vec<Key> = Vec::new();
+        // Of sets with the same classes at the same places one is expanded.
+        let mut expanded: Vec<Vec<(EffectClass, String)>> = Vec::new();
         while expanded.len() < EXPANSIONS {
-            let best =
-                self.sets.iter().take(BEAM).find(|set| set.key.len() < self.most && !expanded.contains(&set.key));
+            let first = self.sets.first().map_or(f64::NEG_INFINITY, |set| self.log_posterior(set));
+            let best = self.sets.iter().take(BEAM).find(|set| {
+                let is_promising = self.log_posterior(set) > first - BEHIND || set.key.is_empty();
+                is_promising && set.key.len() < self.most && !expanded.contains(&self.kinds_of(&set.key))
+            });
             let Some(key) = best.map(|set| set.key.clone()) else { break };
             self.expand(&key);
-            expanded.push(key);
+            expanded.push(self.kinds_of(&key));
         }
         let mut swapped: Vec<Key> = Vec::new();
         while swapped.len() < POLISHED {
@@ -72,6 +83,14 @@ impl<'r, 'a> Search<'r, 'a> {
             self.swap(&key);
             swapped.push(key);
         }
+    }
+
+    /// Returns classes and places of the effects of a set.
+    fn kinds_of(&self, key: &Key) -> Vec<(EffectClass, String)> {
+        let of = |&k: &usize| (self.refit.candidates[k].effect.class(), self.refit.candidates[k].place());
+        let mut kinds: Vec<(EffectClass, String)> = key.iter().map(of).collect();
+        kinds.sort();
+        kinds
     }
 
     /// Returns a fitted set.
@@ -108,10 +127,17 @@ impl<'r, 'a> Search<'r, 'a> {
         let Some(scene) = Scene::new(&parent, &errors) else { return };
         let all = &self.refit.candidates;
         let fits = |&index: &usize| parent.added.iter().all(|added| can_be_together(&added.candidate, &all[index]));
-        let wanted: Vec<usize> = (0..all.len()).filter(|index| !key.contains(index)).filter(fits).collect();
+        // What happens once in one record is a rival of all else, but is not stacked on it.
+        let is_stacked = |&index: &usize| key.is_empty() || all[index].only.is_none();
+        let wanted: Vec<usize> =
+            (0..all.len()).filter(|index| !key.contains(index)).filter(fits).filter(is_stacked).collect();
         let screened = scene.screen(all, &wanted);
-        let mut singles: Vec<&Screened> = screened.iter().take(SINGLES).collect();
-        let mut raw: Vec<&Screened> = screened.iter().collect();
+        // What explains less than it costs is not fitted. On the declared model all may be nonlinear in what it explains.
+        let price = price(kinds(all));
+        let pays = |gain: f64| ALLOWANCE * gain > price;
+        let paying = || screened.iter().filter(|screened| pays(screened.correlated()));
+        let mut singles: Vec<&Screened> = paying().take(SINGLES).collect();
+        let mut raw: Vec<&Screened> = if key.is_empty() { screened.iter().collect() } else { paying().collect() };
         raw.sort_by(|a, b| b.gains[0].total_cmp(&a.gains[0]));
         for other in raw.into_iter().take(RAW) {
             if singles.iter().all(|single| single.index != other.index) {
@@ -119,14 +145,18 @@ impl<'r, 'a> Search<'r, 'a> {
             }
         }
         let singles: Vec<Vec<&Screened>> = singles.into_iter().map(|single| vec![single]).collect();
+        let best = screened.first().map_or(0.0, Screened::correlated);
         let pairs = if key.len() + 2 <= self.most { pairs(&screened, all) } else { Vec::new() };
+        let pairs = pairs.into_iter().filter(|(gain, _)| pays(gain - best)).map(|(_, pair)| pair).collect();
         for (new, full) in [singles, pairs].into_iter().zip(FULL) {
             self.fit_best(&parent, new, &errors, full);
         }
-        for k in 0..key.len() {
-            self.ensure(&without(key, k));
-        }
         self.sort();
+        // What no longer pays goes.
+        let Some(first) = self.sets.first().map(|set| set.key.clone()) else { return };
+        for k in 0..first.len() {
+            self.ensure(&without(&first, k));
+        }
     }
 
     /// Fits the sets in which an effect is exchanged for another of its class at its place.
@@ -240,7 +270,8 @@ impl<'r, 'a> Search<'r, 'a> {
         if nested.is_empty() {
             nested.extend(self.sets.iter().filter(|smaller| smaller.key.is_empty()));
         }
-        self.refit.under_error_models(&mut set, &nested);
+        let best = self.sets.iter().map(FittedSet::log_evidence).fold(f64::NEG_INFINITY, f64::max);
+        self.refit.under_error_models(&mut set, &nested, best);
         if !set.under.is_empty() {
             self.sets.push(set);
         }
@@ -262,8 +293,9 @@ fn output_errors(set: &FittedSet<'_>) -> Vec<Errors> {
 }
 
 /// Returns the best pairs by their normal equations.
-fn pairs<'s>(screened: &'s [Screened], candidates: &[Candidate]) -> Vec<Vec<&'s Screened>> {
-    let among = &screened[..screened.len().min(PAIRED)];
+fn pairs<'s>(screened: &'s [Screened], candidates: &[Candidate]) -> Vec<(f64, Vec<&'s Screened>)> {
+    let repeats = screened.iter().filter(|screened| candidates[screened.index].only.is_none());
+    let among: Vec<&Screened> = repeats.take(PAIRED).collect();
     #[allow(clippy::cast_precision_loss)]
     let further = |a: usize, b: usize| {
         let count = |k: usize| candidates[among[k].index].effect.parameters().len();
@@ -273,10 +305,10 @@ fn pairs<'s>(screened: &'s [Screened], candidates: &[Candidate]) -> Vec<Vec<&'s 
         .into_par_iter()
         .flat_map_iter(|a| (0..a).map(move |b| (a, b)))
         .filter(|&(a, b)| can_be_together(&candidates[among[a].index], &candidates[among[b].index]))
-        .map(|(a, b)| (pair_gain(&among[a], &among[b]) - PER_PARAMETER * further(a, b), a, b))
+        .map(|(a, b)| (pair_gain(among[a], among[b]) - PER_PARAMETER * further(a, b), a, b))
         .collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
-    all.into_iter().take(PAIRS).map(|(_, a, b)| vec![&among[b], &among[a]]).collect()
+    all.into_iter().take(PAIRS).map(|(gain, a, b)| (gain, vec![among[b], among[a]])).collect()
 }
 
 /// Returns true if two candidates may act at once: a place has each characteristic once at most.

@@ -54,6 +54,9 @@ const MOST: f64 = 0.8;
 /// Shares and probability that a set must have where only the ends of the calibration records are forecast.
 const RUN_ON: f64 = 0.8;
 
+/// Logarithm of the probability relative to the first set that passed below which a set does not count.
+const NEGLIGIBLE: f64 = 8.0;
+
 /// Probability that none of the candidates is right.
 const OTHER: f64 = 0.05;
 
@@ -65,7 +68,18 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         let sets = search.sets.iter().filter(|set| !set.key.is_empty() && search.log_posterior(set) > declared);
         sets.filter(|set| !search.is_inert(set)).map(|set| set.key.clone()).collect()
     };
-    let passed: Vec<Key> = above.iter().filter(|key| forecasts.passes(search, key)).cloned().collect();
+    let mut passed: Vec<Key> = Vec::new();
+    let mut least = f64::NEG_INFINITY;
+    for key in &above {
+        let posterior = search.get(key).map_or(f64::NEG_INFINITY, |set| search.log_posterior(set));
+        if posterior < least {
+            break;
+        }
+        if forecasts.passes(search, key) {
+            least = least.max(posterior - NEGLIGIBLE);
+            passed.push(key.clone());
+        }
+    }
     let set = passed.first().cloned().unwrap_or_default();
     // Posterior over the declared model and all sets that passed.
     let weight =
