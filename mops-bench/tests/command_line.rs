@@ -140,7 +140,8 @@ fn sets_of_effects_are_compared_by_evidence() {
     assert!(done.status.success(), "{text}");
     let gain = |effect: &str| -> f64 {
         let line = text.lines().find(|line| line.starts_with(effect)).expect("the set is there");
-        line.rsplit_once('(').unwrap().1.trim_end_matches(')').parse().unwrap()
+        let odds = line.split_once("log-odds ").unwrap().1;
+        odds.split(',').next().unwrap().parse().unwrap()
     };
     assert!(gain("viscous-friction") > 5.0 && gain("cubic-drag") < gain("viscous-friction"), "{text}");
     assert_eq!(text.matches("force error").count(), 3, "{text}");

@@ -7,6 +7,8 @@ mod refit;
 mod report;
 mod screening;
 mod search;
+#[cfg(test)]
+mod tests;
 mod verdict;
 
 pub use report::{Selection, SetFit, SetOfEffects, compare, select};

@@ -20,9 +20,8 @@ pub struct Screened {
     pub guesses: Vec<Added>,
     /// Gain in log-likelihood under each error model, nats.
     pub gains: Vec<f64>,
-    /// For each error model the response of the candidate, of length 1, without what the unknowns take up, and its product with
-    /// the residuals.
-    pub directions: Vec<(Vec<f64>, f64)>,
+    /// For each error model the direction of the response.
+    directions: Vec<Direction>,
     /// True if the product must be negative: strengths have one sign.
     is_one_sided: bool,
 }
@@ -39,6 +38,14 @@ impl Screened {
 fn correlated(gains: &[f64]) -> (usize, f64) {
     let counted = gains.iter().copied().enumerate().skip(usize::from(gains.len() > 1));
     counted.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
+}
+
+/// Response of a candidate under an error model, of length 1, without what the unknowns take up.
+#[derive(Clone)]
+struct Direction {
+    values: Vec<f64>,
+    /// Scalar product with the residuals.
+    along: f64,
 }
 
 /// Residuals whitened by an error model, and the directions that the unknowns take up.
@@ -163,7 +170,7 @@ impl<'s> Scene<'s> {
                 // `-2 f l along - f^2 l^2`, halved.
                 gains.push((-factor * length * along - 0.5 * factor * factor * length * length).max(0.0));
                 factors.push(factor);
-                directions.push((direction, along));
+                directions.push(Direction { values: direction, along });
                 chosen = strengths;
             }
             if gains.len() < self.projections.len() {
@@ -254,8 +261,8 @@ fn take_out(direction: &[f64], vector: &mut [f64]) {
 /// Returns the gain of a pair in log-likelihood, by its normal equations: the larger one of the correlated error models. A
 /// strength of one sign whose sign would be wrong stays out.
 pub fn pair_gain(a: &Screened, b: &Screened) -> f64 {
-    let of = |((da, pa), (db, pb)): (&(Vec<f64>, f64), &(Vec<f64>, f64))| {
-        let cosine = dot(da, db);
+    let of = |(a_direction, b_direction): (&Direction, &Direction)| {
+        let (cosine, pa, pb) = (dot(&a_direction.values, &b_direction.values), a_direction.along, b_direction.along);
         let rest = 1.0 - cosine * cosine;
         if rest < 1e-6 {
             return 0.0;

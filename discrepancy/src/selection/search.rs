@@ -236,7 +236,7 @@ impl<'r, 'a> Search<'r, 'a> {
                 }
             }
         }
-        best.map(|set| self.add(set)).is_some()
+        best.map(|set| self.add_under(set, f64::NEG_INFINITY)).is_some()
     }
 
     /// Makes sure that a set is fitted under all error models. Returns false if it cannot be.
@@ -259,7 +259,13 @@ impl<'r, 'a> Search<'r, 'a> {
         true
     }
 
-    fn add(&mut self, mut set: FittedSet<'a>) {
+    /// Fits a set under the error models that can bring it near the best one, and adds it.
+    fn add(&mut self, set: FittedSet<'a>) {
+        let best = self.sets.iter().map(FittedSet::log_evidence).fold(f64::NEG_INFINITY, f64::max);
+        self.add_under(set, best);
+    }
+
+    fn add_under(&mut self, mut set: FittedSet<'a>, best: f64) {
         if self.get(&set.key).is_some() {
             return;
         }
@@ -270,7 +276,6 @@ impl<'r, 'a> Search<'r, 'a> {
         if nested.is_empty() {
             nested.extend(self.sets.iter().filter(|smaller| smaller.key.is_empty()));
         }
-        let best = self.sets.iter().map(FittedSet::log_evidence).fold(f64::NEG_INFINITY, f64::max);
         self.refit.under_error_models(&mut set, &nested, best);
         if !set.under.is_empty() {
             self.sets.push(set);
@@ -314,7 +319,7 @@ fn pairs<'s>(screened: &'s [Screened], candidates: &[Candidate]) -> Vec<(f64, Ve
 /// Returns true if two candidates may act at once: a place has each characteristic once at most.
 fn can_be_together(a: &Candidate, b: &Candidate) -> bool {
     let excludes = || a.effect.characteristic().is_some_and(|of| b.effect.characteristic() == Some(of));
-    !a.is(b) && !(a.port == b.port && excludes())
+    !(a.is(b) || a.port == b.port && excludes())
 }
 
 /// Returns a set without one of its effects.

@@ -60,8 +60,9 @@ impl Files for Data<'_> {
             return Err(std::io::ErrorKind::NotFound.into());
         }
         let bytes = std::fs::read(self.folder.join(name))?;
+        let dropped = |unit: &str| self.declared.is_numeric() || Unit::parse(unit).is_err();
         Ok(String::from_utf8(bytes)
-            .map_or_else(std::string::FromUtf8Error::into_bytes, |text| without_unknown_units(&text)))
+            .map_or_else(std::string::FromUtf8Error::into_bytes, |text| without_units(&text, dropped)))
     }
 
     fn show(&self, path: &str) -> String {
@@ -133,12 +134,12 @@ fn diagnosed(
     })
 }
 
-/// Removes unknown units from the header of a data file; its numbers are then used as they are.
-fn without_unknown_units(text: &str) -> Vec<u8> {
+/// Removes units from the header of a data file; its numbers are then used as they are.
+fn without_units(text: &str, dropped: impl Fn(&str) -> bool) -> Vec<u8> {
     let (header, rows) = text.split_once('\n').unwrap_or((text, ""));
     let cells =
         header.split(',').map(|cell| match cell.trim().strip_suffix(']').and_then(|cell| cell.split_once('[')) {
-            Some((name, unit)) if Unit::parse(unit).is_err() => name,
+            Some((name, unit)) if dropped(unit) => name,
             _ => cell,
         });
     format!("{}\n{rows}", cells.collect::<Vec<_>>().join(",")).into_bytes()

@@ -4,7 +4,7 @@ use mops_core::math;
 
 use super::*;
 use crate::base::{first_locals, pieces};
-use crate::estimation::priors::{nominal_forces, priors};
+use crate::estimation::priors::{nominal_rates, priors};
 use crate::fit::Fitted as LeastSquaresFit;
 use crate::meter::Meter;
 use crate::screen::Scene;
@@ -52,8 +52,9 @@ fn estimate(subject: &Subject, test: impl Fn(&Estimation<'_>, &Point)) {
         fit: &fit,
         model: &variant.model,
         channels: Channels::new(&fit.pieces),
-        nominal: nominal_forces(&fit, &variant, &scene),
+        nominal: nominal_rates(&variant, &scene.trajectories),
         priors: priors(subject, &fit, &variant, &[]),
+        log_choices: 0.0,
     };
     test(&estimation, &estimation.least_squares(point).expect("it simulates").point);
 }
@@ -67,7 +68,7 @@ fn under_white_noise_all_error_models_agree_with_least_squares() {
         let jacobian = DMatrix::from_columns(&columns);
         let covariance = (jacobian.transpose() * &jacobian).try_inverse().expect("identifiable");
         for kind in ErrorModel::ALL {
-            let found = estimation.under(kind, point.clone()).expect("it simulates");
+            let found = estimation.under(kind, point.clone(), None).expect("it simulates");
             assert!(found.converged, "{kind:?}");
             for k in 0..2 {
                 let deviation = covariance[(k, k)].sqrt();
@@ -86,8 +87,8 @@ fn an_unknown_force_is_found_and_parameters_keep_their_intervals() {
     let force = |t: f64| 0.3 * math::sin(1.3 * t);
     let subject = measured(OSCILLATOR, |x| x, force);
     estimate(&subject, |estimation, point| {
-        let found = estimation.under(ErrorModel::Force, point.clone()).expect("it simulates");
-        let output = estimation.under(ErrorModel::SmoothOutput, point.clone()).expect("it simulates");
+        let found = estimation.under(ErrorModel::Force, point.clone(), None).expect("it simulates");
+        let output = estimation.under(ErrorModel::SmoothOutput, point.clone(), None).expect("it simulates");
         assert!(found.log_evidence > output.log_evidence, "{:?} {:?}", found.log_evidence, output.log_evidence);
         for k in 0..2 {
             let (value, deviation) = (found.point.globals[k], found.deviations[k]);
@@ -121,7 +122,7 @@ fn the_smoothed_force_is_the_force_that_acted() {
 fn a_linear_plant_needs_no_second_linearisation() {
     let subject = measured(OSCILLATOR, |x| x, |t| 0.3 * math::sin(1.3 * t));
     estimate(&subject, |estimation, point| {
-        let found = estimation.under(ErrorModel::Force, point.clone()).expect("it simulates");
+        let found = estimation.under(ErrorModel::Force, point.clone(), None).expect("it simulates");
         let mut fit = estimation.fit.clone();
         let without = fit.all(&found.point).expect("it simulates");
         let motions = estimation.motions(&mut fit, &found.point, Some(&found.errors)).expect("it simulates");
@@ -156,7 +157,7 @@ fn the_smoothed_motion_of_a_nonlinear_plant_follows_the_measurement() {
 fn the_evidence_does_not_depend_on_the_scales_of_the_search() {
     let subject = measured(OSCILLATOR, |x| x, |_| 0.0);
     estimate(&subject, |estimation, point| {
-        let found = estimation.under(ErrorModel::SmoothOutput, point.clone()).expect("it simulates");
+        let found = estimation.under(ErrorModel::SmoothOutput, point.clone(), None).expect("it simulates");
         let mut fit = estimation.fit.clone();
         fit.globals.iter_mut().for_each(|global| global.scale *= 7.0);
         let scaled = Estimation {
@@ -165,8 +166,9 @@ fn the_evidence_does_not_depend_on_the_scales_of_the_search() {
             channels: estimation.channels.clone(),
             nominal: estimation.nominal.clone(),
             priors: estimation.priors.clone(),
+            log_choices: 0.0,
         };
-        let again = scaled.under(ErrorModel::SmoothOutput, point.clone()).expect("it simulates");
+        let again = scaled.under(ErrorModel::SmoothOutput, point.clone(), None).expect("it simulates");
         let (a, b) = (found.log_evidence.expect("finite"), again.log_evidence.expect("finite"));
         assert!((a - b).abs() < 1e-2, "{a} {b}");
     });
@@ -177,7 +179,7 @@ fn largest_curves(subject: &Subject) -> Vec<(String, f64)> {
     let found = std::cell::RefCell::new(Vec::new());
     estimate(subject, |estimation, point| {
         for kind in ErrorModel::ALL {
-            let estimate = estimation.under(kind, point.clone()).expect("it simulates");
+            let estimate = estimation.under(kind, point.clone(), None).expect("it simulates");
             let curves = estimation.curves(&estimate).expect("it simulates");
             found.borrow_mut().push((curves[0].coordinate.clone(), curves[0].gain));
         }

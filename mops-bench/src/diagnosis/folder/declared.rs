@@ -119,11 +119,6 @@ fn table(entries: impl Iterator<Item = (String, String)>) -> String {
     format!("{{ {} }}", entries.join(", "))
 }
 
-/// Returns the unit as a TOML string; `"1"` if unknown.
-fn unit(text: &str) -> String {
-    quoted(if Unit::parse(text).is_ok() { text } else { "1" })
-}
-
 impl Output {
     /// Returns the state that is measured, if the output is a state.
     fn state(&self) -> Option<&str> {
@@ -151,6 +146,14 @@ impl Declared {
         Ok(declared)
     }
 
+    /// Returns true if the equations hold for the numbers only: they contain constants without unit, and some quantity has a unit
+    /// other than the coherent SI unit, so that the constants would change with it.
+    pub fn is_numeric(&self) -> bool {
+        let named = self.states.iter().chain(&self.inputs).map(|named| &named.unit);
+        let units = named.chain(self.parameters.iter().map(|p| &p.unit)).chain(self.outputs.iter().map(|o| &o.unit));
+        !self.constants.is_empty() && units.filter_map(|unit| Unit::parse(unit).ok()).any(|unit| !unit.is_coherent())
+    }
+
     /// Returns the study file of the case, with data in the folder.
     ///
     /// # Errors
@@ -158,6 +161,9 @@ impl Declared {
     pub fn study(&self, name: &str, folder: &Path) -> Result<String, String> {
         let mut text = format!("[study]\nname = {}\ntask = \"diagnosis\"\n\n[models.plant.equations]\n", quoted(name));
         let mut line = |key: &str, value: String| writeln!(text, "{key} = {value}").expect("a text takes everything");
+        // A unit as a TOML string; `"1"` if unknown or not to be used.
+        let is_numeric = self.is_numeric();
+        let unit = |text: &str| quoted(if !is_numeric && Unit::parse(text).is_ok() { text } else { "1" });
         let units = |all: &[Named]| table(all.iter().map(|n| (n.name.clone(), unit(&n.unit))));
         line("states", units(&self.states));
         if !self.inputs.is_empty() {

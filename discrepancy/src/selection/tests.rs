@@ -1,0 +1,163 @@
+//! Selections on data that the tests compute themselves.
+
+use mops_core::{Hold, Input, Role, math};
+
+use super::{Selection, compare, select};
+use crate::estimation::ErrorModel;
+use crate::testing::{Record, catalogue, integrated, study, subject, white};
+
+const OSCILLATOR: &str = r#"
+states     = { x = "m", v = "m/s" }
+inputs     = { u = "N" }
+parameters = { d = "N s/m", k = "N/m" }
+der        = { x = "v", v = "1 [kg]*v' = u - d*v - k*x" }
+"#;
+
+/// Effects that are tried: the simplest of each class.
+const TRIED: [&str; 8] = [
+    "coulomb-friction",
+    "quadratic-drag",
+    "cubic-stiffness",
+    "constant-force",
+    "sensor-gain",
+    "sensor-lag",
+    "input-dead-zone",
+    "wind-gust",
+];
+
+const NOISE: f64 = 5e-3;
+const STEP: f64 = 0.05;
+const COUNT: usize = 300;
+
+/// Oscillator with a further force, driven by two sines, measured with white noise and an error that is correlated over 0.5 s.
+fn selected(force: fn(x: f64, v: f64) -> f64, correlated: f64, roles: &[Role]) -> Selection {
+    let record = |number: usize| {
+        #[allow(clippy::cast_precision_loss)]
+        let drive = |t: f64| {
+            2.0 * math::sin((1.3 + 0.4 * number as f64) * t) + 1.5 * math::sin((2.9 - 0.5 * number as f64) * t + 1.0)
+        };
+        #[allow(clippy::cast_precision_loss)]
+        let times: Vec<f64> = (0..COUNT).map(|k| k as f64 * STEP).collect();
+        let held = |t: f64| drive((t / STEP).floor() * STEP);
+        let rates = |t: f64, s: &[f64; 2]| [s[1], held(t) - 0.3 * s[1] - 4.0 * s[0] + force(s[0], s[1])];
+        let states = integrated(rates, [0.5, 0.0], STEP, COUNT);
+        let label = format!("selection {number}");
+        let (fast, slow) = (white(&label, NOISE, COUNT), white(&format!("{label} slow"), 1.0, COUNT));
+        let (decay, mut error) = (math::exp(-STEP / 0.5), 0.0);
+        let values = states.iter().zip(fast).zip(slow).map(|((s, fast), slow)| {
+            error = decay * error + correlated * (1.0 - decay * decay).sqrt() * slow;
+            s[0] + fast + error
+        });
+        let input = Input::Sampled {
+            times: times.clone(),
+            values: times.iter().map(|&t| drive(t)).collect(),
+            hold: Hold::Zero,
+        };
+        Record { inputs: vec![("u", input)], signals: vec![("x", values.collect(), NOISE)], times }
+    };
+    let mut subject = subject(OSCILLATOR, &[0.2, 5.0, 0.4, 0.1], 2, (0..roles.len()).map(record).collect());
+    for (measurement, role) in subject.measurements.iter_mut().zip(roles) {
+        measurement.role = *role;
+    }
+    select(&study(&subject), &catalogue(&TRIED)).expect("it simulates")
+}
+
+const BOTH: [Role; 2] = [Role::Calibration, Role::Selection];
+
+fn spring(x: f64, _: f64) -> f64 {
+    -2.0 * x * x * x
+}
+
+#[test]
+fn a_missing_effect_is_claimed_by_class_and_place() {
+    let found = selected(spring, 0.0, &BOTH);
+    assert_eq!(found.found, ["cubic-stiffness@joint:x"]);
+    let verdict = &found.verdict;
+    let (entry, probability) = &verdict.entries[0];
+    assert!(
+        verdict.is_effect && verdict.is_first && entry.class == "elastic" && entry.place == "joint:x",
+        "{verdict:?}"
+    );
+    assert!((0.9..=0.95).contains(probability) && verdict.share.is_some_and(|share| share > 0.99), "{verdict:?}");
+    let curve = verdict.declared[0].as_ref().expect("the joint moves");
+    assert!(curve.coordinate == "position at joint:x" && curve.gain > 20.0, "{curve:?}");
+    assert!(verdict.remaining.as_ref().is_some_and(|curve| curve.gain < 3.0), "{verdict:?}");
+}
+
+#[test]
+fn where_nothing_is_missing_nothing_is_claimed() {
+    for correlated in [0.0, 6.0 * NOISE] {
+        let found = selected(|_, _| 0.0, correlated, &BOTH);
+        assert!(!found.verdict.is_effect && found.verdict.nothing > 0.9, "{correlated}: {:?}", found.verdict);
+        assert!(
+            found.verdict.declared[0].as_ref().is_none_or(|curve| curve.gain < 6.0),
+            "{:?}",
+            found.verdict.declared
+        );
+        assert_eq!(found.verdict.lack_of_fit > 6.0, correlated > 0.0, "{}", found.verdict.lack_of_fit);
+    }
+}
+
+#[test]
+fn without_another_record_the_end_of_the_same_one_decides() {
+    let found = selected(spring, 2.0 * NOISE, &BOTH[..1]);
+    assert!(
+        found.verdict.is_effect && found.found == ["cubic-stiffness@joint:x"],
+        "{:?} {:?}",
+        found.found,
+        found.verdict
+    );
+}
+
+#[test]
+fn no_set_fits_worse_than_one_that_it_contains() {
+    let found = selected(spring, 6.0 * NOISE, &BOTH);
+    let log =
+        |set: &super::SetOfEffects, kind| set.fits.iter().find(|fit| fit.kind == kind).map(|fit| fit.log_likelihood);
+    let mut compared = 0;
+    for larger in &found.sets {
+        for smaller in &found.sets {
+            if smaller.effects.len() >= larger.effects.len()
+                || !smaller.effects.iter().all(|e| larger.effects.contains(e))
+            {
+                continue;
+            }
+            for kind in ErrorModel::ALL.into_iter().map(Some).chain([None]) {
+                if let (Some(larger_log), Some(smaller_log)) = (log(larger, kind), log(smaller, kind)) {
+                    // The priors of the further parameters may cost as much as they gain.
+                    let least = smaller_log - 1.0;
+                    assert!(
+                        larger_log > least,
+                        "{kind:?} {:?} {larger_log} {:?} {smaller_log}",
+                        larger.effects,
+                        smaller.effects
+                    );
+                    compared += 1;
+                }
+            }
+        }
+    }
+    assert!(compared > 8, "{compared}");
+}
+
+#[test]
+fn given_sets_are_fitted_from_smaller_ones_and_unknown_names_are_refused() {
+    let subject = subject(
+        OSCILLATOR,
+        &[0.3, 4.0, 0.5, 0.0],
+        2,
+        vec![Record::of_first("x", &[[0.5, 0.0]; 40], 0.05, NOISE, "names")],
+    );
+    let names = |sets: &[&[&str]]| {
+        let owned = |set: &&[&str]| set.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+        sets.iter().map(owned).collect::<Vec<_>>()
+    };
+    let (study, effects) = (study(&subject), catalogue(&["constant-force", "quadratic-drag"]));
+    let pair = ["constant-force@joint:x", "quadratic-drag@joint:x"];
+    let found = compare(&study, &effects, &names(&[&pair[..1], &pair])).expect("each is known");
+    assert!(found.sets.iter().any(|set| set.effects.len() == 2));
+    for unknown in [&["drag@joint:x"][..], &pair] {
+        let refused = compare(&study, &effects, &names(&[unknown]));
+        assert!(refused.is_err_and(|error| error.to_string().contains("cannot fit")), "{unknown:?}");
+    }
+}
