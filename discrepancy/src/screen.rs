@@ -175,7 +175,7 @@ pub fn screen(
 
 /// Typical sizes for a candidate: at its port, between two joints relative to each other; of a joint that is the companion of an
 /// actuator or sensor the position and speed.
-fn sizes_for(
+pub fn sizes_for(
     candidate: &Candidate,
     model: &WithEffects,
     pieces: &[Piece],

@@ -123,7 +123,7 @@ pub fn estimation<'e>(
     }
 }
 
-/// Returns the name of a candidate: `effect@place`, with what tells it apart from others of that name.
+/// Returns the name of a candidate: `effect@place`, then the companion and the only record, if any.
 pub fn name(candidate: &Candidate, subject: &Subject) -> String {
     let mut name = format!("{}@{}", candidate.effect.name(), candidate.place());
     if let Some(companion) = &candidate.companion {

@@ -24,9 +24,8 @@ pub struct Refit<'a> {
     pub simulations: &'a Meter<'a>,
 }
 
-/// Iterations of a first look, and how many of the best starts go on to the end.
+/// Iterations of a first look at a start.
 const LOOK: usize = 5;
-const CONTINUED: usize = 1;
 
 /// Iterations under given hyperparameters.
 const RANKED: usize = 12;
@@ -53,16 +52,11 @@ impl<'a> Refit<'a> {
         let first = |start: &Start| self.from(key, start, LOOK);
         let mut looks: Vec<FittedSet<'a>> = starts.par_iter().filter_map(first).collect();
         looks.sort_by(|a, b| b.least_squares.log_likelihood.total_cmp(&a.least_squares.log_likelihood));
-        looks.truncate(CONTINUED);
-        let end = |look: FittedSet<'a>| {
-            let least_squares = match look.least_squares.converged {
-                true => look.least_squares.clone(),
-                false => look.estimation(&[]).least_squares(look.least_squares.point.clone())?,
-            };
-            Some(FittedSet { least_squares, ..look })
-        };
-        let ends = looks.into_iter().filter_map(end);
-        ends.max_by(|a, b| a.least_squares.log_likelihood.total_cmp(&b.least_squares.log_likelihood))
+        let mut best = looks.into_iter().next()?;
+        if !best.least_squares.converged {
+            best.least_squares = best.estimation(&[]).least_squares(best.least_squares.point.clone())?;
+        }
+        Some(best)
     }
 
     fn from(&self, key: &Key, start: &Start, iterations: usize) -> Option<FittedSet<'a>> {
@@ -148,11 +142,13 @@ impl<'a> Refit<'a> {
         let kinds: Vec<ErrorModel> = first.iter().map(|(kind, _)| *kind).collect();
         let under: Vec<(ErrorModel, Estimate)> = kinds.par_iter().filter_map(|&kind| best(kind)).collect();
         // Correlated errors are more patient with a poor start than least squares is.
-        let likeliest = under.iter().max_by(|a, b| evidence(&a.1).total_cmp(&evidence(&b.1)));
-        let again = likeliest.and_then(|(_, likeliest)| estimation.least_squares(likeliest.point.clone()));
-        let again = again.filter(|again| again.log_likelihood > set.least_squares.log_likelihood);
         set.under = under;
-        set.least_squares = again.unwrap_or_else(|| set.least_squares.clone());
+        let again = set
+            .likeliest()
+            .and_then(|(_, likeliest)| set.estimation(&self.nominal).least_squares(likeliest.point.clone()));
+        if let Some(again) = again.filter(|again| again.log_likelihood > set.least_squares.log_likelihood) {
+            set.least_squares = again;
+        }
     }
 
     /// Returns the optimum of a smaller set with the further effects of a set added faintly.

@@ -1,13 +1,14 @@
 //! Screening: to first order, how much each candidate and each pair of candidates would explain.
 
-use mops_core::{InitialGrid, Port, Scope};
+use mops_core::{InitialGrid, Scope};
 use rayon::prelude::*;
 
 use super::fitted_set::FittedSet;
-use crate::candidate::{Candidate, Sizes};
+use crate::candidate::Candidate;
 use crate::estimation::{Channels, Errors};
 use crate::fit::{Piece, dot};
-use crate::trace_of::{View, relative_sizes, sizes, sizes_by_samples};
+use crate::screen::sizes_for;
+use crate::trace_of::View;
 use crate::trajectory::Trajectory;
 use crate::variant::Added;
 
@@ -129,7 +130,7 @@ impl<'s> Scene<'s> {
         all
     }
 
-    /// Screens one candidate; `None` if it does nothing here that can be told from the unknowns.
+    /// Screens one candidate; `None` if the unknowns take up all that it does.
     fn screened(&self, index: usize, candidate: &Candidate) -> Option<Screened> {
         let (fit, model) = (&self.set.fit, &self.set.variant.model);
         let effect = candidate.effect.as_ref();
@@ -275,28 +276,4 @@ pub fn pair_gain(a: &Screened, b: &Screened) -> f64 {
         0.5 * (pa * pa + pb * pb - 2.0 * cosine * pa * pb) / rest
     };
     a.directions.iter().zip(&b.directions).skip(1).map(of).fold(0.0, f64::max)
-}
-
-/// Returns typical sizes for a candidate: at its port, between two joints relative to each other; of a joint that is the companion
-/// of an actuator or sensor the position and speed.
-fn sizes_for(
-    candidate: &Candidate,
-    model: &mops_models::WithEffects,
-    pieces: &[Piece],
-    trajectories: &[Trajectory],
-) -> Option<Sizes> {
-    let own = match &candidate.companion {
-        Some(other @ Port::Joint { .. }) if candidate.effect.mutual() => {
-            relative_sizes(&candidate.port, other, model, pieces, trajectories)?
-        }
-        _ => sizes(&candidate.port, model, pieces, trajectories)?,
-    };
-    let own = sizes_by_samples(own, candidate, model, pieces);
-    match (&candidate.port, &candidate.companion) {
-        (Port::Actuator { .. } | Port::Sensor { .. }, Some(joint @ Port::Joint { .. })) => {
-            let Sizes { position, speed, .. } = sizes(joint, model, pieces, trajectories)?;
-            Some(Sizes { position, speed, ..own })
-        }
-        _ => Some(own),
-    }
 }

@@ -24,7 +24,7 @@ pub struct Entry {
 pub struct Verdict {
     /// The first set that passed; empty for the declared model.
     pub set: Key,
-    /// True if the set is told as the missing effects; false if something is missing that it does not explain.
+    /// True if the effects of the set are claimed to be missing in the declared model.
     pub is_effect: bool,
     /// Class and place of its effects with the posterior probability of each.
     pub entries: Vec<(Entry, f64)>,
@@ -103,10 +103,7 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         || above.first().is_some_and(|first| !set.is_empty() && first.iter().all(|k| set.contains(k)));
     let curves = |key: &Key, kind: Option<ErrorModel>| {
         let set = search.get(key)?;
-        let (_, estimate) = match kind {
-            None => set.likeliest()?,
-            Some(kind) => set.under.iter().find(|(of, _)| *of == kind)?,
-        };
+        let estimate = kind.map_or_else(|| set.likeliest().map(|(_, estimate)| estimate), |kind| set.estimate(kind))?;
         set.estimation(&search.refit.nominal).curves(estimate)?.into_iter().next()
     };
     let on_declared = [curves(&nothing, None), curves(&nothing, Some(ErrorModel::SmoothOutput))];
