@@ -1,6 +1,8 @@
 //! Elastic end stops with dampers that cannot pull.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::{ANY, NOT_NEGATIVE, Pressed};
@@ -23,6 +25,7 @@ impl Definition for EndStop {
     const FORMULA: &'static str = "-k max(q - high + tau v, 0) for q > high, k max(low - q - tau v, 0) for q < low";
     const SOURCE: &'static str = "B. Brogliato, Nonsmooth Mechanics, 3rd edition (Springer 2016), chapter 2";
     const CLASS: EffectClass = EffectClass::Elastic;
+    const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Stops);
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("k", "stiffness of the stops", Dimension::OUTPUT.over(Dimension::POSITION))

@@ -238,6 +238,8 @@ pub enum Characteristic {
     Lag,
     /// Dead band of a sensor.
     DeadBand,
+    /// Stops at which a motion ends: a record shows them only where the motion turns back or comes to rest.
+    Stops,
 }
 
 /// Scope of an effect parameter: the plant or a single experiment.

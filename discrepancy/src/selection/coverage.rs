@@ -1,6 +1,6 @@
 //! Which candidates the records can tell at all, decided before any of them is fitted.
 
-use mops_core::{DeclaredTerm, InitialGrid, Port};
+use mops_core::{Characteristic, DeclaredTerm, InitialGrid, Port};
 use mops_models::WithEffects;
 
 use crate::candidate::Candidate;
@@ -11,6 +11,9 @@ use crate::trajectory::Trajectory;
 
 /// Share of the nominal acceleration that a declared spring must have.
 const SPRING: f64 = 1e-3;
+
+/// Share of the largest speed below which a motion is at rest.
+const RESTS: f64 = 1e-3;
 
 /// Noises from which steps of samples are visible.
 const VISIBLE: f64 = 2.0;
@@ -27,6 +30,10 @@ pub fn is_covered(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], 
     }
     let modifies = candidate.effect.modifies();
     if modifies == Some(DeclaredTerm::Spring) && !has_spring(candidate, model, pieces, along) {
+        return false;
+    }
+    if candidate.effect.characteristic() == Some(Characteristic::Stops) && !shows_stops(candidate, model, pieces, along)
+    {
         return false;
     }
     if !matches!(candidate.port, Port::Sensor { .. }) {
@@ -56,6 +63,27 @@ fn has_spring(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], alon
     let acceleration = largest(&mut moments().map(|m| m.rates[speed]));
     let spring = largest(&mut moments().map(|m| m.a[(speed, coordinate)] * m.x[position]));
     spring > SPRING * acceleration
+}
+
+/// Returns true if a motion shows stops: it turns back at both ends, or comes to rest. A falling body turns back at its top only.
+fn shows_stops(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> bool {
+    pieces.iter().zip(along).any(|(piece, along)| {
+        let Some(Spot::Joint(_, _, speed)) = spot(&candidate.port, model, piece) else { return false };
+        let other = match candidate.companion.as_ref().and_then(|port| spot(port, model, piece)) {
+            Some(Spot::Joint(_, _, other)) => Some(other),
+            _ => None,
+        };
+        let speed = |m: &mops_models::Moment| m.x[speed] - other.map_or(0.0, |other| m.x[other]);
+        let speeds: Vec<f64> = along.moments.iter().map(speed).collect();
+        let still = RESTS * speeds.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let turns = |sign: f64| {
+            let moving = speeds.iter().position(|v| sign * v > still);
+            moving.is_some_and(|first| speeds[first..].iter().any(|v| sign * v <= still))
+        };
+        let is_at_rest = |speeds: &[f64]| speeds.iter().all(|v| v.abs() <= still);
+        let moved = speeds.iter().position(|v| v.abs() > still).unwrap_or(speeds.len());
+        turns(1.0) && turns(-1.0) || speeds[moved..].windows(2 * TOUCHED).any(is_at_rest)
+    })
 }
 
 fn touches_limit(values: &[f64], noise: f64) -> bool {
