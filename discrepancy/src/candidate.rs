@@ -171,6 +171,8 @@ const PER_STEP: u32 = 4;
 pub struct Sizes {
     /// Of what an effect adds.
     pub output: f64,
+    /// Rate that a unit of it adds where the model was when this was told; 1 at inputs and sensors.
+    pub mobility: f64,
     /// Of the position about its middle.
     pub position: f64,
     /// Of the speed.
@@ -197,6 +199,7 @@ impl Sizes {
     /// Sizes of which nothing is told.
     pub const UNTOLD: Self = Self {
         output: 1.0,
+        mobility: 1.0,
         position: 1.0,
         speed: 1.0,
         value: 1.0,

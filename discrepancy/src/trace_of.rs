@@ -95,6 +95,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
     let moments = || spots.iter().flat_map(|(i, _)| trajectories[*i].moments.iter());
     let positive = |x: f64| if x.is_finite() && x > 1e-300 { x } else { 1.0 };
     let common = Sizes { record, sample, ..Sizes::UNTOLD };
+    let mobility_of = |force: usize| positive(trajectories[0].mobilities[force].abs());
     let sizes = match spots.first()?.1 {
         Spot::Joint(w, q, v) => {
             let inputs = trajectories[0].inputs();
@@ -103,7 +104,8 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
             let output = size(accelerations) / positive(mobility);
             let speed = positive(amplitude(moments().map(|m| m.x[v])));
             let position = positive(amplitude(moments().map(|m| m.x[q])));
-            Sizes { output, position, speed, time: position / speed, range: range(moments().map(|m| m.x[q])), ..common }
+            let range = range(moments().map(|m| m.x[q]));
+            Sizes { output, mobility: mobility_of(w), position, speed, time: position / speed, range, ..common }
         }
         Spot::Process(w, s) => {
             let inputs = trajectories[0].inputs();
@@ -113,6 +115,7 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
             let speed = positive(rate);
             Sizes {
                 output: rate / positive(mobility),
+                mobility: mobility_of(w),
                 position,
                 speed,
                 time: position / speed,

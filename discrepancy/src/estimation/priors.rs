@@ -2,10 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use mops_core::{Dimension, ParameterKind, Port, math};
+use mops_core::{Dimension, Job, ParameterKind, Port, math};
 
 use super::estimate::Prior;
-use crate::fit::{Fit, Global, Sets};
+use crate::fit::{Fit, Global, Point, Sets};
 use crate::subject::{Local, Subject};
 use crate::trajectory::Trajectory;
 use crate::variant::{Added, Variant};
@@ -34,8 +34,19 @@ const OFFSET: f64 = 0.1;
 /// Standard deviation of a uniform distribution in its width: `1/sqrt(12)`.
 const UNIFORM: f64 = 0.288_675_134_594_812_9;
 
-/// Returns the priors of the shared parameters, then of the initial states of each record.
-pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Added]) -> Vec<Prior> {
+/// Returns the priors of the shared parameters, then of the initial states of each record, near a point. A force is expected to
+/// be as large as those that move the plant as it is there: the rate that a typical force adds is the same wherever the plant is.
+pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Added], point: &Point) -> Vec<Prior> {
+    let parameters = fit.parameters(0, point);
+    let piece = &fit.pieces[0];
+    let job = Job { case: &piece.case, parameters: &parameters, signals: &[], horizon: piece.horizon };
+    let mobilities = variant.model.mobilities(&job).unwrap_or_default();
+    // By how much a typical force is larger than where the sizes of an effect were told.
+    let heavier = |added: &Added| {
+        let here = force_of(&added.candidate.port, variant).and_then(|force| mobilities.get(force));
+        let ratio = here.map_or(1.0, |here| added.sizes.mobility / here.abs());
+        if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
+    };
     let at_centre = |stretch, deviation| Prior { stretch, deviation, centre: None, half: false };
     let declared = |k: usize, global: &Global| {
         let stretch = if global.log { subject.start()[k].abs() } else { global.scale };
@@ -60,7 +71,10 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
                 Dimension::ONE => about_null(1.0, GAIN),
                 Dimension::TIME => about_null(added.sizes.lag(), 1.0),
                 Dimension::OUTPUT if is_sensor => about_null(added.sizes.range[1] - added.sizes.range[0], OFFSET),
-                dimension => about_null(added.sizes.of(dimension).abs(), STRENGTH),
+                dimension => {
+                    let scale = math::powi(heavier(added), dimension.output.into());
+                    about_null(added.sizes.of(dimension).abs() * scale, STRENGTH)
+                }
             },
             ParameterKind::Phase => at_centre(TAU, UNIFORM),
             ParameterKind::Instant => at_centre(added.sizes.record, UNIFORM),
@@ -78,6 +92,20 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
     });
     let start = |local: &Local| at_centre(local.scale, START);
     shared.chain(fit.pieces.iter().flat_map(|piece| &piece.locals).map(start)).collect()
+}
+
+/// Returns the position of the force at a port among the forces of a model; `None` at inputs and sensors.
+fn force_of(port: &Port, variant: &Variant) -> Option<usize> {
+    let acts_on = match port {
+        Port::Joint { velocity, .. } => velocity,
+        Port::Process { state, .. } => state,
+        Port::Actuator { .. } | Port::Sensor { .. } => return None,
+    };
+    let processes = variant.model.model().interface().ports.iter().filter_map(|port| match port {
+        Port::Process { state, .. } => Some(state),
+        _ => None,
+    });
+    processes.into_iter().position(|state| state == acts_on)
 }
 
 /// Returns the nominal rate of each balance of a model, in the order of its forces: the root mean square along the motion.

@@ -53,7 +53,7 @@ fn estimate(subject: &Subject, test: impl Fn(&Estimation<'_>, &Point)) {
         model: &variant.model,
         channels: Channels::new(&fit.pieces),
         nominal: nominal_rates(&variant, &scene.trajectories),
-        priors: priors(subject, &fit, &variant, &[]),
+        priors: priors(subject, &fit, &variant, &[], &point),
         log_choices: 0.0,
     };
     test(&estimation, &estimation.least_squares(point).expect("it simulates").point);
