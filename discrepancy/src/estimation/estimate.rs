@@ -78,6 +78,17 @@ const ITERATIONS: usize = 10;
 /// Iterations of least squares.
 const LEAST_SQUARES: usize = 60;
 
+/// Iterations of a rough fit, and the decrease of log-likelihood that is predicted where it ends, nats.
+const ROUGH: usize = 30;
+const ROUGHLY: f64 = 0.1;
+
+/// Iterations in a row that each decrease the sum of squares by a smaller share after which a rough fit ends.
+const STALLED: usize = 5;
+const STALLS: f64 = 0.01;
+
+/// Multiple of the predicted gain that a rough fit may still turn out to gain.
+const ALLOWANCE: f64 = 1.5;
+
 /// Predicted decrease of the sum of squares, relative to its mean per residual, below which a fit has converged.
 const CONVERGED: f64 = 0.01;
 
@@ -99,7 +110,16 @@ impl Estimation<'_> {
     /// Fits parameters and initial states under an error model at the outputs whose hyperparameters are given, in at most so many
     /// iterations. The evidence is that for these hyperparameters.
     pub fn with(&self, errors: &Errors, start: Point, iterations: usize) -> Option<Estimate> {
-        let found = self.descend(self.fit, errors, start, iterations)?;
+        self.given(errors, self.descend(self.fit, errors, start, Effort::of(iterations))?)
+    }
+
+    /// Does the same roughly, and gives up where the log-likelihood cannot become as large as `least`.
+    pub fn roughly(&self, errors: &Errors, start: Point, least: f64) -> Option<Estimate> {
+        let effort = Effort { iterations: ROUGH, negligible: 2.0 * ROUGHLY, least, is_rough: true };
+        self.given(errors, self.descend(self.fit, errors, start, effort)?)
+    }
+
+    fn given(&self, errors: &Errors, found: Found) -> Option<Estimate> {
         let log_likelihood = found.log_likelihood();
         let given = Fitted { errors: errors.clone(), count: 0, log_prior: 0.0, log_determinant: 0.0 };
         Some(self.concluded(log_likelihood, found, given))
@@ -129,7 +149,7 @@ impl Estimation<'_> {
             let known = errors.as_ref().or(before);
             let thoroughly = round == 0;
             let fitted = Errors::fit(kind, &self.fit.pieces, &self.channels, &residuals, motions, known, thoroughly)?;
-            let found = self.descend(&fit, &fitted.errors, point.clone(), ITERATIONS)?;
+            let found = self.descend(&fit, &fitted.errors, point.clone(), Effort::of(ITERATIONS))?;
             let is_first = round == usize::from(kind == ErrorModel::Force);
             let gain = best.as_ref().filter(|_| !is_first).map_or(f64::INFINITY, |best| found.first - best.0);
             if gain > 0.0 {
@@ -147,7 +167,7 @@ impl Estimation<'_> {
             }
         }
         let (_, point, fitted) = best?;
-        let found = self.descend(&self.along(&fitted.errors), &fitted.errors, point, 0)?;
+        let found = self.descend(&self.along(&fitted.errors), &fitted.errors, point, Effort::of(0))?;
         Some(self.concluded(found.log_likelihood(), found, fitted))
     }
 
@@ -344,7 +364,7 @@ impl Estimation<'_> {
 
     /// Minimises the sum of squares of the whitened residuals in linear, scaled coordinates, with that of the distances of unknowns
     /// from the centres of their priors.
-    fn descend(&self, fit: &Fit<'_>, errors: &Errors, start: Point, iterations: usize) -> Option<Found> {
+    fn descend(&self, fit: &Fit<'_>, errors: &Errors, start: Point, effort: Effort) -> Option<Found> {
         let unknowns = self.unknowns();
         let free = self.free();
         let mut values = self.values(&start);
@@ -384,13 +404,22 @@ impl Estimation<'_> {
         let samples = residuals.len() - known.len();
         let mut iterate = LeastSquares::new(bounds, z, residuals, jacobian);
         #[allow(clippy::cast_precision_loss)]
-        let negligible =
-            |iterate: &LeastSquares| CONVERGED * (iterate.sum() / iterate.residuals().len().max(1) as f64).max(1.0);
+        let negligible = |iterate: &LeastSquares| {
+            effort.negligible * (iterate.sum() / iterate.residuals().len().max(1) as f64).max(1.0)
+        };
         let log = |iterate: &LeastSquares| -0.5 * (iterate.sum() + logarithms);
         let first = log(&iterate);
-        let is_converged =
-            |iterate: &LeastSquares| iterate.full_step().is_some_and(|full| full.predicted < negligible(iterate));
-        for _ in 0..iterations {
+        let remaining = |iterate: &LeastSquares| iterate.full_step().map_or(f64::INFINITY, |full| full.predicted);
+        let is_converged = |iterate: &LeastSquares| remaining(iterate) < negligible(iterate);
+        let is_hopeless = |iterate: &LeastSquares| {
+            effort.least > f64::NEG_INFINITY && log(iterate) + ALLOWANCE * 0.5 * remaining(iterate) < effort.least
+        };
+        let mut stalled = 0;
+        for iteration in 0..effort.iterations {
+            if iteration > 1 && is_hopeless(&iterate) || effort.is_rough && stalled >= STALLED {
+                break;
+            }
+            let before = iterate.sum();
             let Some(step) = iterate.step() else { if iterate.reject() { continue } else { break } };
             if step.predicted < negligible(&iterate) && is_converged(&iterate) {
                 break;
@@ -408,6 +437,7 @@ impl Estimation<'_> {
                 _ if iterate.reject() => {}
                 _ => break,
             }
+            stalled = if iterate.sum() < (1.0 - STALLS) * before { 0 } else { stalled + 1 };
         }
         let converged = is_converged(&iterate);
         Some(Found { point: self.point(&values), iterate, free, scale, logarithms, samples, first, converged })
@@ -451,6 +481,26 @@ fn between(from: &Point, to: &Point, share: f64) -> Point {
 
 fn positive(scale: f64) -> f64 {
     if scale.is_finite() && scale > 0.0 { scale } else { 1.0 }
+}
+
+/// How far a descent goes.
+#[derive(Clone, Copy)]
+struct Effort {
+    /// Largest number of iterations.
+    iterations: usize,
+    /// Predicted decrease of the sum of squares, relative to its mean per residual, below which it ends.
+    negligible: f64,
+    /// Log-likelihood that it must be able to reach.
+    least: f64,
+    /// True if it ends where it stalls.
+    is_rough: bool,
+}
+
+impl Effort {
+    /// To the end, in at most so many iterations.
+    const fn of(iterations: usize) -> Self {
+        Self { iterations, negligible: CONVERGED, least: f64::NEG_INFINITY, is_rough: false }
+    }
 }
 
 /// End of a descent.

@@ -60,7 +60,7 @@ pub struct FittedSet<'a> {
 impl FittedSet<'_> {
     /// Returns the estimation problem, with the nominal rates of the baseline.
     pub fn estimation(&self, nominal: &[f64]) -> Estimation<'_> {
-        estimation(self.fit.subject, &self.fit, &self.variant, &self.added, nominal)
+        estimation(self.fit.subject, &self.fit, &self.variant, &self.added, nominal, &self.least_squares.point)
     }
 
     /// Returns the fit under an error model.
@@ -86,18 +86,53 @@ impl FittedSet<'_> {
         most + math::ln(sum / count)
     }
 
+    /// Returns by how much correlated errors are likelier than white noise of fitted size, nats: what shows that the model still
+    /// lacks something. `None` if the set cannot be simulated or no error model could be fitted.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn lack_of_fit(&self) -> Option<f64> {
+        let (_, likeliest) = self.likeliest()?;
+        let channels = Channels::new(&self.fit.pieces);
+        let mut sums = vec![(0.0, 0.0); channels.count];
+        for (index, (piece, residuals)) in
+            self.fit.pieces.iter().zip(self.fit.all(&self.least_squares.point)?).enumerate()
+        {
+            let mut rest = residuals.as_slice();
+            for (k, series) in piece.series.iter().enumerate() {
+                let (own, others) = rest.split_at(series.times.len());
+                let sum = &mut sums[channels.of(index, k)];
+                *sum = (sum.0 + own.iter().map(|r| r * r).sum::<f64>(), sum.1 + own.len() as f64);
+                rest = others;
+            }
+        }
+        let of = |(square, count): (f64, f64)| -0.5 * count * (math::ln(std::f64::consts::TAU * square / count) + 1.0);
+        Some(likeliest.log_likelihood - sums.into_iter().filter(|sum| sum.1 > 0.0).map(of).sum::<f64>())
+    }
+
+    /// Returns the largest root mean square error of a record by least squares, in noises.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn largest_error(&self) -> Option<f64> {
+        let all = self.fit.all(&self.least_squares.point)?;
+        let of = |r: &Vec<f64>| (r.iter().map(|r| r * r).sum::<f64>() / r.len().max(1) as f64).sqrt();
+        Some(all.iter().map(of).fold(0.0, f64::max))
+    }
+
     /// Returns the values of the set at a point, to start another fit from.
     pub fn start_at(&self, point: &Point) -> Start {
-        let mut added = self.added.clone();
-        for (index, effect) in added.iter_mut().enumerate() {
-            effect.take(index, &self.variant, &self.fit, point);
-        }
-        let declared = |(values, piece): (&Vec<f64>, &crate::fit::Piece)| {
-            values[..self.fit.subject.measurements[piece.measurement].locals.len()].to_vec()
-        };
-        let locals = point.locals.iter().zip(&self.fit.pieces).map(declared).collect();
-        Start { tuners: point.globals[..self.fit.subject.globals.len()].to_vec(), locals, added }
+        start_at(&self.added, &self.fit, &self.variant, point)
     }
+}
+
+/// Returns the values of a set of effects at a point of its fit, to start another fit from.
+pub fn start_at(added: &[Added], fit: &Fit<'_>, variant: &Variant, point: &Point) -> Start {
+    let mut added = added.to_vec();
+    for (index, effect) in added.iter_mut().enumerate() {
+        effect.take(index, variant, fit, point);
+    }
+    let declared = |(values, piece): (&Vec<f64>, &crate::fit::Piece)| {
+        values[..fit.subject.measurements[piece.measurement].locals.len()].to_vec()
+    };
+    let locals = point.locals.iter().zip(&fit.pieces).map(declared).collect();
+    Start { tuners: point.globals[..fit.subject.globals.len()].to_vec(), locals, added }
 }
 
 /// Returns the logarithm of the evidence of an estimate.
@@ -105,20 +140,21 @@ pub fn evidence(estimate: &Estimate) -> f64 {
     estimate.log_evidence.unwrap_or(f64::NEG_INFINITY)
 }
 
-/// Returns the estimation problem of a fit.
+/// Returns the estimation problem of a fit near a point.
 pub fn estimation<'e>(
     subject: &Subject,
     fit: &'e Fit<'e>,
     variant: &'e Variant,
     added: &[Added],
     nominal: &[f64],
+    near: &Point,
 ) -> Estimation<'e> {
     Estimation {
         fit,
         model: &variant.model,
         channels: Channels::new(&fit.pieces),
         nominal: nominal.to_vec(),
-        priors: priors(subject, fit, variant, added),
+        priors: priors(subject, fit, variant, added, near),
         log_choices: log_choices(added),
     }
 }

@@ -29,6 +29,7 @@ const BEGINNING: f64 = 0.6;
 pub struct Forecasts {
     kinds: Vec<Forecast>,
     known: HashMap<(Key, Forecast), Option<f64>>,
+    passed: HashMap<Key, bool>,
 }
 
 impl Forecasts {
@@ -38,7 +39,7 @@ impl Forecasts {
             true => vec![Forecast::LeastSquares, Forecast::SmoothOutput],
             false => vec![Forecast::RunOn],
         };
-        Self { kinds, known: HashMap::new() }
+        Self { kinds, known: HashMap::new(), passed: HashMap::new() }
     }
 
     /// Returns true if other records are forecast.
@@ -49,14 +50,21 @@ impl Forecasts {
     /// Returns true if a set forecasts better than the declared model and than every set with one effect less, with the
     /// parameters of each kind.
     pub fn passes(&mut self, search: &mut Search<'_, '_>, key: &Key) -> bool {
-        Self::rivals(key).into_iter().all(|rival| {
+        let passes = Self::rivals(key).into_iter().all(|rival| {
             search.ensure(&rival)
                 && self.kinds.clone().into_iter().all(|kind| {
                     let own = self.error(search, key, kind);
                     let theirs = self.error(search, &rival, kind);
                     own.is_some_and(|own| theirs.is_none_or(|theirs| own < theirs))
                 })
-        })
+        });
+        self.passed.insert(key.clone(), passes);
+        passes
+    }
+
+    /// Returns whether a set passes, if it was tested.
+    pub fn passed(&self, key: &Key) -> Option<bool> {
+        self.passed.get(key).copied()
     }
 
     /// Returns the smallest share of the mean square error above noise of a set with one effect less that a set removes.
@@ -115,7 +123,7 @@ pub fn free_run(set: &FittedSet<'_>, point: &Point, pieces: Vec<Piece>) -> Optio
     for (global, value) in fit.globals.iter_mut().zip(&mut point.globals) {
         global.bounds = [*value; 2];
     }
-    let found = estimation(subject, &fit, &variant, &start.added, &[]).least_squares(point)?;
+    let found = estimation(subject, &fit, &variant, &start.added, &[], &point).least_squares(point)?;
     let residuals = fit.all(&found.point)?;
     mean_square(residuals.iter().flatten().copied())
 }
@@ -132,7 +140,7 @@ fn run_on(set: &FittedSet<'_>) -> Option<f64> {
         }
         piece.horizon = end;
     }
-    let fitted = estimation(set.fit.subject, &beginning, &set.variant, &set.added, &[])
+    let fitted = estimation(set.fit.subject, &beginning, &set.variant, &set.added, &[], &set.least_squares.point)
         .least_squares(set.least_squares.point.clone())?;
     let mut errors = Vec::new();
     for ((index, piece), end) in set.fit.pieces.iter().enumerate().zip(&ends) {

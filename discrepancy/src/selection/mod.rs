@@ -1,5 +1,6 @@
 //! Which effects a model lacks: sets of effects, fitted under the error models, compared by evidence and by forecast.
 
+mod baseline;
 mod coverage;
 mod fitted_set;
 mod forecast;
@@ -12,4 +13,4 @@ mod tests;
 mod verdict;
 
 pub use report::{Selection, SetFit, SetOfEffects, compare, select};
-pub use verdict::{Entry, Verdict};
+pub use verdict::{Conclusion, Entry, Stated, Verdict};

@@ -3,7 +3,7 @@
 use mops_core::{Role, math};
 use rayon::prelude::*;
 
-use super::fitted_set::{FittedSet, Key, Start, evidence};
+use super::fitted_set::{FittedSet, Key, Start, evidence, start_at};
 use crate::base;
 use crate::candidate::Candidate;
 use crate::estimation::{ErrorModel, Errors, Estimate, Estimation};
@@ -27,20 +27,30 @@ pub struct Refit<'a> {
 /// Iterations of a first look at a start.
 const LOOK: usize = 5;
 
-/// Iterations under given hyperparameters.
-const RANKED: usize = 12;
+/// Starts that are fitted; of more the likeliest ones are.
+const NEAREST: usize = 3;
 
 /// Distance of two optima in standard errors from which each is a start for the other's error model.
 const APART: f64 = 0.5;
 
 /// Evidence, nats, below the best from which a set is not fitted under the force error.
-const HOPELESS: f64 = 15.0;
+pub const HOPELESS: f64 = 15.0;
 
 /// Decrease of log-likelihood, nats, from which a set fits worse than one that it contains.
 const WORSE: f64 = 0.5;
 
 /// Share of its strength with which an effect is added to the optimum of a set that contains it not.
 const FAINT: f64 = 0.05;
+
+/// Set of effects that was fitted roughly under given hyperparameters.
+pub struct Rough {
+    /// Where the fit ended.
+    pub start: Start,
+    /// Log-likelihood there.
+    pub log_likelihood: f64,
+    /// Logarithm of the evidence for these hyperparameters.
+    pub log_evidence: f64,
+}
 
 impl<'a> Refit<'a> {
     fn calibration(&self) -> Vec<Piece> {
@@ -63,20 +73,45 @@ impl<'a> Refit<'a> {
         let Start { tuners, locals, added } = start;
         let pieces = self.calibration();
         let (fit, point, variant) = problem(self.subject, added, pieces, tuners, locals.clone(), &[], self.simulations);
-        let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, added, &[]);
+        let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, added, &[], &point);
         let least_squares = estimation.with(&Errors::White, point, iterations)?;
         Some(FittedSet { key: key.clone(), added: added.clone(), fit, variant, least_squares, under: Vec::new() })
     }
 
-    /// Returns the logarithm of the evidence of a set under error models at the outputs whose hyperparameters are given, the
-    /// largest of those.
-    pub fn rank(&self, set: &FittedSet<'a>, errors: &[Errors]) -> f64 {
-        let estimation = set.estimation(&[]);
-        let of = |errors: &Errors| {
-            let found = estimation.with(errors, set.least_squares.point.clone(), RANKED);
-            found.map_or(f64::NEG_INFINITY, |found| evidence(&found))
+    /// Fits a set roughly under an error model at the outputs whose hyperparameters are given, from the likeliest of the starts;
+    /// `None` if all fail. Gives up where the log-likelihood cannot become as large as `least`.
+    pub fn roughly(&self, starts: &[Start], errors: &Errors, least: f64) -> Option<Rough> {
+        let mut looks: Vec<(f64, usize)> = Vec::new();
+        if starts.len() > NEAREST {
+            let of = |start: &Start| self.with(start, |estimation, point| estimation.with(errors, point, 0));
+            let found: Vec<Option<(Start, Estimate)>> = starts.par_iter().map(of).collect();
+            let found = found.iter().enumerate();
+            looks.extend(found.filter_map(|(k, found)| Some((found.as_ref()?.1.log_likelihood, k))));
+            looks.sort_by(|a, b| b.0.total_cmp(&a.0));
+            looks.truncate(NEAREST);
+        } else {
+            looks.extend((0..starts.len()).map(|k| (0.0, k)));
+        }
+        let fitted = |&(_, k): &(f64, usize)| {
+            self.with(&starts[k], |estimation, point| estimation.roughly(errors, point, least))
         };
-        errors.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
+        let all = looks.par_iter().filter_map(fitted).collect::<Vec<(Start, Estimate)>>();
+        let best = all.into_iter().max_by(|a, b| evidence(&a.1).total_cmp(&evidence(&b.1)))?;
+        Some(Rough { log_likelihood: best.1.log_likelihood, log_evidence: evidence(&best.1), start: best.0 })
+    }
+
+    /// Estimates the unknowns of a set from a start; returns its values as another start, and the estimate.
+    fn with(
+        &self,
+        start: &Start,
+        estimate: impl Fn(&Estimation<'_>, Point) -> Option<Estimate>,
+    ) -> Option<(Start, Estimate)> {
+        let Start { tuners, locals, added } = start;
+        let pieces = self.calibration();
+        let (fit, point, variant) = problem(self.subject, added, pieces, tuners, locals.clone(), &[], self.simulations);
+        let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, added, &[], &point);
+        let found = estimate(&estimation, point)?;
+        Some((start_at(added, &fit, &variant, &found.point), found))
     }
 
     /// Fits a set under all error models, from its optimum by least squares and from those of the other error models, and makes
@@ -106,9 +141,11 @@ impl<'a> Refit<'a> {
         let advantage =
             |nested: &&FittedSet<'a>| Some(evidence(nested.estimate(ErrorModel::Force)?) - at_output(&nested.under));
         let advantage = nested.iter().filter_map(advantage).fold(0.0, f64::max);
-        if at_output(&first) + advantage > best - HOPELESS {
-            first.extend(from(ErrorModel::Force, &near, errors_of(ErrorModel::Force)));
+        if at_output(&first) + advantage <= best - HOPELESS {
+            set.under = first;
+            return;
         }
+        first.extend(from(ErrorModel::Force, &near, errors_of(ErrorModel::Force)));
         let best = |kind: ErrorModel| {
             let own = first.iter().find(|(of, _)| *of == kind).map(|(_, estimate)| estimate);
             let mut found: Vec<(ErrorModel, Estimate)> = Vec::new();

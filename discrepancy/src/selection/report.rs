@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use mops_core::{Effect, Role, Study, StudyError};
 
+use super::baseline::baseline;
 use super::coverage::is_covered;
-use super::fitted_set::{FittedSet, Key, Start, name};
+use super::fitted_set::{FittedSet, Key, name};
 use super::forecast::{Forecasts, free_run};
 use super::refit::Refit;
 use super::search::Search;
@@ -30,7 +31,8 @@ pub struct SetOfEffects {
     pub log_evidence: f64,
     /// Logarithm of the posterior probability, relative to the declared model.
     pub log_odds: f64,
-    /// True if the set forecasts records of role selection better than the declared model and every set with one effect less.
+    /// True if the set forecasts records of role selection better than the declared model and every set with one effect less;
+    /// `None` if that was not tested.
     pub forecasts: Option<bool>,
     /// True if an effect of the set does nothing under every error model.
     pub is_inert: bool,
@@ -126,9 +128,8 @@ fn with_search(
     let subject = Subject::new(study)?;
     let simulations = Meter::new(&());
     let failed = || StudyError::here("the model cannot be simulated near its initial guesses");
-    let baseline = base::fit(&subject, study.seed(), &simulations).ok_or_else(failed)?;
-    subject.take_pace(&baseline.point.globals);
-    let start = Start { tuners: baseline.point.globals, locals: baseline.point.locals, added: Vec::new() };
+    let start = baseline(&subject, &simulations).ok_or_else(failed)?;
+    subject.take_pace(&start.tuners);
     let mut refit = Refit {
         subject: &subject,
         candidates: subject.candidates(effects),
@@ -148,15 +149,13 @@ fn with_search(
     let mut forecasts = Forecasts::new(subject.measurements.iter().any(|m| m.role == Role::Selection));
     let verdict = decide(&mut search, &mut forecasts);
     let keys: Vec<Key> = search.sets.iter().map(|set| set.key.clone()).take(SHOWN).collect();
-    let passes: Vec<Option<bool>> =
-        keys.iter().map(|key| (!key.is_empty()).then(|| forecasts.passes(&mut search, key))).collect();
     let declared = search.log_posterior(search.get(&Vec::new()).expect("it was fitted first"));
     // All is computed of the declared model and of the first sets.
-    let shown = keys.iter().zip(passes).enumerate().filter_map(|(rank, (key, passes))| {
+    let shown = keys.iter().enumerate().filter_map(|(rank, key)| {
         let set = search.get(key)?;
         Some(SetOfEffects {
             log_odds: search.log_posterior(set) - declared,
-            forecasts: passes,
+            forecasts: forecasts.passed(key),
             is_inert: search.is_inert(set),
             ..shown(&subject, set, &refit.nominal, rank < IN_FULL || key.is_empty() || *key == verdict.set)
         })

@@ -3,11 +3,13 @@
 use mops_core::EffectClass;
 use rayon::prelude::*;
 
-use super::fitted_set::{FittedSet, Key};
-use super::refit::{Refit, price};
+use super::fitted_set::{FittedSet, Key, Start, evidence};
+use super::refit::{HOPELESS, Refit, Rough, price};
 use super::screening::{Scene, Screened, pair_gain};
 use crate::candidate::Candidate;
-use crate::estimation::{ErrorModel, Errors};
+use crate::estimation::{ErrorModel, Errors, Estimate};
+use crate::fit::Point;
+use crate::variant::Added;
 
 /// Candidates that are fitted after a screening: the best by gain under the correlated error models, and by gain in white noise.
 const SINGLES: usize = 8;
@@ -20,9 +22,15 @@ const PAIRS: usize = 10;
 /// Sets of an expansion that are fitted under all error models: single effects, pairs.
 const FULL: [usize; 2] = [4, 3];
 
-/// Effects of the same class at the same place that are fitted in place of one, and of them under all error models.
+/// Gain of correlated errors over white noise in log-likelihood, nats, from which a model lacks something. Basis: 1 % of the
+/// chi-squared distribution with two degrees of freedom is beyond 2 x 4.6; half of it for the two parameters of an error model.
+pub const SIGNIFICANT: f64 = 3.0;
+
+/// Sets that are fitted roughly at a time.
+const AT_A_TIME: usize = 4;
+
+/// Effects of the same class at the same place that are fitted in place of one.
 const SWAPS: usize = 8;
-const FULL_SWAPS: usize = 2;
 
 /// Gain in log-likelihood, nats, that a pair must bring for each of its parameters beyond two to be fitted before another one.
 const PER_PARAMETER: f64 = 3.0;
@@ -71,6 +79,10 @@ impl<'r, 'a> Search<'r, 'a> {
                 is_promising && set.key.len() < self.most && !expanded.contains(&self.kinds_of(&set.key))
             });
             let Some(key) = best.map(|set| set.key.clone()) else { break };
+            // Effects are added to the declared model in any case, and then as long as something is lacking.
+            if !key.is_empty() && !self.sets.first().is_some_and(lacks_something) {
+                break;
+            }
             self.expand(&key);
             expanded.push(self.kinds_of(&key));
         }
@@ -139,7 +151,10 @@ impl<'r, 'a> Search<'r, 'a> {
         let mut singles: Vec<&Screened> = paying().take(SINGLES).collect();
         let mut raw: Vec<&Screened> = if key.is_empty() { screened.iter().collect() } else { paying().collect() };
         raw.sort_by(|a, b| b.gains[0].total_cmp(&a.gains[0]));
-        for other in raw.into_iter().take(RAW) {
+        // Where correlated errors take up whatever is missing, the gain in white noise is what there is.
+        let is_missed = key.is_empty() && lacks_something(&parent);
+        let others = RAW + if is_missed { SINGLES.saturating_sub(singles.len()) } else { 0 };
+        for other in raw.into_iter().take(others) {
             if singles.iter().all(|single| single.index != other.index) {
                 singles.push(other);
             }
@@ -147,11 +162,15 @@ impl<'r, 'a> Search<'r, 'a> {
         let singles: Vec<Vec<&Screened>> = singles.into_iter().map(|single| vec![single]).collect();
         let best = screened.first().map_or(0.0, Screened::correlated);
         let pairs = if key.len() + 2 <= self.most { pairs(&screened, all) } else { Vec::new() };
-        let pairs = pairs.into_iter().filter(|(gain, _)| pays(gain - best)).map(|(_, pair)| pair).collect();
-        for (new, full) in [singles, pairs].into_iter().zip(FULL) {
-            self.fit_best(&parent, new, &errors, full);
-        }
+        let pairs: Vec<Vec<&Screened>> =
+            pairs.into_iter().filter(|(gain, _)| pays(gain - best)).map(|(_, pair)| pair).collect();
+        self.fit_best(&parent, &singles, FULL[0]);
         self.sort();
+        // Where a set is found that lacks nothing, no pair is needed.
+        if !pairs.is_empty() && self.sets.first().is_some_and(lacks_something) {
+            self.fit_best(&parent, &pairs, FULL[1]);
+            self.sort();
+        }
         // What no longer pays goes.
         let Some(first) = self.sets.first().map(|set| set.key.clone()) else { return };
         for k in 0..first.len() {
@@ -161,7 +180,6 @@ impl<'r, 'a> Search<'r, 'a> {
 
     /// Fits the sets in which an effect is exchanged for another of its class at its place.
     fn swap(&mut self, key: &Key) {
-        let Some(errors) = self.get(key).map(output_errors) else { return };
         for k in 0..key.len() {
             let smaller = without(key, k);
             if !self.ensure(&smaller) {
@@ -174,52 +192,85 @@ impl<'r, 'a> Search<'r, 'a> {
                 this.effect.class() == other.effect.class() && this.port == other.port && !key.contains(&index)
             };
             let fits = |&index: &usize| parent.added.iter().all(|added| can_be_together(&added.candidate, &all[index]));
-            let wanted: Vec<usize> = (0..all.len()).filter(alike).filter(fits).collect();
+            let is_new = |index: &usize| self.get(&with(&smaller, *index)).is_none();
+            let others: Vec<usize> = (0..all.len()).filter(alike).filter(fits).filter(is_new).collect();
+            let wanted = with(&others, key[k]);
             let known = output_errors(&parent);
             let Some(scene) = Scene::new(&parent, &known) else { continue };
             let screened = scene.screen(all, &wanted);
-            let singles = screened.iter().take(SWAPS).map(|single| vec![single]).collect();
-            self.fit_best(&parent, singles, &errors, FULL_SWAPS);
+            // Where first order foretells what the effect gains, it foretells what the others would.
+            let [white, correlated] = self.get(key).map_or([0.0; 2], |set| gains(set, &parent));
+            let own = screened.iter().find(|own| own.index == key[k]);
+            let is_foretold = own.is_some_and(|own| ALLOWANCE * own.gains[0] > white);
+            let is_near = |single: &&Screened| {
+                let pays = || ALLOWANCE * single.correlated() > correlated - HOPELESS;
+                single.index != key[k] && (!is_foretold || ALLOWANCE * single.gains[0] > white - HOPELESS || pays())
+            };
+            // Error models of their own decide, not those of the set, which are narrow around it.
+            let fitted = |single: &&Screened| {
+                let new = [*single];
+                let mut from = starts(&parent, &parent.least_squares.point, &new);
+                if let Some(likelier) = likelier_output(&parent) {
+                    from.extend(starts(&parent, &likelier.point, &new).into_iter().take(1));
+                }
+                let rough = self.refit.roughly(&from, &Errors::White, f64::NEG_INFINITY)?;
+                self.refit.least_squares(&larger(&parent, &new), &[rough.start])
+            };
+            let near: Vec<&Screened> = screened.iter().filter(is_near).take(SWAPS).collect();
+            let sets: Vec<FittedSet<'a>> = near.par_iter().filter_map(fitted).collect();
+            sets.into_iter().for_each(|set| self.add(set));
         }
         self.sort();
     }
 
-    /// Fits sets with more effects by least squares, and those of highest evidence under given errors under all error models.
-    fn fit_best(&mut self, parent: &FittedSet<'a>, new: Vec<Vec<&Screened>>, errors: &[Errors], full: usize) {
-        let fitted = |new: &Vec<&Screened>| {
-            let set = self.larger(parent, new)?;
-            Some((self.refit.rank(&set, &errors[1..]), set))
+    /// Fits sets with more effects roughly, by least squares and under the likelier output error of their parent, then those of
+    /// highest evidence under all error models.
+    fn fit_best(&mut self, parent: &FittedSet<'a>, new: &[Vec<&Screened>], full: usize) {
+        let unknown = |new: &&Vec<&Screened>| self.get(&larger(parent, new)).is_none();
+        let new: Vec<&Vec<&Screened>> = new.iter().filter(unknown).collect();
+        let Some(given) = likelier_output(parent) else { return };
+        // What does not pay is not worth it, but on the declared model a few are tried whatever is expected of them.
+        let least = if parent.key.is_empty() {
+            f64::NEG_INFINITY
+        } else {
+            let added = new.first().map_or(0, |new| new.len());
+            #[allow(clippy::cast_precision_loss)]
+            let price = added as f64 * price(kinds(&self.refit.candidates));
+            let parent = self.refit.roughly(&[parent.start_at(&given.point)], &given.errors, f64::NEG_INFINITY);
+            parent.map_or(f64::NEG_INFINITY, |parent| parent.log_evidence + price / ALLOWANCE)
         };
-        let mut ranked: Vec<(f64, FittedSet<'a>)> = new.par_iter().filter_map(fitted).collect();
-        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        for (_, set) in ranked.into_iter().take(full) {
-            self.add(set);
+        let mut trials: Vec<Trial> = Vec::new();
+        // In groups, as what others have reached tells what is hopeless.
+        for group in new.chunks(AT_A_TIME) {
+            let best = trials.iter().map(|trial| trial.rough.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
+            let of = |new: &&Vec<&Screened>| {
+                let mut begin: Vec<Start> = starts(parent, &given.point, new).into_iter().take(1).collect();
+                let mut by_squares = starts(parent, &parent.least_squares.point, new);
+                by_squares.extend(begin.iter().cloned());
+                let by_squares = self.refit.roughly(&by_squares, &Errors::White, f64::NEG_INFINITY)?;
+                begin.push(by_squares.start.clone());
+                let rough = self.refit.roughly(&begin, &given.errors, best - HOPELESS)?;
+                Some(Trial { key: larger(parent, new), by_squares, rough })
+            };
+            let found: Vec<Option<Trial>> = group.par_iter().map(of).collect();
+            trials.extend(found.into_iter().flatten());
         }
-    }
-
-    /// Fits a set by least squares that has more effects than another.
-    fn larger(&self, parent: &FittedSet<'a>, new: &[&Screened]) -> Option<FittedSet<'a>> {
-        let mut key = parent.key.clone();
-        key.extend(new.iter().map(|new| new.index));
-        key.sort_unstable();
-        if self.get(&key).is_some() {
-            return None;
+        let best = trials.iter().map(|trial| trial.rough.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+        let least = least.max(best - HOPELESS);
+        trials.sort_by(|a, b| b.rough.log_evidence.total_cmp(&a.rough.log_evidence));
+        let worth = trials.iter().take_while(|trial| trial.rough.log_evidence > least).count().min(full);
+        let mut rest = trials.split_off(worth);
+        if parent.key.is_empty() {
+            // Correlated errors may take up what is missing; squares cannot.
+            rest.sort_by(|a, b| b.by_squares.log_evidence.total_cmp(&a.by_squares.log_evidence));
+            let leading = trials.iter().map(|trial| trial.by_squares.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+            trials.extend(rest.into_iter().take(RAW).filter(|trial| trial.by_squares.log_evidence > leading));
         }
-        let least_squares = parent.start_at(&parent.least_squares.point);
-        let mut starts = Vec::new();
-        let [first, rest @ ..] = new else { return None };
-        let with_rest =
-            |start: super::fitted_set::Start| rest.iter().fold(start, |start, new| start.with(&new.guesses[0]));
-        for guess in &first.guesses {
-            starts.push(with_rest(least_squares.with(guess)));
-            if rest.is_empty() {
-                starts.extend(guess.restarts().iter().map(|again| least_squares.with(again)));
-            }
-        }
-        for (_, estimate) in parent.under.iter().filter(|(kind, _)| *kind == ErrorModel::SmoothOutput) {
-            starts.push(with_rest(parent.start_at(&estimate.point).with(&first.guesses[0])));
-        }
-        self.refit.least_squares(&key, &starts)
+        let fitted = |Trial { key, by_squares, rough }: &Trial| {
+            self.refit.least_squares(key, &[by_squares.start.clone(), rough.start.clone()])
+        };
+        let sets: Vec<FittedSet<'a>> = trials.par_iter().filter_map(fitted).collect();
+        sets.into_iter().for_each(|set| self.add(set));
     }
 
     /// Fits a set from fitted ones with one effect less. Returns false if there are none, or the fits fail.
@@ -229,7 +280,11 @@ impl<'r, 'a> Search<'r, 'a> {
             let Some(parent) = self.get(&without(key, k)) else { continue };
             let Some(scene) = Scene::new(parent, &[Errors::White]) else { continue };
             for screened in scene.screen(&self.refit.candidates, &[key[k]]) {
-                let Some(set) = self.larger(parent, &[&screened]) else { continue };
+                let mut starts = starts(parent, &parent.least_squares.point, &[&screened]);
+                if let Some(smooth) = parent.estimate(ErrorModel::SmoothOutput) {
+                    starts.extend(self::starts(parent, &smooth.point, &[&screened]).into_iter().take(1));
+                }
+                let Some(set) = self.refit.least_squares(key, &starts) else { continue };
                 let log = |set: &FittedSet<'a>| set.least_squares.log_likelihood;
                 if best.as_ref().is_none_or(|best| log(&set) > log(best)) {
                     best = Some(set);
@@ -288,6 +343,52 @@ impl<'r, 'a> Search<'r, 'a> {
         keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
         self.sets = keyed.into_iter().map(|(_, set)| set).collect();
     }
+}
+
+/// Set that was fitted roughly, by least squares and under an error model.
+struct Trial {
+    key: Key,
+    by_squares: Rough,
+    rough: Rough,
+}
+
+/// Returns the fit of a set under the output error under which it has more evidence.
+fn likelier_output<'s>(set: &'s FittedSet<'_>) -> Option<&'s Estimate> {
+    let outputs = set.under.iter().filter(|(kind, _)| *kind != ErrorModel::Force);
+    outputs.map(|(_, estimate)| estimate).max_by(|a, b| evidence(a).total_cmp(&evidence(b)))
+}
+
+/// Returns by how much a set is likelier than another one in white noise, and under the likelier error model of each at the
+/// outputs, nats.
+fn gains(set: &FittedSet<'_>, smaller: &FittedSet<'_>) -> [f64; 2] {
+    let log = |set| likelier_output(set).map_or(f64::NEG_INFINITY, |estimate| estimate.log_likelihood);
+    [set.least_squares.log_likelihood - smaller.least_squares.log_likelihood, log(set) - log(smaller)]
+}
+
+/// Returns true if correlated errors are significantly likelier than white noise at the optimum of a set.
+fn lacks_something(set: &FittedSet<'_>) -> bool {
+    set.lack_of_fit().is_none_or(|nats| nats > SIGNIFICANT)
+}
+
+/// Returns a set with one more candidate.
+fn with(key: &Key, index: usize) -> Key {
+    let mut larger = key.clone();
+    larger.push(index);
+    larger.sort_unstable();
+    larger
+}
+
+/// Returns the candidates of a set with further ones.
+fn larger(parent: &FittedSet<'_>, new: &[&Screened]) -> Key {
+    new.iter().fold(parent.key.clone(), |key, new| with(&key, new.index))
+}
+
+/// Returns a set at a point with further effects: the first of them at each of its guesses, the others at their best.
+fn starts(parent: &FittedSet<'_>, at: &Point, new: &[&Screened]) -> Vec<Start> {
+    let [first, rest @ ..] = new else { return Vec::new() };
+    let known = rest.iter().fold(parent.start_at(at), |start, new| start.with(&new.guesses[0]));
+    let again = first.guesses.iter().filter(|_| rest.is_empty()).flat_map(Added::restarts);
+    first.guesses.iter().cloned().chain(again).map(|guess| known.with(&guess)).collect()
 }
 
 /// Returns white noise, and the error models of a set at the outputs.

@@ -2,8 +2,11 @@
 
 use mops_core::{Hold, Input, Role, math};
 
-use super::{Selection, compare, select};
+use super::baseline::baseline;
+use super::{Conclusion, Selection, compare, select};
 use crate::estimation::ErrorModel;
+use crate::meter::Meter;
+use crate::subject::Subject;
 use crate::testing::{Record, catalogue, integrated, study, subject, white};
 
 const OSCILLATOR: &str = r#"
@@ -30,7 +33,7 @@ const STEP: f64 = 0.05;
 const COUNT: usize = 300;
 
 /// Oscillator with a further force, driven by two sines, measured with white noise and an error that is correlated over 0.5 s.
-fn selected(force: fn(x: f64, v: f64) -> f64, correlated: f64, roles: &[Role]) -> Selection {
+fn recorded(force: fn(x: f64, v: f64) -> f64, correlated: f64, roles: &[Role], start: &[f64; 4]) -> Subject {
     let record = |number: usize| {
         #[allow(clippy::cast_precision_loss)]
         let drive = |t: f64| {
@@ -55,11 +58,25 @@ fn selected(force: fn(x: f64, v: f64) -> f64, correlated: f64, roles: &[Role]) -
         };
         Record { inputs: vec![("u", input)], signals: vec![("x", values.collect(), NOISE)], times }
     };
-    let mut subject = subject(OSCILLATOR, &[0.2, 5.0, 0.4, 0.1], 2, (0..roles.len()).map(record).collect());
+    let mut subject = subject(OSCILLATOR, start, 2, (0..roles.len()).map(record).collect());
     for (measurement, role) in subject.measurements.iter_mut().zip(roles) {
         measurement.role = *role;
     }
+    subject
+}
+
+fn selected(force: fn(x: f64, v: f64) -> f64, correlated: f64, roles: &[Role]) -> Selection {
+    let subject = recorded(force, correlated, roles, &[0.2, 5.0, 0.4, 0.1]);
     select(&study(&subject), &catalogue(&TRIED)).expect("it simulates")
+}
+
+#[test]
+fn the_baseline_is_found_from_a_start_that_is_far_off() {
+    // A stiffness of 40 N/m oscillates three times as fast: the record of 15 s has many local minima in between.
+    let subject = recorded(|_, _| 0.0, 0.0, &BOTH[..1], &[3.0, 40.0, -0.4, 0.1]);
+    let found = baseline(&subject, &Meter::new(&())).expect("it simulates");
+    // Data of the drawn record hold 0.3 N s/m and 4 N/m; the noise leaves them uncertain by less than 1 %.
+    assert!((found.tuners[0] - 0.3).abs() < 0.01 && (found.tuners[1] - 4.0).abs() < 0.02, "{:?}", found.tuners);
 }
 
 const BOTH: [Role; 2] = [Role::Calibration, Role::Selection];
@@ -73,28 +90,35 @@ fn a_missing_effect_is_claimed_by_class_and_place() {
     let found = selected(spring, 0.0, &BOTH);
     assert_eq!(found.found, ["cubic-stiffness@joint:x"]);
     let verdict = &found.verdict;
-    let (entry, probability) = &verdict.entries[0];
+    let stated = &verdict.stated[0];
     assert!(
-        verdict.is_effect && verdict.is_first && entry.class == "elastic" && entry.place == "joint:x",
+        verdict.conclusion == Conclusion::Effect
+            && verdict.is_first
+            && stated.is_claimed
+            && stated.entry.class == "elastic"
+            && stated.entry.place == "joint:x",
         "{verdict:?}"
     );
-    assert!((0.9..=0.95).contains(probability) && verdict.share.is_some_and(|share| share > 0.99), "{verdict:?}");
+    assert!(
+        (0.9..=0.95).contains(&stated.probability) && verdict.share.is_some_and(|share| share > 0.99),
+        "{verdict:?}"
+    );
     let curve = verdict.declared[0].as_ref().expect("the joint moves");
     assert!(curve.coordinate == "position at joint:x" && curve.gain > 20.0, "{curve:?}");
     assert!(verdict.remaining.as_ref().is_some_and(|curve| curve.gain < 3.0), "{verdict:?}");
 }
 
 #[test]
-fn where_nothing_is_missing_nothing_is_claimed() {
-    for correlated in [0.0, 6.0 * NOISE] {
+fn where_nothing_is_missing_nothing_is_claimed_and_what_is_correlated_stays_unexplained() {
+    for (correlated, expected) in [(0.0, Conclusion::None), (6.0 * NOISE, Conclusion::Unexplained)] {
         let found = selected(|_, _| 0.0, correlated, &BOTH);
-        assert!(!found.verdict.is_effect && found.verdict.nothing > 0.9, "{correlated}: {:?}", found.verdict);
+        assert_eq!(found.verdict.conclusion, expected, "{correlated}: {:?}", found.verdict);
+        assert!(found.verdict.nothing > 0.9, "{correlated}: {:?}", found.verdict);
         assert!(
             found.verdict.declared[0].as_ref().is_none_or(|curve| curve.gain < 6.0),
             "{:?}",
             found.verdict.declared
         );
-        assert_eq!(found.verdict.lack_of_fit > 6.0, correlated > 0.0, "{}", found.verdict.lack_of_fit);
     }
 }
 
@@ -102,7 +126,7 @@ fn where_nothing_is_missing_nothing_is_claimed() {
 fn without_another_record_the_end_of_the_same_one_decides() {
     let found = selected(spring, 2.0 * NOISE, &BOTH[..1]);
     assert!(
-        found.verdict.is_effect && found.found == ["cubic-stiffness@joint:x"],
+        found.verdict.conclusion == Conclusion::Effect && found.found == ["cubic-stiffness@joint:x"],
         "{:?} {:?}",
         found.found,
         found.verdict
@@ -137,7 +161,7 @@ fn no_set_fits_worse_than_one_that_it_contains() {
             }
         }
     }
-    assert!(compared > 8, "{compared}");
+    assert!(compared > 4, "{compared}");
 }
 
 #[test]

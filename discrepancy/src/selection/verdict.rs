@@ -6,7 +6,7 @@ use mops_core::math;
 
 use super::fitted_set::Key;
 use super::forecast::Forecasts;
-use super::search::Search;
+use super::search::{SIGNIFICANT, Search};
 use crate::candidate::Candidate;
 use crate::estimation::{ErrorModel, FreeCurve};
 
@@ -19,15 +19,37 @@ pub struct Entry {
     pub place: String,
 }
 
+/// What is told of the declared model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Conclusion {
+    /// Effects are missing, at least one of them of a class and at a place that are told.
+    Effect,
+    /// Something is missing that no set of effects explains well enough.
+    Unexplained,
+    /// Nothing is missing that the records show.
+    None,
+}
+
+/// Class and place of an effect of the set, with their posterior probability.
+#[derive(Debug, Clone)]
+pub struct Stated {
+    /// Class and place.
+    pub entry: Entry,
+    /// Posterior probability, with a share for what is in no catalogue.
+    pub probability: f64,
+    /// True if the probability suffices for a claim; otherwise the effect is a proposal.
+    pub is_claimed: bool,
+}
+
 /// Result of a selection.
 #[derive(Debug, Clone)]
 pub struct Verdict {
     /// The first set that passed; empty for the declared model.
     pub set: Key,
-    /// True if the effects of the set are claimed to be missing in the declared model.
-    pub is_effect: bool,
-    /// Class and place of its effects with the posterior probability of each.
-    pub entries: Vec<(Entry, f64)>,
+    /// What is told.
+    pub conclusion: Conclusion,
+    /// Class and place of the effects of the set.
+    pub stated: Vec<Stated>,
     /// Posterior probability of the declared model.
     pub nothing: f64,
     /// True if the set is the one of highest evidence.
@@ -38,8 +60,10 @@ pub struct Verdict {
     pub remaining: Option<FreeCurve>,
     /// Share of the error of the forecast above noise that the set removes.
     pub share: Option<f64>,
-    /// Gain of correlated errors over white noise in log-likelihood at the declared model, nats.
+    /// Gain of correlated errors over white noise of fitted size in log-likelihood at the declared model, nats.
     pub lack_of_fit: f64,
+    /// Largest root mean square error of a calibration record at the declared model, in noises.
+    pub largest_error: f64,
 }
 
 /// Gain of a curve in nats from which it fires.
@@ -50,6 +74,13 @@ const SMALL: f64 = 0.3;
 
 /// Share of the forecast error that a set must remove where a curve on top of it fires.
 const MOST: f64 = 0.8;
+
+/// Posterior probability from which class and place are claimed, and the most that is told where the set of highest evidence did
+/// not pass.
+const CLAIMED: f64 = 0.9;
+
+/// Error of a record, in noises, above which a significant lack of fit matters.
+const MATTERS: f64 = 1.1;
 
 /// Shares and probability that a set must have where only the ends of the calibration records are forecast.
 const RUN_ON: f64 = 0.8;
@@ -82,18 +113,20 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
     }
     let set = passed.first().cloned().unwrap_or_default();
     // Posterior over the declared model and all sets that passed.
-    let weight =
-        |key: &Key| math::exp(search.get(key).map_or(f64::NEG_INFINITY, |set| search.log_posterior(set)) - declared);
-    let total: f64 = 1.0 + passed.iter().map(weight).sum::<f64>();
+    let log = |key: &Key| search.get(key).map_or(f64::NEG_INFINITY, |set| search.log_posterior(set));
+    let most = passed.iter().map(log).fold(declared, f64::max);
+    let weight = |log: f64| math::exp(log - most);
+    let total: f64 = weight(declared) + passed.iter().map(|key| weight(log(key))).sum::<f64>();
     let mut by_entry: BTreeMap<Entry, f64> = BTreeMap::new();
     for key in &passed {
         let mut entries: Vec<Entry> = key.iter().map(|&k| entry(search, &search.refit.candidates[k])).collect();
         entries.sort();
         entries.dedup();
         for entry in entries {
-            *by_entry.entry(entry).or_default() += weight(key) / total;
+            *by_entry.entry(entry).or_default() += weight(log(key)) / total;
         }
     }
+    let nothing_probability = weight(declared) / total;
     let mut entries: Vec<Entry> = set.iter().map(|&k| entry(search, &search.refit.candidates[k])).collect();
     entries.sort();
     entries.dedup();
@@ -115,25 +148,38 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
     };
     let fires = remaining.as_ref().is_some_and(|curve| curve.gain >= FIRES && curve.gain >= SMALL * gained());
     let explains = !fires || share.is_some_and(|share| share >= MOST);
-    let is_claimed = if forecasts.are_of_other_records() {
-        true
-    } else {
-        is_first
-            && forecasts.share(search, &set).is_some_and(|share| share >= RUN_ON)
-            && entries.iter().any(|(_, probability)| *probability >= RUN_ON)
+    let least = if forecasts.are_of_other_records() { CLAIMED } else { RUN_ON };
+    let most = if is_first { 1.0 } else { CLAIMED };
+    let state = |(entry, probability): (Entry, f64)| Stated {
+        is_claimed: probability >= least,
+        probability: (probability * (1.0 - OTHER)).min(most),
+        entry,
     };
-    let white = search.get(&nothing).map_or(0.0, |set| set.least_squares.log_likelihood);
-    let correlated = search.get(&nothing).and_then(|set| set.likeliest()).map_or(white, |l| l.1.log_likelihood);
+    let stated: Vec<Stated> = entries.into_iter().map(state).collect();
+    let is_supported = forecasts.are_of_other_records()
+        || is_first && forecasts.share(search, &set).is_some_and(|share| share >= RUN_ON);
+    let is_effect = explains && is_supported && stated.iter().any(|stated| stated.is_claimed);
+    let declared_model = search.get(&nothing).expect("it was fitted first");
+    let lack_of_fit = declared_model.lack_of_fit().unwrap_or(f64::INFINITY);
+    let largest_error = declared_model.largest_error().unwrap_or(f64::INFINITY);
+    let conclusion = if is_effect {
+        Conclusion::Effect
+    } else if lack_of_fit > SIGNIFICANT && largest_error > MATTERS {
+        Conclusion::Unexplained
+    } else {
+        Conclusion::None
+    };
     Verdict {
-        is_effect: !set.is_empty() && explains && is_claimed,
-        entries: entries.into_iter().map(|(entry, p)| (entry, p * (1.0 - OTHER))).collect(),
-        nothing: 1.0 / total,
+        conclusion,
+        stated,
+        nothing: nothing_probability,
         set,
         is_first,
         declared: on_declared,
         remaining,
         share,
-        lack_of_fit: correlated - white,
+        lack_of_fit,
+        largest_error,
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use mops::discrepancy::estimation::{ErrorModel, Errors};
-use mops::discrepancy::selection::{Selection, SetFit, SetOfEffects, compare, select};
+use mops::discrepancy::selection::{Conclusion, Entry, Selection, SetFit, SetOfEffects, compare, select};
 use mops::terminal::{CommandError, print};
 use mops::{Catalogue, Diagnostic, Study};
 
@@ -37,15 +37,24 @@ pub(super) fn evidence(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
 /// Formats the verdict.
 fn verdict(selection: &Selection) -> String {
     let verdict = &selection.verdict;
-    let mut text = match (verdict.is_effect, verdict.set.is_empty()) {
-        (true, _) => format!("effect: {}\n", selection.found.join(" + ")),
-        (false, true) => "nothing claimed\n".to_owned(),
-        (false, false) => format!("nothing claimed; best description: {}\n", selection.found.join(" + ")),
+    let found = selection.found.join(" + ");
+    let mut text = match (verdict.conclusion, verdict.set.is_empty()) {
+        (Conclusion::Effect, _) => format!("effect: {found}\n"),
+        (Conclusion::Unexplained, true) => "unexplained\n".to_owned(),
+        (Conclusion::Unexplained, false) => format!("unexplained; best description: {found}\n"),
+        (Conclusion::None, true) => "none\n".to_owned(),
+        (Conclusion::None, false) => format!("none; best description: {found}\n"),
     };
-    for (entry, probability) in &verdict.entries {
-        let _ = writeln!(text, "  {} at {}: {:.3}", entry.class, entry.place, probability);
+    for stated in &verdict.stated {
+        let claimed = if stated.is_claimed { "" } else { ", not claimed" };
+        let Entry { class, place } = &stated.entry;
+        let _ = writeln!(text, "  {class} at {place}: {:.3}{claimed}", stated.probability);
     }
-    let _ = write!(text, "  declared model {:.3}; lack of fit {:.1} nats", verdict.nothing, verdict.lack_of_fit);
+    let _ = write!(
+        text,
+        "  declared model {:.3}; lack of fit {:.1} nats, largest error {:.2} noises",
+        verdict.nothing, verdict.lack_of_fit, verdict.largest_error
+    );
     if let Some(share) = verdict.share {
         let _ = write!(text, "; share of the forecast error {share:.3}");
     }
