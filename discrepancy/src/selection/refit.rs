@@ -10,7 +10,7 @@ use crate::estimation::{ErrorModel, Errors, Estimate, Estimation};
 use crate::fit::{Piece, Point};
 use crate::meter::Meter;
 use crate::subject::Subject;
-use crate::variant::problem;
+use crate::variant::{Variant, problem};
 
 /// Fits sets of effects to the calibration records.
 pub struct Refit<'a> {
@@ -83,35 +83,32 @@ impl<'a> Refit<'a> {
     pub fn roughly(&self, starts: &[Start], errors: &Errors, least: f64) -> Option<Rough> {
         let mut looks: Vec<(f64, usize)> = Vec::new();
         if starts.len() > NEAREST {
-            let of = |start: &Start| self.with(start, |estimation, point| estimation.with(errors, point, 0));
-            let found: Vec<Option<(Start, Estimate)>> = starts.par_iter().map(of).collect();
-            let found = found.iter().enumerate();
-            looks.extend(found.filter_map(|(k, found)| Some((found.as_ref()?.1.log_likelihood, k))));
+            let of = |start: &Start| self.at(start, |estimation, _, point| estimation.log_likelihood(errors, &point));
+            let found: Vec<Option<f64>> = starts.par_iter().map(of).collect();
+            looks.extend(found.into_iter().enumerate().filter_map(|(k, log)| Some((log?, k))));
             looks.sort_by(|a, b| b.0.total_cmp(&a.0));
             looks.truncate(NEAREST);
         } else {
             looks.extend((0..starts.len()).map(|k| (0.0, k)));
         }
         let fitted = |&(_, k): &(f64, usize)| {
-            self.with(&starts[k], |estimation, point| estimation.roughly(errors, point, least))
+            self.at(&starts[k], |estimation, variant, point| {
+                let found = estimation.roughly(errors, point, least)?;
+                Some((start_at(&starts[k].added, estimation.fit, variant, &found.point), found))
+            })
         };
         let all = looks.par_iter().filter_map(fitted).collect::<Vec<(Start, Estimate)>>();
         let best = all.into_iter().max_by(|a, b| evidence(&a.1).total_cmp(&evidence(&b.1)))?;
         Some(Rough { log_likelihood: best.1.log_likelihood, log_evidence: evidence(&best.1), start: best.0 })
     }
 
-    /// Estimates the unknowns of a set from a start; returns its values as another start, and the estimate.
-    fn with(
-        &self,
-        start: &Start,
-        estimate: impl Fn(&Estimation<'_>, Point) -> Option<Estimate>,
-    ) -> Option<(Start, Estimate)> {
+    /// Returns what is computed of the estimation problem of a set at a start.
+    fn at<T>(&self, start: &Start, compute: impl Fn(&Estimation<'_>, &Variant, Point) -> Option<T>) -> Option<T> {
         let Start { tuners, locals, added } = start;
         let pieces = self.calibration();
         let (fit, point, variant) = problem(self.subject, added, pieces, tuners, locals.clone(), &[], self.simulations);
         let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, added, &[], &point);
-        let found = estimate(&estimation, point)?;
-        Some((start_at(added, &fit, &variant, &found.point), found))
+        compute(&estimation, &variant, point)
     }
 
     /// Fits a set under all error models, from its optimum by least squares and from those of the other error models, and makes
