@@ -71,7 +71,14 @@ pub struct Subject {
     pub notes: Vec<String>,
     /// Steps that a simulation of the declared model takes in a second of its time, once that is calibrated.
     pub pace: OnceLock<f64>,
+    /// Relative tolerance that suffices for simulations, once told.
+    pub tolerance: OnceLock<f64>,
 }
+
+/// Error of a step of a simulation as a share of the noise, and the loosest relative tolerance. Basis: an assumption; an error of
+/// a few hundredths of the noise cannot be told from it.
+const EXACT: f64 = 0.03;
+const LOOSEST: f64 = 1e-5;
 
 impl Subject {
     /// Takes it from a study.
@@ -195,6 +202,7 @@ impl Subject {
             measurements,
             notes,
             pace: OnceLock::new(),
+            tolerance: OnceLock::new(),
         })
     }
 
@@ -219,6 +227,13 @@ impl Subject {
         };
         let fastest = self.measurements.iter().enumerate().filter_map(of).fold(0.0, f64::max);
         self.pace.get_or_init(|| fastest);
+    }
+
+    /// Lets simulations be as inexact as the noise of the most exact sensor allows, relative to its largest value.
+    pub fn take_tolerance(&self) {
+        let of = |s: &Series| s.noise / s.values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let finest = self.measurements.iter().flat_map(|m| &m.series).map(of).fold(f64::INFINITY, f64::min);
+        self.tolerance.get_or_init(|| (EXACT * finest).min(LOOSEST));
     }
 
     /// Start values of the global unknowns.

@@ -107,6 +107,7 @@ pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Recor
         measurements,
         notes: Vec::new(),
         pace: OnceLock::new(),
+        tolerance: OnceLock::new(),
     }
 }
 

@@ -132,7 +132,7 @@ impl Variant {
         let declared = subject.pace.get().map_or(0.0, |pace| pace * horizon);
         #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let limit = (FEW_STEPS + share * (STEPS_PER_SAMPLE * longest as f64 + TIMES_DECLARED * declared)) as usize;
-        let model = model.with_step_limit(limit);
+        let model = model.with_step_limit(limit).with_tolerance(subject.tolerance.get().copied().unwrap_or(0.0));
         let mut next = subject.model.interface().parameters.len();
         let mut first = Vec::new();
         for a in added {

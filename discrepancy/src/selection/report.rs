@@ -128,6 +128,7 @@ fn with_search(
     let subject = Subject::new(study)?;
     let simulations = Meter::new(&());
     let failed = || StudyError::here("the model cannot be simulated near its initial guesses");
+    subject.take_tolerance();
     let start = baseline(&subject, &simulations).ok_or_else(failed)?;
     subject.take_pace(&start.tuners);
     let mut refit = Refit {

@@ -25,6 +25,8 @@ pub struct WithEffects {
     places: Vec<Place>,
     interface: Interface,
     max_steps: usize,
+    /// Relative tolerance that suffices; 0 for that of the model.
+    loosest: f64,
 }
 
 /// Place of an effect, as indices, and the indices of its parameters and initial states among the parameters.
@@ -107,7 +109,7 @@ impl WithEffects {
             }
             places.push(Place { site: sites.0, companion: sites.1, parameters, starts });
         }
-        Ok(Self { model, placements, places, interface, max_steps: usize::MAX })
+        Ok(Self { model, placements, places, interface, max_steps: usize::MAX, loosest: 0.0 })
     }
 
     /// Limits the number of steps: a simulation that needs more fails. Some parameter values make effects stiff.
@@ -117,9 +119,20 @@ impl WithEffects {
         self
     }
 
+    /// Loosens the relative tolerance to a value, where that of the model is tighter.
+    #[must_use]
+    pub fn with_tolerance(mut self, relative: f64) -> Self {
+        self.loosest = relative;
+        self
+    }
+
     fn tolerance(&self, open: &dyn mops_core::Open) -> Tolerance {
         let tolerance = open.tolerance();
-        Tolerance { max_steps: tolerance.max_steps.min(self.max_steps), ..tolerance }
+        Tolerance {
+            max_steps: tolerance.max_steps.min(self.max_steps),
+            relative: tolerance.relative.max(self.loosest),
+            ..tolerance
+        }
     }
 
     /// Returns the model without effects.
