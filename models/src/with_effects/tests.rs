@@ -78,6 +78,23 @@ fn an_equation_written_the_other_way_round_has_the_same_friction() {
 }
 
 #[test]
+fn a_looser_tolerance_saves_steps_and_a_tighter_one_changes_no_bit() {
+    let job = Job { case: &Case::default(), parameters: &[2.0, 0.3, 3.0, 1.0], signals: &[0], horizon: 4.0 };
+    let model = || with(&equations(BLOCK), &[("viscous-friction", "joint:x")]);
+    let simulated = |model: WithEffects| {
+        let analysis = model.analyse(&job).expect("it simulates");
+        let steps = analysis.response().expect("it is in time").work.steps;
+        (analysis.trace("x").sample(&[4.0])[0], steps)
+    };
+    let (exact, loose) = (simulated(model()), simulated(model().with_tolerance(1e-4)));
+    assert_eq!(simulated(model().with_tolerance(1e-12)), exact);
+    assert!(loose.1 < exact.1, "{loose:?} {exact:?}");
+    // Under viscous friction alone a mass m with speed v comes to `x + m v (1 - exp(-d t/m))/d`.
+    let closed = 0.3 + 2.0 * 3.0 * (1.0 - math::exp(-2.0));
+    assert!((exact.0 - closed).abs() < 1e-7 && (loose.0 - closed).abs() < 1e-2, "{loose:?} {exact:?} {closed}");
+}
+
+#[test]
 fn neutral_effects_change_no_bit() {
     let plain = equations(BLOCK);
     let model = with(&plain, &[("coulomb-friction", "joint:x"), ("viscous-friction", "joint:x")]);
