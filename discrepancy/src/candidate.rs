@@ -171,7 +171,8 @@ const PER_STEP: u32 = 4;
 pub struct Sizes {
     /// Of what an effect adds.
     pub output: f64,
-    /// Rate that a unit of it adds where the model was when this was told; 1 at inputs and sensors.
+    /// Rate of the state per unit of the added term, at the parameters for which the sizes were determined; 1 at inputs and
+    /// sensors.
     pub mobility: f64,
     /// Of the position about its middle.
     pub position: f64,

@@ -71,12 +71,12 @@ pub struct Subject {
     pub notes: Vec<String>,
     /// Steps that a simulation of the declared model takes in a second of its time, once that is calibrated.
     pub pace: OnceLock<f64>,
-    /// Relative tolerance that suffices for simulations, once told.
+    /// Relative tolerance of simulations, once it has been derived from the noise.
     pub tolerance: OnceLock<f64>,
 }
 
-/// Error of a step of a simulation as a share of the noise, and the loosest relative tolerance. Basis: an assumption; an error of
-/// a few hundredths of the noise cannot be told from it.
+/// Error of a simulation step as a fraction of the noise, and the loosest relative tolerance. Basis: an assumption; an error of a
+/// few hundredths of the noise is indistinguishable from it.
 const EXACT: f64 = 0.03;
 const LOOSEST: f64 = 1e-5;
 
@@ -229,7 +229,7 @@ impl Subject {
         self.pace.get_or_init(|| fastest);
     }
 
-    /// Lets simulations be as inexact as the noise of the most exact sensor allows, relative to its largest value.
+    /// Derives the relative tolerance of simulations from the noise of the most precise sensor, relative to its largest value.
     pub fn take_tolerance(&self) {
         let of = |s: &Series| s.noise / s.values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         let finest = self.measurements.iter().flat_map(|m| &m.series).map(of).fold(f64::INFINITY, f64::min);

@@ -86,8 +86,8 @@ const ROUGHLY: f64 = 0.1;
 const STALLED: usize = 5;
 const STALLS: f64 = 0.01;
 
-/// Multiple of the predicted gain that a rough fit may still turn out to gain.
-const ALLOWANCE: f64 = 1.5;
+/// Largest expected ratio of an actual gain to that predicted to first order.
+pub const ALLOWANCE: f64 = 1.5;
 
 /// Predicted decrease of the sum of squares, relative to its mean per residual, below which a fit has converged.
 const CONVERGED: f64 = 0.01;

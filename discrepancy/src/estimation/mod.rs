@@ -8,5 +8,5 @@ mod scoring;
 
 pub use curve::FreeCurve;
 pub use errors::{Channels, ErrorModel, Errors, Motion};
-pub use estimate::{Estimate, Estimation};
+pub use estimate::{ALLOWANCE, Estimate, Estimation};
 pub(crate) use priors::{log_choices, nominal_rates, priors};

@@ -41,7 +41,7 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
     let piece = &fit.pieces[0];
     let job = Job { case: &piece.case, parameters: &parameters, signals: &[], horizon: piece.horizon };
     let mobilities = variant.model.mobilities(&job).unwrap_or_default();
-    // By how much a typical force is larger than where the sizes of an effect were told.
+    // Ratio of a typical force at the point to that for which the sizes of an effect were determined.
     let heavier = |added: &Added| {
         let here = force_of(&added.candidate.port, variant).and_then(|force| mobilities.get(force));
         let ratio = here.map_or(1.0, |here| added.sizes.mobility / here.abs());

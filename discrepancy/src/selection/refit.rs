@@ -7,7 +7,7 @@ use super::fitted_set::{FittedSet, Key, Start, evidence, start_at};
 use crate::base;
 use crate::candidate::Candidate;
 use crate::estimation::{ErrorModel, Errors, Estimate, Estimation};
-use crate::fit::{Piece, Point};
+use crate::fit::{Fit, Point};
 use crate::meter::Meter;
 use crate::subject::Subject;
 use crate::variant::{Variant, problem};
@@ -33,7 +33,8 @@ const NEAREST: usize = 3;
 /// Distance of two optima in standard errors from which each is a start for the other's error model.
 const APART: f64 = 0.5;
 
-/// Evidence, nats, below the best from which a set is not fitted under the force error.
+/// Distance below the best log-likelihood or log-evidence, nats, from which a fit is given up: a rough fit of another set, further
+/// starts under the output errors, the force error.
 pub const HOPELESS: f64 = 15.0;
 
 /// Decrease of log-likelihood, nats, from which a set fits worse than one that it contains.
@@ -53,8 +54,11 @@ pub struct Rough {
 }
 
 impl<'a> Refit<'a> {
-    fn calibration(&self) -> Vec<Piece> {
-        base::pieces(self.subject, |role| role == Role::Calibration)
+    /// Returns the problem of fitting a set to the calibration records, with the point of a start.
+    fn problem(&self, start: &Start) -> (Fit<'a>, Point, Variant) {
+        let Start { tuners, locals, added } = start;
+        let pieces = base::pieces(self.subject, |role| role == Role::Calibration);
+        problem(self.subject, added, pieces, tuners, locals.clone(), &[], self.simulations)
     }
 
     /// Fits a set by least squares: a few iterations from each start, then the best to the end. `None` if all fail.
@@ -70,12 +74,11 @@ impl<'a> Refit<'a> {
     }
 
     fn from(&self, key: &Key, start: &Start, iterations: usize) -> Option<FittedSet<'a>> {
-        let Start { tuners, locals, added } = start;
-        let pieces = self.calibration();
-        let (fit, point, variant) = problem(self.subject, added, pieces, tuners, locals.clone(), &[], self.simulations);
-        let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, added, &[], &point);
+        let added = start.added.clone();
+        let (fit, point, variant) = self.problem(start);
+        let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, &added, &[], &point);
         let least_squares = estimation.with(&Errors::White, point, iterations)?;
-        Some(FittedSet { key: key.clone(), added: added.clone(), fit, variant, least_squares, under: Vec::new() })
+        Some(FittedSet { key: key.clone(), added, fit, variant, least_squares, under: Vec::new() })
     }
 
     /// Fits a set roughly under an error model at the outputs whose hyperparameters are given, from the likeliest of the starts;
@@ -104,10 +107,8 @@ impl<'a> Refit<'a> {
 
     /// Returns what is computed of the estimation problem of a set at a start.
     fn at<T>(&self, start: &Start, compute: impl Fn(&Estimation<'_>, &Variant, Point) -> Option<T>) -> Option<T> {
-        let Start { tuners, locals, added } = start;
-        let pieces = self.calibration();
-        let (fit, point, variant) = problem(self.subject, added, pieces, tuners, locals.clone(), &[], self.simulations);
-        let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, added, &[], &point);
+        let (fit, point, variant) = self.problem(start);
+        let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, &start.added, &[], &point);
         compute(&estimation, &variant, point)
     }
 
@@ -205,9 +206,7 @@ impl<'a> Refit<'a> {
                 faint
             }));
         }
-        let Start { tuners, locals, added } = start;
-        let (_, point, _) = problem(self.subject, &added, self.calibration(), &tuners, locals, &[], self.simulations);
-        Some(point)
+        Some(self.problem(&start).1)
     }
 }
 

@@ -7,7 +7,7 @@ use super::fitted_set::{FittedSet, Key, Start, evidence};
 use super::refit::{HOPELESS, Refit, Rough, price};
 use super::screening::{Scene, Screened, pair_gain};
 use crate::candidate::Candidate;
-use crate::estimation::{ErrorModel, Errors, Estimate};
+use crate::estimation::{ALLOWANCE, ErrorModel, Errors, Estimate};
 use crate::fit::Point;
 use crate::variant::Added;
 
@@ -22,8 +22,8 @@ const PAIRS: usize = 10;
 /// Sets of an expansion that are fitted under all error models: single effects, pairs.
 const FULL: [usize; 2] = [4, 3];
 
-/// Gain of correlated errors over white noise in log-likelihood, nats, from which a model lacks something. Basis: 1 % of the
-/// chi-squared distribution with two degrees of freedom is beyond 2 x 4.6; half of it for the two parameters of an error model.
+/// Gain of correlated errors over white noise in log-likelihood, nats, from which a lack of fit is significant. Basis: twice the
+/// gain exceeds 6 in 5 % of all cases by chance, for the two further parameters of one error model (chi-squared distribution).
 pub const SIGNIFICANT: f64 = 3.0;
 
 /// Sets that are fitted roughly at a time.
@@ -44,9 +44,6 @@ const BEHIND: f64 = 6.0;
 
 /// Most probable sets whose effects are exchanged for others of their class, one after the other.
 const POLISHED: usize = 3;
-
-/// Multiple of its first-order gain that a candidate may turn out to gain.
-const ALLOWANCE: f64 = 1.5;
 
 /// Gain in log-likelihood, nats, below which an effect under every error model does nothing.
 const INERT: f64 = 0.3;
@@ -198,22 +195,19 @@ impl<'r, 'a> Search<'r, 'a> {
             let known = output_errors(&parent);
             let Some(scene) = Scene::new(&parent, &known) else { continue };
             let screened = scene.screen(all, &wanted);
-            // Where first order foretells what the effect gains, it foretells what the others would.
+            // The first-order gains of the others are trusted only if that of the effect itself predicts its actual gain.
             let [white, correlated] = self.get(key).map_or([0.0; 2], |set| gains(set, &parent));
             let own = screened.iter().find(|own| own.index == key[k]);
-            let is_foretold = own.is_some_and(|own| ALLOWANCE * own.gains[0] > white);
+            let is_predicted = own.is_some_and(|own| ALLOWANCE * own.gains[0] > white);
             let is_near = |single: &&Screened| {
                 let pays = || ALLOWANCE * single.correlated() > correlated - HOPELESS;
-                single.index != key[k] && (!is_foretold || ALLOWANCE * single.gains[0] > white - HOPELESS || pays())
+                single.index != key[k] && (!is_predicted || ALLOWANCE * single.gains[0] > white - HOPELESS || pays())
             };
-            // Error models of their own decide, not those of the set, which are narrow around it.
+            // Each is fitted with hyperparameters of its own: those of the set are narrow around its own optimum.
             let fitted = |single: &&Screened| {
                 let new = [*single];
-                let mut from = starts(&parent, &parent.least_squares.point, &new);
-                if let Some(likelier) = likelier_output(&parent) {
-                    from.extend(starts(&parent, &likelier.point, &new).into_iter().take(1));
-                }
-                let rough = self.refit.roughly(&from, &Errors::White, f64::NEG_INFINITY)?;
+                let likelier = likelier_output(&parent).and_then(|likelier| best_start(&parent, &likelier.point, &new));
+                let rough = self.by_squares(&parent, &new, likelier.as_ref())?;
                 self.refit.least_squares(&larger(&parent, &new), &[rough.start])
             };
             let near: Vec<&Screened> = screened.iter().filter(is_near).take(SWAPS).collect();
@@ -240,15 +234,13 @@ impl<'r, 'a> Search<'r, 'a> {
             parent.map_or(f64::NEG_INFINITY, |parent| parent.log_evidence + price / ALLOWANCE)
         };
         let mut trials: Vec<Trial> = Vec::new();
-        // In groups, as what others have reached tells what is hopeless.
+        // In groups: what earlier groups have reached decides which fits are hopeless.
         for group in new.chunks(AT_A_TIME) {
             let best = trials.iter().map(|trial| trial.rough.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
             let of = |new: &&Vec<&Screened>| {
-                let mut begin: Vec<Start> = starts(parent, &given.point, new).into_iter().take(1).collect();
-                let mut by_squares = starts(parent, &parent.least_squares.point, new);
-                by_squares.extend(begin.iter().cloned());
-                let by_squares = self.refit.roughly(&by_squares, &Errors::White, f64::NEG_INFINITY)?;
-                begin.push(by_squares.start.clone());
+                let likelier = best_start(parent, &given.point, new);
+                let by_squares = self.by_squares(parent, new, likelier.as_ref())?;
+                let begin: Vec<Start> = likelier.into_iter().chain([by_squares.start.clone()]).collect();
                 let rough = self.refit.roughly(&begin, &given.errors, best - HOPELESS)?;
                 Some(Trial { key: larger(parent, new), by_squares, rough })
             };
@@ -273,6 +265,14 @@ impl<'r, 'a> Search<'r, 'a> {
         sets.into_iter().for_each(|set| self.add(set));
     }
 
+    /// Fits a set with more effects roughly by least squares: from the optimum of its parent by least squares, and from another
+    /// start.
+    fn by_squares(&self, parent: &FittedSet<'a>, new: &[&Screened], other: Option<&Start>) -> Option<Rough> {
+        let mut from = starts(parent, &parent.least_squares.point, new);
+        from.extend(other.cloned());
+        self.refit.roughly(&from, &Errors::White, f64::NEG_INFINITY)
+    }
+
     /// Fits a set from fitted ones with one effect less. Returns false if there are none, or the fits fail.
     pub fn fit(&mut self, key: &Key) -> bool {
         let mut best: Option<FittedSet<'a>> = None;
@@ -281,9 +281,8 @@ impl<'r, 'a> Search<'r, 'a> {
             let Some(scene) = Scene::new(parent, &[Errors::White]) else { continue };
             for screened in scene.screen(&self.refit.candidates, &[key[k]]) {
                 let mut starts = starts(parent, &parent.least_squares.point, &[&screened]);
-                if let Some(smooth) = parent.estimate(ErrorModel::SmoothOutput) {
-                    starts.extend(self::starts(parent, &smooth.point, &[&screened]).into_iter().take(1));
-                }
+                let smooth = parent.estimate(ErrorModel::SmoothOutput);
+                starts.extend(smooth.and_then(|smooth| best_start(parent, &smooth.point, &[&screened])));
                 let Some(set) = self.refit.least_squares(key, &starts) else { continue };
                 let log = |set: &FittedSet<'a>| set.least_squares.log_likelihood;
                 if best.as_ref().is_none_or(|best| log(&set) > log(best)) {
@@ -389,6 +388,11 @@ fn starts(parent: &FittedSet<'_>, at: &Point, new: &[&Screened]) -> Vec<Start> {
     let known = rest.iter().fold(parent.start_at(at), |start, new| start.with(&new.guesses[0]));
     let again = first.guesses.iter().filter(|_| rest.is_empty()).flat_map(Added::restarts);
     first.guesses.iter().cloned().chain(again).map(|guess| known.with(&guess)).collect()
+}
+
+/// Returns a set at a point with further effects, each at its best guess.
+fn best_start(parent: &FittedSet<'_>, at: &Point, new: &[&Screened]) -> Option<Start> {
+    starts(parent, at, new).into_iter().next()
 }
 
 /// Returns white noise, and the error models of a set at the outputs.

@@ -19,10 +19,10 @@ pub struct Entry {
     pub place: String,
 }
 
-/// What is told of the declared model.
+/// Conclusion on the declared model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Conclusion {
-    /// Effects are missing, at least one of them of a class and at a place that are told.
+    /// Effects are missing; class and place of at least one of them are claimed.
     Effect,
     /// Something is missing that no set of effects explains well enough.
     Unexplained,
@@ -46,7 +46,7 @@ pub struct Stated {
 pub struct Verdict {
     /// The first set that passed; empty for the declared model.
     pub set: Key,
-    /// What is told.
+    /// Conclusion.
     pub conclusion: Conclusion,
     /// Class and place of the effects of the set.
     pub stated: Vec<Stated>,
@@ -75,8 +75,8 @@ const SMALL: f64 = 0.3;
 /// Share of the forecast error that a set must remove where a curve on top of it fires.
 const MOST: f64 = 0.8;
 
-/// Posterior probability from which class and place are claimed, and the most that is told where the set of highest evidence did
-/// not pass.
+/// Posterior probability from which class and place are claimed, and the largest one that is reported if the set of highest
+/// evidence did not pass.
 const CLAIMED: f64 = 0.9;
 
 /// Error of a record, in noises, above which a significant lack of fit matters.
