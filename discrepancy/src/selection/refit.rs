@@ -139,7 +139,12 @@ impl<'a> Refit<'a> {
         let advantage =
             |nested: &&FittedSet<'a>| Some(evidence(nested.estimate(ErrorModel::Force)?) - at_output(&nested.under));
         let advantage = nested.iter().filter_map(advantage).fold(0.0, f64::max);
-        if at_output(&first) + advantage <= best - HOPELESS {
+        // A set that fits worse than one it contains has not been fitted yet.
+        let is_behind = |(kind, estimate): &(ErrorModel, Estimate)| {
+            let smaller = nested.iter().filter_map(|smaller| smaller.estimate(*kind));
+            smaller.into_iter().any(|smaller| smaller.log_likelihood - WORSE >= estimate.log_likelihood)
+        };
+        if at_output(&first) + advantage <= best - HOPELESS && !first.iter().any(is_behind) {
             set.under = first;
             return;
         }
