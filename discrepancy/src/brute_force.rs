@@ -3,18 +3,13 @@
 use std::sync::Arc;
 
 use mops_core::math;
-use mops_core::{Effect, Role, Study, StudyError};
+use mops_core::{Effect, Study, StudyError};
 use rayon::prelude::*;
 
-use crate::base;
-use crate::fit::Point;
+use crate::estimation::Errors;
 use crate::meter::Meter;
-use crate::screen::{Scene, screen};
+use crate::selection::{FittedSet, Screening, prepare};
 use crate::subject::Subject;
-use crate::variant::{Added, problem};
-
-/// Iterations of each refit.
-const ITERATIONS: usize = 40;
 
 /// What brute force gives.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,31 +36,27 @@ pub fn brute_force(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<BruteFo
     let subject = Subject::new(study)?;
     let simulations = Meter::new(&());
     let failed = || StudyError::here("the model cannot be simulated near its start values");
-    let declared = base::fit(&subject, study.seed(), &simulations).ok_or_else(failed)?;
-    subject.take_pace(&declared.point.globals);
-    let point = &declared.point;
-    let of = |added: &[Added]| {
-        let pieces = base::pieces(&subject, |role| role == Role::Calibration);
-        problem(&subject, added, pieces, &point.globals, point.locals.clone(), &[], &simulations)
-    };
-    let (fit, _, variant) = of(&[]);
-    let scene = Scene::new(&fit, &variant.model, &declared).ok_or_else(failed)?;
-
-    let screened = screen(&subject.candidates(effects), &fit, &variant.model, &scene, &[]).screened;
+    let (refit, declared) = prepare(&subject, effects, &simulations).ok_or_else(failed)?;
+    let white = [Errors::White];
+    let scene = Screening::new(&declared, &white).ok_or_else(failed)?;
+    let all: Vec<usize> = (0..refit.candidates.len()).collect();
+    let screened = scene.screen(&refit.candidates, &all);
+    let unknowns = |set: &FittedSet<'_>| set.estimation(&[]).free().len();
+    let count: usize = declared.fit.pieces.iter().flat_map(|p| &p.series).map(|s| s.times.len()).sum();
     let refitted: Vec<Option<f64>> = screened
         .par_iter()
         .map(|candidate| {
-            let (fit, start, _) = of(std::slice::from_ref(&candidate.added));
-            let fitted = fit.solve(start, ITERATIONS)?;
-            let unknowns = |point: &Point| point.globals.len() + point.locals.iter().map(Vec::len).sum::<usize>();
-            let more = unknowns(&fitted.point) - unknowns(&declared.point);
-            Some(fitted.chi2 - declared.chi2 + more as f64 * math::ln(fitted.count as f64))
+            let start = declared.start_at(&declared.least_squares.point).with(&candidate.guesses[0]);
+            let set = refit.least_squares(&vec![candidate.index], &[start])?;
+            let more = unknowns(&set) as f64 - unknowns(&declared) as f64;
+            let gain = set.least_squares.log_likelihood - declared.least_squares.log_likelihood;
+            Some(more * math::ln(count as f64) - 2.0 * gain)
         })
         .collect();
     let mut best = BruteForce { best: None, bic: 0.0, refits: refitted.iter().flatten().count(), simulations: 0 };
     for (candidate, bic) in screened.iter().zip(refitted) {
         let Some(bic) = bic.filter(|&bic| bic < best.bic) else { continue };
-        let candidate = &candidate.added.candidate;
+        let candidate = &refit.candidates[candidate.index];
         best = BruteForce { best: Some((candidate.effect.name().to_owned(), candidate.place())), bic, ..best };
     }
     best.simulations = simulations.count();

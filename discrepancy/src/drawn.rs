@@ -9,22 +9,21 @@ use mops_core::Port;
 
 use crate::candidate::Candidate;
 use crate::locate::{Located, located, thinning};
-use crate::screen::Scene;
-use crate::search::Trial;
-use crate::stopgap::is_table;
+use crate::scene::Scene;
+use crate::selection::FittedSet;
 use crate::trace_of::{Spot, View, spot};
 use crate::unknown::respond;
 use mops_core::diagnosis::Evidence;
 
 /// Draws what was found into the evidence of the places where effects were added.
-pub fn draw(places: &mut [Located], last: &Trial<'_>) {
+pub fn draw(places: &mut [Located], set: &FittedSet<'_>) {
     for place in places {
-        let here: Vec<usize> = (0..last.added.len()).filter(|&k| last.added[k].candidate.port == place.port).collect();
-        let can = |&k: &usize| can_be_drawn(&last.added[k].candidate);
-        if here.iter().all(|&k| is_table(&last.added[k])) || !here.iter().all(can) {
+        let here: Vec<usize> = (0..set.added.len()).filter(|&k| set.added[k].candidate.port == place.port).collect();
+        let can = |&k: &usize| can_be_drawn(&set.added[k].candidate);
+        if here.is_empty() || !here.iter().all(can) {
             continue;
         }
-        if let Some(Evidence { over, over_time, .. }) = drawn(&place.port, &here, last) {
+        if let Some(Evidence { over, over_time, .. }) = drawn(&place.port, &here, set) {
             (place.evidence.over, place.evidence.over_time) = (over, over_time);
         }
     }
@@ -39,17 +38,17 @@ fn can_be_drawn(candidate: &Candidate) -> bool {
 }
 
 /// The signal at a port, with what the effects of these indices make of it; `None` where it cannot be had.
-fn drawn(port: &Port, effects: &[usize], last: &Trial<'_>) -> Option<Evidence> {
-    let (mut fit, model) = (last.fit.clone(), &last.variant.model);
+fn drawn(port: &Port, effects: &[usize], set: &FittedSet<'_>) -> Option<Evidence> {
+    let (mut fit, model, point) = (set.fit.clone(), &set.variant.model, &set.least_squares.point);
     let at_sensor = matches!(port, Port::Sensor { .. });
     if at_sensor {
         // What it shows without them.
         for &index in effects {
-            let neutral = last.added[index].candidate.effect.parameters()[0].null_value.unwrap_or(0.0);
-            fit.pieces.iter_mut().for_each(|piece| piece.fixed.push((last.variant.first[index], neutral)));
+            let neutral = set.added[index].candidate.effect.parameters()[0].null_value.unwrap_or(0.0);
+            fit.pieces.iter_mut().for_each(|piece| piece.fixed.push((set.variant.first[index], neutral)));
         }
     }
-    let mut scene = Scene::new(&fit, model, &last.fitted)?;
+    let mut scene = Scene::new(&fit, model, point)?;
     // Everything else is held.
     scene.basis.clear();
     let mut signals = Vec::new();
@@ -59,8 +58,8 @@ fn drawn(port: &Port, effects: &[usize], last: &Trial<'_>) -> Option<Evidence> {
         let points = if let Spot::Sensor(series) = here { own.series[series].times.len() } else { along.moments.len() };
         let mut signal = vec![0.0; points];
         for &index in effects {
-            let a = &last.added[index];
-            let strengths = last.variant.strengths(&last.fit, &last.fitted.point, index, a.strengths.len(), piece);
+            let a = &set.added[index];
+            let strengths = set.variant.strengths(&set.fit, point, index, a.strengths.len(), piece);
             let added = View::new(&a.candidate, model, own, along)?.added(&strengths)?;
             // Nothing where it does not act.
             signal.iter_mut().zip(added).for_each(|(s, a)| *s += a);

@@ -88,8 +88,6 @@ pub struct Family {
 const KNOTS: u32 = 25;
 const SPEEDS: u32 = 14;
 const TIMES: u32 = 13;
-/// Most points of a table.
-const POINTS: u32 = 15;
 
 impl Family {
     /// Signals that are free over time: about `total` knots, shared out among the pieces with these spans, at most
@@ -174,22 +172,10 @@ impl Family {
         });
     }
 
-    /// The knots with their values, for a function of one argument.
-    pub fn table(&self, values: &[f64]) -> Vec<[f64; 2]> {
-        let knots = self.blocks.iter().flat_map(|block| &block.knots);
-        knots.zip(&values[self.columns.clone()]).map(|(&x, &y)| [x, y]).collect()
-    }
-
-    /// The values of a function of one argument at some places from those at its knots, as a matrix.
-    pub fn at(&self, places: &[f64]) -> DMatrix<f64> {
-        let knots = &self.blocks[0].knots;
-        let mut at = DMatrix::zeros(places.len(), knots.len());
-        for (i, &place) in places.iter().enumerate() {
-            let (k, share) = between(knots, place);
-            at[(i, k)] += 1.0 - share;
-            at[(i, k + 1)] += share;
-        }
-        at
+    /// Knots of a function of one argument.
+    #[cfg(test)]
+    fn knots(&self) -> Vec<f64> {
+        self.blocks.iter().flat_map(|block| block.knots.iter().copied()).collect()
     }
 
     fn each(&self, piece: usize, mut look: impl FnMut(usize, &Block)) {
@@ -201,33 +187,6 @@ impl Family {
             first += block.knots.len();
         }
     }
-}
-
-/// A table with at most 15 of its points, more of them where it bends more: the share of points in an interval goes with the
-/// root of the second derivative, which makes the largest error smallest.
-///
-/// Source: C. de Boor, A Practical Guide to Splines (1978), chapter III.
-pub fn thinned(table: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
-    let n = table.len();
-    if n <= POINTS as usize {
-        return table;
-    }
-    let slope = |k: usize| (table[k + 1][1] - table[k][1]) / (table[k + 1][0] - table[k][0]);
-    let bend = |k: usize| if k == 0 || k + 1 >= n { 0.0 } else { (slope(k) - slope(k - 1)).abs() };
-    let bends: Vec<f64> = (0..n - 1).map(|k| (0.5 * (bend(k) + bend(k + 1))).sqrt()).collect();
-    let total: f64 = bends.iter().sum();
-    #[allow(clippy::cast_precision_loss)]
-    let least = if total > 0.0 { 0.5 * total / bends.len() as f64 } else { 1.0 };
-    let mut sums = vec![0.0];
-    for bend in &bends {
-        sums.push(sums[sums.len() - 1] + bend + least);
-    }
-    let step = sums[n - 1] / f64::from(POINTS - 1);
-    let at = |target: f64| {
-        let (k, share) = between(&sums, target);
-        [0, 1].map(|i| table[k][i] + share * (table[k + 1][i] - table[k][i]))
-    };
-    (0..POINTS).map(|k| at(f64::from(k) * step)).collect()
 }
 
 /// The knot before a value, and the share of the way to the next; values outside count as the nearest knot.
@@ -244,7 +203,7 @@ mod tests {
     fn a_function_is_linear_between_its_knots() {
         let family = Family::function(Over::Position, [-1.0, 3.0].into_iter(), 2).expect("it changes");
         let values: Vec<f64> =
-            [0.0; 2].into_iter().chain(family.table(&[0.0; 27]).iter().map(|p| 2.0 * p[0])).collect();
+            [0.0; 2].into_iter().chain(family.knots().iter().map(|x| 2.0 * x)).collect();
         let looks = [-2.0, -1.0, 0.1, 2.9, 5.0].map(|position| Look { position, ..Look::default() });
         let mut signal = vec![0.0; 5];
         family.add(&values, 0, &looks, &mut signal);
@@ -254,21 +213,11 @@ mod tests {
     }
 
     #[test]
-    fn a_thinned_table_keeps_its_ends_and_its_points_where_it_bends() {
-        let bump = |x: f64| math::exp(-math::powi((x - 0.3) / 0.1, 2));
-        let table: Vec<[f64; 2]> = (0..=40).map(|k| f64::from(k) / 40.0).map(|x| [x, bump(x)]).collect();
-        let few = thinned(table);
-        assert_eq!((few.len(), few[0][0], few[14][0]), (15, 0.0, 1.0));
-        let near = few.iter().filter(|p| (p[0] - 0.3).abs() < 0.2).count();
-        assert!(near >= 8, "{few:?}");
-    }
-
-    #[test]
     fn what_does_not_change_is_no_argument_and_a_speed_has_no_knot_at_rest() {
         assert!(Family::function(Over::Input, [2.0, 2.0].into_iter(), 0).is_none());
         let speed = Family::function(Over::Speed, [-1.0, 3.0].into_iter(), 0).expect("it changes");
-        let table = speed.table(&[0.0; 14]);
-        assert!(table.windows(2).all(|w| w[0][0] < w[1][0]) && table.iter().all(|p| p[0].abs() > 0.01), "{table:?}");
-        assert_eq!((table[0][0], table[13][0]), (-1.0, 3.0));
+        let knots = speed.knots();
+        assert!(knots.windows(2).all(|w| w[0] < w[1]) && knots.iter().all(|x| x.abs() > 0.01), "{knots:?}");
+        assert_eq!((knots[0], knots[13]), (-1.0, 3.0));
     }
 }

@@ -1,13 +1,11 @@
 //! Least squares over pieces of experiments: residuals in units of the noise, with exact slopes, bounds and start values of
 //! each piece.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use mops_core::{Case, Job, Model};
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::least_squares::Normal;
 use crate::meter::Meter;
 use crate::subject::{Local, Series, Subject};
 
@@ -96,27 +94,8 @@ pub struct Fit<'a> {
     pub globals: Vec<Global>,
     /// The pieces.
     pub pieces: Vec<Piece>,
-    /// What is expected of some of the globals.
-    pub expected: Vec<Expected>,
     /// Counts simulations, and ends them.
     pub simulations: &'a Meter<'a>,
-}
-
-/// Globals, one after the other, that are expected to be normal about 0.
-#[derive(Debug, Clone)]
-pub struct Expected {
-    /// The first of them.
-    pub first: usize,
-    /// Turns them into independent ones of variance 1.
-    pub whitening: Arc<DMatrix<f64>>,
-}
-
-impl Expected {
-    /// The independent ones at a point.
-    pub fn at(&self, point: &Point) -> DVector<f64> {
-        let values = &point.globals[self.first..self.first + self.whitening.ncols()];
-        self.whitening.as_ref() * DVector::from_column_slice(values)
-    }
 }
 
 /// Residuals of a piece, channel by channel, and their slopes.
@@ -126,50 +105,6 @@ pub struct Residuals {
     pub r: Vec<f64>,
     /// Slopes: one column per global, then per local of the piece; no columns where none were asked for.
     pub j: Vec<Vec<f64>>,
-}
-
-/// A fitted point.
-#[derive(Debug, Clone)]
-pub struct Fitted {
-    /// The unknowns.
-    pub point: Point,
-    /// Sum of the squares of the residuals.
-    pub chi2: f64,
-    /// Number of residuals.
-    pub count: usize,
-    /// The residuals of each piece.
-    pub residuals: Vec<Vec<f64>>,
-    /// The normal equations there, once somebody needed them.
-    pub normal: OnceLock<Arc<Normal>>,
-}
-
-impl Fitted {
-    /// Root mean square of the residuals.
-    #[allow(clippy::cast_precision_loss)]
-    pub fn normalised(&self) -> f64 {
-        (self.chi2 / self.count.max(1) as f64).sqrt()
-    }
-}
-
-/// What is known at the point of another fit, which has the first of the unknowns of this one.
-pub struct Known {
-    /// The point.
-    pub point: Point,
-    /// Residuals and slopes there.
-    pub all: Vec<Residuals>,
-}
-
-/// Which slopes are wanted.
-#[derive(Clone, Copy)]
-pub enum Slopes {
-    /// None.
-    None,
-    /// All of them.
-    All,
-    /// Those by what is not pinned; 0 stands for the others.
-    Free,
-    /// Those by the unknowns from these on: globals, then locals of the piece.
-    From(usize, usize),
 }
 
 impl Fit<'_> {
@@ -203,7 +138,7 @@ impl Fit<'_> {
     }
 
     /// The unknowns as directions of the model's parameters.
-    fn seeds(&self, piece: usize, point: &Point, count: usize, slopes: Slopes) -> Vec<Vec<f64>> {
+    fn seeds(&self, piece: usize, point: &Point, count: usize) -> Vec<Vec<f64>> {
         let p = &self.pieces[piece];
         let tuners = self.tuners(point);
         let overridden = |k: usize| p.fixed.iter().any(|f| f.0 == k) || p.locals.iter().any(|l| l.parameter == k);
@@ -216,7 +151,7 @@ impl Fit<'_> {
             if let Sets::Parameter(k) = global.sets {
                 seed[k] = 1.0;
             }
-            if matches!(slopes, Slopes::Free) && global.is_pinned() {
+            if global.is_pinned() {
                 seed.fill(0.0);
             }
             (0..count).filter(|&k| overridden(k)).for_each(|k| seed[k] = 0.0);
@@ -227,21 +162,16 @@ impl Fit<'_> {
             seed[local.parameter] = 1.0;
             seed
         };
-        let (first, own) = match slopes {
-            Slopes::None => return Vec::new(),
-            Slopes::From(first, own) => (first, own),
-            Slopes::All | Slopes::Free => (0, 0),
-        };
-        self.globals[first..].iter().map(global).chain(p.locals[own..].iter().map(local)).collect()
+        self.globals.iter().map(global).chain(p.locals.iter().map(local)).collect()
     }
 
     /// Residuals of a piece; `None` where the simulation fails.
     pub fn residuals(&self, piece: usize, point: &Point) -> Option<Vec<f64>> {
-        self.look(piece, point, Slopes::None).map(|found| found.r)
+        self.look(piece, point, false).map(|found| found.r)
     }
 
-    /// Residuals of a piece with the slopes that are wanted.
-    pub fn look(&self, piece: usize, point: &Point, slopes: Slopes) -> Option<Residuals> {
+    /// Residuals of a piece, with their slopes if these are wanted; that by a pinned global is 0.
+    fn look(&self, piece: usize, point: &Point, with_slopes: bool) -> Option<Residuals> {
         let p = &self.pieces[piece];
         let parameters = self.parameters(piece, point);
         let signals = p.signals();
@@ -249,7 +179,7 @@ impl Fit<'_> {
         if !self.simulations.admits() {
             return None;
         }
-        let all = self.seeds(piece, point, parameters.len(), slopes);
+        let all = if with_slopes { self.seeds(piece, point, parameters.len()) } else { Vec::new() };
         // What does nothing here needs no simulation.
         let (columns, seeds): (Vec<usize>, Vec<Vec<f64>>) =
             all.iter().cloned().enumerate().filter(|(_, seed)| seed.iter().any(|&s| s != 0.0)).unzip();
@@ -280,12 +210,7 @@ impl Fit<'_> {
 
     /// Residuals of all pieces with their slopes.
     pub fn slopes(&self, point: &Point) -> Option<Vec<Residuals>> {
-        self.looks(point, Slopes::All)
-    }
-
-    /// The same of all pieces.
-    pub fn looks(&self, point: &Point, slopes: Slopes) -> Option<Vec<Residuals>> {
-        (0..self.pieces.len()).into_par_iter().map(|piece| self.look(piece, point, slopes)).collect()
+        (0..self.pieces.len()).into_par_iter().map(|piece| self.look(piece, point, true)).collect()
     }
 }
 

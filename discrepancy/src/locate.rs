@@ -8,18 +8,16 @@
 //! Source: T. Rogers, T. Friis, A latent restoring force approach to nonlinear system identification, Mechanical Systems and
 //! Signal Processing 180 (2022) 109426; here with knots instead of a state-space form.
 
-use std::sync::Arc;
-
 use mops_core::Port;
 use mops_models::WithEffects;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::family::{Over, thinned};
+use crate::family::Over;
 use crate::fit::Fit;
-use crate::screen::Scene;
+use crate::scene::Scene;
 use crate::unknown::{Term, Unknown};
-use mops_core::diagnosis::{Curve, Evidence, Unexplained};
+use mops_core::diagnosis::{Curve, Evidence};
 
 /// A place with the signal that is likeliest there.
 pub struct Located {
@@ -27,27 +25,6 @@ pub struct Located {
     pub port: Port,
     /// The signal.
     pub evidence: Evidence,
-    /// The signal as a function of one thing alone, likeliest first.
-    pub tables: Vec<Table>,
-    /// What the signal is made of.
-    terms: Vec<Term>,
-    /// Variance of the terms.
-    variance: f64,
-}
-
-/// A signal as a function of one thing.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Table {
-    /// Of what.
-    pub over: Over,
-    /// Logarithm of the marginal likelihood over that of the model without it.
-    pub evidence: f64,
-    /// Share of the residual above the noise that it explains.
-    pub share: f64,
-    /// The signal, linear between its points.
-    pub points: Vec<[f64; 2]>,
-    /// Turns values at the points into independent ones of variance 1, as far as a signal this smooth is expected.
-    pub expected: Option<Arc<DMatrix<f64>>>,
 }
 
 /// Logarithms of a likelihood that are this close count as the same: the place that the model names first is taken.
@@ -63,29 +40,6 @@ pub fn locate(fit: &Fit<'_>, model: &WithEffects, scene: &Scene) -> Vec<Located>
     let first = first.map(|first| all.remove(first));
     all.sort_by(|a, b| b.evidence.evidence.total_cmp(&a.evidence.evidence));
     first.into_iter().chain(all).collect()
-}
-
-impl Located {
-    /// What the signal is made of.
-    pub fn terms(&self) -> &[Term] {
-        &self.terms
-    }
-
-    /// Variance of these.
-    pub fn variance(&self) -> f64 {
-        self.variance
-    }
-
-    /// A table over what explains most, to first order.
-    pub fn unexplained(&self) -> Option<Unexplained> {
-        let table = self.tables.first()?;
-        Some(Unexplained {
-            place: self.evidence.place.clone(),
-            share: self.evidence.share,
-            over: table.over.name().to_owned(),
-            table: table.points.clone(),
-        })
-    }
 }
 
 /// A choice of terms with its evidence and variance.
@@ -117,7 +71,6 @@ pub fn located(port: &Port, fit: &Fit<'_>, model: &WithEffects, scene: &Scene) -
     let over = |choice: &Choice| unknown.families[choice.terms[0].family].over;
     let mut functions: Vec<&Choice> = singles.iter().filter(|c| over(c) != Over::Free).collect();
     functions.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-    let tables = functions.iter().filter_map(|c| table(&unknown, c)).collect();
     // Step 2: sums of two, the size of each about that which it has alone.
     let sum = |a: &Choice, b: &Choice, factor: f64| {
         let scaled = |c: &Choice, by: f64| Term { factor: by * c.variance.sqrt(), ..c.terms[0] };
@@ -133,33 +86,7 @@ pub fn located(port: &Port, fit: &Fit<'_>, model: &WithEffects, scene: &Scene) -
     }
     let best = singles.into_iter().chain(sums).reduce(better)?;
     let evidence = evidence(port, &unknown, &best, fit, model)?;
-    Some(Located { port: port.clone(), evidence, tables, terms: best.terms, variance: best.variance })
-}
-
-fn table(unknown: &Unknown, choice: &Choice) -> Option<Table> {
-    let estimate = unknown.normals.estimate(&unknown.prior(&choice.terms)?, choice.variance)?;
-    let Term { family, length, .. } = choice.terms[0];
-    let family = &unknown.families[family];
-    let points = thinned(family.table(estimate.coefficients.as_slice()));
-    let root = family.at(&points.iter().map(|p| p[0]).collect::<Vec<_>>()) * family.root(length)?;
-    Some(Table {
-        over: family.over,
-        evidence: choice.evidence,
-        share: share(unknown, estimate.coefficients.as_slice(), estimate.freedom),
-        points,
-        expected: whitening(&root, choice.variance).map(Arc::new),
-    })
-}
-
-/// Turns values of covariance `variance R R'` into independent ones of variance 1.
-fn whitening(root: &DMatrix<f64>, variance: f64) -> Option<DMatrix<f64>> {
-    let mut covariance = variance * root * root.transpose();
-    // Points between the same knots tell nothing apart to the last digit.
-    let jitter = 1e-6 * covariance.trace() / f64::from(u32::try_from(covariance.nrows()).unwrap_or(u32::MAX));
-    for k in 0..covariance.nrows() {
-        covariance[(k, k)] += jitter;
-    }
-    covariance.cholesky()?.l().try_inverse()
+    Some(Located { port: port.clone(), evidence })
 }
 
 /// The share of the squares above the noise that a signal takes away, the freedom it uses paid for; what is less than the

@@ -6,7 +6,7 @@ use mops_core::{Hold, Input};
 use crate::held_out::predictive_gain;
 use crate::locate::{Located, locate};
 use crate::meter::Meter;
-use crate::screen::Scene;
+use crate::scene::Scene;
 use crate::search::{Limits, Search};
 use crate::stopgap::{stopgap, unexplained};
 use crate::subject::Subject;

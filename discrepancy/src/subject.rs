@@ -71,14 +71,21 @@ pub struct Subject {
     pub notes: Vec<String>,
     /// Steps that a simulation of the declared model takes in a second of its time, once that is calibrated.
     pub pace: OnceLock<f64>,
-    /// Relative tolerance of simulations, once it has been derived from the noise.
-    pub tolerance: OnceLock<f64>,
+    /// Relative tolerance of simulations.
+    pub tolerance: f64,
 }
 
 /// Error of a simulation step as a fraction of the noise, and the loosest relative tolerance. Basis: an assumption; an error of a
 /// few hundredths of the noise is indistinguishable from it.
 const EXACT: f64 = 0.03;
 const LOOSEST: f64 = 1e-5;
+
+/// Returns the relative tolerance of simulations that the noise of the most precise sensor, relative to its largest value, wants.
+fn tolerance(measurements: &[Measurement]) -> f64 {
+    let of = |s: &Series| s.noise / s.values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let finest = measurements.iter().flat_map(|m| &m.series).map(of).fold(f64::INFINITY, f64::min);
+    (EXACT * finest).min(LOOSEST)
+}
 
 impl Subject {
     /// Takes it from a study.
@@ -199,10 +206,10 @@ impl Subject {
             study: Arc::new(study.clone()),
             model: Arc::clone(model),
             globals,
+            tolerance: tolerance(&measurements),
             measurements,
             notes,
             pace: OnceLock::new(),
-            tolerance: OnceLock::new(),
         })
     }
 
@@ -227,13 +234,6 @@ impl Subject {
         };
         let fastest = self.measurements.iter().enumerate().filter_map(of).fold(0.0, f64::max);
         self.pace.get_or_init(|| fastest);
-    }
-
-    /// Derives the relative tolerance of simulations from the noise of the most precise sensor, relative to its largest value.
-    pub fn take_tolerance(&self) {
-        let of = |s: &Series| s.noise / s.values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-        let finest = self.measurements.iter().flat_map(|m| &m.series).map(of).fold(f64::INFINITY, f64::min);
-        self.tolerance.get_or_init(|| (EXACT * finest).min(LOOSEST));
     }
 
     /// Start values of the global unknowns.

@@ -11,9 +11,10 @@ use mops_effects::effects;
 use mops_models::equations::EquationsOptions;
 
 use crate::base::{first_locals, pieces};
-use crate::fit::{Fit, Fitted};
+use crate::fit::{Fit, Point};
 use crate::meter::Meter;
-use crate::screen::Scene;
+use crate::scene::Scene;
+use crate::selection::estimation;
 use crate::subject::{Local, Measurement, Series, Subject};
 use crate::variant::{Variant, problem};
 
@@ -107,7 +108,7 @@ pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Recor
         measurements,
         notes: Vec::new(),
         pace: OnceLock::new(),
-        tolerance: OnceLock::new(),
+        tolerance: 0.0,
     }
 }
 
@@ -145,14 +146,14 @@ pub fn study(subject: &Subject) -> Study {
     Study::from_parts(parts)
 }
 
-/// The subject's model fitted to its records, and what a screening sees of it.
-pub fn fitted<'a>(subject: &'a Subject, simulations: &'a Meter<'a>) -> (Fit<'a>, Variant, Fitted, Scene) {
+/// The subject's model fitted to its records by least squares, and the motion there.
+pub fn fitted<'a>(subject: &'a Subject, simulations: &'a Meter<'a>) -> (Fit<'a>, Variant, Point, Scene) {
     let pieces = pieces(subject, |_| true);
     let locals = first_locals(&pieces);
     let (fit, point, variant) = problem(subject, &[], pieces, &subject.start(), locals, &[], simulations);
-    let fitted = fit.solve(point, 60).expect("it simulates");
-    let scene = Scene::new(&fit, &variant.model, &fitted).expect("it simulates");
-    (fit, variant, fitted, scene)
+    let found = estimation(subject, &fit, &variant, &[], &[], &point).least_squares(point).expect("it simulates");
+    let scene = Scene::new(&fit, &variant.model, &found.point).expect("it simulates");
+    (fit, variant, found.point, scene)
 }
 
 /// The effects of these names.

@@ -216,6 +216,30 @@ pub fn sizes_by_samples(sizes: Sizes, candidate: &Candidate, model: &WithEffects
     Sizes { quantum, gap, ..sizes }
 }
 
+/// Typical sizes for a candidate: at its port, between two joints relative to each other; of a joint that is the companion of an
+/// actuator or sensor the position and speed.
+pub fn sizes_for(
+    candidate: &Candidate,
+    model: &WithEffects,
+    pieces: &[Piece],
+    trajectories: &[Trajectory],
+) -> Option<Sizes> {
+    let own = match &candidate.companion {
+        Some(other @ Port::Joint { .. }) if candidate.effect.mutual() => {
+            relative_sizes(&candidate.port, other, model, pieces, trajectories)?
+        }
+        _ => sizes(&candidate.port, model, pieces, trajectories)?,
+    };
+    let own = sizes_by_samples(own, candidate, model, pieces);
+    match (&candidate.port, &candidate.companion) {
+        (Port::Actuator { .. } | Port::Sensor { .. }, Some(joint @ Port::Joint { .. })) => {
+            let Sizes { position, speed, .. } = sizes(joint, model, pieces, trajectories)?;
+            Some(Sizes { position, speed, ..own })
+        }
+        _ => Some(own),
+    }
+}
+
 /// A candidate's place in a piece, and what it sees there.
 pub struct View<'a> {
     candidate: &'a Candidate,

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::family::{Family, Look, Over};
 use crate::fit::{Fit, Piece, dot};
 use crate::gaussian::{Normals, Prior, joined};
-use crate::screen::Scene;
+use crate::scene::Scene;
 use crate::trace_of::{Spot, spot};
 
 /// Knots of a free signal over all pieces.

@@ -2,13 +2,12 @@
 
 use std::sync::Arc;
 
-use mops_core::{Dimension, EffectParameter, InitialGrid, Model, Port, Scope};
+use mops_core::{Dimension, EffectParameter, InitialGrid, Model, Scope};
 use mops_models::WithEffects;
-use nalgebra::DMatrix;
 
 use crate::base::globals;
 use crate::candidate::{Candidate, Sizes};
-use crate::fit::{Expected, Fit, Global, Piece, Point, Sets};
+use crate::fit::{Fit, Global, Piece, Point, Sets};
 use crate::meter::Meter;
 use crate::subject::{Local, Subject};
 
@@ -25,8 +24,6 @@ pub struct Added {
     pub starts: Vec<(usize, Vec<f64>)>,
     /// Typical sizes at its place.
     pub sizes: Sizes,
-    /// Turns the strengths into independent ones of variance 1, where something is expected of them.
-    pub expected: Option<Arc<DMatrix<f64>>>,
 }
 
 impl Added {
@@ -49,15 +46,6 @@ impl Added {
         }
     }
 
-    /// Whether its first strength stands at a finite bound that is not neutral: more is no effect but a mistake, as the gain of
-    /// a sensor is that is off by half. An actuator may well be at such a limit: dead, or acting one way only.
-    pub fn is_at_limit(&self) -> bool {
-        let (first, value) = (&self.candidate.effect.parameters()[0], self.strengths[0]);
-        let is_limit = |end: &f64| end.is_finite() && first.null_value != Some(*end);
-        !matches!(self.candidate.port, Port::Actuator { .. })
-            && first.bounds.iter().filter(|e| is_limit(e)).any(|&e| e == value)
-    }
-
     /// The same at all shapes that are tried, and as strong as a fit is restarted from: [`mops_core::EffectParameter::restarts`].
     pub fn restarts(&self) -> Vec<Self> {
         let effect = self.candidate.effect.as_ref();
@@ -68,35 +56,6 @@ impl Added {
             shapes.iter().map(move |shape| Self { strengths: [&[strength], &shape[1..]].concat(), ..self.clone() })
         };
         first.restarts.iter().flat_map(at).collect()
-    }
-
-    /// The same as strong as it is, and twice as strong; none where it is neutral. A limit is the stronger the lower it is.
-    pub fn as_strong_and_twice(&self) -> Vec<Self> {
-        let (first, strength) = (&self.candidate.effect.parameters()[0], self.strengths[0]);
-        let at = |times: f64| {
-            let strength = strength * if first.null_value == Some(0.0) { times } else { 1.0 / times };
-            let mut strong = self.clone();
-            strong.strengths[0] = strength.clamp(first.bounds[0], first.bounds[1]);
-            strong
-        };
-        if first.null_value == Some(strength) { Vec::new() } else { [1.0, 2.0].map(at).to_vec() }
-    }
-
-    /// The same where strengths that another effect has by the same name begin as they are there: so an effect begins as the
-    /// simpler part of one that was fitted.
-    pub fn begun_like(&self, other: &Self) -> Self {
-        let mut begun = self.clone();
-        let theirs = other.candidate.effect.parameters();
-        for (strength, value) in self.candidate.effect.parameters().iter().zip(&mut begun.strengths) {
-            let [low, high] = strength.bounds;
-            let known = theirs.iter().position(|s| s.name == strength.name && s.dimension == strength.dimension);
-            if let Some(known) =
-                known.map(|k| other.strengths[k]).filter(|k| !strength.fixed && (low..=high).contains(k))
-            {
-                *value = known;
-            }
-        }
-        begun
     }
 }
 
@@ -132,7 +91,7 @@ impl Variant {
         let declared = subject.pace.get().map_or(0.0, |pace| pace * horizon);
         #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let limit = (FEW_STEPS + share * (STEPS_PER_SAMPLE * longest as f64 + TIMES_DECLARED * declared)) as usize;
-        let model = model.with_step_limit(limit).with_tolerance(subject.tolerance.get().copied().unwrap_or(0.0));
+        let model = model.with_step_limit(limit).with_tolerance(subject.tolerance);
         let mut next = subject.model.interface().parameters.len();
         let mut first = Vec::new();
         for a in added {
@@ -189,10 +148,8 @@ pub fn problem<'a>(
         all[k].bounds = [tuners[k]; 2];
     }
     let mut values = tuners.to_vec();
-    let mut expected = Vec::new();
     for (a, &first) in added.iter().zip(&variant.first) {
         let effect = a.candidate.effect.as_ref();
-        expected.extend(a.expected.iter().map(|w| Expected { first: all.len(), whitening: Arc::clone(w) }));
         for (k, strength) in effect.parameters().iter().enumerate() {
             let (parameter, value) = (first + k, a.strengths[k]);
             let typical = a.sizes.of(strength.dimension);
@@ -241,6 +198,6 @@ pub fn problem<'a>(
         }
     }
     let model: Arc<dyn Model> = Arc::clone(&variant.model) as Arc<dyn Model>;
-    let fit = Fit { subject, model, globals: all, pieces, expected, simulations };
+    let fit = Fit { subject, model, globals: all, pieces, simulations };
     (fit, Point { globals: values, locals }, variant)
 }

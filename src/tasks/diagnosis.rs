@@ -23,7 +23,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 fn search(study: &Study, options: &Options, watch: &dyn Watch) -> Result<Diagnosis, SolveError> {
     let task = &study.tasks().diagnosis;
     let effects = effects(task, &options.effects)?;
-    let options = mops_discrepancy::Options { max_effects: task.max_effects, level: task.level, seed: study.seed() };
+    let options = mops_discrepancy::Options { max_effects: task.max_effects, level: task.level };
     mops_discrepancy::diagnose(study, &effects, &options, watch).map_err(SolveError)
 }
 
@@ -77,6 +77,9 @@ pub(crate) fn of(study: Study, options: &Options, diagnosis: Diagnosis) -> Solve
     (outcome.solver, outcome.evaluations) = ("discrepancy".to_owned(), 0);
     (outcome.simulations, outcome.calibration) = (diagnosis.simulations, None);
     outcome.front.clear();
+    if diagnosis.is_stopped {
+        outcome.warnings.push("the diagnosis was stopped: sets of effects that were not fitted may explain more".to_owned());
+    }
     outcome.found.diagnosis = Some(diagnosis);
     solved
 }

@@ -5,6 +5,7 @@
 
 use std::f64::consts::TAU;
 
+use mops_core::diagnosis::Dependence;
 use mops_core::{Port, Unit, math};
 use mops_models::Moment;
 use nalgebra::{DMatrix, DVector};
@@ -45,25 +46,18 @@ const STILL: f64 = 1e-12;
 /// Turns that an angle must cover to be a coordinate modulo one turn too.
 const TURNS: f64 = 1.5;
 
-/// Gain of a free curve.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FreeCurve {
-    /// Coordinate and place, for example `speed at joint:q`.
-    pub coordinate: String,
-    /// Gain in log-evidence, nats, with that for the choice of the deviations taken off.
-    pub gain: f64,
-    /// Centres of the bumps, in the unit of the coordinate; delays of the copies of an input, s.
-    pub centres: Vec<f64>,
-    /// Most probable weights: in nominal forces, in amplitudes of the input, or as gains of the delayed copies.
-    pub weights: Vec<f64>,
-}
+/// Points of a curve that is returned.
+const POINTS: usize = 41;
 
 /// Coordinate with the places at which the force over it acts.
 struct Coordinate {
-    name: String,
+    /// What is returned of it, without gain and curve.
+    names: Dependence,
     value: Value,
-    /// Columns of the linear system with the size of a weight of 1.
+    /// Columns of the linear system with the size of a weight of 1; a force between two places acts on the second last.
     acts: Vec<(usize, f64)>,
+    /// Sign that a positive force has in its column.
+    sign: f64,
 }
 
 /// Value of a coordinate at an instant.
@@ -90,7 +84,7 @@ impl Value {
 
 impl Estimation<'_> {
     /// Returns the free curves on top of an estimate, the one with the largest gain first; `None` if a simulation fails.
-    pub fn curves(&self, estimate: &Estimate) -> Option<Vec<FreeCurve>> {
+    pub fn curves(&self, estimate: &Estimate) -> Option<Vec<Dependence>> {
         let fit = self.along(&estimate.errors);
         let mut slopes = fit.slopes(&estimate.point)?;
         estimate.errors.take_force_out_of(&mut slopes);
@@ -124,9 +118,9 @@ impl Estimation<'_> {
             let (penalty, mut weights) = tried.flatten().min_by(least)?;
             weights.truncate(BUMPS);
             let gain = 0.5 * (without - penalty) - CHOICE;
-            Some(FreeCurve { coordinate: shape.name.clone(), gain, centres: shape.centres.clone(), weights })
+            Some(Dependence { gain, curve: shape.curve(&weights), ..shape.coordinate.names.clone() })
         };
-        let mut curves: Vec<FreeCurve> = shapes.iter().enumerate().filter_map(gain).collect();
+        let mut curves: Vec<Dependence> = shapes.iter().enumerate().filter_map(gain).collect();
         curves.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         Some(curves)
     }
@@ -183,16 +177,13 @@ impl Estimation<'_> {
                     let values = || trajectories.iter().flat_map(|t| &t.moments).map(|m| m.u[input]);
                     let amplitude = deviation(values());
                     if amplitude > 0.0 {
-                        let acts = || vec![(input, amplitude)];
-                        let name = &interface.inputs[input].name;
-                        all.push(Coordinate {
-                            name: format!("input at {port}"),
-                            value: Value::Input(input),
-                            acts: acts(),
-                        });
-                        let value = Value::Delayed(name.clone(), self.channels.shortest_step());
-                        let acts = vec![(input, 1.0)];
-                        all.push(Coordinate { name: format!("delayed input at {port}"), value, acts });
+                        let unit = &interface.inputs[input].unit;
+                        let own = names("input", port, None, unit, Some(unit));
+                        all.push(Coordinate { names: own, value: Value::Input(input), acts: vec![(input, amplitude)], sign: 1.0 });
+                        let delayed = names("delayed input", port, None, &Unit::known("s"), Some(&Unit::one()));
+                        let value =
+                            Value::Delayed(interface.inputs[input].name.clone(), self.channels.shortest_step());
+                        all.push(Coordinate { names: delayed, value, acts: vec![(input, 1.0)], sign: 1.0 });
                     }
                 }
                 _ => {}
@@ -201,20 +192,23 @@ impl Estimation<'_> {
         let mobilities = trajectories.first().map_or(&[][..], |t| &t.mobilities);
         let nominal = |force: usize| (self.nominal[force] / mobilities[force]).abs();
         let own = |force: usize| vec![(inputs + force, nominal(force))];
+        let sign = |force: usize| trajectories.first().map_or(1.0, |t| t.forward[force]);
         let is_angle = |state: usize| states[state].unit == Unit::known("rad");
         for (port, force, position, speed) in &joints {
-            let mut add = |what: &str, value| {
-                all.push(Coordinate { name: format!("{what} at {port}"), value, acts: own(*force) });
+            let mut add = |what: &str, state: usize, value| {
+                let names = names(what, port, None, &states[state].unit, force_unit(port));
+                all.push(Coordinate { names, value, acts: own(*force), sign: sign(*force) });
             };
-            add("speed", Value::State(*speed));
-            add("position", Value::State(*position));
+            add("speed", *speed, Value::State(*speed));
+            add("position", *position, Value::State(*position));
             if is_angle(*position) {
-                add("position modulo one turn", Value::Angle(*position));
+                add("position modulo one turn", *position, Value::Angle(*position));
             }
         }
         let is_joint = |force: usize| joints.iter().any(|joint| joint.1 == force);
         for (port, force, state) in stores.iter().filter(|store| !is_joint(store.1)) {
-            all.push(Coordinate { name: format!("level at {port}"), value: Value::State(*state), acts: own(*force) });
+            let names = names("level", port, None, &states[*state].unit, force_unit(port));
+            all.push(Coordinate { names, value: Value::State(*state), acts: own(*force), sign: sign(*force) });
         }
         // Between two places of a kind the force acts on one and back on the other.
         let between = |a: usize, b: usize| {
@@ -226,20 +220,20 @@ impl Estimation<'_> {
                 if states[*position].unit != states[*other_position].unit || same_unit(port, other) == Some(false) {
                     continue;
                 }
-                let mut add = |what: &str, value| {
-                    let acts = between(*force, *other_force);
-                    all.push(Coordinate { name: format!("{what} between {port} and {other}"), value, acts });
+                let mut add = |what: &str, state: usize, value| {
+                    let names = names(what, port, Some(other), &states[state].unit, force_unit(port));
+                    all.push(Coordinate { names, value, acts: between(*force, *other_force), sign: sign(*other_force) });
                 };
-                add("deflection", Value::Difference(*position, *other_position));
-                add("rate of deflection", Value::Difference(*speed, *other_speed));
+                add("deflection", *position, Value::Difference(*position, *other_position));
+                add("rate of deflection", *speed, Value::Difference(*speed, *other_speed));
             }
         }
         let stores: Vec<_> = stores.iter().filter(|store| !is_joint(store.1)).collect();
         for (port, force, state) in &stores {
             for (other, other_force, other_state) in stores.iter().filter(|other| other.1 != *force) {
                 if states[*state].unit == states[*other_state].unit && same_unit(port, other) != Some(false) {
-                    let (name, value) = (format!("level, flow from {port} to {other}"), Value::State(*state));
-                    all.push(Coordinate { name, value, acts: between(*force, *other_force) });
+                    let names = names("level", port, Some(other), &states[*state].unit, force_unit(port));
+                    all.push(Coordinate { names, value: Value::State(*state), acts: between(*force, *other_force), sign: sign(*other_force) });
                 }
             }
         }
@@ -247,13 +241,30 @@ impl Estimation<'_> {
     }
 }
 
+/// Returns the names and units of a coordinate.
+fn names(what: &str, place: &Port, other: Option<&Port>, unit: &Unit, signal_unit: Option<&Unit>) -> Dependence {
+    Dependence {
+        coordinate: what.to_owned(),
+        place: place.to_string(),
+        other: other.map(ToString::to_string),
+        gain: 0.0,
+        unit: unit.to_string(),
+        signal_unit: signal_unit.map(ToString::to_string).unwrap_or_default(),
+        curve: Vec::new(),
+    }
+}
+
+/// Returns the unit of the force at a place, if the model determines it.
+fn force_unit(port: &Port) -> Option<&Unit> {
+    match port {
+        Port::Joint { unit, .. } | Port::Process { unit, .. } => unit.as_ref(),
+        _ => None,
+    }
+}
+
 /// Returns whether the forces at two places have one unit, if both are known.
 fn same_unit(a: &Port, b: &Port) -> Option<bool> {
-    let unit = |port: &Port| match port {
-        Port::Joint { unit, .. } | Port::Process { unit, .. } => unit.clone(),
-        _ => None,
-    };
-    Some(unit(a)? == unit(b)?)
+    Some(force_unit(a)? == force_unit(b)?)
 }
 
 #[allow(clippy::cast_precision_loss)]
@@ -265,7 +276,6 @@ fn deviation(values: impl Iterator<Item = f64> + Clone) -> f64 {
 
 /// Bumps over a coordinate.
 struct Shape<'c> {
-    name: String,
     coordinate: &'c Coordinate,
     centres: Vec<f64>,
     /// Standard deviation of a bump.
@@ -278,7 +288,6 @@ impl<'c> Shape<'c> {
     fn new(coordinate: &'c Coordinate, trajectories: &[Trajectory]) -> Option<Self> {
         let moments = || trajectories.iter().flat_map(|t| &t.moments);
         let count = BUMPS as f64;
-        let name = coordinate.name.clone();
         let (centres, width) = match &coordinate.value {
             Value::Delayed(_, step) => ((0..BUMPS).map(|b| b as f64 * step).collect(), *step),
             Value::Angle(state) => {
@@ -301,7 +310,32 @@ impl<'c> Shape<'c> {
                 ((0..BUMPS).map(|b| low + b as f64 * step).collect(), step)
             }
         };
-        Some(Self { name, coordinate, centres, width })
+        Some(Self { coordinate, centres, width })
+    }
+
+    /// Returns the bump around a centre at a value.
+    fn bump(&self, value: f64, centre: f64) -> f64 {
+        let mut distance = (value - centre).abs();
+        if matches!(self.coordinate.value, Value::Angle(_)) {
+            distance = distance.min(TAU - distance);
+        }
+        math::exp(-0.5 * math::powi(distance / self.width, 2))
+    }
+
+    /// Returns points of the curve with these weights: over the visited values, or the gains of the delayed copies.
+    #[allow(clippy::cast_precision_loss)]
+    fn curve(&self, weights: &[f64]) -> Vec<[f64; 2]> {
+        let size = self.coordinate.sign * self.coordinate.acts.last().map_or(1.0, |(_, size)| *size);
+        let (first, last) = match self.coordinate.value {
+            Value::Delayed(..) => {
+                return self.centres.iter().zip(weights).map(|(delay, weight)| [*delay, weight * size]).collect();
+            }
+            Value::Angle(_) => (0.0, TAU),
+            _ => (self.centres[0], self.centres[BUMPS - 1]),
+        };
+        let place = |k: usize| first + (last - first) * k as f64 / (POINTS - 1) as f64;
+        let value = |x: f64| self.centres.iter().zip(weights).map(|(c, w)| w * self.bump(x, *c)).sum::<f64>() * size;
+        (0..POINTS).map(place).map(|x| [x, value(x)]).collect()
     }
 
     /// Returns what a weight of 1 of a column adds to the residuals of a record.
@@ -316,13 +350,7 @@ impl<'c> Shape<'c> {
         };
         let value = |m: &Moment| match &self.coordinate.value {
             Value::Delayed(input, _) => piece.case.input(input).map_or(0.0, |input| input.at(m.t - centre)),
-            value => {
-                let mut distance = (value.at(m) - centre).abs();
-                if matches!(value, Value::Angle(_)) {
-                    distance = distance.min(TAU - distance);
-                }
-                math::exp(-0.5 * math::powi(distance / self.width, 2))
-            }
+            value => self.bump(value.at(m), centre),
         };
         let shape: Vec<f64> = trajectory.moments.iter().map(value).collect();
         let mut sum: Option<Vec<f64>> = None;

@@ -5,8 +5,8 @@ mod errors;
 mod estimate;
 mod priors;
 mod scoring;
+mod steps;
 
-pub use curve::FreeCurve;
 pub use errors::{Channels, ErrorModel, Errors, Motion};
 pub use estimate::{ALLOWANCE, Estimate, Estimation};
 pub(crate) use priors::{log_choices, nominal_rates, priors};

@@ -108,6 +108,15 @@ impl FittedSet<'_> {
         Some(likeliest.log_likelihood - sums.into_iter().filter(|sum| sum.1 > 0.0).map(of).sum::<f64>())
     }
 
+    /// Returns the root mean square error of all records by least squares, in noises.
+    pub fn error(&self) -> Option<f64> {
+        let all = self.fit.all(&self.least_squares.point)?;
+        let count: usize = all.iter().map(Vec::len).sum();
+        #[allow(clippy::cast_precision_loss)]
+        let mean = all.iter().flatten().map(|r| r * r).sum::<f64>() / count.max(1) as f64;
+        Some(mean.sqrt())
+    }
+
     /// Returns the largest root mean square error of a record by least squares, in noises.
     #[allow(clippy::cast_precision_loss)]
     pub fn largest_error(&self) -> Option<f64> {

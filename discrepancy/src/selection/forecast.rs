@@ -8,7 +8,7 @@ use super::fitted_set::{FittedSet, Key, estimation};
 use super::search::{Search, without};
 use crate::base;
 use crate::estimation::ErrorModel;
-use crate::fit::{Piece, Point};
+use crate::fit::{Fit, Piece, Point};
 use crate::variant::problem;
 
 /// What is forecast, with whose parameters.
@@ -82,6 +82,13 @@ impl Forecasts {
         Some(share(self.error(search, key, kind)?, self.error(search, &Vec::new(), kind)?))
     }
 
+    /// Returns the root mean square error of a set on the records of a role, in noises; `None` if there are none, or the forecast
+    /// fails.
+    pub fn error_on(set: &FittedSet<'_>, role: Role) -> Option<f64> {
+        let pieces = base::pieces(set.fit.subject, |of| of == role);
+        free_run(set, &set.least_squares.point, pieces).map(f64::sqrt)
+    }
+
     /// Returns the sets with one effect less, and the declared model.
     fn rivals(key: &Key) -> Vec<Key> {
         let mut rivals: Vec<Key> = (0..key.len()).map(|k| without(key, k)).collect();
@@ -115,6 +122,12 @@ pub fn free_run(set: &FittedSet<'_>, point: &Point, pieces: Vec<Piece>) -> Optio
     if pieces.is_empty() {
         return None;
     }
+    let (fit, point) = with_free_starts(set, point, pieces)?;
+    mean_square(fit.all(&point)?.into_iter().flatten())
+}
+
+/// Fits the initial states of records, with the parameters of a point.
+pub fn with_free_starts<'a>(set: &FittedSet<'a>, point: &Point, pieces: Vec<Piece>) -> Option<(Fit<'a>, Point)> {
     let start = set.start_at(point);
     let locals = base::first_locals(&pieces);
     let subject = set.fit.subject;
@@ -123,9 +136,8 @@ pub fn free_run(set: &FittedSet<'_>, point: &Point, pieces: Vec<Piece>) -> Optio
     for (global, value) in fit.globals.iter_mut().zip(&mut point.globals) {
         global.bounds = [*value; 2];
     }
-    let found = estimation(subject, &fit, &variant, &start.added, &[], &point).least_squares(point)?;
-    let residuals = fit.all(&found.point)?;
-    mean_square(residuals.iter().flatten().copied())
+    let point = estimation(subject, &fit, &variant, &start.added, &[], &point).least_squares(point)?.point;
+    Some((fit, point))
 }
 
 /// Returns the mean square error in noises at the ends of the calibration records, run on from least squares on their beginnings.

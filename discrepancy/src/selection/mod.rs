@@ -4,6 +4,7 @@ mod baseline;
 mod coverage;
 mod fitted_set;
 mod forecast;
+mod preparation;
 mod refit;
 mod report;
 mod screening;
@@ -11,6 +12,16 @@ mod search;
 #[cfg(test)]
 mod tests;
 mod verdict;
+
+pub(crate) use fitted_set::{FittedSet, Key};
+#[cfg(test)]
+pub(crate) use fitted_set::estimation;
+pub(crate) use forecast::{Forecasts, with_free_starts};
+pub(crate) use preparation::prepare;
+pub(crate) use screening::{Scene as Screening, Screened};
+pub(crate) use refit::price;
+pub(crate) use search::{Search, without};
+pub(crate) use verdict::{FIRES, OTHER, decide, entry};
 
 pub use report::{Selection, SetFit, SetOfEffects, compare, select};
 pub use verdict::{Conclusion, Entry, Stated, Verdict};

@@ -70,6 +70,7 @@ impl<'a> Refit<'a> {
         if !best.least_squares.converged {
             best.least_squares = best.estimation(&[]).least_squares(best.least_squares.point.clone())?;
         }
+        best.least_squares = best.estimation(&[]).with_steps(best.least_squares.clone());
         Some(best)
     }
 

@@ -2,21 +2,19 @@
 
 use std::sync::Arc;
 
+use mops_core::diagnosis::Dependence;
 use mops_core::{Effect, Role, Study, StudyError};
 
-use super::baseline::baseline;
-use super::coverage::is_covered;
 use super::fitted_set::{FittedSet, Key, name};
 use super::forecast::{Forecasts, free_run};
-use super::refit::Refit;
+use super::preparation::prepare;
 use super::search::Search;
 use super::verdict::{Verdict, decide};
 use crate::base;
-use crate::estimation::{ErrorModel, Errors, Estimate, FreeCurve, nominal_rates};
+use crate::estimation::{ErrorModel, Errors, Estimate};
 use crate::fit::Sets;
 use crate::meter::Meter;
 use crate::subject::Subject;
-use crate::trajectory::Trajectory;
 
 /// Set of effects, fitted to the calibration records.
 #[derive(Debug, Clone)]
@@ -58,7 +56,7 @@ pub struct SetFit {
     /// Root mean square errors in noises of calibration, selection and validation records, in free run with free initial states.
     pub free_run: [Option<f64>; 3],
     /// Free curves on top of the fit, the one with the largest gain first; none for least squares.
-    pub curves: Vec<FreeCurve>,
+    pub curves: Vec<Dependence>,
     /// True if the fit converged.
     pub converged: bool,
 }
@@ -128,24 +126,9 @@ fn with_search(
     let subject = Subject::new(study)?;
     let simulations = Meter::new(&());
     let failed = || StudyError::here("the model cannot be simulated near its initial guesses");
-    subject.take_tolerance();
-    let start = baseline(&subject, &simulations).ok_or_else(failed)?;
-    subject.take_pace(&start.tuners);
-    let mut refit = Refit {
-        subject: &subject,
-        candidates: subject.candidates(effects),
-        nominal: Vec::new(),
-        simulations: &simulations,
-    };
-    let declared = refit.least_squares(&Vec::new(), &[start]).ok_or_else(failed)?;
-    let along = |piece| Trajectory::new(&declared.fit, &declared.variant.model, piece, &declared.least_squares.point);
-    let trajectories: Vec<Trajectory> =
-        (0..declared.fit.pieces.len()).map(|piece| along(piece).ok()).collect::<Option<_>>().ok_or_else(failed)?;
-    refit.nominal = nominal_rates(&declared.variant, &trajectories);
-    refit
-        .candidates
-        .retain(|candidate| is_covered(candidate, &declared.variant.model, &declared.fit.pieces, &trajectories));
-    let mut search = Search::new(&refit, declared, study.tasks().diagnosis.max_effects);
+    let (refit, declared) = prepare(&subject, effects, &simulations).ok_or_else(failed)?;
+    let task = &study.tasks().diagnosis;
+    let mut search = Search::new(&refit, declared, task.max_effects, task.level);
     fit(&mut search)?;
     let mut forecasts = Forecasts::new(subject.measurements.iter().any(|m| m.role == Role::Selection));
     let verdict = decide(&mut search, &mut forecasts);

@@ -7,8 +7,8 @@ use super::fitted_set::FittedSet;
 use crate::candidate::Candidate;
 use crate::estimation::{Channels, Errors};
 use crate::fit::{Piece, dot};
-use crate::screen::sizes_for;
-use crate::trace_of::View;
+
+use crate::trace_of::{View, sizes_for};
 use crate::trajectory::Trajectory;
 use crate::variant::Added;
 
@@ -21,6 +21,11 @@ pub struct Screened {
     pub guesses: Vec<Added>,
     /// Gain in log-likelihood under each error model, nats.
     pub gains: Vec<f64>,
+    /// Share of the squared response in white noise that the unknowns absorb.
+    pub absorbed: f64,
+    /// First parameter for which the gain under the likelier correlated error model is half a nat, if the response is in proportion
+    /// to it.
+    pub detectable: Option<f64>,
     /// For each error model the direction of the response.
     directions: Vec<Direction>,
     /// True if the product must be negative: strengths have one sign.
@@ -28,6 +33,11 @@ pub struct Screened {
 }
 
 impl Screened {
+    /// Returns the cosine of the responses of two candidates in white noise, without what the unknowns take up.
+    pub fn likeness(&self, other: &Self) -> f64 {
+        dot(&self.directions[0].values, &other.directions[0].values).abs()
+    }
+
     /// Returns the largest gain under the correlated error models.
     pub fn correlated(&self) -> f64 {
         correlated(&self.gains).1
@@ -156,10 +166,17 @@ impl<'s> Scene<'s> {
             let mut gains = Vec::new();
             let mut directions = Vec::new();
             let mut factors = Vec::new();
+            let mut lengths = Vec::new();
+            let mut absorbed = 0.0;
             let mut chosen: Vec<&Vec<f64>> = Vec::new();
             for projection in &self.projections {
                 let Some((strengths, total)) = self.likeliest(projection, &traces) else { break };
+                let size = dot(&total, &total);
                 let Some((length, direction)) = projection.left(total) else { break };
+                if gains.is_empty() {
+                    absorbed = 1.0 - length * length / size;
+                }
+                lengths.push(length);
                 let along = dot(&direction, &projection.residuals);
                 let wanted = -along / length;
                 let factor = if is_linear {
@@ -196,10 +213,11 @@ impl<'s> Scene<'s> {
                 own: fit.pieces.iter().zip(&chosen).flat_map(of_piece).collect(),
                 starts: Vec::new(),
                 sizes,
-                expected: None,
             };
             let is_one_sided = !is_linear || first.bounds[0] >= 0.0;
-            let now = Screened { index, guesses: vec![guess], gains, directions, is_one_sided };
+            let detectable = is_linear.then(|| group[0][0].abs() / lengths[k]);
+            let now =
+                Screened { index, guesses: vec![guess], gains, absorbed, detectable, directions, is_one_sided };
             match before {
                 Some(k) => found[k] = now,
                 None => found.push(now),

@@ -1,6 +1,6 @@
 //! Best-first search over sets of effects.
 
-use mops_core::EffectClass;
+use mops_core::{EffectClass, math};
 use rayon::prelude::*;
 
 use super::fitted_set::{FittedSet, Key, Start, evidence};
@@ -22,10 +22,6 @@ const PAIRS: usize = 10;
 /// Sets of an expansion that are fitted under all error models: single effects, pairs.
 const FULL: [usize; 2] = [4, 3];
 
-/// Gain of correlated errors over white noise in log-likelihood, nats, from which a lack of fit is significant. Basis: twice the
-/// gain exceeds 6 in 5 % of all cases by chance, for the two further parameters of one error model (chi-squared distribution).
-pub const SIGNIFICANT: f64 = 3.0;
-
 /// Sets that are fitted roughly at a time.
 const AT_A_TIME: usize = 4;
 
@@ -45,6 +41,9 @@ const BEHIND: f64 = 6.0;
 /// Most probable sets whose effects are exchanged for others of their class, one after the other.
 const POLISHED: usize = 3;
 
+/// Difference in log-likelihood, nats, up to which two sets describe the records equally well.
+const SAME: f64 = 3.0;
+
 /// Gain in log-likelihood, nats, below which an effect under every error model does nothing.
 const INERT: f64 = 0.3;
 
@@ -56,13 +55,35 @@ pub struct Search<'r, 'a> {
     pub sets: Vec<FittedSet<'a>>,
     /// Largest number of effects of a set.
     pub most: usize,
+    /// Gain of correlated errors over white noise in log-likelihood, nats, from which a lack of fit is significant.
+    pub significant: f64,
+    /// Candidates screened on the declared model, the best first.
+    pub screened: Vec<Screened>,
+    /// Sets that were the most probable one after the other.
+    pub history: Vec<Key>,
 }
 
 impl<'r, 'a> Search<'r, 'a> {
-    /// Begins with the declared model, fitted by least squares.
-    pub fn new(refit: &'r Refit<'a>, mut declared: FittedSet<'a>, most: usize) -> Self {
+    /// Begins with the declared model, fitted by least squares. A lack of fit is significant if it occurs by chance with
+    /// probability `level`: twice its log-likelihood ratio is chi-squared with two degrees of freedom, the further parameters of
+    /// one error model.
+    pub fn new(refit: &'r Refit<'a>, mut declared: FittedSet<'a>, most: usize, level: f64) -> Self {
         refit.under_error_models(&mut declared, &[], f64::NEG_INFINITY);
-        Self { refit, sets: vec![declared], most }
+        let significant = -math::ln(level);
+        Self { refit, sets: vec![declared], most, significant, screened: Vec::new(), history: Vec::new() }
+    }
+
+    /// Returns true if correlated errors are significantly likelier than white noise at the optimum of a set.
+    fn lacks_something(&self, set: &FittedSet<'_>) -> bool {
+        set.lack_of_fit().is_none_or(|nats| nats > self.significant)
+    }
+
+    /// Notes the most probable set if it has changed.
+    fn note(&mut self) {
+        let Some(first) = self.sets.first().map(|set| set.key.clone()) else { return };
+        if self.history.last().map_or(!first.is_empty(), |last| *last != first) {
+            self.history.push(first);
+        }
     }
 
     /// Expands the most probable sets until they have all been.
@@ -77,10 +98,15 @@ impl<'r, 'a> Search<'r, 'a> {
             });
             let Some(key) = best.map(|set| set.key.clone()) else { break };
             // Effects are added to the declared model in any case, and then as long as something is lacking.
-            if !key.is_empty() && !self.sets.first().is_some_and(lacks_something) {
+            if !key.is_empty() && !self.sets.first().is_some_and(|set| self.lacks_something(set)) {
                 break;
             }
+            #[allow(clippy::cast_precision_loss)]
+            let done = 0.15 + 0.12 * expanded.len() as f64;
+            let what = if key.is_empty() { "single effects and pairs" } else { "further effects" };
+            self.refit.simulations.stage(what, done);
             self.expand(&key);
+            self.note();
             expanded.push(self.kinds_of(&key));
         }
         let mut swapped: Vec<Key> = Vec::new();
@@ -89,7 +115,9 @@ impl<'r, 'a> Search<'r, 'a> {
             if swapped.contains(&key) {
                 break;
             }
+            self.refit.simulations.stage("other effects of the same class", 0.8);
             self.swap(&key);
+            self.note();
             swapped.push(key);
         }
     }
@@ -126,6 +154,30 @@ impl<'r, 'a> Search<'r, 'a> {
             .any(|smaller| ErrorModel::ALL.into_iter().filter_map(|kind| gain(smaller, kind)).all(|gain| gain < INERT))
     }
 
+    /// Returns true if an effect of a set is at a limit at which a simpler effect at its place describes the records as well: a
+    /// parameter beside the first is at a bound, where it is the simpler effect in all but name.
+    pub fn is_degenerate(&self, set: &FittedSet<'a>) -> bool {
+        let candidates = &self.refit.candidates;
+        let added = set.start_at(&set.least_squares.point).added;
+        let at_limit = added.iter().filter(|added| {
+            let parameters = added.candidate.effect.parameters().iter().zip(&added.strengths).skip(1);
+            parameters.into_iter().any(|(parameter, value)| !parameter.fixed && parameter.bounds.contains(value))
+        });
+        let is_matched = |added: &Added| {
+            let Some(at) = set.key.iter().position(|k| candidates[*k].is(&added.candidate)) else { return false };
+            let rest = without(&set.key, at);
+            self.sets.iter().any(|other| {
+                let new = other.key.iter().find(|k| !rest.contains(k));
+                let is_simpler = |&k: &usize| candidates[k].has_fewer_strengths_than(&added.candidate);
+                other.key.len() == set.key.len()
+                    && rest.iter().all(|k| other.key.contains(k))
+                    && new.is_some_and(is_simpler)
+                    && other.least_squares.log_likelihood > set.least_squares.log_likelihood - SAME
+            })
+        };
+        at_limit.into_iter().any(is_matched)
+    }
+
     /// Fits the sets with one or two effects more, and those with one less.
     fn expand(&mut self, key: &Key) {
         let parent = self.get(key).expect("it was fitted").clone();
@@ -141,6 +193,9 @@ impl<'r, 'a> Search<'r, 'a> {
         let wanted: Vec<usize> =
             (0..all.len()).filter(|index| !key.contains(index)).filter(fits).filter(is_stacked).collect();
         let screened = scene.screen(all, &wanted);
+        if key.is_empty() {
+            self.screened.clone_from(&screened);
+        }
         // What explains less than it costs is not fitted. On the declared model all may be nonlinear in what it explains.
         let price = price(kinds(all));
         let pays = |gain: f64| ALLOWANCE * gain > price;
@@ -149,7 +204,7 @@ impl<'r, 'a> Search<'r, 'a> {
         let mut raw: Vec<&Screened> = if key.is_empty() { screened.iter().collect() } else { paying().collect() };
         raw.sort_by(|a, b| b.gains[0].total_cmp(&a.gains[0]));
         // Where correlated errors take up whatever is missing, the gain in white noise is what there is.
-        let is_missed = key.is_empty() && lacks_something(&parent);
+        let is_missed = key.is_empty() && self.lacks_something(&parent);
         let others = RAW + if is_missed { SINGLES.saturating_sub(singles.len()) } else { 0 };
         for other in raw.into_iter().take(others) {
             if singles.iter().all(|single| single.index != other.index) {
@@ -164,7 +219,7 @@ impl<'r, 'a> Search<'r, 'a> {
         self.fit_best(&parent, &singles, FULL[0]);
         self.sort();
         // Where a set is found that lacks nothing, no pair is needed.
-        if !pairs.is_empty() && self.sets.first().is_some_and(lacks_something) {
+        if !pairs.is_empty() && self.sets.first().is_some_and(|set| self.lacks_something(set)) {
             self.fit_best(&parent, &pairs, FULL[1]);
             self.sort();
         }
@@ -362,11 +417,6 @@ fn likelier_output<'s>(set: &'s FittedSet<'_>) -> Option<&'s Estimate> {
 fn gains(set: &FittedSet<'_>, smaller: &FittedSet<'_>) -> [f64; 2] {
     let log = |set| likelier_output(set).map_or(f64::NEG_INFINITY, |estimate| estimate.log_likelihood);
     [set.least_squares.log_likelihood - smaller.least_squares.log_likelihood, log(set) - log(smaller)]
-}
-
-/// Returns true if correlated errors are significantly likelier than white noise at the optimum of a set.
-fn lacks_something(set: &FittedSet<'_>) -> bool {
-    set.lack_of_fit().is_none_or(|nats| nats > SIGNIFICANT)
 }
 
 /// Returns a set with one more candidate.

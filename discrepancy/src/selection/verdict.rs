@@ -6,9 +6,10 @@ use mops_core::math;
 
 use super::fitted_set::Key;
 use super::forecast::Forecasts;
-use super::search::{SIGNIFICANT, Search};
+use super::search::Search;
 use crate::candidate::Candidate;
-use crate::estimation::{ErrorModel, FreeCurve};
+use crate::estimation::ErrorModel;
+use mops_core::diagnosis::Dependence;
 
 /// Class of effects at a place.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,6 +47,10 @@ pub struct Stated {
 pub struct Verdict {
     /// The first set that passed; empty for the declared model.
     pub set: Key,
+    /// Sets that passed, with their posterior probabilities.
+    pub passed: Vec<(Key, f64)>,
+    /// True if a free curve on top of the set shows that most remains.
+    pub is_refused_by_curve: bool,
     /// Conclusion.
     pub conclusion: Conclusion,
     /// Class and place of the effects of the set.
@@ -54,10 +59,11 @@ pub struct Verdict {
     pub nothing: f64,
     /// True if the set is the one of highest evidence.
     pub is_first: bool,
-    /// Curve on the declared model with the largest gain, under its likeliest error model, and under the smooth output error.
-    pub declared: [Option<FreeCurve>; 2],
-    /// Curve on top of the set with the largest gain, under its likeliest error model.
-    pub remaining: Option<FreeCurve>,
+    /// Curves on the declared model, that with the largest gain first, under its likeliest error model, and under the smooth
+    /// output error.
+    pub declared: [Vec<Dependence>; 2],
+    /// Curves on top of the set under its likeliest error model, that with the largest gain first; none without a set.
+    pub remaining: Vec<Dependence>,
     /// Share of the error of the forecast above noise that the set removes.
     pub share: Option<f64>,
     /// Gain of correlated errors over white noise of fitted size in log-likelihood at the declared model, nats.
@@ -67,7 +73,7 @@ pub struct Verdict {
 }
 
 /// Gain of a curve in nats from which it fires.
-const FIRES: f64 = 6.0;
+pub const FIRES: f64 = 6.0;
 
 /// Share of the gain of the set up to which a curve is small.
 const SMALL: f64 = 0.3;
@@ -85,25 +91,28 @@ const MATTERS: f64 = 1.1;
 /// Shares and probability that a set must have where only the ends of the calibration records are forecast.
 const RUN_ON: f64 = 0.8;
 
-/// Logarithm of the probability relative to the first set that passed below which a set does not count.
-const NEGLIGIBLE: f64 = 8.0;
+/// Logarithm of the probability relative to the first set that passed below which a set does not count: less than 1 %.
+const NEGLIGIBLE: f64 = 5.0;
 
 /// Probability that none of the candidates is right.
-const OTHER: f64 = 0.05;
+pub const OTHER: f64 = 0.05;
 
 /// Decides on the sets of a search.
 pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict {
     let nothing = Key::new();
     let declared = search.log_posterior(search.get(&nothing).expect("it was fitted first"));
-    let above: Vec<Key> = {
-        let sets = search.sets.iter().filter(|set| !set.key.is_empty() && search.log_posterior(set) > declared);
-        sets.filter(|set| !search.is_inert(set)).map(|set| set.key.clone()).collect()
+    let candidates: Vec<Key> = {
+        let sets = search.sets.iter().filter(|set| !set.key.is_empty());
+        sets.filter(|set| !search.is_inert(set) && !search.is_degenerate(set)).map(|set| set.key.clone()).collect()
     };
+    // What is less probable than the declared model is not chosen, but counts for the probabilities.
+    let first = candidates.first().filter(|key| search.get(key).is_some_and(|set| search.log_posterior(set) > declared));
+    let first = first.cloned();
     let mut passed: Vec<Key> = Vec::new();
     let mut least = f64::NEG_INFINITY;
-    for key in &above {
+    for key in &candidates {
         let posterior = search.get(key).map_or(f64::NEG_INFINITY, |set| search.log_posterior(set));
-        if posterior < least {
+        if posterior < least || posterior <= declared && passed.is_empty() {
             break;
         }
         if forecasts.passes(search, key) {
@@ -127,26 +136,26 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         }
     }
     let nothing_probability = weight(declared) / total;
+    let weights: Vec<(Key, f64)> = passed.iter().map(|key| (key.clone(), weight(log(key)) / total)).collect();
     let mut entries: Vec<Entry> = set.iter().map(|&k| entry(search, &search.refit.candidates[k])).collect();
     entries.sort();
     entries.dedup();
     let probability = |entry: &Entry| by_entry.get(entry).copied().unwrap_or(0.0);
     let entries: Vec<(Entry, f64)> = entries.into_iter().map(|e| (e.clone(), probability(&e))).collect();
-    let is_first = above.first() == Some(&set)
-        || above.first().is_some_and(|first| !set.is_empty() && first.iter().all(|k| set.contains(k)));
+    let is_first = first.is_some_and(|first| !set.is_empty() && first.iter().all(|k| set.contains(k)));
     let curves = |key: &Key, kind: Option<ErrorModel>| {
         let set = search.get(key)?;
         let estimate = kind.map_or_else(|| set.likeliest().map(|(_, estimate)| estimate), |kind| set.estimate(kind))?;
-        set.estimation(&search.refit.nominal).curves(estimate)?.into_iter().next()
+        set.estimation(&search.refit.nominal).curves(estimate)
     };
-    let on_declared = [curves(&nothing, None), curves(&nothing, Some(ErrorModel::SmoothOutput))];
-    let remaining = if set.is_empty() { None } else { curves(&set, None) };
+    let on_declared = [None, Some(ErrorModel::SmoothOutput)].map(|kind| curves(&nothing, kind).unwrap_or_default());
+    let remaining = if set.is_empty() { Vec::new() } else { curves(&set, None).unwrap_or_default() };
     let share = if set.is_empty() { None } else { forecasts.share_of_declared(search, &set) };
     let gained = || {
         let log = |key: &Key| search.get(key).and_then(|set| set.likeliest()).map_or(0.0, |l| l.1.log_likelihood);
         log(&set) - log(&nothing)
     };
-    let fires = remaining.as_ref().is_some_and(|curve| curve.gain >= FIRES && curve.gain >= SMALL * gained());
+    let fires = remaining.first().is_some_and(|curve| curve.gain >= FIRES && curve.gain >= SMALL * gained());
     let explains = !fires || share.is_some_and(|share| share >= MOST);
     let least = if forecasts.are_of_other_records() { CLAIMED } else { RUN_ON };
     let most = if is_first { 1.0 } else { CLAIMED };
@@ -164,7 +173,7 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
     let largest_error = declared_model.largest_error().unwrap_or(f64::INFINITY);
     let conclusion = if is_effect {
         Conclusion::Effect
-    } else if lack_of_fit > SIGNIFICANT && largest_error > MATTERS {
+    } else if lack_of_fit > search.significant && largest_error > MATTERS {
         Conclusion::Unexplained
     } else {
         Conclusion::None
@@ -173,6 +182,8 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         conclusion,
         stated,
         nothing: nothing_probability,
+        is_refused_by_curve: !explains,
+        passed: weights,
         set,
         is_first,
         declared: on_declared,
@@ -184,7 +195,7 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
 }
 
 /// Returns class and place of a candidate; what happens once in one record is a disturbance of that record.
-fn entry(search: &Search<'_, '_>, candidate: &Candidate) -> Entry {
+pub fn entry(search: &Search<'_, '_>, candidate: &Candidate) -> Entry {
     let class = match candidate.only {
         Some(only) => format!("disturbance in {}", search.refit.subject.measurements[only].name),
         None => candidate.effect.class().name().to_owned(),

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use mops::core::diagnosis::Dependence;
 use mops::discrepancy::estimation::{ErrorModel, Errors};
 use mops::discrepancy::selection::{Conclusion, Entry, Selection, SetFit, SetOfEffects, compare, select};
 use mops::terminal::{CommandError, print};
@@ -59,8 +60,8 @@ fn verdict(selection: &Selection) -> String {
         let _ = write!(text, "; share of the forecast error {share:.3}");
     }
     let _ = writeln!(text, "; {}first by evidence", if verdict.is_first { "" } else { "not " });
-    let curve = |curve: &Option<mops::discrepancy::estimation::FreeCurve>| {
-        curve.as_ref().map_or("none".to_owned(), |c| format!("{} {:+.1}", c.coordinate, c.gain))
+    let curve = |curves: &[Dependence]| {
+        curves.first().map_or("none".to_owned(), |curve| format!("{curve} {:+.1}", curve.gain))
     };
     let [likeliest, smooth] = &verdict.declared;
     let _ =
@@ -88,7 +89,7 @@ fn table(selection: &Selection) -> String {
         let _ = writeln!(text, "{}", if set.is_inert { ", inert" } else { "" });
         for fit in &set.fits {
             let _ = writeln!(text, "  {}", line(set, fit));
-            let curves = fit.curves.iter().take(CURVES).map(|c| format!("{} {:+.1}", c.coordinate, c.gain));
+            let curves = fit.curves.iter().take(CURVES).map(|c| format!("{c} {:+.1}", c.gain));
             if !fit.curves.is_empty() {
                 let _ = writeln!(text, "    free curve over: {}", curves.collect::<Vec<_>>().join("; "));
             }

@@ -7,8 +7,8 @@ use serde::{Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::{
-    Diagnosis, Evidence, ExperimentError, Found, HeldBack, Noticeable, ParameterMove, Ranked, Removed, Rival,
-    Stability, Step, StrengthValue, Unexplained, Verdict,
+    Dependence, Diagnosis, Evidence, ExperimentError, ForecastOf, Found, HeldBack, Noticeable, ParameterMove, Ranked,
+    Removed, Rival, Rule, Stability, Step, StrengthValue, Unexplained, Verdict,
 };
 use crate::experiment::Role;
 
@@ -18,12 +18,28 @@ use crate::experiment::Role;
 pub(crate) struct Block {
     /// Verdict on the model.
     verdict: Verdict,
-    /// Probability of the verdict.
+    /// Probability of the verdict; null if it cannot be stated.
+    #[schemars(with = "Option<f64>")]
     probability: f64,
-    /// p-value of the residual's structure without a missing effect, corrected for the search over the catalogue.
+    /// p-value of the residual's structure without a missing effect.
     p_value: f64,
-    /// Effects added to the model.
+    /// Effects added to the model, claimed or proposed.
     found: Vec<FoundEffect>,
+    /// Share of the squared error of the declared model, in noises, that the effects found remove from validation data, else
+    /// selection data; null without effects or without such data.
+    explained_share: Option<f64>,
+    /// Coordinate on which what the declared model lacks depends; null if none is significant.
+    depends_on: Option<Dependence>,
+    /// Coordinate on which what remains with the effects found depends; null if none is significant.
+    remaining: Option<Dependence>,
+    /// Data whose forecast decided.
+    forecast_of: ForecastOf,
+    /// True if the effects found are those of highest evidence.
+    first_by_evidence: bool,
+    /// True if the search was stopped before its end.
+    stopped: bool,
+    /// True if all fits that the verdict rests on converged.
+    converged: bool,
     /// Terms of the nominal model that the data contradict.
     removed: Vec<Removed>,
     /// Models visited by the search, in order.
@@ -77,7 +93,11 @@ struct FoundEffect {
     details: Vec<StrengthValue>,
     /// Probability that this effect, rather than another, is missing.
     probability: f64,
-    /// Decrease of the BIC when the effect is added.
+    /// Probability that an effect of this class is missing at this place.
+    class_probability: f64,
+    /// True if class and place are claimed; otherwise the effect is a proposal.
+    claimed: bool,
+    /// Decrease of the BIC when the effect is added: twice the gain in log-evidence, which the BIC approximates.
     bic_gain: f64,
     /// Alternatives at the same place whose BIC is at most 6 higher.
     indistinguishable: Vec<Rival>,
@@ -112,8 +132,10 @@ struct Candidate {
     strengths: Map<String, Value>,
     /// Share of the effect's output signature that parameters and initial states absorb.
     absorbed: f64,
-    /// Error with the effect on calibration and selection data, in units of the noise.
+    /// Error with the effect on calibration data, in units of the noise.
     normalised: f64,
+    /// Rule that the effect failed; null for a claimed one.
+    failed: Option<Rule>,
 }
 
 /// Error of a model on an experiment.
@@ -199,6 +221,13 @@ impl Block {
             probability: diagnosis.probability,
             p_value: diagnosis.p_value,
             found: found.iter().map(FoundEffect::of).collect(),
+            explained_share: diagnosis.explained_share,
+            depends_on: diagnosis.depends_on.clone(),
+            remaining: diagnosis.remaining.clone(),
+            forecast_of: diagnosis.forecast_of,
+            first_by_evidence: diagnosis.is_first,
+            stopped: diagnosis.is_stopped,
+            converged: diagnosis.converged,
             removed: diagnosis.removed.clone(),
             steps: diagnosis.steps.clone(),
             ranked: ranked.iter().map(Candidate::of).collect(),
@@ -228,6 +257,8 @@ impl FoundEffect {
             strengths: strengths(&found.strengths),
             details: found.strengths.clone(),
             probability: found.probability,
+            class_probability: found.class_probability,
+            claimed: found.claimed,
             bic_gain: found.bic_gain,
             indistinguishable: found.indistinguishable.clone(),
             stability: found.stability.clone(),
@@ -249,6 +280,7 @@ impl Candidate {
             strengths: strengths(&ranked.strengths),
             absorbed: ranked.absorbed,
             normalised: ranked.normalised,
+            failed: ranked.failed,
         }
     }
 }

@@ -57,7 +57,8 @@ pub struct Rival {
 }
 
 /// Missing effect that was added to the model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Found {
     /// The effect.
     pub effect: String,
@@ -77,7 +78,11 @@ pub struct Found {
     pub strengths: Vec<StrengthValue>,
     /// Probability that this effect, rather than another, is missing.
     pub probability: f64,
-    /// Decrease of the BIC when the effect is added.
+    /// Probability that an effect of this class is missing at this place.
+    pub class_probability: f64,
+    /// True if class and place are claimed; otherwise the effect is a proposal.
+    pub claimed: bool,
+    /// Decrease of the BIC when the effect is added: twice the gain in log-evidence, which the BIC approximates.
     pub bic_gain: f64,
     /// Alternatives at the same place whose BIC is at most 6 higher.
     pub indistinguishable: Vec<Rival>,
@@ -123,6 +128,61 @@ pub struct HangsOn {
     pub place: String,
 }
 
+/// Rule that a candidate effect failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Rule {
+    /// The evidence does not support the effect.
+    Evidence,
+    /// The model with the effect forecasts other data no better than without it.
+    Forecast,
+    /// The free curve shows that most remains unexplained.
+    Curve,
+    /// Another effect is more probable.
+    Probability,
+}
+
+/// Coordinate on which a missing force or a change of an input depends, determined without a catalogue.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Dependence {
+    /// Coordinate: `position`, `speed`, `level`, `input`, ...
+    pub coordinate: String,
+    /// Place, as `kind:name`.
+    pub place: String,
+    /// Second place, as `kind:name`, for a force between two places.
+    pub other: Option<String>,
+    /// Gain in log-evidence, nats.
+    pub gain: f64,
+    /// Unit of the coordinate.
+    pub unit: String,
+    /// Unit of what is missing; empty if the model's equations do not determine it.
+    pub signal_unit: String,
+    /// Points of the curve: coordinate, most probable value of what is missing.
+    pub curve: Vec<[f64; 2]>,
+}
+
+impl std::fmt::Display for Dependence {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { coordinate, place, other, .. } = self;
+        match other {
+            Some(other) if coordinate == "level" => write!(f, "{coordinate}, flow from {place} to {other}"),
+            Some(other) => write!(f, "{coordinate} between {place} and {other}"),
+            None => write!(f, "{coordinate} at {place}"),
+        }
+    }
+}
+
+/// Data whose forecast decides which effects are claimed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ForecastOf {
+    /// Selection records.
+    #[default]
+    Selection,
+    /// Ends of the calibration records, from parameters fitted to their beginnings.
+    EndOfRecords,
+}
+
 /// Term of the nominal model that the data contradict.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Removed {
@@ -149,8 +209,11 @@ pub struct Ranked {
     pub strengths: Vec<StrengthValue>,
     /// Share of the effect's output signature that parameters and initial states absorb.
     pub absorbed: f64,
-    /// Error with the effect on calibration and selection data, in units of the noise.
+    /// Error with the effect on calibration data, in units of the noise.
     pub normalised: f64,
+    /// Rule that the effect failed; `None` for a claimed one.
+    #[serde(default)]
+    pub failed: Option<Rule>,
 }
 
 /// Residual that no effect explains.
@@ -328,22 +391,38 @@ pub struct Step {
     pub effects: Vec<String>,
     /// Number of windows per record; 1 for whole records.
     pub windows: usize,
-    /// Error on calibration and selection data, in units of the noise.
+    /// Error on calibration data, in units of the noise.
     pub normalised: f64,
 }
 
 /// Result of a diagnosis.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 #[non_exhaustive]
 pub struct Diagnosis {
     /// Verdict.
     pub verdict: Verdict,
-    /// Probability of the verdict.
+    /// Probability of the verdict; NaN if it cannot be stated.
     pub probability: f64,
-    /// p-value of the residual's structure without a missing effect, corrected for the search over the catalogue.
+    /// p-value of the residual's structure without a missing effect.
     pub p_value: f64,
     /// Effects added.
     pub found: Vec<Found>,
+    /// Share of the squared error of the declared model, in noises, that the effects found remove from validation data, else
+    /// selection data; `None` without effects or without such data.
+    pub explained_share: Option<f64>,
+    /// Coordinate on which what the declared model lacks depends.
+    pub depends_on: Option<Dependence>,
+    /// Coordinate on which what remains with the effects found depends.
+    pub remaining: Option<Dependence>,
+    /// Data whose forecast decided.
+    pub forecast_of: ForecastOf,
+    /// True if the effects found are those of highest evidence.
+    pub is_first: bool,
+    /// True if the search was stopped before its end.
+    pub is_stopped: bool,
+    /// True if all fits that the verdict rests on converged.
+    pub converged: bool,
     /// Terms of the nominal model that the data contradict.
     pub removed: Vec<Removed>,
     /// Models visited by the search, in order.

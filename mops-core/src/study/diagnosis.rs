@@ -13,7 +13,7 @@ const MOST_EFFECTS: usize = 6;
 pub struct DiagnosisTask {
     /// Maximum number of added effects, at least 1.
     pub max_effects: usize,
-    /// False-alarm probability: the significance level of the tests for missing effects.
+    /// Significance level of the test for a lack of fit: effects are added as long as it is significant.
     pub level: f64,
     /// Kinds of effect to try; `None` for the whole catalogue.
     pub effects: Option<Vec<String>>,
@@ -23,7 +23,7 @@ pub struct DiagnosisTask {
 
 impl Default for DiagnosisTask {
     fn default() -> Self {
-        Self { max_effects: 3, level: 0.01, effects: None, without: Vec::new() }
+        Self { max_effects: 3, level: 0.05, effects: None, without: Vec::new() }
     }
 }
 
@@ -44,8 +44,8 @@ pub(super) fn check(task: DiagnosisTask, study: &Study) -> Result<DiagnosisTask,
         return Err(within(StudyError::new("max-effects", fact).with_help(help)));
     }
     if !(task.level > 0.0 && task.level <= 0.2) {
-        let fact = format!("expected a false-alarm probability above 0 and at most 0.2, found {}", task.level);
-        let help = "with the default 0.01, one complete model in a hundred is reported as incomplete";
+        let fact = format!("expected a significance level above 0 and at most 0.2, found {}", task.level);
+        let help = "with the default 0.05, white noise looks like a lack of fit in one of twenty cases";
         return Err(within(StudyError::new("level", fact).with_help(help)));
     }
     if task.effects.as_ref().is_some_and(Vec::is_empty) {

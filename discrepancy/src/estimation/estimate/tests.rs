@@ -181,7 +181,7 @@ fn largest_curves(subject: &Subject) -> Vec<(String, f64)> {
         for kind in ErrorModel::ALL {
             let estimate = estimation.under(kind, point.clone(), None).expect("it simulates");
             let curves = estimation.curves(&estimate).expect("it simulates");
-            found.borrow_mut().push((curves[0].coordinate.clone(), curves[0].gain));
+            found.borrow_mut().push((curves[0].to_string(), curves[0].gain));
         }
     });
     found.into_inner()

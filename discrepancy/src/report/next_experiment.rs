@@ -1,11 +1,18 @@
-//! The experiment that would separate two models which the data cannot tell apart: variations of those there are, judged by
-//! how far the models then differ.
+//! The experiment that would separate two models that the data cannot distinguish: variations of the existing ones, compared by
+//! the distance of the predictions.
 
 use mops_core::math;
 use mops_core::{Case, Input, Job};
 
-use crate::search::Trial;
-use crate::weigh::CLEARLY;
+use crate::selection::FittedSet;
+
+/// Squared distance of two predictions, in squared noises, from which data distinguish them. Source: R. E. Kass, A. E. Raftery,
+/// Bayes factors, Journal of the American Statistical Association 90 (1995) 773, section 3.2: twice the logarithm of a Bayes
+/// factor from which the evidence is strong.
+const CLEARLY: f64 = 6.0;
+
+/// Ratio to the distance in the experiment as it was from which a variation is worth another experiment.
+const WORTH: f64 = 1.5;
 
 /// Factors by which inputs or start values are varied.
 const FACTORS: [f64; 4] = [0.3, 0.5, 2.0, 3.0];
@@ -13,17 +20,14 @@ const FACTORS: [f64; 4] = [0.3, 0.5, 2.0, 3.0];
 /// Largest angle that start values are varied to, rad: a turn further is the same.
 const HALF_A_TURN: f64 = std::f64::consts::PI;
 
-/// What would separate two trials that were fitted to the same data, in words; `None` where no variation does better than
-/// the experiments themselves, or well enough to tell them apart.
-pub fn separating(a: &Trial<'_>, b: &Trial<'_>, names: [&str; 2]) -> Option<String> {
-    if a.windows != 1 || b.windows != 1 {
-        return None;
-    }
+/// Returns in words the experiment that would separate two models fitted to the same data; `None` if no variation does better
+/// than the experiments themselves, or well enough to distinguish the two.
+pub fn separating(a: &FittedSet<'_>, b: &FittedSet<'_>, names: [&str; 2]) -> Option<String> {
     let mut best: Option<(f64, f64, String)> = None;
     for piece in 0..a.fit.pieces.len() {
         let name = &a.fit.subject.measurements[a.fit.pieces[piece].measurement].name;
         let Some(now) = difference(a, b, piece, 1.0, 1.0) else { continue };
-        let samples = a.fitted.residuals[piece].len();
+        let samples: usize = a.fit.pieces[piece].series.iter().map(|s| s.times.len()).sum();
         let driven = !a.fit.pieces[piece].case.inputs.is_empty();
         for factor in FACTORS {
             let inputs = driven.then_some((factor, 1.0, "its inputs"));
@@ -31,7 +35,7 @@ pub fn separating(a: &Trial<'_>, b: &Trial<'_>, names: [&str; 2]) -> Option<Stri
                 let Some(then) = difference(a, b, piece, input, start) else { continue };
                 #[allow(clippy::cast_precision_loss)]
                 let is_telling = then * then * samples as f64 >= CLEARLY;
-                if is_telling && then > 1.5 * now && best.as_ref().is_none_or(|(most, ..)| then > *most) {
+                if is_telling && then > WORTH * now && best.as_ref().is_none_or(|(most, ..)| then > *most) {
                     best = Some((then, now, format!("`{name}` again with {what} {factor} times as large")));
                 }
             }
@@ -44,23 +48,23 @@ pub fn separating(a: &Trial<'_>, b: &Trial<'_>, names: [&str; 2]) -> Option<Stri
     ))
 }
 
-/// Root mean square of the difference of two models in a varied experiment, in units of the noise.
+/// Returns the root mean square difference of two models in a varied experiment, in units of the noise.
 #[allow(clippy::cast_precision_loss)]
-fn difference(a: &Trial<'_>, b: &Trial<'_>, piece: usize, input: f64, start: f64) -> Option<f64> {
+fn difference(a: &FittedSet<'_>, b: &FittedSet<'_>, piece: usize, input: f64, start: f64) -> Option<f64> {
     let [x, y] = [outputs(a, piece, input, start)?, outputs(b, piece, input, start)?];
     let square: f64 = x.iter().zip(&y).map(|(x, y)| math::powi(x - y, 2)).sum();
     let rms = (square / x.len().max(1) as f64).sqrt();
     rms.is_finite().then_some(rms)
 }
 
-fn outputs(trial: &Trial<'_>, piece: usize, input: f64, start: f64) -> Option<Vec<f64>> {
-    let p = &trial.fit.pieces[piece];
-    let mut parameters = trial.fit.parameters(piece, &trial.fitted.point);
-    let own = trial.fit.subject.measurements[p.measurement].locals.len();
+fn outputs(set: &FittedSet<'_>, piece: usize, input: f64, start: f64) -> Option<Vec<f64>> {
+    let p = &set.fit.pieces[piece];
+    let mut parameters = set.fit.parameters(piece, &set.least_squares.point);
+    let own = set.fit.subject.measurements[p.measurement].locals.len();
     for local in &p.locals[..own] {
         let value = &mut parameters[local.parameter];
         *value *= start;
-        let unit = &trial.fit.model.interface().parameters[local.parameter].variable.unit;
+        let unit = &set.fit.model.interface().parameters[local.parameter].variable.unit;
         if start > 1.0 && unit.to_string() == "rad" && value.abs() > HALF_A_TURN {
             return None;
         }
@@ -69,7 +73,7 @@ fn outputs(trial: &Trial<'_>, piece: usize, input: f64, start: f64) -> Option<Ve
     let case = Case { inputs: inputs.collect(), ..p.case.clone() };
     let signals = p.signals();
     let job = Job { case: &case, parameters: &parameters, signals: &signals, horizon: p.horizon };
-    let analysis = trial.fit.model.analyse(&job).ok()?;
+    let analysis = set.fit.model.analyse(&job).ok()?;
     let sample = |s: &crate::subject::Series| {
         let trace = analysis.trace(&s.name).sample(&s.times);
         trace.into_iter().map(|y| y / s.noise).collect::<Vec<f64>>()

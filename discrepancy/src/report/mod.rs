@@ -1,0 +1,301 @@
+//! The report of a search: from sets of effects and a verdict to a diagnosis.
+
+mod candidates;
+mod next_experiment;
+mod parameters;
+mod records;
+
+use std::collections::BTreeMap;
+
+use mops_core::diagnosis::{
+    Change, Dependence, Diagnosis, ForecastOf, Found, HeldBack, Noticeable, Step, StrengthValue, Unexplained, Verdict,
+};
+use mops_core::{Role, math};
+
+use self::records::Records;
+use crate::drawn::draw;
+use crate::locate::{Located, locate};
+use crate::scene::Scene;
+use crate::selection::{
+    Conclusion, FIRES, FittedSet, Forecasts, Key, OTHER, Search, Verdict as Decision, entry, price, without,
+};
+use crate::variant::Added;
+
+/// Gain in log-evidence, nats, beyond the prior of a candidate from which it would have been noticed. Basis: posterior odds of
+/// 20 to 1.
+const NOTICED: f64 = 3.0;
+
+/// Standard errors between the estimates by least squares and under the likeliest error model from which a parameter is moved by
+/// what the model lacks.
+const MOVED: f64 = 3.0;
+
+/// A search with its verdict.
+pub struct Findings<'f, 'r, 'a> {
+    /// Sets of effects.
+    pub search: &'f Search<'r, 'a>,
+    /// Forecasts of the sets that were tested.
+    pub forecasts: &'f Forecasts,
+    /// Verdict.
+    pub verdict: &'f Decision,
+    /// True if the search was stopped before its end.
+    pub is_stopped: bool,
+}
+
+impl<'a> Findings<'_, '_, 'a> {
+    /// Returns the diagnosis.
+    pub fn diagnosis(&self) -> Diagnosis {
+        let Self { search, verdict, .. } = self;
+        let nothing = Key::new();
+        let chosen = if verdict.conclusion == Conclusion::None { &nothing } else { &verdict.set };
+        let declared = search.get(&nothing).expect("it was fitted first");
+        let set = search.get(chosen).expect("a set that passed was fitted");
+        let (before, after) = (Records::new(declared), Records::new(set));
+        let mut located = located(declared);
+        draw(&mut located, set);
+
+        let mut made = Diagnosis::default();
+        made.verdict = match verdict.conclusion {
+            Conclusion::Effect => Verdict::Effect,
+            Conclusion::Unexplained => Verdict::Unexplained,
+            Conclusion::None => Verdict::None,
+        };
+        made.found = (0..set.added.len()).map(|index| self.found(set, index)).collect();
+        made.probability = self.probability(&made.found);
+        // Twice the log-likelihood ratio is chi-squared with two degrees of freedom.
+        made.p_value = math::exp(-verdict.lack_of_fit).min(1.0);
+        made.depends_on = significant(&verdict.declared[0]);
+        made.remaining = significant(&verdict.remaining).filter(|_| !set.key.is_empty());
+        made.forecast_of =
+            if self.forecasts.are_of_other_records() { ForecastOf::Selection } else { ForecastOf::EndOfRecords };
+        made.is_first = verdict.is_first || verdict.conclusion == Conclusion::None;
+        made.is_stopped = self.is_stopped;
+        made.converged = declared.least_squares.converged && set.least_squares.converged;
+        made.explained_share = explained_share(&before, &after).filter(|_| !set.key.is_empty());
+        if made.verdict == Verdict::Unexplained {
+            made.unexplained = made.depends_on.as_ref().map(|curve| unexplained(curve, &located));
+        }
+        made.ranked = self.ranked();
+        made.next_experiment = self.next_experiment(set);
+        made.steps = self.steps();
+        made.before = before.errors();
+        made.after = after.errors();
+        made.parameters = before.moves(&after);
+        if made.verdict == Verdict::None {
+            made.noticeable = self.noticeable();
+        }
+        made.evidence = located.into_iter().map(|located| located.evidence).collect();
+        made.predictions = before.predictions(&after);
+        let names: Vec<String> = made.found.iter().map(|found| found.name.clone()).collect();
+        made.starts = after.starts(&names);
+        let notes = search.refit.subject.notes.iter().cloned();
+        made.notes = notes.chain(before.at_bounds(&after)).chain(self.notes(set, &made)).collect();
+        made.simulations = search.refit.simulations.count();
+        made
+    }
+
+    /// Returns the probability of the verdict: of class and place of the least certain claim, or that nothing is missing; NaN if
+    /// something is missing that is not explained.
+    fn probability(&self, found: &[Found]) -> f64 {
+        match self.verdict.conclusion {
+            Conclusion::Effect => {
+                let claimed = found.iter().filter(|found| found.claimed).map(|found| found.class_probability);
+                claimed.fold(1.0, f64::min)
+            }
+            Conclusion::None => self.verdict.nothing * (1.0 - OTHER),
+            Conclusion::Unexplained => f64::NAN,
+        }
+    }
+
+    /// Returns the position of an added effect among the candidates.
+    fn index_of(&self, added: &Added) -> usize {
+        let candidates = &self.search.refit.candidates;
+        candidates.iter().position(|candidate| candidate.is(&added.candidate)).expect("effects are candidates")
+    }
+
+    /// Returns the posterior probability that an effect is missing; NaN if no set that holds it passed.
+    fn probability_of(&self, index: usize) -> f64 {
+        let holding: Vec<f64> =
+            self.verdict.passed.iter().filter(|(key, _)| key.contains(&index)).map(|(_, weight)| *weight).collect();
+        if holding.is_empty() { f64::NAN } else { holding.iter().sum::<f64>() * (1.0 - OTHER) }
+    }
+
+    fn found(&self, set: &FittedSet<'a>, index: usize) -> Found {
+        let (search, added) = (self.search, &set.added[index]);
+        let (effect, place) = (added.candidate.effect.as_ref(), added.candidate.place());
+        let position = self.index_of(added);
+        let entry = entry(search, &added.candidate);
+        let stated = self.verdict.stated.iter().find(|stated| stated.entry == entry);
+        let smaller = set.key.iter().position(|k| *k == position).and_then(|k| search.get(&without(&set.key, k)));
+        Found {
+            effect: effect.name().to_owned(),
+            name: name(set, index),
+            companion: added.candidate.companion.as_ref().map(ToString::to_string),
+            only: added.candidate.only.map(|only| search.refit.subject.measurements[only].name.clone()),
+            class: effect.class().name().to_owned(),
+            formula: effect.formula().to_owned(),
+            strengths: parameters::strengths(set, index),
+            probability: self.probability_of(position),
+            class_probability: stated.map_or(0.0, |stated| stated.probability),
+            claimed: self.verdict.conclusion == Conclusion::Effect && stated.is_some_and(|stated| stated.is_claimed),
+            bic_gain: smaller.map_or(f64::NAN, |smaller| 2.0 * (set.log_evidence() - smaller.log_evidence())),
+            indistinguishable: self.rivals(set, position),
+            stability: None,
+            held_back: if set.key.len() > 1 { self.held_back(set, smaller) } else { Vec::new() },
+            place,
+        }
+    }
+
+    /// Returns the errors on held-out records with and without an effect.
+    fn held_back(&self, set: &FittedSet<'a>, smaller: Option<&FittedSet<'a>>) -> Vec<HeldBack> {
+        let Some(smaller) = smaller else { return Vec::new() };
+        let of = |role| {
+            let error = |set: &FittedSet<'a>| Forecasts::error_on(set, role);
+            Some(HeldBack { role, without: error(smaller)?, with: error(set)? })
+        };
+        [Role::Selection, Role::Validation].into_iter().filter_map(of).collect()
+    }
+
+    /// Returns the experiment that would best separate the set from the most probable one with other classes or places, or from
+    /// the first alternative at the same place.
+    fn next_experiment(&self, set: &FittedSet<'a>) -> Option<String> {
+        let entries = |set: &FittedSet<'a>| {
+            let mut all: Vec<_> = set.added.iter().map(|added| entry(self.search, &added.candidate)).collect();
+            all.sort();
+            all
+        };
+        let is_rival = |other: &&FittedSet<'a>| {
+            !other.key.is_empty() && other.key != set.key && other.key.len() <= set.key.len().max(1)
+        };
+        let rivals: Vec<&FittedSet<'a>> = self.search.sets.iter().filter(is_rival).collect();
+        let own = entries(set);
+        let apart = rivals.iter().find(|other| entries(other) != own);
+        let rival = apart.into_iter().chain(rivals.first()).next()?;
+        if set.key.is_empty() {
+            return None;
+        }
+        let names = |set: &FittedSet<'a>, other: &FittedSet<'a>| {
+            let of = |added: &Added| format!("`{}` at {}", added.candidate.effect.name(), added.candidate.place());
+            let is_common = |added: &&Added| other.added.iter().any(|same| same.candidate.is(&added.candidate));
+            let own: Vec<String> = set.added.iter().filter(|added| !is_common(added)).map(of).collect();
+            if own.is_empty() { "the model without it".to_owned() } else { own.join(" with ") }
+        };
+        next_experiment::separating(set, rival, [&names(set, rival), &names(rival, set)])
+    }
+
+    /// Returns the sets that were the most probable one after the other.
+    fn steps(&self) -> Vec<Step> {
+        let mut last: Key = Key::new();
+        let mut steps = Vec::new();
+        for key in &self.search.history {
+            let Some(set) = self.search.get(key) else { continue };
+            let contains = |larger: &Key, smaller: &Key| smaller.iter().all(|k| larger.contains(k));
+            let did = match () {
+                () if contains(key, &last) => Change::Added,
+                () if contains(&last, key) => Change::Eliminated,
+                () if key.len() == last.len() && key.iter().any(|k| last.contains(k)) => Change::Swapped,
+                () if key.len() < last.len() => Change::Substituted,
+                () => Change::Restarted,
+            };
+            let of = |added: &Added| format!("{} at {}", added.candidate.effect.name(), added.candidate.place());
+            let effects = set.added.iter().map(of).collect();
+            steps.push(Step { did, effects, windows: 1, normalised: set.error().unwrap_or(f64::NAN) });
+            last.clone_from(key);
+        }
+        steps
+    }
+
+    /// Returns the detection limits of the effects that are linear in their first parameter and no special events.
+    fn noticeable(&self) -> Vec<Noticeable> {
+        let search = self.search;
+        let needed: f64 = (2.0_f64 * (price(search.refit.candidates.len()) + NOTICED)).sqrt();
+        let of = |screened: &crate::selection::Screened| {
+            let added = &screened.guesses[0];
+            let strengths = parameters::of_candidate(search.refit.subject, added);
+            let first = strengths.into_iter().next()?;
+            Some(Noticeable {
+                effect: added.candidate.effect.name().to_owned(),
+                place: added.candidate.place(),
+                strength: StrengthValue { value: screened.detectable.filter(|d| d.is_finite())? * needed, ..first },
+            })
+        };
+        let usual = search.screened.iter().filter(|s| s.guesses[0].candidate.effect.rarity() == 0);
+        let mut all: Vec<Noticeable> = usual.filter_map(of).collect();
+        all.sort_by(|a, b| a.place.cmp(&b.place));
+        all
+    }
+
+    fn notes(&self, set: &FittedSet<'a>, made: &Diagnosis) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.is_stopped {
+            notes.push("the search was stopped: sets of effects that were not fitted may explain more".to_owned());
+        }
+        if !made.converged {
+            notes.push("a fit by least squares did not converge".to_owned());
+        }
+        if made.forecast_of == ForecastOf::EndOfRecords {
+            notes.push("no selection record: forecasts were tested on the ends of the calibration records only".to_owned());
+        }
+        if made.verdict == Verdict::Effect && !made.is_first {
+            notes.push("a set of higher evidence forecasts worse than a smaller one".to_owned());
+        }
+        if let Some((_, likeliest)) = set.likeliest() {
+            for (k, moved) in made.parameters.iter().enumerate() {
+                let apart = (likeliest.point.globals[k] - moved.after).abs();
+                if moved.std_error.is_some_and(|error| apart > MOVED * error) {
+                    notes.push(format!("the model still lacks something that moves `{}`", moved.name));
+                }
+            }
+        }
+        notes
+    }
+}
+
+/// Returns the name of an effect in the augmented model.
+fn name(set: &FittedSet<'_>, index: usize) -> String {
+    let added = &set.added[index];
+    let (effect, place) = (added.candidate.effect.as_ref(), added.candidate.place());
+    let tail = place.split_once(':').map_or(place.as_str(), |(_, name)| name);
+    // A gust in another experiment, say.
+    let namesakes = set.added[..index].iter().filter(|other| other.candidate.is_named(effect.name(), &place));
+    match namesakes.count() {
+        0 => format!("{tail}-{}", effect.name()),
+        before => format!("{tail}-{}-{}", effect.name(), before + 1),
+    }
+}
+
+/// Returns the unknown input at each place that would explain the residual of the declared model, the likeliest place first.
+fn located(declared: &FittedSet<'_>) -> Vec<Located> {
+    let scene = Scene::new(&declared.fit, &declared.variant.model, &declared.least_squares.point);
+    scene.map_or_else(Vec::new, |scene| locate(&declared.fit, &declared.variant.model, &scene))
+}
+
+/// Returns the curve with the largest gain if it is significant.
+fn significant(curves: &[Dependence]) -> Option<Dependence> {
+    curves.first().filter(|curve| curve.gain >= FIRES).cloned()
+}
+
+fn unexplained(curve: &Dependence, located: &[Located]) -> Unexplained {
+    let at_place = located.iter().find(|located| located.evidence.place == curve.place);
+    Unexplained {
+        place: curve.place.clone(),
+        share: at_place.map_or(f64::NAN, |located| located.evidence.share),
+        over: curve.coordinate.clone(),
+        table: curve.curve.clone(),
+    }
+}
+
+/// Returns the share of the squared error of the declared model that a repaired one removes from validation records, else from
+/// selection records.
+fn explained_share(before: &Records<'_, '_>, after: &Records<'_, '_>) -> Option<f64> {
+    let share = |role| {
+        let [before, after] = [before, after].map(|records| records.sum_of_squares(role));
+        Some(1.0 - after? / before?).filter(|share| share.is_finite())
+    };
+    share(Role::Validation).or_else(|| share(Role::Selection))
+}
+
+/// Returns for each key the value that comes first.
+fn first_of_each<K: Ord, T>(all: Vec<T>, key: impl Fn(&T) -> K) -> Vec<T> {
+    let mut seen: BTreeMap<K, ()> = BTreeMap::new();
+    all.into_iter().filter(|value| seen.insert(key(value), ()).is_none()).collect()
+}

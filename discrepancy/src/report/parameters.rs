@@ -1,0 +1,60 @@
+//! Parameters of effects with their standard errors and intervals.
+
+use mops_core::Model;
+use mops_core::diagnosis::StrengthValue;
+
+use crate::estimation::ErrorModel;
+use crate::fit::Sets;
+use crate::selection::FittedSet;
+use crate::subject::Subject;
+use crate::variant::{Added, Variant};
+
+/// Standard normal quantile at 0.975.
+const QUANTILE: f64 = 1.959_964;
+
+/// Returns the parameters of an effect of a set: values from least squares, standard errors and intervals from the likeliest error
+/// model. An interval holds both estimates; a parameter at a bound has none.
+pub fn strengths(set: &FittedSet<'_>, index: usize) -> Vec<StrengthValue> {
+    let added = &set.start_at(&set.least_squares.point).added[index];
+    let likeliest = set.likeliest().map(|(_, likeliest)| likeliest);
+    let mut all = described(added, &set.variant, index);
+    for (k, value) in all.iter_mut().enumerate() {
+        let parameter = set.variant.first[index] + k;
+        let Some(g) = set.fit.globals.iter().position(|global| global.sets == Sets::Parameter(parameter)) else {
+            continue;
+        };
+        let global = &set.fit.globals[g];
+        if global.is_stepped() {
+            let output = set.under.iter().find(|(kind, _)| *kind != ErrorModel::Force).map(|(_, estimate)| estimate);
+            let ends = output.and_then(|estimate| set.estimation(&[]).stepped_interval(estimate, g));
+            value.interval95 = ends.map(|[low, high]| [low.min(value.value), high.max(value.value)]);
+            continue;
+        }
+        let Some(estimate) = likeliest else { continue };
+        let (centre, error) = (estimate.point.globals[g], estimate.deviations[g]);
+        let is_at_bound = global.bounds.contains(&centre) || global.bounds.contains(&value.value);
+        if error > 0.0 && error.is_finite() && !is_at_bound {
+            let end = |side: f64| (centre + side * QUANTILE * error).clamp(global.bounds[0], global.bounds[1]);
+            value.std_error = Some(error);
+            value.interval95 = Some([end(-1.0).min(value.value), end(1.0).max(value.value)]);
+        }
+    }
+    all
+}
+
+/// Returns the parameters of a candidate at its guess.
+pub fn of_candidate(subject: &Subject, added: &Added) -> Vec<StrengthValue> {
+    described(added, &Variant::new(subject, std::slice::from_ref(added), &[]), 0)
+}
+
+fn described(added: &Added, variant: &Variant, index: usize) -> Vec<StrengthValue> {
+    let parameters = &variant.model.interface().parameters;
+    let of = |(k, parameter): (usize, &mops_core::EffectParameter)| StrengthValue {
+        name: parameter.name.to_owned(),
+        value: added.strengths[k],
+        unit: added.candidate.unit(parameter, &parameters[variant.first[index] + k].variable.unit),
+        std_error: None,
+        interval95: None,
+    };
+    added.candidate.effect.parameters().iter().enumerate().map(of).collect()
+}
