@@ -194,6 +194,8 @@ pub struct Sizes {
     pub gap: Option<Gap>,
     /// Largest slew rate of a command; `None` elsewhere than at an actuator.
     pub slew: Option<f64>,
+    /// Stiffness of the declared model at a joint, force by position; `None` elsewhere.
+    pub stiffness: Option<f64>,
 }
 
 impl Sizes {
@@ -211,6 +213,7 @@ impl Sizes {
         quantum: None,
         gap: None,
         slew: None,
+        stiffness: None,
     };
 
     /// The typical size of a strength.

@@ -202,8 +202,7 @@ mod tests {
     #[test]
     fn a_function_is_linear_between_its_knots() {
         let family = Family::function(Over::Position, [-1.0, 3.0].into_iter(), 2).expect("it changes");
-        let values: Vec<f64> =
-            [0.0; 2].into_iter().chain(family.knots().iter().map(|x| 2.0 * x)).collect();
+        let values: Vec<f64> = [0.0; 2].into_iter().chain(family.knots().iter().map(|x| 2.0 * x)).collect();
         let looks = [-2.0, -1.0, 0.1, 2.9, 5.0].map(|position| Look { position, ..Look::default() });
         let mut signal = vec![0.0; 5];
         family.add(&values, 0, &looks, &mut signal);

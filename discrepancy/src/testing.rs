@@ -11,10 +11,11 @@ use mops_effects::effects;
 use mops_models::equations::EquationsOptions;
 
 use crate::base::{first_locals, pieces};
+use crate::estimation::Errors;
 use crate::fit::{Fit, Point};
 use crate::meter::Meter;
 use crate::scene::Scene;
-use crate::selection::estimation;
+use crate::selection::{Screening, estimation, prepare};
 use crate::subject::{Local, Measurement, Series, Subject};
 use crate::variant::{Variant, problem};
 
@@ -154,6 +155,16 @@ pub fn fitted<'a>(subject: &'a Subject, simulations: &'a Meter<'a>) -> (Fit<'a>,
     let found = estimation(subject, &fit, &variant, &[], &[], &point).least_squares(point).expect("it simulates");
     let scene = Scene::new(&fit, &variant.model, &found.point).expect("it simulates");
     (fit, variant, found.point, scene)
+}
+
+/// Screens effects on the fitted model of a subject; returns them, the best first, with their gains in log-likelihood in white
+/// noise, nats.
+pub fn screened(subject: &Subject, effects: &[Arc<dyn Effect>], simulations: &Meter<'_>) -> Vec<(String, f64)> {
+    let (refit, declared) = prepare(subject, effects, simulations).expect("it simulates");
+    let white = [Errors::White];
+    let all: Vec<usize> = (0..refit.candidates.len()).collect();
+    let screened = Screening::new(&declared, &white).expect("it simulates").screen(&refit.candidates, &all);
+    screened.iter().map(|s| (refit.candidates[s.index].effect.name().to_owned(), s.gains[0])).collect()
 }
 
 /// The effects of these names.

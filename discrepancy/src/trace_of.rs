@@ -105,7 +105,9 @@ pub fn sizes(place: &Port, model: &WithEffects, pieces: &[Piece], trajectories: 
             let speed = positive(amplitude(moments().map(|m| m.x[v])));
             let position = positive(amplitude(moments().map(|m| m.x[q])));
             let range = range(moments().map(|m| m.x[q]));
-            Sizes { output, mobility: mobility_of(w), position, speed, time: position / speed, range, ..common }
+            let stiffness = Some(size(moments().map(|m| m.a[(v, q)])) / positive(mobility));
+            let mobility = mobility_of(w);
+            Sizes { output, mobility, position, speed, time: position / speed, range, stiffness, ..common }
         }
         Spot::Process(w, s) => {
             let inputs = trajectories[0].inputs();

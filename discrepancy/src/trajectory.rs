@@ -356,9 +356,9 @@ mod tests {
         let subject = subject(OSCILLATOR, &truth, 2, vec![record(&["x", "v", "a"], 6.0, 0.02)]);
         let simulations = Meter::new(&());
         let (fit, variant, mut at, _) = fitted(&subject, &simulations);
-        at.point.globals = truth[..4].to_vec();
-        at.point.locals = vec![truth[4..].to_vec()];
-        let along = super::Trajectory::new(&fit, &variant.model, 0, &at.point).expect("it simulates");
+        at.globals = truth[..4].to_vec();
+        at.locals = vec![truth[4..].to_vec()];
+        let along = super::Trajectory::new(&fit, &variant.model, 0, &at).expect("it simulates");
         let unit = vec![1.0; along.moments.len()];
         let response = along.response(along.inputs(), &unit);
         let piece = &fit.pieces[0];

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Dimension, EffectParameter, InitialGrid, Model, Scope};
+use mops_core::{DeclaredTerm, Dimension, EffectParameter, InitialGrid, Model, Port, Scope};
 use mops_models::WithEffects;
 
 use crate::base::globals;
@@ -46,16 +46,28 @@ impl Added {
         }
     }
 
-    /// The same at all shapes that are tried, and as strong as a fit is restarted from: [`mops_core::EffectParameter::restarts`].
+    /// Whether its first strength stands at a finite bound that is not neutral: more is no effect but a mistake, as the gain of
+    /// a sensor is that is off by half. An actuator may well be at such a limit: dead, or acting one way only.
+    pub fn is_at_limit(&self) -> bool {
+        let (first, value) = (&self.candidate.effect.parameters()[0], self.strengths[0]);
+        let is_limit = |end: &f64| end.is_finite() && first.null_value != Some(*end);
+        !matches!(self.candidate.port, Port::Actuator { .. })
+            && first.bounds.iter().filter(|e| is_limit(e)).any(|&e| e == value)
+    }
+
+    /// Returns the effect at every shape that is tried, at the strengths from which a fit is restarted: multiples of the typical
+    /// size, and the declared stiffness for an effect that takes the place of a declared spring.
     pub fn restarts(&self) -> Vec<Self> {
         let effect = self.candidate.effect.as_ref();
         let first = &effect.parameters()[0];
         let shapes = self.sizes.combinations(effect);
-        let at = |times: &f64| {
-            let strength = (times * self.sizes.of(first.dimension)).clamp(first.bounds[0], first.bounds[1]);
+        let spring = self.sizes.stiffness.filter(|_| effect.modifies() == Some(DeclaredTerm::Spring));
+        let multiples = first.restarts.iter().map(|times| times * self.sizes.of(first.dimension));
+        let at = |strength: f64| {
+            let strength = strength.clamp(first.bounds[0], first.bounds[1]);
             shapes.iter().map(move |shape| Self { strengths: [&[strength], &shape[1..]].concat(), ..self.clone() })
         };
-        first.restarts.iter().flat_map(at).collect()
+        multiples.chain(spring).flat_map(at).collect()
     }
 }
 

@@ -78,7 +78,9 @@ pub(crate) fn of(study: Study, options: &Options, diagnosis: Diagnosis) -> Solve
     (outcome.simulations, outcome.calibration) = (diagnosis.simulations, None);
     outcome.front.clear();
     if diagnosis.is_stopped {
-        outcome.warnings.push("the diagnosis was stopped: sets of effects that were not fitted may explain more".to_owned());
+        outcome
+            .warnings
+            .push("the diagnosis was stopped: sets of effects that were not fitted may explain more".to_owned());
     }
     outcome.found.diagnosis = Some(diagnosis);
     solved

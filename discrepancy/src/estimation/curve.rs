@@ -179,10 +179,14 @@ impl Estimation<'_> {
                     if amplitude > 0.0 {
                         let unit = &interface.inputs[input].unit;
                         let own = names("input", port, None, unit, Some(unit));
-                        all.push(Coordinate { names: own, value: Value::Input(input), acts: vec![(input, amplitude)], sign: 1.0 });
+                        all.push(Coordinate {
+                            names: own,
+                            value: Value::Input(input),
+                            acts: vec![(input, amplitude)],
+                            sign: 1.0,
+                        });
                         let delayed = names("delayed input", port, None, &Unit::known("s"), Some(&Unit::one()));
-                        let value =
-                            Value::Delayed(interface.inputs[input].name.clone(), self.channels.shortest_step());
+                        let value = Value::Delayed(interface.inputs[input].name.clone(), self.channels.shortest_step());
                         all.push(Coordinate { names: delayed, value, acts: vec![(input, 1.0)], sign: 1.0 });
                     }
                 }
@@ -222,7 +226,12 @@ impl Estimation<'_> {
                 }
                 let mut add = |what: &str, state: usize, value| {
                     let names = names(what, port, Some(other), &states[state].unit, force_unit(port));
-                    all.push(Coordinate { names, value, acts: between(*force, *other_force), sign: sign(*other_force) });
+                    all.push(Coordinate {
+                        names,
+                        value,
+                        acts: between(*force, *other_force),
+                        sign: sign(*other_force),
+                    });
                 };
                 add("deflection", *position, Value::Difference(*position, *other_position));
                 add("rate of deflection", *speed, Value::Difference(*speed, *other_speed));
@@ -233,7 +242,12 @@ impl Estimation<'_> {
             for (other, other_force, other_state) in stores.iter().filter(|other| other.1 != *force) {
                 if states[*state].unit == states[*other_state].unit && same_unit(port, other) != Some(false) {
                     let names = names("level", port, Some(other), &states[*state].unit, force_unit(port));
-                    all.push(Coordinate { names, value: Value::State(*state), acts: between(*force, *other_force), sign: sign(*other_force) });
+                    all.push(Coordinate {
+                        names,
+                        value: Value::State(*state),
+                        acts: between(*force, *other_force),
+                        sign: sign(*other_force),
+                    });
                 }
             }
         }

@@ -10,3 +10,4 @@ mod steps;
 pub use errors::{Channels, ErrorModel, Errors, Motion};
 pub use estimate::{ALLOWANCE, Estimate, Estimation};
 pub(crate) use priors::{log_choices, nominal_rates, priors};
+pub(crate) use steps::FALL;

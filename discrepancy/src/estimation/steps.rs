@@ -18,7 +18,7 @@ const FOLLOW: usize = 2;
 const SETTLED: f64 = 0.05;
 
 /// Decrease of log-likelihood at the ends of a 95 % interval: half the quantile of chi-squared with one degree of freedom.
-const FALL: f64 = 1.920_729;
+pub const FALL: f64 = 1.920_729;
 
 /// Doublings of the stride, and bisections, in the search for the end of an interval.
 const DOUBLINGS: i32 = 16;

@@ -59,17 +59,20 @@ impl<'a> Findings<'_, '_, 'a> {
         let candidate = &set.added[position].candidate;
         let smaller = set.key.iter().position(|k| *k == index).and_then(|k| search.get(&without(&set.key, k)));
         let screened = search.screened.iter().find(|screened| screened.index == index);
-        Some((own.is_some(), Ranked {
-            effect: candidate.effect.name().to_owned(),
-            place: candidate.place(),
-            class: candidate.effect.class().name().to_owned(),
-            probability: self.probability_of(index),
-            bic_gain: smaller.map_or(f64::NAN, |smaller| 2.0 * (set.log_evidence() - smaller.log_evidence())),
-            strengths: parameters::strengths(set, position),
-            absorbed: screened.map_or(f64::NAN, |screened| screened.absorbed),
-            normalised: set.error().unwrap_or(f64::NAN),
-            failed: self.failed(set, index),
-        }))
+        Some((
+            own.is_some(),
+            Ranked {
+                effect: candidate.effect.name().to_owned(),
+                place: candidate.place(),
+                class: candidate.effect.class().name().to_owned(),
+                probability: self.probability_of(index),
+                bic_gain: smaller.map_or(f64::NAN, |smaller| 2.0 * (set.log_evidence() - smaller.log_evidence())),
+                strengths: parameters::strengths(set, position),
+                absorbed: screened.map_or(f64::NAN, |screened| screened.absorbed),
+                normalised: set.error().unwrap_or(f64::NAN),
+                failed: self.failed(set, index),
+            },
+        ))
     }
 
     /// Returns the rule that a candidate failed in its most probable set; `None` if it is claimed.
@@ -97,7 +100,8 @@ impl<'a> Findings<'_, '_, 'a> {
         let candidates = &search.refit.candidates;
         let Some(at) = set.key.iter().position(|k| *k == index) else { return Vec::new() };
         let rest: Key = without(&set.key, at);
-        let others = search.sets.iter().filter_map(|other| {
+        let usable = search.sets.iter().filter(|other| !self.verdict.excluded.contains(&other.key));
+        let others = usable.filter_map(|other| {
             let new = other.key.iter().find(|k| !rest.contains(k))?;
             let is_alternative = other.key.len() == set.key.len()
                 && rest.iter().all(|k| other.key.contains(k))

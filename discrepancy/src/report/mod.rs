@@ -4,6 +4,7 @@ mod candidates;
 mod next_experiment;
 mod parameters;
 mod records;
+mod removed;
 
 use std::collections::BTreeMap;
 
@@ -49,6 +50,8 @@ impl<'a> Findings<'_, '_, 'a> {
         let chosen = if verdict.conclusion == Conclusion::None { &nothing } else { &verdict.set };
         let declared = search.get(&nothing).expect("it was fitted first");
         let set = search.get(chosen).expect("a set that passed was fitted");
+        let (set, terms) = search.refit.without_terms(set);
+        let set = &set;
         let (before, after) = (Records::new(declared), Records::new(set));
         let mut located = located(declared);
         draw(&mut located, set);
@@ -60,6 +63,7 @@ impl<'a> Findings<'_, '_, 'a> {
             Conclusion::None => Verdict::None,
         };
         made.found = (0..set.added.len()).map(|index| self.found(set, index)).collect();
+        made.removed = removed::removed(search, declared, &terms);
         made.probability = self.probability(&made.found);
         // Twice the log-likelihood ratio is chi-squared with two degrees of freedom.
         made.p_value = math::exp(-verdict.lack_of_fit).min(1.0);
@@ -75,7 +79,7 @@ impl<'a> Findings<'_, '_, 'a> {
             made.unexplained = made.depends_on.as_ref().map(|curve| unexplained(curve, &located));
         }
         made.ranked = self.ranked();
-        made.next_experiment = self.next_experiment(set);
+        made.next_experiment = self.next_experiment(search.get(chosen).unwrap_or(set));
         made.steps = self.steps();
         made.before = before.errors();
         made.after = after.errors();
@@ -88,7 +92,7 @@ impl<'a> Findings<'_, '_, 'a> {
         let names: Vec<String> = made.found.iter().map(|found| found.name.clone()).collect();
         made.starts = after.starts(&names);
         let notes = search.refit.subject.notes.iter().cloned();
-        made.notes = notes.chain(before.at_bounds(&after)).chain(self.notes(set, &made)).collect();
+        made.notes = notes.chain(before.at_bounds(&after, &terms)).chain(self.notes(set, &made)).collect();
         made.simulations = search.refit.simulations.count();
         made
     }
@@ -126,6 +130,8 @@ impl<'a> Findings<'_, '_, 'a> {
         let entry = entry(search, &added.candidate);
         let stated = self.verdict.stated.iter().find(|stated| stated.entry == entry);
         let smaller = set.key.iter().position(|k| *k == position).and_then(|k| search.get(&without(&set.key, k)));
+        // The set was fitted with all declared terms.
+        let fitted = search.get(&set.key).unwrap_or(set);
         Found {
             effect: effect.name().to_owned(),
             name: name(set, index),
@@ -137,8 +143,8 @@ impl<'a> Findings<'_, '_, 'a> {
             probability: self.probability_of(position),
             class_probability: stated.map_or(0.0, |stated| stated.probability),
             claimed: self.verdict.conclusion == Conclusion::Effect && stated.is_some_and(|stated| stated.is_claimed),
-            bic_gain: smaller.map_or(f64::NAN, |smaller| 2.0 * (set.log_evidence() - smaller.log_evidence())),
-            indistinguishable: self.rivals(set, position),
+            bic_gain: smaller.map_or(f64::NAN, |smaller| 2.0 * (fitted.log_evidence() - smaller.log_evidence())),
+            indistinguishable: self.rivals(fitted, position),
             stability: None,
             held_back: if set.key.len() > 1 { self.held_back(set, smaller) } else { Vec::new() },
             place,
@@ -233,7 +239,9 @@ impl<'a> Findings<'_, '_, 'a> {
             notes.push("a fit by least squares did not converge".to_owned());
         }
         if made.forecast_of == ForecastOf::EndOfRecords {
-            notes.push("no selection record: forecasts were tested on the ends of the calibration records only".to_owned());
+            notes.push(
+                "no selection record: forecasts were tested on the ends of the calibration records only".to_owned(),
+            );
         }
         if made.verdict == Verdict::Effect && !made.is_first {
             notes.push("a set of higher evidence forecasts worse than a smaller one".to_owned());

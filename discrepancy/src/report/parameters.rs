@@ -3,11 +3,15 @@
 use mops_core::Model;
 use mops_core::diagnosis::StrengthValue;
 
-use crate::estimation::ErrorModel;
+use crate::estimation::{ErrorModel, FALL};
 use crate::fit::Sets;
-use crate::selection::FittedSet;
+use crate::selection::{FittedSet, estimation};
 use crate::subject::Subject;
-use crate::variant::{Added, Variant};
+use crate::variant::{Added, Variant, problem};
+use crate::windows::whole;
+
+/// Iterations in which everything else follows a parameter that no fit moves.
+const FOLLOW: usize = 20;
 
 /// Standard normal quantile at 0.975.
 const QUANTILE: f64 = 1.959_964;
@@ -21,6 +25,9 @@ pub fn strengths(set: &FittedSet<'_>, index: usize) -> Vec<StrengthValue> {
     for (k, value) in all.iter_mut().enumerate() {
         let parameter = set.variant.first[index] + k;
         let Some(g) = set.fit.globals.iter().position(|global| global.sets == Sets::Parameter(parameter)) else {
+            if added.candidate.effect.parameters()[k].fixed {
+                value.interval95 = allowed(set, index, k);
+            }
             continue;
         };
         let global = &set.fit.globals[g];
@@ -40,6 +47,32 @@ pub fn strengths(set: &FittedSet<'_>, index: usize) -> Vec<StrengthValue> {
         }
     }
     all
+}
+
+/// Returns the range of the values of a parameter that no fit moves that the records allow, everything else fitted again; `None` if
+/// only one is allowed.
+fn allowed(set: &FittedSet<'_>, index: usize, k: usize) -> Option<[f64; 2]> {
+    let outputs = set.under.iter().filter(|(kind, _)| *kind != ErrorModel::Force);
+    let (_, estimate) = outputs.max_by(|a, b| a.1.log_likelihood.total_cmp(&b.1.log_likelihood))?;
+    let mut start = set.start_at(&estimate.point);
+    let added = &start.added[index];
+    let parameter = &added.candidate.effect.parameters()[k];
+    let values = added.sizes.values(parameter.dimension, parameter.grid, parameter.bounds);
+    let mut range = [added.strengths[k]; 2];
+    for value in values {
+        start.added[index].strengths[k] = value;
+        let pieces = set.fit.pieces.iter().map(|piece| piece.measurement);
+        let subject = set.fit.subject;
+        let pieces = pieces.map(|index| whole(index, &subject.measurements[index])).collect();
+        let (fit, point, variant) =
+            problem(subject, &start.added, pieces, &start.tuners, start.locals.clone(), &[], set.fit.simulations);
+        let estimation = estimation(subject, &fit, &variant, &start.added, &[], &point);
+        let Some(found) = estimation.with(&estimate.errors, point, FOLLOW) else { continue };
+        if found.log_likelihood > estimate.log_likelihood - FALL {
+            range = [range[0].min(value), range[1].max(value)];
+        }
+    }
+    (range[0] < range[1]).then_some(range)
 }
 
 /// Returns the parameters of a candidate at its guess.

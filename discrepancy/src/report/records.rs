@@ -153,9 +153,8 @@ impl<'s, 'a> Records<'s, 'a> {
             Some(format!("{}.{own}", names.get(number.parse::<usize>().ok()?.checked_sub(1)?)?))
         };
         let of = |(m, predicted): (&Measurement, &Predicted)| {
-            let one = |(name, value): &(String, f64)| {
-                (m.name.clone(), renamed(name).unwrap_or_else(|| name.clone()), *value)
-            };
+            let one =
+                |(name, value): &(String, f64)| (m.name.clone(), renamed(name).unwrap_or_else(|| name.clone()), *value);
             predicted.starts.iter().map(one).collect::<Vec<_>>()
         };
         self.subject().measurements.iter().zip(&self.all).flat_map(of).collect()
@@ -179,8 +178,9 @@ impl<'s, 'a> Records<'s, 'a> {
         self.subject().globals.iter().enumerate().map(one).collect()
     }
 
-    /// Returns a note for each parameter of the study at a bound in this model or a repaired one.
-    pub fn at_bounds(&self, after: &Self) -> Vec<String> {
+    /// Returns a note for each parameter of the study at a bound in this model or a repaired one, without the terms that the
+    /// repaired one has not.
+    pub fn at_bounds(&self, after: &Self, removed: &[usize]) -> Vec<String> {
         let subject = self.subject();
         let one = |k: usize| {
             let tuner = &subject.study.tuners()[subject.globals[k]];
@@ -194,7 +194,7 @@ impl<'s, 'a> Records<'s, 'a> {
             let bound = tuner.unit.amount(tuner.bounds[usize::from(side == "upper")]);
             Some(format!("`{}` {of} is at its {side} bound {bound}: widen its range if it may lie beyond", tuner.name))
         };
-        (0..subject.globals.len()).filter_map(one).collect()
+        (0..subject.globals.len()).filter(|k| !removed.contains(k)).filter_map(one).collect()
     }
 }
 

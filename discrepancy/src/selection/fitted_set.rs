@@ -3,8 +3,8 @@
 use mops_core::math;
 
 use crate::candidate::Candidate;
-use crate::estimation::{Channels, ErrorModel, Estimate, Estimation, log_choices, priors};
-use crate::fit::{Fit, Point};
+use crate::estimation::{Channels, ErrorModel, Errors, Estimate, Estimation, log_choices, priors};
+use crate::fit::{Fit, Piece, Point};
 use crate::subject::Subject;
 use crate::variant::{Added, Variant};
 
@@ -88,24 +88,10 @@ impl FittedSet<'_> {
 
     /// Returns by how much correlated errors are likelier than white noise of fitted size, nats: what shows that the model still
     /// lacks something. `None` if the set cannot be simulated or no error model could be fitted.
-    #[allow(clippy::cast_precision_loss)]
     pub fn lack_of_fit(&self) -> Option<f64> {
         let (_, likeliest) = self.likeliest()?;
-        let channels = Channels::new(&self.fit.pieces);
-        let mut sums = vec![(0.0, 0.0); channels.count];
-        for (index, (piece, residuals)) in
-            self.fit.pieces.iter().zip(self.fit.all(&self.least_squares.point)?).enumerate()
-        {
-            let mut rest = residuals.as_slice();
-            for (k, series) in piece.series.iter().enumerate() {
-                let (own, others) = rest.split_at(series.times.len());
-                let sum = &mut sums[channels.of(index, k)];
-                *sum = (sum.0 + own.iter().map(|r| r * r).sum::<f64>(), sum.1 + own.len() as f64);
-                rest = others;
-            }
-        }
-        let of = |(square, count): (f64, f64)| -0.5 * count * (math::ln(std::f64::consts::TAU * square / count) + 1.0);
-        Some(likeliest.log_likelihood - sums.into_iter().filter(|sum| sum.1 > 0.0).map(of).sum::<f64>())
+        let white = white_log_likelihood(&self.fit.pieces, &self.fit.all(&self.least_squares.point)?);
+        Some(likeliest.log_likelihood - white)
     }
 
     /// Returns the root mean square error of all records by least squares, in noises.
@@ -131,13 +117,66 @@ impl FittedSet<'_> {
     }
 }
 
+/// Returns the log-likelihood of the residuals of records under white noise, fitted to each channel.
+fn white_log_likelihood(pieces: &[Piece], residuals: &[Vec<f64>]) -> f64 {
+    let of = |(square, count): (f64, f64)| -0.5 * count * (math::ln(std::f64::consts::TAU * square / count) + 1.0);
+    squares(pieces, residuals).into_iter().filter(|sum| sum.1 > 0.0).map(of).sum::<f64>()
+}
+
+/// Returns the sum of squared residuals and their number for each channel.
+#[allow(clippy::cast_precision_loss)]
+fn squares(pieces: &[Piece], residuals: &[Vec<f64>]) -> Vec<(f64, f64)> {
+    let channels = Channels::new(pieces);
+    let mut sums = vec![(0.0, 0.0); channels.count];
+    for (index, (piece, residuals)) in pieces.iter().zip(residuals).enumerate() {
+        let mut rest = residuals.as_slice();
+        for (k, series) in piece.series.iter().enumerate() {
+            let (own, others) = rest.split_at(series.times.len());
+            let sum = &mut sums[channels.of(index, k)];
+            *sum = (sum.0 + own.iter().map(|r| r * r).sum::<f64>(), sum.1 + own.len() as f64);
+            rest = others;
+        }
+    }
+    sums
+}
+
+/// Returns by how much residuals of other records are likelier under white noise of their own size than under that of given ones,
+/// nats; channels of smaller residuals do not count. Channels without counterpart are compared with the noise of their sensors.
+pub fn growth(given: (&[Piece], &[Vec<f64>]), others: (&[Piece], &[Vec<f64>])) -> f64 {
+    let mean = |(square, count): &(f64, f64)| if *count > 0.0 { square / count } else { 1.0 };
+    let known: Vec<f64> = squares(given.0, given.1).iter().map(mean).collect();
+    let of = |(c, sum): (usize, &(f64, f64))| {
+        let ratio = mean(sum) / known.get(c).copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
+        if ratio > 1.0 { 0.5 * sum.1 * (ratio - 1.0 - math::ln(ratio)) } else { 0.0 }
+    };
+    squares(others.0, others.1).iter().enumerate().map(of).sum()
+}
+
+/// Returns by how much correlated errors at the outputs are likelier than white noise of fitted size for given residuals of records,
+/// nats; `None` if neither can be fitted.
+pub fn correlation(pieces: &[Piece], residuals: &[Vec<f64>]) -> Option<f64> {
+    let channels = Channels::new(pieces);
+    let log = |kind| {
+        let errors = Errors::fit(kind, pieces, &channels, residuals, Vec::new(), None, true)?.errors;
+        let mut sum = 0.0;
+        for (index, (piece, residuals)) in pieces.iter().zip(residuals).enumerate() {
+            let mut columns = [residuals.clone()];
+            sum += errors.whiten(piece, &channels, index, &mut columns);
+            sum += columns[0].iter().map(|r| r * r).sum::<f64>();
+        }
+        Some(-0.5 * sum)
+    };
+    let correlated = [ErrorModel::SmoothOutput, ErrorModel::RoughOutput].into_iter().filter_map(log);
+    Some(correlated.max_by(f64::total_cmp)? - white_log_likelihood(pieces, residuals))
+}
+
 /// Returns the values of a set of effects at a point of its fit, to start another fit from.
 pub fn start_at(added: &[Added], fit: &Fit<'_>, variant: &Variant, point: &Point) -> Start {
     let mut added = added.to_vec();
     for (index, effect) in added.iter_mut().enumerate() {
         effect.take(index, variant, fit, point);
     }
-    let declared = |(values, piece): (&Vec<f64>, &crate::fit::Piece)| {
+    let declared = |(values, piece): (&Vec<f64>, &Piece)| {
         values[..fit.subject.measurements[piece.measurement].locals.len()].to_vec()
     };
     let locals = point.locals.iter().zip(&fit.pieces).map(declared).collect();

@@ -13,13 +13,13 @@ mod search;
 mod tests;
 mod verdict;
 
-pub(crate) use fitted_set::{FittedSet, Key};
 #[cfg(test)]
-pub(crate) use fitted_set::estimation;
+pub(crate) use baseline::baseline;
+pub(crate) use fitted_set::{FittedSet, Key, estimation};
 pub(crate) use forecast::{Forecasts, with_free_starts};
 pub(crate) use preparation::prepare;
-pub(crate) use screening::{Scene as Screening, Screened};
 pub(crate) use refit::price;
+pub(crate) use screening::{Scene as Screening, Screened};
 pub(crate) use search::{Search, without};
 pub(crate) use verdict::{FIRES, OTHER, decide, entry};
 

@@ -23,8 +23,7 @@ pub fn prepare<'a>(
     simulations.stage("fit of the declared model", 0.02);
     let start = baseline(subject, simulations)?;
     subject.take_pace(&start.tuners);
-    let mut refit =
-        Refit { subject, candidates: subject.candidates(effects), nominal: Vec::new(), simulations };
+    let mut refit = Refit { subject, candidates: subject.candidates(effects), nominal: Vec::new(), simulations };
     let declared = refit.least_squares(&Vec::new(), &[start])?;
     let along =
         |piece| Trajectory::new(&declared.fit, &declared.variant.model, piece, &declared.least_squares.point).ok();

@@ -40,6 +40,14 @@ pub const HOPELESS: f64 = 15.0;
 /// Decrease of log-likelihood, nats, from which a set fits worse than one that it contains.
 const WORSE: f64 = 0.5;
 
+/// Distances from 0 at which an initial state of an effect is tried, in scales: the scale is a tenth of its typical size; and the
+/// iterations in which all else follows.
+const DISTANCES: [f64; 6] = [-5.0, 5.0, -10.0, 10.0, -20.0, 20.0];
+const FOLLOW: usize = 2;
+
+/// Standard errors up to which a declared term may be 0.
+const UNCERTAIN: f64 = 2.0;
+
 /// Share of its strength with which an effect is added to the optimum of a set that contains it not.
 const FAINT: f64 = 0.05;
 
@@ -104,6 +112,37 @@ impl<'a> Refit<'a> {
         let all = looks.par_iter().filter_map(fitted).collect::<Vec<(Start, Estimate)>>();
         let best = all.into_iter().max_by(|a, b| evidence(&a.1).total_cmp(&evidence(&b.1)))?;
         Some(Rough { log_likelihood: best.1.log_likelihood, log_evidence: evidence(&best.1), start: best.0 })
+    }
+
+    /// Returns a start in which initial states of effects are moved that no derivative has moved from 0, where that describes the
+    /// records clearly better; `None` if there are none. An actuator of limited rate that begins at its command follows at once:
+    /// begun beside it, it catches up in a time in proportion to the distance, so that what it adds is of second order.
+    pub fn with_moved_states(&self, start: &Start) -> Option<Start> {
+        let (fit, point, variant) = self.problem(start);
+        let declared = self.subject.model.interface().parameters.len();
+        let is_silent =
+            |piece: usize, k: usize| fit.pieces[piece].locals[k].parameter >= declared && point.locals[piece][k] == 0.0;
+        let silent =
+            (0..fit.pieces.len()).flat_map(|piece| (0..fit.pieces[piece].locals.len()).map(move |k| (piece, k)));
+        let silent: Vec<(usize, usize)> = silent.filter(|&(piece, k)| is_silent(piece, k)).collect();
+        let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, &start.added, &[], &point);
+        // The other unknowns had made up for a state that begins elsewhere.
+        let followed = |point: Point| estimation.with(&Errors::White, point, FOLLOW);
+        let mut best = if silent.is_empty() { None } else { followed(point.clone()) }?;
+        let mut is_moved = false;
+        for (piece, k) in silent {
+            let trial = |distance: &f64| {
+                let mut point = best.point.clone();
+                point.locals[piece][k] = distance * fit.pieces[piece].locals[k].scale;
+                followed(point)
+            };
+            let tried: Vec<Estimate> = DISTANCES.par_iter().filter_map(trial).collect();
+            let likeliest = tried.into_iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
+            if let Some(moved) = likeliest.filter(|moved| moved.log_likelihood > best.log_likelihood + HOPELESS) {
+                (best, is_moved) = (moved, true);
+            }
+        }
+        is_moved.then(|| start_at(&start.added, &fit, &variant, &best.point))
     }
 
     /// Returns what is computed of the estimation problem of a set at a start.
@@ -190,6 +229,37 @@ impl<'a> Refit<'a> {
         if let Some(again) = again.filter(|again| again.log_likelihood > set.least_squares.log_likelihood) {
             set.least_squares = again;
         }
+    }
+
+    /// Returns a set without the declared terms that its effects make superfluous, and their positions among the parameters of the
+    /// study: factors that may be 0, are no larger than their uncertainty, and without which the evidence is larger.
+    pub fn without_terms(&self, set: &FittedSet<'a>) -> (FittedSet<'a>, Vec<usize>) {
+        let (mut set, mut held) = (set.clone(), Vec::new());
+        for k in 0..if set.key.is_empty() { 0 } else { self.subject.globals.len() } {
+            let Some((kind, estimate)) = set.likeliest().cloned() else { break };
+            let ([low, high], value) = (set.fit.globals[k].bounds, set.least_squares.point.globals[k]);
+            let may_be_zero = low <= 0.0 && high >= 0.0 || self.subject.is_log(k) && low > 0.0;
+            if !may_be_zero || value > low && value.abs() > UNCERTAIN * estimate.deviations[k] {
+                continue;
+            }
+            let all: Vec<usize> = held.iter().copied().chain([k]).collect();
+            let mut start = set.start_at(&set.least_squares.point);
+            start.tuners[k] = 0.0;
+            let pieces = base::pieces(self.subject, |role| role == Role::Calibration);
+            let Start { tuners, locals, added } = start;
+            let (fit, point, variant) = problem(self.subject, &added, pieces, &tuners, locals, &all, self.simulations);
+            let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, &added, &self.nominal, &point);
+            let Some(least_squares) = estimation.least_squares(point) else { continue };
+            let Some(under) = estimation.under(kind, least_squares.point.clone(), Some(&estimate.errors)) else {
+                continue;
+            };
+            if evidence(&under) > evidence(&estimate) {
+                held = all;
+                let key = set.key.clone();
+                set = FittedSet { key, added, fit, variant, least_squares, under: vec![(kind, under)] };
+            }
+        }
+        (set, held)
     }
 
     /// Returns the optimum of a smaller set with the further effects of a set added faintly.

@@ -216,8 +216,7 @@ impl<'s> Scene<'s> {
             };
             let is_one_sided = !is_linear || first.bounds[0] >= 0.0;
             let detectable = is_linear.then(|| group[0][0].abs() / lengths[k]);
-            let now =
-                Screened { index, guesses: vec![guess], gains, absorbed, detectable, directions, is_one_sided };
+            let now = Screened { index, guesses: vec![guess], gains, absorbed, detectable, directions, is_one_sided };
             match before {
                 Some(k) => found[k] = now,
                 None => found.push(now),

@@ -8,7 +8,7 @@ use super::refit::{HOPELESS, Refit, Rough, price};
 use super::screening::{Scene, Screened, pair_gain};
 use crate::candidate::Candidate;
 use crate::estimation::{ALLOWANCE, ErrorModel, Errors, Estimate};
-use crate::fit::Point;
+use crate::fit::{Point, Sets};
 use crate::variant::Added;
 
 /// Candidates that are fitted after a screening: the best by gain under the correlated error models, and by gain in white noise.
@@ -154,28 +154,58 @@ impl<'r, 'a> Search<'r, 'a> {
             .any(|smaller| ErrorModel::ALL.into_iter().filter_map(|kind| gain(smaller, kind)).all(|gain| gain < INERT))
     }
 
-    /// Returns true if an effect of a set is at a limit at which a simpler effect at its place describes the records as well: a
-    /// parameter beside the first is at a bound, where it is the simpler effect in all but name.
+    /// Returns true if an effect of a set is at a limit: as strong as is physically possible, or such that a simpler effect at its
+    /// place describes the records as well. At a bound of a parameter beside the first it is the simpler effect in all but name.
     pub fn is_degenerate(&self, set: &FittedSet<'a>) -> bool {
+        let likeliest = set.likeliest().map(|(kind, estimate)| (Some(*kind), estimate));
+        let estimates = [(None, &set.least_squares)].into_iter().chain(likeliest);
+        estimates.into_iter().any(|(kind, estimate)| {
+            let added = set.start_at(&estimate.point).added;
+            let is_at_limit = |index: usize| {
+                let parameters =
+                    added[index].candidate.effect.parameters().iter().zip(&added[index].strengths).enumerate();
+                parameters.into_iter().skip(1).any(|(k, (parameter, value))| {
+                    !parameter.fixed && parameter.bounds.contains(value) && !self.is_wide(set, &added[index], index, k)
+                })
+            };
+            added.iter().any(Added::is_at_limit)
+                || (0..added.len())
+                    .any(|index| is_at_limit(index) && self.is_matched(set, &added[index].candidate, kind, estimate))
+        })
+    }
+
+    /// Returns true if the records allow most values that are tried of a parameter that no derivative determines.
+    fn is_wide(&self, set: &FittedSet<'a>, added: &Added, index: usize, k: usize) -> bool {
+        let parameter = &added.candidate.effect.parameters()[k];
+        let sets = Sets::Parameter(set.variant.first[index] + k);
+        let position = set.fit.globals.iter().position(|global| global.sets == sets && global.is_stepped());
+        let mut tried = added.sizes.values(parameter.dimension, parameter.grid, parameter.bounds);
+        tried.retain(|value| !parameter.bounds.contains(value));
+        let interval = position.zip(likelier_output(set));
+        let interval = interval.and_then(|(g, at)| set.estimation(&[]).stepped_interval(at, g));
+        let allowed = |[low, high]: [f64; 2]| tried.iter().filter(|v| (low..=high).contains(*v)).count();
+        interval.is_some_and(|interval| 2 * allowed(interval) >= tried.len())
+    }
+
+    /// Returns true if a set with a simpler effect in place of one is about as likely, by least squares or under an error model.
+    fn is_matched(
+        &self,
+        set: &FittedSet<'a>,
+        candidate: &Candidate,
+        kind: Option<ErrorModel>,
+        estimate: &Estimate,
+    ) -> bool {
         let candidates = &self.refit.candidates;
-        let added = set.start_at(&set.least_squares.point).added;
-        let at_limit = added.iter().filter(|added| {
-            let parameters = added.candidate.effect.parameters().iter().zip(&added.strengths).skip(1);
-            parameters.into_iter().any(|(parameter, value)| !parameter.fixed && parameter.bounds.contains(value))
-        });
-        let is_matched = |added: &Added| {
-            let Some(at) = set.key.iter().position(|k| candidates[*k].is(&added.candidate)) else { return false };
-            let rest = without(&set.key, at);
-            self.sets.iter().any(|other| {
-                let new = other.key.iter().find(|k| !rest.contains(k));
-                let is_simpler = |&k: &usize| candidates[k].has_fewer_strengths_than(&added.candidate);
-                other.key.len() == set.key.len()
-                    && rest.iter().all(|k| other.key.contains(k))
-                    && new.is_some_and(is_simpler)
-                    && other.least_squares.log_likelihood > set.least_squares.log_likelihood - SAME
-            })
-        };
-        at_limit.into_iter().any(is_matched)
+        let Some(at) = set.key.iter().position(|k| candidates[*k].is(candidate)) else { return false };
+        let rest = without(&set.key, at);
+        self.sets.iter().any(|other| {
+            let new = other.key.iter().find(|k| !rest.contains(k));
+            let theirs = kind.map_or(Some(&other.least_squares), |kind| other.estimate(kind));
+            other.key.len() == set.key.len()
+                && rest.iter().all(|k| other.key.contains(k))
+                && new.is_some_and(|&k| candidates[k].has_fewer_strengths_than(candidate))
+                && theirs.is_some_and(|theirs| theirs.log_likelihood > estimate.log_likelihood - SAME)
+        })
     }
 
     /// Fits the sets with one or two effects more, and those with one less.
@@ -188,8 +218,8 @@ impl<'r, 'a> Search<'r, 'a> {
         let Some(scene) = Scene::new(&parent, &errors) else { return };
         let all = &self.refit.candidates;
         let fits = |&index: &usize| parent.added.iter().all(|added| can_be_together(&added.candidate, &all[index]));
-        // What happens once in one record is a rival of all else, but is not stacked on it.
-        let is_stacked = |&index: &usize| key.is_empty() || all[index].only.is_none();
+        // What happens once in one record is a rival of all else, but is stacked on its like only.
+        let is_stacked = |&index: &usize| all[index].only.is_none() || key.iter().all(|&k| all[k].only.is_some());
         let wanted: Vec<usize> =
             (0..all.len()).filter(|index| !key.contains(index)).filter(fits).filter(is_stacked).collect();
         let screened = scene.screen(all, &wanted);
@@ -325,7 +355,10 @@ impl<'r, 'a> Search<'r, 'a> {
     fn by_squares(&self, parent: &FittedSet<'a>, new: &[&Screened], other: Option<&Start>) -> Option<Rough> {
         let mut from = starts(parent, &parent.least_squares.point, new);
         from.extend(other.cloned());
-        self.refit.roughly(&from, &Errors::White, f64::NEG_INFINITY)
+        let rough = self.refit.roughly(&from, &Errors::White, f64::NEG_INFINITY)?;
+        let moved = self.refit.with_moved_states(&rough.start);
+        let again = moved.and_then(|moved| self.refit.roughly(&[moved], &Errors::White, f64::NEG_INFINITY));
+        Some(again.filter(|again| again.log_likelihood > rough.log_likelihood).unwrap_or(rough))
     }
 
     /// Fits a set from fitted ones with one effect less. Returns false if there are none, or the fits fail.

@@ -114,11 +114,7 @@ fn where_nothing_is_missing_nothing_is_claimed_and_what_is_correlated_stays_unex
         let found = selected(|_, _| 0.0, correlated, &BOTH);
         assert_eq!(found.verdict.conclusion, expected, "{correlated}: {:?}", found.verdict);
         assert!(found.verdict.nothing > 0.9, "{correlated}: {:?}", found.verdict);
-        assert!(
-            found.verdict.declared[0].first().is_none_or(|curve| curve.gain < 6.0),
-            "{:?}",
-            found.verdict.declared
-        );
+        assert!(found.verdict.declared[0].first().is_none_or(|curve| curve.gain < 6.0), "{:?}", found.verdict.declared);
     }
 }
 

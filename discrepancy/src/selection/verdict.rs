@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use mops_core::math;
+use mops_core::{Role, math};
 
-use super::fitted_set::Key;
-use super::forecast::Forecasts;
+use super::fitted_set::{FittedSet, Key, correlation, growth};
+use super::forecast::{Forecasts, with_free_starts};
 use super::search::Search;
+use crate::base;
 use crate::candidate::Candidate;
 use crate::estimation::ErrorModel;
 use mops_core::diagnosis::Dependence;
@@ -47,6 +48,8 @@ pub struct Stated {
 pub struct Verdict {
     /// The first set that passed; empty for the declared model.
     pub set: Key,
+    /// Sets with an effect that does nothing or is at a limit.
+    pub excluded: Vec<Key>,
     /// Sets that passed, with their posterior probabilities.
     pub passed: Vec<(Key, f64)>,
     /// True if a free curve on top of the set shows that most remains.
@@ -66,9 +69,10 @@ pub struct Verdict {
     pub remaining: Vec<Dependence>,
     /// Share of the error of the forecast above noise that the set removes.
     pub share: Option<f64>,
-    /// Gain of correlated errors over white noise of fitted size in log-likelihood at the declared model, nats.
+    /// Gain of correlated errors over white noise of fitted size in log-likelihood at the declared model, nats: the larger one of
+    /// calibration and selection records.
     pub lack_of_fit: f64,
-    /// Largest root mean square error of a calibration record at the declared model, in noises.
+    /// Largest root mean square error of a calibration or selection record at the declared model, in noises.
     pub largest_error: f64,
 }
 
@@ -94,6 +98,10 @@ const RUN_ON: f64 = 0.8;
 /// Logarithm of the probability relative to the first set that passed below which a set does not count: less than 1 %.
 const NEGLIGIBLE: f64 = 5.0;
 
+/// Difference of log-evidence, nats, that is not worth more than a bare mention. Source: R. E. Kass, A. E. Raftery, Bayes factors,
+/// Journal of the American Statistical Association 90 (1995) 773, section 3.2.
+const BARE_MENTION: f64 = 1.0;
+
 /// Probability that none of the candidates is right.
 pub const OTHER: f64 = 0.05;
 
@@ -101,12 +109,15 @@ pub const OTHER: f64 = 0.05;
 pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict {
     let nothing = Key::new();
     let declared = search.log_posterior(search.get(&nothing).expect("it was fitted first"));
-    let candidates: Vec<Key> = {
+    let (excluded, candidates): (Vec<Key>, Vec<Key>) = {
         let sets = search.sets.iter().filter(|set| !set.key.is_empty());
-        sets.filter(|set| !search.is_inert(set) && !search.is_degenerate(set)).map(|set| set.key.clone()).collect()
+        let keys = |sets: Vec<&FittedSet<'_>>| sets.into_iter().map(|set| set.key.clone()).collect();
+        let (excluded, candidates) = sets.partition(|set| search.is_inert(set) || search.is_degenerate(set));
+        (keys(excluded), keys(candidates))
     };
     // What is less probable than the declared model is not chosen, but counts for the probabilities.
-    let first = candidates.first().filter(|key| search.get(key).is_some_and(|set| search.log_posterior(set) > declared));
+    let first =
+        candidates.first().filter(|key| search.get(key).is_some_and(|set| search.log_posterior(set) > declared));
     let first = first.cloned();
     let mut passed: Vec<Key> = Vec::new();
     let mut least = f64::NEG_INFINITY;
@@ -120,7 +131,7 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
             passed.push(key.clone());
         }
     }
-    let set = passed.first().cloned().unwrap_or_default();
+    let set = simplest(search, &passed);
     // Posterior over the declared model and all sets that passed.
     let log = |key: &Key| search.get(key).map_or(f64::NEG_INFINITY, |set| search.log_posterior(set));
     let most = passed.iter().map(log).fold(declared, f64::max);
@@ -128,21 +139,19 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
     let total: f64 = weight(declared) + passed.iter().map(|key| weight(log(key))).sum::<f64>();
     let mut by_entry: BTreeMap<Entry, f64> = BTreeMap::new();
     for key in &passed {
-        let mut entries: Vec<Entry> = key.iter().map(|&k| entry(search, &search.refit.candidates[k])).collect();
-        entries.sort();
-        entries.dedup();
-        for entry in entries {
+        for entry in entries_of(search, key) {
             *by_entry.entry(entry).or_default() += weight(log(key)) / total;
         }
     }
     let nothing_probability = weight(declared) / total;
     let weights: Vec<(Key, f64)> = passed.iter().map(|key| (key.clone(), weight(log(key)) / total)).collect();
-    let mut entries: Vec<Entry> = set.iter().map(|&k| entry(search, &search.refit.candidates[k])).collect();
-    entries.sort();
-    entries.dedup();
+    let entries = entries_of(search, &set);
     let probability = |entry: &Entry| by_entry.get(entry).copied().unwrap_or(0.0);
     let entries: Vec<(Entry, f64)> = entries.into_iter().map(|e| (e.clone(), probability(&e))).collect();
-    let is_first = first.is_some_and(|first| !set.is_empty() && first.iter().all(|k| set.contains(k)));
+    let is_first = first.is_some_and(|first| {
+        let own = entries_of(search, &set);
+        !set.is_empty() && entries_of(search, &first).iter().all(|entry| own.contains(entry))
+    });
     let curves = |key: &Key, kind: Option<ErrorModel>| {
         let set = search.get(key)?;
         let estimate = kind.map_or_else(|| set.likeliest().map(|(_, estimate)| estimate), |kind| set.estimate(kind))?;
@@ -169,8 +178,7 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         || is_first && forecasts.share(search, &set).is_some_and(|share| share >= RUN_ON);
     let is_effect = explains && is_supported && stated.iter().any(|stated| stated.is_claimed);
     let declared_model = search.get(&nothing).expect("it was fitted first");
-    let lack_of_fit = declared_model.lack_of_fit().unwrap_or(f64::INFINITY);
-    let largest_error = declared_model.largest_error().unwrap_or(f64::INFINITY);
+    let (lack_of_fit, largest_error) = lacks(declared_model);
     let conclusion = if is_effect {
         Conclusion::Effect
     } else if lack_of_fit > search.significant && largest_error > MATTERS {
@@ -183,6 +191,7 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         stated,
         nothing: nothing_probability,
         is_refused_by_curve: !explains,
+        excluded,
         passed: weights,
         set,
         is_first,
@@ -192,6 +201,50 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         lack_of_fit,
         largest_error,
     }
+}
+
+/// Returns classes and places of the effects of a set, each once.
+fn entries_of(search: &Search<'_, '_>, key: &Key) -> Vec<Entry> {
+    let mut entries: Vec<Entry> = key.iter().map(|&k| entry(search, &search.refit.candidates[k])).collect();
+    entries.sort();
+    entries.dedup();
+    entries
+}
+
+/// Returns the first of the sets that passed, or the simplest one that says the same about as probably: with the fewest parameters
+/// among those of the same classes and places.
+fn simplest(search: &Search<'_, '_>, passed: &[Key]) -> Key {
+    let Some(first) = passed.first() else { return Key::new() };
+    let log = |key: &Key| search.get(key).map_or(f64::NEG_INFINITY, |set| search.log_posterior(set));
+    let parameters =
+        |key: &Key| -> usize { key.iter().map(|&k| search.refit.candidates[k].effect.parameters().len()).sum() };
+    let entries = entries_of(search, first);
+    let is_alike = |key: &&Key| {
+        key.len() == first.len() && log(key) > log(first) - BARE_MENTION && entries_of(search, key) == entries
+    };
+    passed.iter().filter(is_alike).min_by_key(|key| parameters(key)).unwrap_or(first).clone()
+}
+
+/// Returns the lack of fit of a model and its largest error of a record, over calibration and selection records. On these it is
+/// either correlation, or errors that are larger than on the former.
+fn lacks(set: &FittedSet<'_>) -> (f64, f64) {
+    let on_calibration = (set.lack_of_fit().unwrap_or(f64::INFINITY), set.largest_error().unwrap_or(f64::INFINITY));
+    let pieces = base::pieces(set.fit.subject, |role| role == Role::Selection);
+    if pieces.is_empty() {
+        return on_calibration;
+    }
+    let on_selection = || {
+        let (fit, point) = with_free_starts(set, &set.least_squares.point, pieces)?;
+        let residuals = fit.all(&point)?;
+        #[allow(clippy::cast_precision_loss)]
+        let rms = |r: &Vec<f64>| (r.iter().map(|r| r * r).sum::<f64>() / r.len().max(1) as f64).sqrt();
+        let largest = residuals.iter().map(rms).fold(0.0, f64::max);
+        let own = set.fit.all(&set.least_squares.point)?;
+        let grown = growth((&set.fit.pieces, &own), (&fit.pieces, &residuals));
+        Some((correlation(&fit.pieces, &residuals)?.max(grown), largest))
+    };
+    let on_selection = on_selection().unwrap_or((f64::INFINITY, f64::INFINITY));
+    (on_calibration.0.max(on_selection.0), on_calibration.1.max(on_selection.1))
 }
 
 /// Returns class and place of a candidate; what happens once in one record is a disturbance of that record.

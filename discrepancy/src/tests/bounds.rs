@@ -19,12 +19,12 @@ fn a_declared_parameter_that_its_bound_stops_is_told() {
         let mut parts = study(&subject).into_parts();
         parts.tuners[0].bounds = [0.1, largest];
         let study = Study::from_parts(parts);
-        diagnose(&study, &[], &Options { max_effects: 1, level: 0.01, seed: 1 }, &()).expect("it simulates").notes
+        diagnose(&study, &[], &Options { max_effects: 1, level: 0.01 }, &()).expect("it simulates").notes
     };
-    assert_eq!(notes(1.0), [] as [String; 0]);
+    assert!(notes(1.0).iter().all(|note| !note.contains("bound")));
     let told = notes(0.4);
     assert!(
-        told.iter().any(|n| n.starts_with("`a` of the declared and of the repaired model sits at its upper bound 0.4")),
+        told.iter().any(|n| n.starts_with("`a` of the declared and of the repaired model is at its upper bound 0.4")),
         "{told:?}"
     );
 }

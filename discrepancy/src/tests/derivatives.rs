@@ -7,9 +7,7 @@ use mops_core::{Effect, Hold, Input};
 use mops_effects::effects;
 
 use crate::meter::Meter;
-use crate::screen::screen;
-use crate::search::{Limits, Search};
-use crate::testing::{Record, fitted, integrated, subject, white};
+use crate::testing::{Record, integrated, screened, subject, white};
 
 const CART: &str = r#"
 states     = { x = "m", v = "m/s" }
@@ -74,14 +72,10 @@ fn by_outputs(record: Record) -> String {
     let mut subject = subject(CART, &[1.5, 14.0, 0.5, 0.3, 0.0], 2, vec![record]);
     subject.measurements[0].locals[0].start = 0.3;
     let simulations = Meter::new(&());
-    let (fit, variant, _, scene) = fitted(&subject, &simulations);
     let named: Vec<Arc<dyn Effect>> =
         effects().into_iter().filter(|e| TERMS.iter().any(|(name, _)| *name == e.name())).collect();
     assert_eq!(named.len(), TERMS.len());
-    let limits = Limits::at(0.01);
-    let search = Search::new(&subject, &named, limits, &simulations);
-    let screened = screen(&search.candidates(&[]), &fit, &variant.model, &scene, &[]).screened;
-    screened[0].added.candidate.effect.name().to_owned()
+    screened(&subject, &named, &simulations).remove(0).0
 }
 
 #[test]

@@ -1,15 +1,11 @@
 //! The wrong hold of an input hides an effect: what the command did between its samples looks like a force of its own.
 
-use std::sync::Arc;
-
 use mops_core::math;
-use mops_core::{Effect, Hold, Input};
+use mops_core::{Hold, Input};
 use mops_effects::effects;
 
 use crate::meter::Meter;
-use crate::screen::screen;
-use crate::search::{Limits, Search};
-use crate::testing::{Record, fitted, integrated, subject, white};
+use crate::testing::{Record, fitted, integrated, screened, subject, white};
 
 const OSCILLATOR: &str = r#"
 states     = { x = "m", v = "m/s" }
@@ -49,14 +45,11 @@ fn record(hold: Hold) -> Record {
 fn explained(hold: Hold) -> f64 {
     let subject = subject(OSCILLATOR, &[1.2, 30.0, 0.6, 0.0, 0.0], 2, vec![record(hold)]);
     let simulations = Meter::new(&());
-    let (fit, variant, _, scene) = fitted(&subject, &simulations);
-    let named: Vec<Arc<dyn Effect>> = effects();
-    let limits = Limits::at(0.01);
-    let search = Search::new(&subject, &named, limits, &simulations);
-    let screened = screen(&search.candidates(&[]), &fit, &variant.model, &scene, &[]).screened;
+    let (_, _, _, scene) = fitted(&subject, &simulations);
     let left: f64 = scene.residuals.iter().map(|r| r * r).sum();
-    let cubic = screened.iter().find(|s| s.added.candidate.effect.name() == "cubic-stiffness");
-    cubic.expect("a position can have a spring").gain / left
+    let screened = screened(&subject, &effects(), &simulations);
+    let cubic = screened.iter().find(|(name, _)| name == "cubic-stiffness");
+    2.0 * cubic.expect("a position can have a spring").1 / left
 }
 
 #[test]

@@ -26,7 +26,7 @@ fn blown(label: &str, at: f64, force: f64) -> Record {
 fn gusts_in_two_experiments_are_two_findings() {
     let records = vec![blown("one", 1.0, 2.0), blown("other", 2.5, -3.0)];
     let subject = subject(BLOCK, &[8.0, 0.5, 1.0, 0.0], 2, records);
-    let options = Options { max_effects: 3, level: 0.01, seed: 1 };
+    let options = Options { max_effects: 3, level: 0.01 };
     let diagnosis = diagnose(&study(&subject), &catalogue(&["wind-gust"]), &options, &()).expect("it simulates");
     let found = diagnosis.found;
     let mut told: Vec<(Option<&str>, f64)> = found.iter().map(|f| (f.only.as_deref(), f.strengths[0].value)).collect();

@@ -26,7 +26,7 @@ fn a_session_with_twice_the_friction_is_judged_over_the_whole_record_and_in_wind
     let records = vec![swing("first", 40.0, 0.05), swing("months later", 40.4, 0.1)];
     let mut subject = subject(PENDULUM, &[41.0, 0.06, 1.0, 0.0], 2, records);
     subject.measurements[1].role = Role::Validation;
-    let options = Options { max_effects: 1, level: 0.01, seed: 1 };
+    let options = Options { max_effects: 1, level: 0.01 };
     let diagnosis = diagnose(&study(&subject), &[], &options, &()).expect("it simulates");
     let [own, later] = &diagnosis.after[..] else { panic!("{:?}", diagnosis.after) };
     let [own_windows, later_windows] = [own, later].map(|e| e.in_windows.as_ref().expect("it is long enough"));

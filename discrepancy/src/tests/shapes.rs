@@ -26,7 +26,7 @@ fn radiation(noise: f64, from: &[f64]) -> Vec<StrengthValue> {
         Record::of_first("T", &integrated(rates, [start, 0.0], 1.0, 200), 1.0, noise, &format!("{start}"))
     };
     let subject = subject(BODY, &[0.02, 100.0], 1, from.iter().map(cooled).collect());
-    let options = Options { max_effects: 1, level: 0.01, seed: 1 };
+    let options = Options { max_effects: 1, level: 0.01 };
     let diagnosis = diagnose(&study(&subject), &catalogue(&["radiation-loss"]), &options, &()).expect("it simulates");
     diagnosis.found.into_iter().next().expect("it is found").strengths
 }
@@ -66,7 +66,7 @@ fn a_rail_is_worn_at_distances_of_its_own() {
         measurement.locals[0].start = start;
     }
     let some = catalogue(&["coulomb-friction", "position-dependent-friction"]);
-    let options = Options { max_effects: 1, level: 0.01, seed: 1 };
+    let options = Options { max_effects: 1, level: 0.01 };
     let found = diagnose(&study(&subject), &some, &options, &()).expect("it simulates").found;
     assert_eq!(found[0].effect, "position-dependent-friction");
     let waves = &found[0].strengths[2];
@@ -94,7 +94,7 @@ fn waves_of_a_linear_motor_are_looked_for_along_its_rail_whatever_the_unit_of_th
     };
     let subject = subject(MOTOR, &[0.5, 1.5, 0.0, 0.0], 2, vec![driven(0.9), driven(0.5)]);
     let some = catalogue(&["input-gain", "torque-ripple", "quadratic-input"]);
-    let options = Options { max_effects: 1, level: 0.01, seed: 1 };
+    let options = Options { max_effects: 1, level: 0.01 };
     let found = diagnose(&study(&subject), &some, &options, &()).expect("it simulates").found;
     assert_eq!(found[0].effect, "torque-ripple");
     let waves = &found[0].strengths[1];

@@ -33,8 +33,8 @@ fn an_oscillation_that_is_driven_by_its_speed_is_never_put_down_to_negative_fric
     let subject = subject(SWING, &[2.1, 7.8, 0.2, 0.0], 2, vec![record]);
     let takes: Vec<_> = effects().into_iter().filter(|e| e.class() == EffectClass::Dissipative).collect();
     assert!(takes.len() > 5);
-    let diagnosis = diagnose(&study(&subject), &takes, &Options { max_effects: 2, level: 0.05, seed: 1 }, &())
-        .expect("it simulates");
+    let diagnosis =
+        diagnose(&study(&subject), &takes, &Options { max_effects: 2, level: 0.05 }, &()).expect("it simulates");
     assert!(diagnosis.before[0].normalised > 3.0, "{:?}", diagnosis.before);
     assert_eq!(diagnosis.verdict, Verdict::Unexplained, "{:?}", diagnosis.found);
     let strengths = diagnosis.found.iter().flat_map(|f| f.strengths.first().map(|s| (&f.effect, s)));

@@ -2,10 +2,8 @@
 
 use mops_core::{Hold, Input};
 
-use crate::base::first_locals;
-use crate::meter::Meter;
-use crate::search::{Limits, Search};
-use crate::testing::{Record, catalogue, integrated, subject, white};
+use crate::testing::{Record, catalogue, integrated, study, subject, white};
+use crate::{Options, diagnose};
 
 const CART: &str = r#"
 states     = { x = "m", v = "m/s" }
@@ -40,40 +38,13 @@ fn pulled(pull: f64, label: &str) -> Record {
 #[test]
 fn a_motor_with_a_lag_that_pulls_before_the_record_begins_leaves_only_the_noise() {
     const PULL: f64 = 6.0;
-    let record = pulled(PULL, "pull");
-    let subject = subject(CART, &[M, D, 0.0, 0.0], 2, vec![record]);
-    let simulations = Meter::new(&());
-    let lag = catalogue(&["actuator-lag"]);
-    let limits = Limits::at(0.01);
-    let search = Search::new(&subject, &lag, limits, &simulations);
-    let declared = search.trial(&[], &subject.start(), vec![vec![0.0; 2]], 1, 60).expect("it simulates");
-    assert!(declared.fitted.normalised() > 5.0, "{}", declared.fitted.normalised());
-
-    let round = search.round(&declared).expect("it simulates");
-    let best = &round.trials[0];
-    assert!(best.fitted.normalised() < 1.1, "{}", best.fitted.normalised());
-    assert!((best.added[0].strengths[0] - TAU).abs() < 0.05 * TAU, "{:?}", best.added[0].strengths);
+    let subject = subject(CART, &[M, D, 0.0, 0.0], 2, vec![pulled(PULL, "pull")]);
+    let options = Options { max_effects: 1, level: 0.01 };
+    let found = diagnose(&study(&subject), &catalogue(&["actuator-lag"]), &options, &()).expect("it simulates");
+    assert!(found.before[0].normalised > 5.0, "{:?}", found.before);
+    assert!(found.after[0].normalised < 1.1, "{:?}", found.after);
+    assert!((found.found[0].strengths[0].value - TAU).abs() < 0.05 * TAU, "{:?}", found.found[0].strengths);
     // The lag begins with what the motor pulled beyond the command, `6 - (-2)`.
-    let start = best.fitted.point.locals[0][2];
-    assert!((start - (PULL - command(0.0))).abs() < 0.4, "{start}");
-}
-
-/// The same cart behind a motor whose pull `f` follows the command with a lag, as the model says.
-const MOTOR: &str = r#"
-states     = { f = "N", x = "m", v = "m/s" }
-inputs     = { u = "N" }
-parameters = { m = "kg", d = "N s/m", tau = "s" }
-der        = { f = "(u - f)/tau", x = "v", v = "m*v' = f - d*v" }
-"#;
-
-#[test]
-fn a_state_that_nobody_measures_begins_anew_in_every_window() {
-    let record = pulled(0.0, "motor");
-    // Where the pull begins is known; where it is as a window begins is not.
-    let subject = subject(MOTOR, &[M, D, TAU, 0.0, 0.0, 0.0], 2, vec![record]);
-    let simulations = Meter::new(&());
-    let search = Search::new(&subject, &[], Limits::at(0.01), &simulations);
-    let locals = first_locals(&search.pieces(8));
-    let windows = search.trial(&[], &subject.start(), locals, 8, 40).expect("it simulates");
-    assert!(windows.fitted.normalised() < 1.1, "{}", windows.fitted.normalised());
+    let start = found.starts.iter().find(|(_, name, _)| name == "u-actuator-lag.start1").expect("the lag has a state");
+    assert!((start.2 - (PULL - command(0.0))).abs() < 0.4, "{start:?}");
 }

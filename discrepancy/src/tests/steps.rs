@@ -1,14 +1,11 @@
 //! Stairs have no slope: the size of steps is searched for, and a gain that makes up for a wrong size does not hide the right one.
 
-use std::sync::Arc;
-
 use mops_core::math;
-use mops_core::{Effect, Hold, Input};
+use mops_core::{Hold, Input};
 use mops_effects::effects;
 
-use crate::meter::Meter;
-use crate::search::{Limits, Search};
-use crate::testing::{Record, integrated, subject, white};
+use crate::testing::{Record, integrated, study, subject, white};
+use crate::{Options, diagnose};
 
 const LAG: &str = r#"
 states     = { x = "m" }
@@ -40,14 +37,10 @@ fn found(input: f64, measurement: f64) -> (String, f64, f64) {
     let inputs = vec![("u", Input::Sampled { times: times.clone(), values: samples, hold: Hold::Zero })];
     let record = Record { inputs, times, signals: vec![("x", values, NOISE)] };
     let subject = subject(LAG, &[1.2, 1.0, 0.5], 1, vec![record]);
-    let simulations = Meter::new(&());
-    let all: Vec<Arc<dyn Effect>> = effects();
-    let limits = Limits::at(0.01);
-    let search = Search::new(&subject, &all, limits, &simulations);
-    let declared = search.trial(&[], &subject.start(), vec![vec![0.5]], 1, 60).expect("it simulates");
-    let round = search.round(&search.over_or_in_windows(&declared)).expect("it simulates");
-    let best = &round.trials[0];
-    (best.added[0].candidate.effect.name().to_owned(), best.added[0].strengths[0], best.fitted.normalised())
+    let options = Options { max_effects: 1, level: 0.01 };
+    let found = diagnose(&study(&subject), &effects(), &options, &()).expect("it simulates");
+    let effect = &found.found[0];
+    (effect.effect.clone(), effect.strengths[0].value, found.after[0].normalised)
 }
 
 #[test]

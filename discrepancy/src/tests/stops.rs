@@ -44,7 +44,7 @@ fn run(label: &str, pushes: &[(f64, f64)]) -> Record {
 fn diagnosis(records: Vec<Record>) -> Diagnosis {
     let subject: Subject = subject(MASS, &[1.0, 1.0, 50.0, 0.0, 0.0], 2, records);
     let effects = catalogue(&["end-stop", "cubic-stiffness", "quadratic-stiffness", "wind-gust", "coulomb-friction"]);
-    diagnose(&study(&subject), &effects, &Options { max_effects: 1, level: 0.01, seed: 1 }, &()).unwrap()
+    diagnose(&study(&subject), &effects, &Options { max_effects: 1, level: 0.01 }, &()).unwrap()
 }
 
 #[test]
@@ -59,13 +59,12 @@ fn a_stiff_stop_is_found_where_it_is() {
     assert!(told.after.iter().all(|error| error.normalised < 1.1), "{:?}", told.after);
 }
 
-/// What a stop does once, a gust at that moment could have done.
+/// What a stop does once, a gust at that moment could have done, if it were ten times as strong as all else.
 #[test]
-fn a_stop_that_is_touched_once_cannot_be_told_from_a_gust() {
-    let told = diagnosis(vec![run("once", &[(0.5, 20.0)]), run("never", &[(1.0, 5.0), (3.2, -9.0)])]);
-    assert_eq!(told.verdict, Verdict::Effect, "{:?}", told.found);
-    let mut named = vec![told.found[0].effect.as_str()];
-    named.extend(told.found[0].indistinguishable.iter().map(|other| other.effect.as_str()));
-    named.sort_unstable();
-    assert_eq!(named, ["end-stop", "wind-gust"]);
+fn a_stop_that_is_touched_once_is_more_probable_than_a_violent_gust() {
+    let found = diagnosis(vec![run("once", &[(0.5, 20.0)]), run("never", &[(1.0, 5.0), (3.2, -9.0)])]);
+    assert_eq!(found.verdict, Verdict::Effect);
+    assert_eq!(found.found[0].effect, "end-stop");
+    let gust = found.ranked.iter().find(|ranked| ranked.effect == "wind-gust").expect("it was fitted");
+    assert!(gust.normalised < 1.1 && gust.strengths[0].value.abs() > 200.0, "{gust:?}");
 }

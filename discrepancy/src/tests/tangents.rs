@@ -6,11 +6,13 @@ use mops_core::math;
 use mops_core::{Hold, InitialGrid, Input, Job, Model};
 use mops_effects::effects;
 
+use crate::base::pieces;
 use crate::candidate::candidates;
 use crate::fit::dot;
 use crate::meter::Meter;
-use crate::testing::{Record, fitted, subject};
+use crate::testing::{Record, subject};
 use crate::trace_of::{View, sizes};
+use crate::variant::problem;
 use crate::variant::{Added, Variant};
 use crate::windows::cut;
 
@@ -35,10 +37,10 @@ fn record() -> Record {
 fn every_effect_that_is_linear_in_its_strength_is_screened_by_the_tangent_of_the_simulation() {
     let subject = subject(PLANT, &TRUTH, 2, vec![record()]);
     let simulations = Meter::new(&());
-    let (fit, variant, mut at, mut scene) = fitted(&subject, &simulations);
-    at.point.globals = TRUTH[..3].to_vec();
-    at.point.locals = vec![TRUTH[3..].to_vec()];
-    scene.trajectories = vec![crate::trajectory::Trajectory::new(&fit, &variant.model, 0, &at.point).expect("it runs")];
+    let own = pieces(&subject, |_| true);
+    let locals = vec![TRUTH[3..].to_vec()];
+    let (fit, at, variant) = problem(&subject, &[], own, &TRUTH[..3], locals, &[], &simulations);
+    let trajectories = vec![crate::trajectory::Trajectory::new(&fit, &variant.model, 0, &at).expect("it runs")];
     let piece = &fit.pieces[0];
     let measured = ["x", "v"].map(str::to_owned);
     let mut compared = Vec::new();
@@ -48,21 +50,14 @@ fn every_effect_that_is_linear_in_its_strength_is_screened_by_the_tangent_of_the
         if first.grid != InitialGrid::Linear || first.null_value != Some(0.0) {
             continue;
         }
-        let Some(sizes) = sizes(&candidate.port, &variant.model, &fit.pieces, &scene.trajectories) else { continue };
+        let Some(sizes) = sizes(&candidate.port, &variant.model, &fit.pieces, &trajectories) else { continue };
         let Some(strengths) = sizes.combinations(effect.as_ref()).into_iter().next() else { continue };
-        let view = View::new(&candidate, &variant.model, piece, &scene.trajectories[0]);
+        let view = View::new(&candidate, &variant.model, piece, &trajectories[0]);
         let Some(screened) = view.and_then(|view| view.trace(&strengths)) else { continue };
         let own = Vec::new();
         let with = Variant::new(
             &subject,
-            &[Added {
-                candidate: candidate.clone(),
-                strengths: strengths.clone(),
-                own,
-                starts: Vec::new(),
-                sizes,
-                expected: None,
-            }],
+            &[Added { candidate: candidate.clone(), strengths: strengths.clone(), own, starts: Vec::new(), sizes }],
             &fit.pieces,
         );
         let mut parameters = TRUTH.to_vec();
@@ -97,10 +92,12 @@ fn every_effect_that_is_linear_in_its_strength_is_screened_by_the_tangent_of_the
 fn in_a_window_an_actuator_is_screened_with_what_was_commanded_before() {
     let subject = subject(&PLANT.replace(" - 3 [1/m2]*k*x^3", ""), &TRUTH, 2, vec![record()]);
     let simulations = Meter::new(&());
-    let (mut fit, variant, mut at, _) = fitted(&subject, &simulations);
+    let own = pieces(&subject, |_| true);
+    let locals = vec![TRUTH[3..].to_vec()];
+    let (mut fit, mut at, variant) = problem(&subject, &[], own, &TRUTH[..3], locals, &[], &simulations);
     fit.pieces = cut(0, &subject.measurements[0], subject.model.as_ref(), 4);
-    at.point.globals = TRUTH[..3].to_vec();
-    at.point.locals = vec![TRUTH[3..].to_vec(); 4];
+    at.globals = TRUTH[..3].to_vec();
+    at.locals = vec![TRUTH[3..].to_vec(); 4];
     let piece = &fit.pieces[2];
     assert_eq!(piece.case.begins, 3.0 - 0.01);
     let Some((_, Input::Sampled { times, .. })) = piece.case.inputs.first() else { panic!("{:?}", piece.case.inputs) };
@@ -110,7 +107,7 @@ fn in_a_window_an_actuator_is_screened_with_what_was_commanded_before() {
         times.len(),
         times[0]
     );
-    let trajectory = crate::trajectory::Trajectory::new(&fit, &variant.model, 2, &at.point).expect("it runs");
+    let trajectory = crate::trajectory::Trajectory::new(&fit, &variant.model, 2, &at).expect("it runs");
     let measured = ["x", "v"].map(str::to_owned);
     for (name, strength) in [("input-rate-limit", 6.0), ("backlash", 2.0), ("input-delay", 0.3)] {
         let all = candidates(&effects(), subject.model.interface(), &measured, &[0]);
@@ -124,7 +121,6 @@ fn in_a_window_an_actuator_is_screened_with_what_was_commanded_before() {
             own: Vec::new(),
             starts: Vec::new(),
             sizes: sizes.expect("it moves"),
-            expected: None,
         };
         let with = Variant::new(&subject, &[added], &fit.pieces[2..3]);
         let simulated = |strength: f64| -> Vec<f64> {

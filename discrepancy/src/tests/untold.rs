@@ -22,7 +22,7 @@ fn let_go(samples: usize) -> Diagnosis {
     let record = Record::of_first("th", &integrated(rates, [0.8, 0.0], 0.01, samples), 0.01, NOISE, "let go");
     let subject = subject(PENDULUM, &[23.3, 0.24, -1.0, 0.0], 2, vec![record]);
     let some = catalogue(&["coulomb-friction", "stiction", "stribeck-friction"]);
-    let options = Options { max_effects: 2, level: 0.01, seed: 1 };
+    let options = Options { max_effects: 2, level: 0.01 };
     diagnose(&study(&subject), &some, &options, &()).expect("it simulates")
 }
 
@@ -44,7 +44,7 @@ fn pushed() -> Diagnosis {
     record.inputs = vec![("u", Input::Sampled { times, values, hold: Hold::First })];
     let subject = subject(CART, &[0.8, 0.9, 0.0, 0.0], 2, vec![record]);
     let some = catalogue(&["coulomb-friction", "stiction"]);
-    let options = Options { max_effects: 2, level: 0.01, seed: 1 };
+    let options = Options { max_effects: 2, level: 0.01 };
     diagnose(&study(&subject), &some, &options, &()).expect("it simulates")
 }
 

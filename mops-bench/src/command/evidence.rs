@@ -60,9 +60,8 @@ fn verdict(selection: &Selection) -> String {
         let _ = write!(text, "; share of the forecast error {share:.3}");
     }
     let _ = writeln!(text, "; {}first by evidence", if verdict.is_first { "" } else { "not " });
-    let curve = |curves: &[Dependence]| {
-        curves.first().map_or("none".to_owned(), |curve| format!("{curve} {:+.1}", curve.gain))
-    };
+    let curve =
+        |curves: &[Dependence]| curves.first().map_or("none".to_owned(), |curve| format!("{curve} {:+.1}", curve.gain));
     let [likeliest, smooth] = &verdict.declared;
     let _ =
         writeln!(text, "  curve on the declared model: {} (smooth output error: {})", curve(likeliest), curve(smooth));

@@ -5,9 +5,9 @@ use mops_core::math;
 use super::*;
 use crate::base::{first_locals, pieces};
 use crate::estimation::priors::{nominal_rates, priors};
-use crate::fit::Fitted as LeastSquaresFit;
+use crate::fit::Point;
 use crate::meter::Meter;
-use crate::screen::Scene;
+use crate::scene::Scene;
 use crate::subject::Subject;
 use crate::testing::{Record, integrated, subject};
 use crate::variant::{Variant, problem};
@@ -44,10 +44,7 @@ fn estimate(subject: &Subject, test: impl Fn(&Estimation<'_>, &Point)) {
     let locals = first_locals(&pieces);
     let (fit, point, variant): (Fit<'_>, Point, Variant) =
         problem(subject, &[], pieces, &subject.start(), locals, &[], &simulations);
-    let residuals = fit.all(&point).expect("it simulates");
-    let (count, chi2) = (residuals[0].len(), residuals[0].iter().map(|r| r * r).sum());
-    let there = LeastSquaresFit { point: point.clone(), chi2, count, residuals, normal: std::sync::OnceLock::new() };
-    let scene = Scene::new(&fit, &variant.model, &there).expect("it simulates");
+    let scene = Scene::new(&fit, &variant.model, &point).expect("it simulates");
     let estimation = Estimation {
         fit: &fit,
         model: &variant.model,
