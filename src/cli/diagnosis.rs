@@ -75,11 +75,23 @@ fn found(diagnosis: &Diagnosis) -> String {
                 if known { high } else { String::new() },
                 strength.unit.clone(),
                 once(words::probability(found.probability)),
-                once(significant(found.bic_gain, 4)),
+                once(words::probability(found.class_probability)),
+                once(if found.claimed { "claimed" } else { "proposed" }.to_owned()),
             ]);
         }
     }
-    let header = ["effect found", "place", "parameter", "value", "95 % from", "to", "unit", "probability", "BIC gain"];
+    let header = [
+        "effect found",
+        "place",
+        "parameter",
+        "value",
+        "95 % from",
+        "to",
+        "unit",
+        "probability",
+        "class and place",
+        "",
+    ];
     table(&header, &[3, 4, 5, 7, 8], rows)
 }
 
@@ -105,14 +117,15 @@ fn ranking(diagnosis: &Diagnosis) -> String {
         vec![
             ranked.effect.clone(),
             ranked.place.clone(),
-            if ranked.probability.is_finite() { words::probability(ranked.probability) } else { "screened".to_owned() },
-            if ranked.bic_gain.is_finite() { significant(ranked.bic_gain, 4) } else { String::new() },
+            if ranked.probability.is_finite() { words::probability(ranked.probability) } else { String::new() },
+            if ranked.bic_gain.is_finite() { significant(ranked.bic_gain, 4) } else { "screened".to_owned() },
             words::share(ranked.absorbed),
+            ranked.failed.map_or("claimed", words::failed).to_owned(),
             strengths.join(", "),
         ]
     });
     let mut text = table(
-        &["candidate", "place", "probability", "BIC gain", "absorbed", "parameters, from all data"],
+        &["candidate", "place", "probability", "BIC gain", "absorbed", "result", "parameters"],
         &[2, 3, 4],
         rows.collect(),
     );

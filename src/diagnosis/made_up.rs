@@ -2,8 +2,8 @@
 
 use mops_core::Role;
 use mops_core::diagnosis::{
-    Change, Curve, Diagnosis, Evidence, ExperimentError, Found, HangsOn, Noticeable, ParameterMove, Prediction, Ranked,
-    Rival, Stability, Step, StrengthValue, Unexplained, Verdict,
+    Change, Curve, Dependence, Diagnosis, Evidence, ExperimentError, Found, HangsOn, Noticeable, ParameterMove,
+    Prediction, Ranked, Rival, Rule, Stability, Step, StrengthValue, Unexplained, Verdict,
 };
 use mops_core::math;
 
@@ -85,6 +85,21 @@ fn ranked(effect: &str, place: &str, probability: f64, bic_gain: f64) -> Ranked 
         strengths: vec![strength("c", 0.0124, "N m")],
         absorbed: 0.87,
         normalised: 1.01,
+        failed: (bic_gain < 2400.0).then_some(Rule::Probability),
+    }
+}
+
+/// Returns a curve that jumps where its coordinate changes its sign.
+fn dependence(coordinate: &str, place: &str, gain: f64) -> Dependence {
+    let point = |k: i32| [f64::from(k), -0.0124 * math::tanh(3.0 * f64::from(k))];
+    Dependence {
+        coordinate: coordinate.into(),
+        place: place.into(),
+        other: None,
+        gain,
+        unit: "rad/s".into(),
+        signal_unit: "N m".into(),
+        curve: (-7..=7).map(point).collect(),
     }
 }
 
@@ -103,7 +118,12 @@ pub(crate) fn coulomb() -> Diagnosis {
     };
     let mut made = Diagnosis::default();
     made.verdict = Verdict::Effect;
-    made.probability = 0.9997;
+    made.probability = 0.95;
+    made.is_first = true;
+    made.converged = true;
+    made.is_sure = true;
+    made.explained_share = Some(0.996);
+    made.depends_on = Some(dependence("speed", "joint:phi", 310.0));
     made.p_value = 1e-9;
     made.found = vec![Found {
         effect: "coulomb-friction".into(),
@@ -114,7 +134,9 @@ pub(crate) fn coulomb() -> Diagnosis {
         class: "dissipative".into(),
         formula: "-torque sgn(speed), with a stuck mode".into(),
         strengths: vec![strength("c", 0.0124, "N m")],
-        probability: 0.97,
+        probability: 0.9,
+        class_probability: 0.95,
+        claimed: true,
         bic_gain: 2400.0,
         indistinguishable: vec![rival("stribeck-friction", 0.7), rival("quadratic-drag", 4.1)],
         stability: Some(Stability {
@@ -135,10 +157,10 @@ pub(crate) fn coulomb() -> Diagnosis {
         normalised: 1.0,
     }];
     made.ranked = vec![
-        ranked("coulomb-friction", "joint:phi", 0.97, 2400.0),
-        ranked("stribeck-friction", "joint:phi", 0.02, 2399.3),
+        ranked("coulomb-friction", "joint:phi", 0.9, 2400.0),
+        ranked("stribeck-friction", "joint:phi", 0.04, 2399.3),
         ranked("quadratic-drag", "joint:phi", 0.01, 2395.9),
-        ranked("quadratic-drag", "joint:theta", 1e-12, 310.0),
+        ranked("quadratic-drag", "joint:theta", f64::NAN, 310.0),
         ranked("delay", "actuator:u", f64::NAN, f64::NAN),
     ];
     made.unexplained = None;
@@ -183,6 +205,8 @@ pub(crate) fn nothing() -> Diagnosis {
     };
     let mut made = diagnosis.clone();
     made.verdict = Verdict::None;
+    made.explained_share = None;
+    made.depends_on = None;
     made.probability = 0.93;
     made.p_value = 0.43;
     made.found = Vec::new();
@@ -199,7 +223,10 @@ pub(crate) fn unexplained() -> Diagnosis {
     let unexplained = Unexplained { place: "process:x".into(), share: 0.8, over: "position".into(), table };
     let mut made = diagnosis.clone();
     made.verdict = Verdict::Unexplained;
-    made.probability = 0.91;
+    made.probability = f64::NAN;
+    made.is_sure = false;
+    made.explained_share = None;
+    made.depends_on = Some(dependence("position", "process:x", 42.0));
     made.found = Vec::new();
     made.unexplained = Some(unexplained);
     made.after = diagnosis.before.clone();

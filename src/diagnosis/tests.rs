@@ -16,10 +16,10 @@ fn block(diagnosis: &Diagnosis) -> Value {
 #[test]
 fn the_block_has_the_documented_keys_and_values() {
     let found = block(&made_up::coulomb());
-    assert_eq!((&found["verdict"], &found["probability"]), (&json!("effect"), &json!(0.9997)));
+    assert_eq!((&found["verdict"], &found["probability"]), (&json!("effect"), &json!(0.95)));
     let effect = &found["found"][0];
     assert_eq!((&effect["effect"], &effect["place"]), (&json!("coulomb-friction"), &json!("joint:phi")));
-    assert_eq!((&effect["strengths"], &effect["probability"]), (&json!({ "c": 0.0124 }), &json!(0.97)));
+    assert_eq!((&effect["strengths"], &effect["probability"]), (&json!({ "c": 0.0124 }), &json!(0.9)));
     assert_eq!((&effect["bic_gain"], effect["indistinguishable"].as_array().unwrap().len()), (&json!(2400.0), 2));
     assert_eq!((&found["removed"], &found["unexplained"]), (&json!([]), &Value::Null));
     assert_eq!(&found["ranked"][1]["effect"], "stribeck-friction");
@@ -30,7 +30,14 @@ fn the_block_has_the_documented_keys_and_values() {
     assert_eq!(found["after"]["swing"]["normalised"], 1.0);
     let unexplained = block(&made_up::unexplained());
     assert_eq!((&unexplained["verdict"], &unexplained["unexplained"]["share"]), (&json!("unexplained"), &json!(0.8)));
+    assert_eq!(unexplained["probability"], Value::Null);
     assert_eq!(block(&made_up::nothing())["verdict"], "none");
+    assert_eq!((&effect["claimed"], &effect["class_probability"]), (&json!(true), &json!(0.95)));
+    assert_eq!(
+        (&found["depends_on"]["coordinate"], &found["depends_on"]["place"]),
+        (&json!("speed"), &json!("joint:phi"))
+    );
+    assert_eq!((&found["ranked"][1]["failed"], &found["sure"]), (&json!("probability"), &json!(true)));
 }
 
 #[test]

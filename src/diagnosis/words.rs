@@ -1,7 +1,9 @@
 //! Sentences on a diagnosis, for the terminal and the report; names are between backticks.
 
 use mops_core::Role;
-use mops_core::diagnosis::{Diagnosis, Found, HeldBack, Removed, Rival, StrengthValue, Unexplained, Verdict, together};
+use mops_core::diagnosis::{
+    Dependence, Diagnosis, Found, HeldBack, Removed, Rival, Rule, StrengthValue, Verdict, together,
+};
 
 use crate::numbers::significant;
 
@@ -18,41 +20,96 @@ pub(crate) fn verdict(diagnosis: &Diagnosis) -> String {
             p_value(diagnosis.p_value)
         ),
         Verdict::Effect => {
-            let effects = diagnosis.found.iter().map(|found| format!("`{}` {}", found.effect, at(&found.place)));
-            let effects: Vec<String> = effects.collect();
             let terms: Vec<String> = diagnosis.removed.iter().map(|dropped| format!("`{}`", dropped.term)).collect();
-            let certainty = match diagnosis.found.as_slice() {
-                [only] if !only.probability.is_nan() => format!(" (probability {})", probability(only.probability)),
-                _ => String::new(),
-            };
-            let finding = match (effects.as_slice(), terms.as_slice()) {
-                (effects, []) => format!("lacks {}{certainty}", list(effects)),
-                ([], terms) => format!("does not need {}", list(terms)),
-                (effects, terms) => format!("lacks {}{certainty}, and does not need {}", list(effects), list(terms)),
-            };
-            format!("The model {finding}: {}.", error_change(diagnosis))
+            let terms = if terms.is_empty() { String::new() } else { format!(", and does not need {}", list(&terms)) };
+            let sentences = [explained(diagnosis), proposed(diagnosis), remaining(diagnosis)];
+            let more: String = sentences.into_iter().flatten().map(|sentence| format!(" {sentence}")).collect();
+            format!("The model lacks {}{terms}: {}.{more}", claims(diagnosis), error_change(diagnosis))
         }
         Verdict::Unexplained => {
-            let effects: Vec<String> = diagnosis.found.iter().map(|found| format!("`{}`", found.effect)).collect();
-            let place = diagnosis.unexplained.as_ref().map_or_else(String::new, |u| format!(" {}", at(&u.place)));
-            let (finding, input) = if effects.is_empty() {
-                (format!("The model lacks something{place}"), "; an unknown input there explains".to_owned())
-            } else {
-                let finding = format!("Even with {}, the model lacks something", list(&effects));
-                // The place belongs to the residuals of the nominal model.
-                (finding, format!(". In the nominal model, an unknown input{place} explains"))
+            let what = match &diagnosis.depends_on {
+                Some(dependence) => {
+                    format!("something that depends on {}; no effect is claimed", depends_on(dependence))
+                }
+                None => "something that no tested effect explains".to_owned(),
             };
-            let explained = |u: &Unexplained| format!("{input} {} of the residual above the noise", share(u.share));
-            let explained = diagnosis.unexplained.as_ref().map_or_else(String::new, explained);
-            format!("{finding} that no tested effect explains: {}{explained}.", error_change(diagnosis))
+            let more = proposed(diagnosis).map_or_else(String::new, |sentence| format!(" {sentence}"));
+            format!("The model lacks {what}: {}.{more}", error_change(diagnosis))
         }
+    }
+}
+
+/// Returns what is claimed: class and place, each with the effect that describes it best.
+fn claims(diagnosis: &Diagnosis) -> String {
+    let claimed: Vec<&Found> = diagnosis.found.iter().filter(|found| found.claimed).collect();
+    let mut entries: Vec<(&str, &str)> = claimed.iter().map(|f| (f.class.as_str(), f.place.as_str())).collect();
+    entries.dedup();
+    let claim = |(class, place): &(&str, &str)| {
+        let own: Vec<&&Found> = claimed.iter().filter(|f| f.class == *class && f.place == *place).collect();
+        let names: Vec<String> = own.iter().map(|found| format!("`{}`", found.effect)).collect();
+        let certainty = own.first().filter(|f| !f.class_probability.is_nan());
+        let certainty =
+            certainty.map_or_else(String::new, |f| format!(" (probability {})", probability(f.class_probability)));
+        let article = if class.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+        format!("{article} {class} effect {}{certainty}, best described by {}", at(place), list(&names))
+    };
+    list(&entries.iter().map(claim).collect::<Vec<String>>())
+}
+
+/// Returns a sentence on the share of the held-out error that the effects explain.
+fn explained(diagnosis: &Diagnosis) -> Option<String> {
+    let explained = diagnosis.explained_share?;
+    let role =
+        [Role::Validation, Role::Selection].into_iter().find(|role| together(&diagnosis.before, *role).is_some())?;
+    let most = if explained < 0.5 { "; most remains unexplained" } else { "" };
+    Some(format!("The effects found explain {} of the squared error on {} data{most}.", share(explained), role.name()))
+}
+
+/// Returns a sentence on the effects that describe the data, but are not claimed.
+fn proposed(diagnosis: &Diagnosis) -> Option<String> {
+    let proposed: Vec<String> = diagnosis
+        .found
+        .iter()
+        .filter(|found| !found.claimed)
+        .map(|found| format!("`{}` {}", found.effect, at(&found.place)))
+        .collect();
+    (!proposed.is_empty()).then(|| format!("Not claimed, but the best description: {}.", list(&proposed)))
+}
+
+/// Returns a sentence on what remains with the effects found.
+fn remaining(diagnosis: &Diagnosis) -> Option<String> {
+    diagnosis.remaining.as_ref().map(|dependence| format!("What remains depends on {}.", depends_on(dependence)))
+}
+
+/// Returns a coordinate with its place in words: ``the speed in the joint `q` ``.
+pub(crate) fn depends_on(dependence: &Dependence) -> String {
+    let name = |place: &str| place.split_once(':').map_or(place, |(_, name)| name).to_owned();
+    let Dependence { coordinate, place, other, .. } = dependence;
+    match other {
+        Some(other) if coordinate == "level" => {
+            format!("the level of `{}`, as a flow into `{}`", name(place), name(other))
+        }
+        Some(other) => format!("the {coordinate} between the joints `{}` and `{}`", name(place), name(other)),
+        None => format!("the {coordinate} {}", at(place)),
     }
 }
 
 /// Returns the event that the probability of a diagnosis refers to, as the end of a phrase.
 pub(crate) fn of_what(diagnosis: &Diagnosis) -> &'static str {
-    let several = diagnosis.verdict == Verdict::Effect && diagnosis.found.len() > 1;
-    if several { "that all effects are correct" } else { "of the verdict" }
+    match diagnosis.verdict {
+        Verdict::Effect => "of class and place",
+        Verdict::None | Verdict::Unexplained => "of the verdict",
+    }
+}
+
+/// Returns why a candidate was not claimed.
+pub(crate) fn failed(rule: Rule) -> &'static str {
+    match rule {
+        Rule::Evidence => "no evidence",
+        Rule::Forecast => "no better forecast",
+        Rule::Curve => "most remains",
+        Rule::Probability => "less probable",
+    }
 }
 
 /// Returns a p-value as `p = 0.43` or `p < 0.0001`.
@@ -247,8 +304,8 @@ mod tests {
         let found = verdict(&made_up::coulomb());
         for part in [
             "falls from 4.20 to 1.00 times the noise level on calibration data and from 15.40 to 1.02 on validation data",
-            "lacks `coulomb-friction` in the joint `phi`",
-            "probability 97 %",
+            "lacks a dissipative effect in the joint `phi` (probability 95 %), best described by `coulomb-friction`",
+            "explain 100 % of the squared error on validation data",
         ] {
             assert!(found.contains(part), "{part}: {found}");
         }
@@ -258,7 +315,15 @@ mod tests {
              (p = 0.43 for white residuals)."
         );
         let unexplained = verdict(&made_up::unexplained());
-        assert!(unexplained.contains("in the equation of `x`") && unexplained.contains("80 %"), "{unexplained}");
+        assert!(unexplained.contains("depends on the position in the equation of `x`"), "{unexplained}");
+        let mut proposed = made_up::unexplained();
+        proposed.found = made_up::coulomb().found;
+        proposed.found[0].claimed = false;
+        let text = verdict(&proposed);
+        assert!(
+            text.ends_with("Not claimed, but the best description: `coulomb-friction` in the joint `phi`."),
+            "{text}"
+        );
     }
 
     #[test]

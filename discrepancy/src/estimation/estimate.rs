@@ -5,7 +5,6 @@ use mops_models::WithEffects;
 use nalgebra::{DMatrix, DVector};
 
 use super::errors::{Channels, ErrorModel, Errors, Fitted, Motion};
-use super::scoring::log_determinant;
 use crate::error_models::ForceError;
 use crate::fit::{Fit, Piece, Point, Residuals};
 use crate::trajectory::Trajectory;
@@ -283,28 +282,27 @@ impl Estimation<'_> {
     /// Adds the evidence and the standard errors.
     #[allow(clippy::cast_precision_loss)]
     fn concluded(&self, log: f64, found: Found, fitted: Fitted) -> Estimate {
-        let jacobian = found.iterate.jacobian().rows(0, found.samples);
         let stretch: Vec<f64> = found.free.iter().zip(&found.scale).map(|(&k, s)| self.priors[k].stretch / s).collect();
-        let mut information = jacobian.transpose() * jacobian;
-        for a in 0..stretch.len() {
-            for b in 0..stretch.len() {
-                information[(a, b)] *= stretch[a] * stretch[b];
-            }
-            let deviation = self.priors[found.free[a]].deviation;
-            information[(a, a)] += 1.0 / (deviation * deviation);
-        }
+        let (samples, count) = (found.samples, found.free.len());
+        // By rows, as squares lose directions that only the priors determine.
+        let rows = DMatrix::from_fn(samples + count, count, |row, a| match row.checked_sub(samples) {
+            None => found.iterate.jacobian()[(row, a)] * stretch[a],
+            Some(b) if a == b => 1.0 / self.priors[found.free[a]].deviation,
+            Some(_) => 0.0,
+        });
+        let factor = rows.qr().r();
+        let log_determinant: f64 = factor.diagonal().iter().map(|r| 2.0 * math::ln(r.abs())).sum();
         let values = self.values(&found.point);
         let log_prior: f64 = found.free.iter().map(|&k| self.priors[k].log(values[k])).sum();
-        let count = (found.free.len() + fitted.count) as f64;
+        let unknowns = (count + fitted.count) as f64;
         let log_evidence =
-            log + log_prior - self.log_choices + fitted.log_prior + 0.5 * count * math::ln(std::f64::consts::TAU)
-                - 0.5 * log_determinant(&information)
+            log + log_prior - self.log_choices + fitted.log_prior + 0.5 * unknowns * math::ln(std::f64::consts::TAU)
+                - 0.5 * log_determinant
                 - 0.5 * fitted.log_determinant;
         let mut deviations = vec![0.0; self.fit.globals.len()];
-        if let Some(cholesky) = information.cholesky() {
-            let covariance = cholesky.inverse();
+        if let Some(inverse) = factor.solve_upper_triangular(&DMatrix::identity(count, count)) {
             for (a, &k) in found.free.iter().enumerate().filter(|(_, k)| **k < self.fit.globals.len()) {
-                deviations[k] = covariance[(a, a)].sqrt() * self.priors[k].stretch;
+                deviations[k] = inverse.row(a).norm() * self.priors[k].stretch;
             }
         }
         Estimate {

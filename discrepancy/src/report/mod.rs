@@ -73,7 +73,7 @@ impl<'a> Findings<'_, '_, 'a> {
             if self.forecasts.are_of_other_records() { ForecastOf::Selection } else { ForecastOf::EndOfRecords };
         made.is_first = verdict.is_first || verdict.conclusion == Conclusion::None;
         made.is_stopped = self.is_stopped;
-        made.converged = declared.least_squares.converged && set.least_squares.converged;
+        made.converged = set.least_squares.converged;
         made.explained_share = explained_share(&before, &after).filter(|_| !set.key.is_empty());
         if made.verdict == Verdict::Unexplained {
             made.unexplained = made.depends_on.as_ref().map(|curve| unexplained(curve, &located));
@@ -92,9 +92,25 @@ impl<'a> Findings<'_, '_, 'a> {
         let names: Vec<String> = made.found.iter().map(|found| found.name.clone()).collect();
         made.starts = after.starts(&names);
         let notes = search.refit.subject.notes.iter().cloned();
-        made.notes = notes.chain(before.at_bounds(&after, &terms)).chain(self.notes(set, &made)).collect();
+        let at_bounds = before.at_bounds(&after, &terms);
+        made.is_sure = !after.is_at_bound(&terms) && self.is_sure(&made);
+        made.notes = notes.chain(at_bounds).chain(self.notes(set, &made)).collect();
         made.simulations = search.refit.simulations.count();
         made
+    }
+
+    /// Returns true if nothing speaks against the verdict.
+    fn is_sure(&self, made: &Diagnosis) -> bool {
+        let is_supported = match made.verdict {
+            Verdict::Effect => {
+                made.is_first
+                    && made.found.iter().all(|found| found.claimed)
+                    && made.explained_share.is_none_or(|share| share > 0.0)
+            }
+            Verdict::None => true,
+            Verdict::Unexplained => false,
+        };
+        is_supported && made.converged && !made.is_stopped
     }
 
     /// Returns the probability of the verdict: of class and place of the least certain claim, or that nothing is missing; NaN if

@@ -178,6 +178,14 @@ impl<'s, 'a> Records<'s, 'a> {
         self.subject().globals.iter().enumerate().map(one).collect()
     }
 
+    /// Returns true if a parameter of the study is at a bound, without the terms that were removed.
+    pub fn is_at_bound(&self, removed: &[usize]) -> bool {
+        let subject = self.subject();
+        let values = &self.set.least_squares.point.globals;
+        let is_at_bound = |k: usize| subject.study.tuners()[subject.globals[k]].at_bound(values[k]).is_some();
+        (0..subject.globals.len()).any(|k| !removed.contains(&k) && is_at_bound(k))
+    }
+
     /// Returns a note for each parameter of the study at a bound in this model or a repaired one, without the terms that the
     /// repaired one has not.
     pub fn at_bounds(&self, after: &Self, removed: &[usize]) -> Vec<String> {

@@ -154,23 +154,27 @@ impl<'r, 'a> Search<'r, 'a> {
             .any(|smaller| ErrorModel::ALL.into_iter().filter_map(|kind| gain(smaller, kind)).all(|gain| gain < INERT))
     }
 
-    /// Returns true if an effect of a set is at a limit: as strong as is physically possible, or such that a simpler effect at its
-    /// place describes the records as well. At a bound of a parameter beside the first it is the simpler effect in all but name.
-    pub fn is_degenerate(&self, set: &FittedSet<'a>) -> bool {
+    /// Returns true if an effect of a set is as strong as is physically possible.
+    pub fn is_at_limit(&self, set: &FittedSet<'a>) -> bool {
+        set.start_at(&set.least_squares.point).added.iter().any(Added::is_at_limit)
+    }
+
+    /// Returns the set in whose name a set counts: itself, or the one with a simpler effect in place of one of its effects that is at
+    /// a limit. At a bound of a parameter beside the first it is the simpler effect in all but name.
+    pub fn simpler(&self, set: &FittedSet<'a>) -> Option<Key> {
         let likeliest = set.likeliest().map(|(kind, estimate)| (Some(*kind), estimate));
         let estimates = [(None, &set.least_squares)].into_iter().chain(likeliest);
-        estimates.into_iter().any(|(kind, estimate)| {
+        estimates.into_iter().find_map(|(kind, estimate)| {
             let added = set.start_at(&estimate.point).added;
-            let is_at_limit = |index: usize| {
+            let is_at_limit = |&index: &usize| {
                 let parameters =
                     added[index].candidate.effect.parameters().iter().zip(&added[index].strengths).enumerate();
                 parameters.into_iter().skip(1).any(|(k, (parameter, value))| {
                     !parameter.fixed && parameter.bounds.contains(value) && !self.is_wide(set, &added[index], index, k)
                 })
             };
-            added.iter().any(Added::is_at_limit)
-                || (0..added.len())
-                    .any(|index| is_at_limit(index) && self.is_matched(set, &added[index].candidate, kind, estimate))
+            let at_limit = (0..added.len()).filter(is_at_limit);
+            at_limit.into_iter().find_map(|index| self.matched(set, &added[index].candidate, kind, estimate))
         })
     }
 
@@ -187,25 +191,26 @@ impl<'r, 'a> Search<'r, 'a> {
         interval.is_some_and(|interval| 2 * allowed(interval) >= tried.len())
     }
 
-    /// Returns true if a set with a simpler effect in place of one is about as likely, by least squares or under an error model.
-    fn is_matched(
+    /// Returns a set with a simpler effect in place of one that is about as likely, by least squares or under an error model.
+    fn matched(
         &self,
         set: &FittedSet<'a>,
         candidate: &Candidate,
         kind: Option<ErrorModel>,
         estimate: &Estimate,
-    ) -> bool {
+    ) -> Option<Key> {
         let candidates = &self.refit.candidates;
-        let Some(at) = set.key.iter().position(|k| candidates[*k].is(candidate)) else { return false };
+        let at = set.key.iter().position(|k| candidates[*k].is(candidate))?;
         let rest = without(&set.key, at);
-        self.sets.iter().any(|other| {
+        let simpler = self.sets.iter().find(|other| {
             let new = other.key.iter().find(|k| !rest.contains(k));
             let theirs = kind.map_or(Some(&other.least_squares), |kind| other.estimate(kind));
             other.key.len() == set.key.len()
                 && rest.iter().all(|k| other.key.contains(k))
                 && new.is_some_and(|&k| candidates[k].has_fewer_strengths_than(candidate))
                 && theirs.is_some_and(|theirs| theirs.log_likelihood > estimate.log_likelihood - SAME)
-        })
+        });
+        simpler.map(|simpler| simpler.key.clone())
     }
 
     /// Fits the sets with one or two effects more, and those with one less.

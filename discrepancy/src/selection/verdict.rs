@@ -48,9 +48,9 @@ pub struct Stated {
 pub struct Verdict {
     /// The first set that passed; empty for the declared model.
     pub set: Key,
-    /// Sets with an effect that does nothing or is at a limit.
+    /// Sets with an effect that does nothing or is at a limit, and those that are simpler ones in all but name.
     pub excluded: Vec<Key>,
-    /// Sets that passed, with their posterior probabilities.
+    /// Sets that passed, with their posterior probabilities; those that are simpler ones in all but name under the keys of these.
     pub passed: Vec<(Key, f64)>,
     /// True if a free curve on top of the set shows that most remains.
     pub is_refused_by_curve: bool,
@@ -82,7 +82,7 @@ pub const FIRES: f64 = 6.0;
 /// Share of the gain of the set up to which a curve is small.
 const SMALL: f64 = 0.3;
 
-/// Share of the forecast error that a set must remove where a curve on top of it fires.
+/// Share of the forecast error that a set must remove where a curve on top of it fires, or where it is not first by evidence.
 const MOST: f64 = 0.8;
 
 /// Posterior probability from which class and place are claimed, and the largest one that is reported if the set of highest
@@ -112,7 +112,7 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
     let (excluded, candidates): (Vec<Key>, Vec<Key>) = {
         let sets = search.sets.iter().filter(|set| !set.key.is_empty());
         let keys = |sets: Vec<&FittedSet<'_>>| sets.into_iter().map(|set| set.key.clone()).collect();
-        let (excluded, candidates) = sets.partition(|set| search.is_inert(set) || search.is_degenerate(set));
+        let (excluded, candidates) = sets.partition(|set| search.is_inert(set) || search.is_at_limit(set));
         (keys(excluded), keys(candidates))
     };
     // What is less probable than the declared model is not chosen, but counts for the probabilities.
@@ -131,7 +131,10 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
             passed.push(key.clone());
         }
     }
-    let set = simplest(search, &passed);
+    // What is a simpler effect in all but name counts for that.
+    let simpler = |key: &Key| search.get(key).and_then(|set| search.simpler(set));
+    let named: Vec<Key> = passed.iter().map(|key| simpler(key).unwrap_or_else(|| key.clone())).collect();
+    let set = simplest(search, &named);
     // Posterior over the declared model and all sets that passed.
     let log = |key: &Key| search.get(key).map_or(f64::NEG_INFINITY, |set| search.log_posterior(set));
     let most = passed.iter().map(log).fold(declared, f64::max);
@@ -144,7 +147,8 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         }
     }
     let nothing_probability = weight(declared) / total;
-    let weights: Vec<(Key, f64)> = passed.iter().map(|key| (key.clone(), weight(log(key)) / total)).collect();
+    let weights: Vec<(Key, f64)> =
+        passed.iter().zip(&named).map(|(key, named)| (named.clone(), weight(log(key)) / total)).collect();
     let entries = entries_of(search, &set);
     let probability = |entry: &Entry| by_entry.get(entry).copied().unwrap_or(0.0);
     let entries: Vec<(Entry, f64)> = entries.into_iter().map(|e| (e.clone(), probability(&e))).collect();
@@ -165,7 +169,8 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         log(&set) - log(&nothing)
     };
     let fires = remaining.first().is_some_and(|curve| curve.gain >= FIRES && curve.gain >= SMALL * gained());
-    let explains = !fires || share.is_some_and(|share| share >= MOST);
+    // Where a set of higher evidence forecasts no better, there is more to it, too.
+    let explains = !fires && is_first || share.is_some_and(|share| share >= MOST);
     let least = if forecasts.are_of_other_records() { CLAIMED } else { RUN_ON };
     let most = if is_first { 1.0 } else { CLAIMED };
     let state = |(entry, probability): (Entry, f64)| Stated {
@@ -191,7 +196,10 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         stated,
         nothing: nothing_probability,
         is_refused_by_curve: !explains,
-        excluded,
+        excluded: excluded
+            .into_iter()
+            .chain(passed.into_iter().zip(named).filter(|(a, b)| a != b).map(|(a, _)| a))
+            .collect(),
         passed: weights,
         set,
         is_first,

@@ -42,7 +42,7 @@ fn of_shapes_that_no_fit_moves_the_one_that_fits_best_stays() {
 
 #[test]
 fn where_the_data_allow_several_the_intervals_span_them() {
-    let found = radiation(0.1, &[98.0]);
+    let found = radiation(0.1, &[98.0, 60.0]);
     assert_eq!(found[2].interval95.map(|[low, _]| low < 293.15), Some(true), "{found:?}");
     let [low, high] = found[0].interval95.expect("it is told");
     assert!(low < RADIATED && RADIATED < high, "{found:?}");

@@ -40,6 +40,9 @@ pub(crate) struct Block {
     stopped: bool,
     /// True if all fits that the verdict rests on converged.
     converged: bool,
+    /// True if the verdict is sure: nothing is missing, or every effect found is claimed, by highest evidence and a better forecast of
+    /// held-out data; the search was not stopped, all fits converged, and no parameter is at a bound.
+    sure: bool,
     /// Terms of the nominal model that the data contradict.
     removed: Vec<Removed>,
     /// Models visited by the search, in order.
@@ -228,6 +231,7 @@ impl Block {
             first_by_evidence: diagnosis.is_first,
             stopped: diagnosis.is_stopped,
             converged: diagnosis.converged,
+            sure: diagnosis.is_sure,
             removed: diagnosis.removed.clone(),
             steps: diagnosis.steps.clone(),
             ranked: ranked.iter().map(Candidate::of).collect(),

@@ -423,6 +423,9 @@ pub struct Diagnosis {
     pub is_stopped: bool,
     /// True if all fits that the verdict rests on converged.
     pub converged: bool,
+    /// True if the verdict is sure: nothing is missing, or every effect found is claimed, by highest evidence and a better forecast of
+    /// held-out data; the search was not stopped, all fits converged, and no parameter is at a bound.
+    pub is_sure: bool,
     /// Terms of the nominal model that the data contradict.
     pub removed: Vec<Removed>,
     /// Models visited by the search, in order.

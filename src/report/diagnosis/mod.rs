@@ -19,6 +19,8 @@ use crate::numbers::significant;
 
 /// Plots of a diagnosis, in the order of the page.
 pub(super) struct Plots {
+    /// What is missing over the coordinate that it depends on.
+    pub(super) missing: Vec<Group>,
     /// Residuals by experiment.
     pub(super) residuals: Vec<Group>,
     /// Unknown inputs by place.
@@ -30,6 +32,7 @@ pub(super) struct Plots {
 impl Plots {
     pub(super) fn of(diagnosis: &Diagnosis) -> Self {
         Self {
+            missing: places::dependence(diagnosis).into_iter().collect(),
             residuals: residuals::groups(diagnosis),
             places: places::groups(diagnosis),
             predictions: residuals::predictions(diagnosis),
@@ -37,32 +40,39 @@ impl Plots {
     }
 
     pub(super) fn groups(&self) -> impl Iterator<Item = &Group> {
-        self.residuals.iter().chain(&self.places).chain(&self.predictions)
+        self.missing.iter().chain(&self.residuals).chain(&self.places).chain(&self.predictions)
     }
 }
 
 /// Returns the verdict in words, with its tone.
 pub(super) fn verdict(diagnosis: &Diagnosis) -> (Tone, String) {
-    let tone = if diagnosis.verdict == Verdict::Unexplained { Tone::Mixed } else { Tone::Good };
-    (tone, words::verdict(diagnosis))
+    (if diagnosis.is_sure { Tone::Good } else { Tone::Mixed }, words::verdict(diagnosis))
 }
 
 /// Returns the facts below the verdict: name and value.
-pub(super) fn facts(diagnosis: &Diagnosis) -> [(String, String); 2] {
+pub(super) fn facts(diagnosis: &Diagnosis) -> Vec<(String, String)> {
     let p_value = match diagnosis.p_value {
         p if p.is_finite() && p < 1e-6 => "below 1e-6".to_owned(),
         p => significant(p, 2),
     };
-    [
-        (format!("Probability {}", words::of_what(diagnosis)), words::probability(diagnosis.probability)),
-        ("p-value if nothing is missing".to_owned(), p_value),
-    ]
+    let probability = (format!("Probability {}", words::of_what(diagnosis)), words::probability(diagnosis.probability));
+    let probability = (!diagnosis.probability.is_nan()).then_some(probability);
+    probability.into_iter().chain([("p-value if nothing is missing".to_owned(), p_value)]).collect()
 }
 
 /// Returns the sections of the page, the main findings first.
 pub(super) fn sections(diagnosis: &Diagnosis, plots: &Plots) -> Markup {
     let groups = |groups: &[Group]| html! { @for group in groups { (figures(group)) } };
     html! {
+        @if let Some(dependence) = &diagnosis.depends_on {
+            (section("What is missing", html! {
+                p {
+                    "Without any formula, what the nominal model lacks depends on " (rich(&words::depends_on(dependence)))
+                    ", with a gain in log-evidence of " (significant(dependence.gain, 3)) " nats."
+                }
+                (groups(&plots.missing))
+            }))
+        }
         @if !diagnosis.found.is_empty() || !diagnosis.removed.is_empty() { (section("Missing effects", missing(diagnosis))) }
         @if !diagnosis.before.is_empty() { (section(if diagnosis.verdict == Verdict::None { "Errors relative to the noise" } else { "Errors before and after" }, errors::table(diagnosis))) }
         @if !plots.residuals.is_empty() {
@@ -115,7 +125,11 @@ fn effect(found: &Found) -> Markup {
                 @for strength in &found.strengths {
                     li { (words::strength(strength)) @if strength.interval95.is_some() { span class="quiet" { ", 95 % interval" } } }
                 }
-                li { "Probability " strong { (words::probability(found.probability)) } ", " (found.class) ", BIC lower by " (significant(found.bic_gain, 3)) "." }
+                li {
+                    (if found.claimed { "Claimed" } else { "Proposed, not claimed" }) ": probability of a " (found.class)
+                    " effect here " strong { (words::probability(found.class_probability)) } ", of this one "
+                    (words::probability(found.probability)) ". BIC lower by " (significant(found.bic_gain, 3)) "."
+                }
                 @for text in words::remarks(found) { li { (rich(&text)) } }
             }
         }

@@ -71,8 +71,35 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> Vec<Group> {
     at_effects.into_iter().chain(others).take(most.min(MOST_PLACES)).map(|e| group(diagnosis, e)).collect()
 }
 
+/// Returns the plot of what is missing over the coordinate that it depends on: the free curve, and the estimated input at the
+/// place with the formulas of the effects found there.
+pub(super) fn dependence(diagnosis: &Diagnosis) -> Option<Group> {
+    let dependence = diagnosis.depends_on.as_ref()?;
+    let [x, y] = [0, 1].map(|k| dependence.curve.iter().map(|point| point[k]).collect::<Vec<f64>>());
+    // A level is the position of a store.
+    let over = if dependence.coordinate == "level" { "position" } else { dependence.coordinate.as_str() };
+    let evidence = diagnosis.evidence.iter().find(|e| e.place == dependence.place && dependence.other.is_none());
+    let points = evidence.and_then(|e| e.over.iter().find(|(name, ..)| name == over)).map(|(.., points)| points);
+    let mut curves = Vec::new();
+    if let Some(points) = points {
+        curves.push(dots("estimated input", &points.x, &points.estimated, Color::Measured));
+        if !points.found.is_empty() {
+            curves.push(dots("formula of the effects found", &points.x, &points.found, Color::Result));
+        }
+    }
+    curves.push(line("free curve", &x, &y, Color::Demand));
+    let plot = Plot {
+        title: format!("What is missing, over {dependence}"),
+        x_label: labelled(&dependence.coordinate, &dependence.unit),
+        y_label: labelled("missing", &dependence.signal_unit),
+        curves,
+        ..Plot::default()
+    };
+    let figure = Figure { plots: vec![("missing".to_owned(), plot)], caption: Vec::new() };
+    Some(Group { title: String::new(), about: Vec::new(), figures: vec![figure] })
+}
+
 fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
-    let unexplained = diagnosis.unexplained.as_ref().filter(|u| u.place == evidence.place);
     let effects: Vec<&str> =
         diagnosis.found.iter().filter(|f| f.place == evidence.place).map(|f| f.effect.as_str()).collect();
     let effects = effects.join(" and ");
@@ -91,11 +118,7 @@ fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
     };
     let mut figures = Vec::new();
     for (over, unit, points) in &evidence.over {
-        let mut curves = curves_of(points, dots);
-        if let Some(unexplained) = unexplained.filter(|u| u.over == *over) {
-            let [x, y] = [0, 1].map(|k| unexplained.table.iter().map(|point| point[k]).collect::<Vec<f64>>());
-            curves.push(line("lookup table, linear interpolation", &x, &y, Color::Demand));
-        }
+        let curves = curves_of(points, dots);
         let title = format!("unknown input at {} over {over}", evidence.place);
         figures.push(figure(over, title, labelled(over, unit), curves));
     }

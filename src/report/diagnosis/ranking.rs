@@ -17,8 +17,8 @@ pub(super) fn table(diagnosis: &Diagnosis) -> Markup {
     html! {
         p {
             "Candidate effects fitted at each place, together with those already accepted. Absorbed: the part of the effect's "
-            "output signature that parameters and initial states can mimic. Parameters in this table are from calibration and "
-            "selection data; those of the effects found, above, are from calibration data alone."
+            "output signature that parameters and initial states can mimic. Without a probability: no set of effects with this "
+            "candidate has more evidence than the nominal model and a better forecast."
         }
         (scrolling("Ranking", rows(diagnosis, first)))
         @if !others.is_empty() {
@@ -43,6 +43,7 @@ fn rows(diagnosis: &Diagnosis, ranked: &[Ranked]) -> Markup {
                     th scope="col" { "parameters" }
                     th scope="col" class="number" { "error / noise" }
                     th scope="col" class="number" { "absorbed" }
+                    th scope="col" { "result" }
                 }
             }
             tbody {
@@ -50,12 +51,13 @@ fn rows(diagnosis: &Diagnosis, ranked: &[Ranked]) -> Markup {
                     tr class=[mark(diagnosis, effect).map(|_| "marked")] {
                         th scope="row" { (effect.effect) small { (effect.class) } }
                         td { (effect.place) }
-                        td { span class="scaled" { span class="number" { (words::probability(effect.probability)) } (bar(effect.probability)) } }
+                        td { span class="scaled" { span class="number" { @if effect.probability.is_finite() { (words::probability(effect.probability)) } } (bar(effect.probability)) } }
                         td { @if let Some(mark) = mark(diagnosis, effect) { (mark) } }
                         td class="number" { @if effect.bic_gain.is_finite() { (significant(effect.bic_gain, 4)) } }
                         td { @for (i, strength) in effect.strengths.iter().enumerate() { @if i > 0 { br; } (words::strength(strength)) } }
                         td class="number" { @if effect.normalised.is_finite() { (words::times(effect.normalised)) } }
                         td class="number" { (words::share(effect.absorbed)) }
+                        td { (effect.failed.map_or("claimed", words::failed)) }
                     }
                 }
             }

@@ -48,6 +48,7 @@ fn an_effect_found_is_reported_from_the_verdict_to_the_next_experiment() {
     assert_eq!(
         titles(&page),
         [
+            "What is missing",
             "Missing effects",
             "Errors before and after",
             "Residuals of the nominal model",
@@ -62,7 +63,8 @@ fn an_effect_found_is_reported_from_the_verdict_to_the_next_experiment() {
         ]
     );
     for text in [
-        "The model lacks <code>coulomb-friction</code> in the joint <code>phi</code>",
+        "The model lacks a dissipative effect in the joint <code>phi</code> (probability 95 %), best described by \
+         <code>coulomb-friction</code>",
         "c = 0.0124 (0.0118 to 0.013) N m",
         "indistinguishable",
         "not excluded",
@@ -71,6 +73,7 @@ fn an_effect_found_is_reported_from_the_verdict_to_the_next_experiment() {
         assert!(page.contains(text), "{text}");
     }
     for plot in [
+        "missing",
         "left-swing-phi",
         "left-push-theta",
         "spectrum-swing-theta",
@@ -95,31 +98,28 @@ fn the_verdict_none_is_reported_with_detection_limits() {
 }
 
 #[test]
-fn what_no_effect_explains_has_a_place_and_a_table() {
+fn what_no_effect_explains_has_a_coordinate_and_a_curve() {
     let mut diagnosis = made_up::unexplained();
     diagnosis.evidence[0].place = "process:x".into();
     diagnosis.next_experiment = None;
     let (folder, page) = written(diagnosis);
-    assert!(
-        page.contains("The model lacks something in the equation of <code>x</code> that no tested effect explains")
-    );
+    assert!(page.contains(
+        "The model lacks something that depends on the position in the equation of <code>x</code>; no effect is claimed"
+    ));
+    assert!(page.contains("verdict mixed"));
     assert!(!titles(&page).contains(&"Missing effects") && !titles(&page).contains(&"Next experiment"));
-    let plot = std::fs::read_to_string(folder.path().join("plots/missing-process-x-position.svg")).unwrap();
-    assert!(plot.contains("lookup table, linear interpolation"));
+    let plot = std::fs::read_to_string(folder.path().join("plots/missing.svg")).unwrap();
+    assert!(plot.contains("free curve") && plot.contains("estimated input"));
 }
 
 #[test]
-fn an_unexplained_residual_with_an_effect_refers_to_the_place_in_the_nominal_model() {
+fn an_effect_that_is_not_claimed_is_proposed() {
     let mut diagnosis = made_up::unexplained();
     diagnosis.found = made_up::coulomb().found;
+    diagnosis.found[0].claimed = false;
     let (_, page) = written(diagnosis);
-    assert!(page.contains(
-        "Even with <code>coulomb-friction</code>, the model lacks something that no tested effect explains: "
-    ));
-    assert!(page.contains(
-        ". In the nominal model, an unknown input in the equation of <code>x</code> explains 80 % of the residual above the \
-         noise."
-    ));
+    assert!(page.contains("Not claimed, but the best description: <code>coulomb-friction</code> in the joint"));
+    assert!(page.contains("Proposed, not claimed: probability of a dissipative effect here"));
 }
 
 #[test]
