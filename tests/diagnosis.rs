@@ -126,7 +126,8 @@ fn a_break_away_force_is_found_although_the_residuals_are_discontinuous_in_it() 
     let truths = [truth("coulomb"), truth("static") / truth("coulomb") - 1.0];
     for (strength, truth) in diagnosis.found[0].strengths.iter().zip(truths) {
         let [low, high] = strength.interval95.expect("the parameter has an interval");
-        assert!(low < truth && truth < high && high - low < 0.5 * truth, "{strength:?} {truth}");
+        // The calibration data exclude a larger rise; below that they cannot show one.
+        assert!(low < truth && truth < high && high < 1.25 * truth, "{strength:?} {truth}");
     }
 }
 

@@ -182,7 +182,7 @@ pub fn problem<'a>(
                     // Half way to the next value that was tried.
                     InitialGrid::Steps => 0.5 * a.sizes.gap_to_next_size(value),
                     InitialGrid::ScaledAndGap(_) => 0.1 * scale,
-                    InitialGrid::Jumps(_) => 0.5 * scale,
+                    InitialGrid::Jumps(values) => 0.5 * values.iter().copied().fold(0.0, f64::max),
                     _ => scale,
                 };
                 let bounds = a.sizes.bounds(strength);

@@ -21,10 +21,13 @@ pub(crate) fn verdict(diagnosis: &Diagnosis) -> String {
         ),
         Verdict::Effect => {
             let terms: Vec<String> = diagnosis.removed.iter().map(|dropped| format!("`{}`", dropped.term)).collect();
-            let terms = if terms.is_empty() { String::new() } else { format!(", and does not need {}", list(&terms)) };
+            let lacking = claims(diagnosis).map(|claims| format!("lacks {claims}"));
+            let needless = (!terms.is_empty()).then(|| format!("does not need {}", list(&terms)));
+            let finding: Vec<String> = lacking.into_iter().chain(needless).collect();
+            let finding = finding.join(", and ");
             let sentences = [explained(diagnosis), proposed(diagnosis), remaining(diagnosis)];
             let more: String = sentences.into_iter().flatten().map(|sentence| format!(" {sentence}")).collect();
-            format!("The model lacks {}{terms}: {}.{more}", claims(diagnosis), error_change(diagnosis))
+            format!("The model {finding}: {}.{more}", error_change(diagnosis))
         }
         Verdict::Unexplained => {
             let what = match &diagnosis.depends_on {
@@ -39,8 +42,8 @@ pub(crate) fn verdict(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// Returns what is claimed: class and place, each with the effect that describes it best.
-fn claims(diagnosis: &Diagnosis) -> String {
+/// Returns what is claimed: class and place, each with the effect that describes it best; `None` if nothing is.
+fn claims(diagnosis: &Diagnosis) -> Option<String> {
     let claimed: Vec<&Found> = diagnosis.found.iter().filter(|found| found.claimed).collect();
     let mut entries: Vec<(&str, &str)> = claimed.iter().map(|f| (f.class.as_str(), f.place.as_str())).collect();
     entries.dedup();
@@ -53,12 +56,12 @@ fn claims(diagnosis: &Diagnosis) -> String {
         let article = if class.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
         format!("{article} {class} effect {}{certainty}, best described by {}", at(place), list(&names))
     };
-    list(&entries.iter().map(claim).collect::<Vec<String>>())
+    (!entries.is_empty()).then(|| list(&entries.iter().map(claim).collect::<Vec<String>>()))
 }
 
 /// Returns a sentence on the share of the held-out error that the effects explain.
 fn explained(diagnosis: &Diagnosis) -> Option<String> {
-    let explained = diagnosis.explained_share?;
+    let explained = diagnosis.explained_share.filter(|_| !diagnosis.found.is_empty())?;
     let role =
         [Role::Validation, Role::Selection].into_iter().find(|role| together(&diagnosis.before, *role).is_some())?;
     let most = if explained < 0.5 { "; most remains unexplained" } else { "" };

@@ -11,7 +11,14 @@ use crate::search::{Options, SolveError, Solved, evaluate_start};
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let started = Instant::now();
     let mut solved = match search(&study, options, watch) {
-        Ok(diagnosis) => of(study, options, diagnosis),
+        Ok(diagnosis) => {
+            let is_stopped = diagnosis.is_stopped;
+            let mut solved = of(study, options, diagnosis);
+            if is_stopped {
+                solved.outcome.stop = watch.halt().into();
+            }
+            solved
+        }
         Err(_) if watch.wants_stop() => interrupted(study, options, watch),
         Err(why) => return Err(why),
     };
@@ -77,11 +84,6 @@ pub(crate) fn of(study: Study, options: &Options, diagnosis: Diagnosis) -> Solve
     (outcome.solver, outcome.evaluations) = ("discrepancy".to_owned(), 0);
     (outcome.simulations, outcome.calibration) = (diagnosis.simulations, None);
     outcome.front.clear();
-    if diagnosis.is_stopped {
-        outcome
-            .warnings
-            .push("the diagnosis was stopped: sets of effects that were not fitted may explain more".to_owned());
-    }
     outcome.found.diagnosis = Some(diagnosis);
     solved
 }

@@ -191,7 +191,7 @@ impl<'r, 'a> Search<'r, 'a> {
         interval.is_some_and(|interval| 2 * allowed(interval) >= tried.len())
     }
 
-    /// Returns a set with a simpler effect in place of one that is about as likely, by least squares or under an error model.
+    /// Returns the simplest set with a simpler effect in place of one that is about as likely, by least squares or under an error model.
     fn matched(
         &self,
         set: &FittedSet<'a>,
@@ -202,7 +202,7 @@ impl<'r, 'a> Search<'r, 'a> {
         let candidates = &self.refit.candidates;
         let at = set.key.iter().position(|k| candidates[*k].is(candidate))?;
         let rest = without(&set.key, at);
-        let simpler = self.sets.iter().find(|other| {
+        let matching = self.sets.iter().filter(|other| {
             let new = other.key.iter().find(|k| !rest.contains(k));
             let theirs = kind.map_or(Some(&other.least_squares), |kind| other.estimate(kind));
             other.key.len() == set.key.len()
@@ -210,7 +210,10 @@ impl<'r, 'a> Search<'r, 'a> {
                 && new.is_some_and(|&k| candidates[k].has_fewer_strengths_than(candidate))
                 && theirs.is_some_and(|theirs| theirs.log_likelihood > estimate.log_likelihood - SAME)
         });
-        simpler.map(|simpler| simpler.key.clone())
+        let parameters = |set: &&FittedSet<'_>| -> usize {
+            set.added.iter().map(|added| added.candidate.effect.parameters().len()).sum()
+        };
+        matching.min_by_key(parameters).map(|simplest| simplest.key.clone())
     }
 
     /// Fits the sets with one or two effects more, and those with one less.
