@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{DeclaredTerm, Dimension, EffectParameter, InitialGrid, Model, Port, Scope};
+use mops_core::{DeclaredTerm, Dimension, EffectParameter, InitialGrid, Model, Port, Role, Scope};
 use mops_models::WithEffects;
 
 use crate::base::globals;
@@ -86,6 +86,9 @@ const STEPS_PER_SAMPLE: f64 = 6.0;
 const TIMES_DECLARED: f64 = 3.0;
 const FEW_STEPS: f64 = 1000.0;
 
+/// Times as many steps for records that parameters are not fitted to.
+const OTHERS: f64 = 5.0;
+
 impl Variant {
     /// The declared model with these effects, to be simulated over pieces of experiments.
     ///
@@ -94,15 +97,21 @@ impl Variant {
     pub fn new(subject: &Subject, added: &[Added], pieces: &[Piece]) -> Self {
         let placements = added.iter().enumerate().map(|(i, a)| a.candidate.placed(format!("+{}", i + 1)));
         let model = WithEffects::new(Arc::clone(&subject.model), placements.collect()).expect("candidates fit");
-        // By the longest record whichever are looked at: what could be simulated among all can be alone.
-        let all = || subject.measurements.iter();
-        let longest = all().flat_map(|m| &m.series).map(|s| s.times.len()).max().unwrap_or(0);
-        let horizon = all().map(|m| m.horizon).fold(0.0, f64::max);
-        let share = pieces.iter().map(|piece| piece.horizon / subject.measurements[piece.measurement].horizon);
-        let share = share.fold(0.0, f64::max);
-        let declared = subject.pace.get().map_or(0.0, |pace| pace * horizon);
-        #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let limit = (FEW_STEPS + share * (STEPS_PER_SAMPLE * longest as f64 + TIMES_DECLARED * declared)) as usize;
+        // By the densest record whichever are looked at: what could be simulated among all can be alone.
+        #[allow(clippy::cast_precision_loss)]
+        let density = |m: &crate::subject::Measurement| {
+            let samples = m.series.iter().map(|s| s.times.len()).max().unwrap_or(0);
+            samples as f64 / m.horizon.max(f64::MIN_POSITIVE)
+        };
+        let densest = subject.measurements.iter().map(density).fold(0.0, f64::max);
+        let horizon = pieces.iter().map(|piece| piece.horizon).fold(0.0, f64::max);
+        let pace = subject.pace.get().copied().unwrap_or(0.0);
+        let limit = FEW_STEPS + horizon * (STEPS_PER_SAMPLE * densest + TIMES_DECLARED * pace);
+        // Other records are simulated for few candidates.
+        let is_other = |piece: &Piece| subject.measurements[piece.measurement].role != Role::Calibration;
+        let limit = if pieces.iter().any(is_other) { OTHERS * limit } else { limit };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let limit = limit as usize;
         let model = model.with_step_limit(limit).with_tolerance(subject.tolerance);
         let mut next = subject.model.interface().parameters.len();
         let mut first = Vec::new();

@@ -62,8 +62,11 @@ fn claims(diagnosis: &Diagnosis) -> Option<String> {
 /// Returns a sentence on the share of the held-out error that the effects explain.
 fn explained(diagnosis: &Diagnosis) -> Option<String> {
     let explained = diagnosis.explained_share.filter(|_| !diagnosis.found.is_empty())?;
-    let role =
-        [Role::Validation, Role::Selection].into_iter().find(|role| together(&diagnosis.before, *role).is_some())?;
+    let is_known = |role: &Role| {
+        let errors = [&diagnosis.before, &diagnosis.after].map(|errors| together(errors, *role));
+        errors.into_iter().all(|error| error.is_some_and(f64::is_finite))
+    };
+    let role = [Role::Validation, Role::Selection].into_iter().find(is_known)?;
     let most = if explained < 0.5 { "; most remains unexplained" } else { "" };
     Some(format!("The effects found explain {} of the squared error on {} data{most}.", share(explained), role.name()))
 }

@@ -83,7 +83,7 @@ impl<'a> Findings<'_, '_, 'a> {
             let is_claimed = verdict.stated.iter().any(|stated| stated.entry == entry && stated.is_claimed);
             return match verdict.conclusion {
                 Conclusion::Effect if is_claimed => None,
-                _ if verdict.is_refused_by_curve => Some(Rule::Curve),
+                _ if verdict.is_refused => Some(Rule::Curve),
                 _ => Some(Rule::Probability),
             };
         }

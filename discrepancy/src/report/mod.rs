@@ -104,6 +104,7 @@ impl<'a> Findings<'_, '_, 'a> {
         let is_supported = match made.verdict {
             Verdict::Effect => {
                 made.is_first
+                    && !self.verdict.is_contradicted
                     && made.found.iter().all(|found| found.claimed)
                     && made.explained_share.is_none_or(|share| share > 0.0)
             }
@@ -258,6 +259,9 @@ impl<'a> Findings<'_, '_, 'a> {
             notes.push(
                 "no selection record: forecasts were tested on the ends of the calibration records only".to_owned(),
             );
+        }
+        if self.verdict.is_contradicted {
+            notes.push("selection records contradict the model with the effects found: more is missing".to_owned());
         }
         if made.verdict == Verdict::Effect && !made.is_first {
             notes.push("a set of higher evidence forecasts worse than a smaller one".to_owned());

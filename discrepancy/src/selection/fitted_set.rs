@@ -68,6 +68,11 @@ impl FittedSet<'_> {
         self.under.iter().find(|(of, _)| *of == kind).map(|(_, estimate)| estimate)
     }
 
+    /// Returns the number of parameters of the effects.
+    pub fn parameters(&self) -> usize {
+        self.added.iter().map(|added| added.candidate.effect.parameters().len()).sum()
+    }
+
     /// Returns the likeliest error model and the fit under it.
     pub fn likeliest(&self) -> Option<&(ErrorModel, Estimate)> {
         self.under.iter().max_by(|a, b| evidence(&a.1).total_cmp(&evidence(&b.1)))
@@ -152,22 +157,39 @@ pub fn growth(given: (&[Piece], &[Vec<f64>]), others: (&[Piece], &[Vec<f64>])) -
     squares(others.0, others.1).iter().enumerate().map(of).sum()
 }
 
+/// Returns the log-likelihood of given residuals of records under an error model at the outputs.
+fn log_likelihood(errors: &Errors, pieces: &[Piece], residuals: &[Vec<f64>]) -> f64 {
+    let channels = Channels::new(pieces);
+    let of = |(index, (piece, residuals)): (usize, (&Piece, &Vec<f64>))| {
+        let mut columns = [residuals.clone()];
+        errors.whiten(piece, &channels, index, &mut columns) + columns[0].iter().map(|r| r * r).sum::<f64>()
+    };
+    -0.5 * pieces.iter().zip(residuals).enumerate().map(of).sum::<f64>()
+}
+
+/// Returns the log-likelihood of given residuals of records under the likelier error model at the outputs that is fitted to them;
+/// `None` if neither can be fitted.
+fn correlated_log_likelihood(pieces: &[Piece], residuals: &[Vec<f64>]) -> Option<f64> {
+    let log = |kind| {
+        let channels = Channels::new(pieces);
+        let fitted = Errors::fit(kind, pieces, &channels, residuals, Vec::new(), None, true)?;
+        Some(log_likelihood(&fitted.errors, pieces, residuals))
+    };
+    [ErrorModel::SmoothOutput, ErrorModel::RoughOutput].into_iter().filter_map(log).max_by(f64::total_cmp)
+}
+
 /// Returns by how much correlated errors at the outputs are likelier than white noise of fitted size for given residuals of records,
 /// nats; `None` if neither can be fitted.
 pub fn correlation(pieces: &[Piece], residuals: &[Vec<f64>]) -> Option<f64> {
-    let channels = Channels::new(pieces);
-    let log = |kind| {
-        let errors = Errors::fit(kind, pieces, &channels, residuals, Vec::new(), None, true)?.errors;
-        let mut sum = 0.0;
-        for (index, (piece, residuals)) in pieces.iter().zip(residuals).enumerate() {
-            let mut columns = [residuals.clone()];
-            sum += errors.whiten(piece, &channels, index, &mut columns);
-            sum += columns[0].iter().map(|r| r * r).sum::<f64>();
-        }
-        Some(-0.5 * sum)
-    };
-    let correlated = [ErrorModel::SmoothOutput, ErrorModel::RoughOutput].into_iter().filter_map(log);
-    Some(correlated.max_by(f64::total_cmp)? - white_log_likelihood(pieces, residuals))
+    Some(correlated_log_likelihood(pieces, residuals)? - white_log_likelihood(pieces, residuals))
+}
+
+/// Returns by how much residuals of other records are likelier under an error model of their own than under a given one at the
+/// outputs, nats; `None` if none can be fitted, or the records have other channels.
+pub fn surprise(errors: &Errors, pieces: &[Piece], residuals: &[Vec<f64>]) -> Option<f64> {
+    let is_of_all = matches!(errors, Errors::Output(errors) if errors.len() == Channels::new(pieces).count);
+    let own = correlated_log_likelihood(pieces, residuals).filter(|_| is_of_all)?;
+    Some(own - log_likelihood(errors, pieces, residuals))
 }
 
 /// Returns the values of a set of effects at a point of its fit, to start another fit from.

@@ -89,6 +89,12 @@ impl Forecasts {
         free_run(set, &set.least_squares.point, pieces).map(f64::sqrt)
     }
 
+    /// Returns the share of the mean square error above noise of the set without an effect that the effect removes.
+    pub fn share_of(&mut self, search: &Search<'_, '_>, key: &Key, index: usize) -> Option<f64> {
+        let kind = self.kinds[0];
+        Some(share(self.error(search, key, kind)?, self.error(search, &without(key, index), kind)?))
+    }
+
     /// Returns the sets with one effect less, and the declared model.
     fn rivals(key: &Key) -> Vec<Key> {
         let mut rivals: Vec<Key> = (0..key.len()).map(|k| without(key, k)).collect();
@@ -119,15 +125,15 @@ fn share(own: f64, theirs: f64) -> f64 {
 
 /// Returns the mean square error in noises of records, with the parameters of a point and free initial states.
 pub fn free_run(set: &FittedSet<'_>, point: &Point, pieces: Vec<Piece>) -> Option<f64> {
-    if pieces.is_empty() {
-        return None;
-    }
     let (fit, point) = with_free_starts(set, point, pieces)?;
     mean_square(fit.all(&point)?.into_iter().flatten())
 }
 
-/// Fits the initial states of records, with the parameters of a point.
+/// Fits the initial states of records, with the parameters of a point; `None` if there are none, or they cannot be simulated.
 pub fn with_free_starts<'a>(set: &FittedSet<'a>, point: &Point, pieces: Vec<Piece>) -> Option<(Fit<'a>, Point)> {
+    if pieces.is_empty() {
+        return None;
+    }
     let start = set.start_at(point);
     let locals = base::first_locals(&pieces);
     let subject = set.fit.subject;

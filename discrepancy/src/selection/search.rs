@@ -61,6 +61,8 @@ pub struct Search<'r, 'a> {
     pub screened: Vec<Screened>,
     /// Sets that were the most probable one after the other.
     pub history: Vec<Key>,
+    /// Sets that are simpler ones in all but name, with these.
+    pub aliases: Vec<(Key, Key)>,
 }
 
 impl<'r, 'a> Search<'r, 'a> {
@@ -70,7 +72,15 @@ impl<'r, 'a> Search<'r, 'a> {
     pub fn new(refit: &'r Refit<'a>, mut declared: FittedSet<'a>, most: usize, level: f64) -> Self {
         refit.under_error_models(&mut declared, &[], f64::NEG_INFINITY);
         let significant = -math::ln(level);
-        Self { refit, sets: vec![declared], most, significant, screened: Vec::new(), history: Vec::new() }
+        Self {
+            refit,
+            sets: vec![declared],
+            most,
+            significant,
+            screened: Vec::new(),
+            history: Vec::new(),
+            aliases: Vec::new(),
+        }
     }
 
     /// Returns true if correlated errors are significantly likelier than white noise at the optimum of a set.
@@ -185,7 +195,7 @@ impl<'r, 'a> Search<'r, 'a> {
         let position = set.fit.globals.iter().position(|global| global.sets == sets && global.is_stepped());
         let mut tried = added.sizes.values(parameter.dimension, parameter.grid, parameter.bounds);
         tried.retain(|value| !parameter.bounds.contains(value));
-        let interval = position.zip(likelier_output(set));
+        let interval = position.zip(likelier_output(set).or(Some(&set.least_squares)));
         let interval = interval.and_then(|(g, at)| set.estimation(&[]).stepped_interval(at, g));
         let allowed = |[low, high]: [f64; 2]| tried.iter().filter(|v| (low..=high).contains(*v)).count();
         interval.is_some_and(|interval| 2 * allowed(interval) >= tried.len())
@@ -210,10 +220,7 @@ impl<'r, 'a> Search<'r, 'a> {
                 && new.is_some_and(|&k| candidates[k].has_fewer_strengths_than(candidate))
                 && theirs.is_some_and(|theirs| theirs.log_likelihood > estimate.log_likelihood - SAME)
         });
-        let parameters = |set: &&FittedSet<'_>| -> usize {
-            set.added.iter().map(|added| added.candidate.effect.parameters().len()).sum()
-        };
-        matching.min_by_key(parameters).map(|simplest| simplest.key.clone())
+        matching.min_by_key(|set| set.parameters()).map(|simplest| simplest.key.clone())
     }
 
     /// Fits the sets with one or two effects more, and those with one less.
@@ -282,7 +289,7 @@ impl<'r, 'a> Search<'r, 'a> {
                 this.effect.class() == other.effect.class() && this.port == other.port && !key.contains(&index)
             };
             let fits = |&index: &usize| parent.added.iter().all(|added| can_be_together(&added.candidate, &all[index]));
-            let is_new = |index: &usize| self.get(&with(&smaller, *index)).is_none();
+            let is_new = |index: &usize| !self.is_known(&with(&smaller, *index));
             let others: Vec<usize> = (0..all.len()).filter(alike).filter(fits).filter(is_new).collect();
             let wanted = with(&others, key[k]);
             let known = output_errors(&parent);
@@ -296,16 +303,20 @@ impl<'r, 'a> Search<'r, 'a> {
                 let pays = || ALLOWANCE * single.correlated() > correlated - HOPELESS;
                 single.index != key[k] && (!is_predicted || ALLOWANCE * single.gains[0] > white - HOPELESS || pays())
             };
-            // Each is fitted with hyperparameters of its own: those of the set are narrow around its own optimum.
+            // Each is fitted with hyperparameters of its own: those of the set are narrow around its own optimum. Where the set
+            // lacks nothing, squares decide.
+            let own = self.get(key).filter(|set| !self.lacks_something(set));
+            let least = own.map_or(f64::NEG_INFINITY, |set| set.least_squares.log_likelihood - HOPELESS);
             let fitted = |single: &&Screened| {
                 let new = [*single];
                 let likelier = likelier_output(&parent).and_then(|likelier| best_start(&parent, &likelier.point, &new));
-                let rough = self.by_squares(&parent, &new, likelier.as_ref())?;
-                self.refit.least_squares(&larger(&parent, &new), &[rough.start])
+                let rough = self.by_squares(&parent, &new, likelier.as_ref(), least)?;
+                let is_hopeless = rough.log_likelihood < least;
+                if is_hopeless { None } else { self.refit.least_squares(&larger(&parent, &new), &[rough.start]) }
             };
             let near: Vec<&Screened> = screened.iter().filter(is_near).take(SWAPS).collect();
             let sets: Vec<FittedSet<'a>> = near.par_iter().filter_map(fitted).collect();
-            sets.into_iter().for_each(|set| self.add(set));
+            self.add_all(sets);
         }
         self.sort();
     }
@@ -313,7 +324,7 @@ impl<'r, 'a> Search<'r, 'a> {
     /// Fits sets with more effects roughly, by least squares and under the likelier output error of their parent, then those of
     /// highest evidence under all error models.
     fn fit_best(&mut self, parent: &FittedSet<'a>, new: &[Vec<&Screened>], full: usize) {
-        let unknown = |new: &&Vec<&Screened>| self.get(&larger(parent, new)).is_none();
+        let unknown = |new: &&Vec<&Screened>| !self.is_known(&larger(parent, new));
         let new: Vec<&Vec<&Screened>> = new.iter().filter(unknown).collect();
         let Some(given) = likelier_output(parent) else { return };
         // What does not pay is not worth it, but on the declared model a few are tried whatever is expected of them.
@@ -332,7 +343,7 @@ impl<'r, 'a> Search<'r, 'a> {
             let best = trials.iter().map(|trial| trial.rough.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
             let of = |new: &&Vec<&Screened>| {
                 let likelier = best_start(parent, &given.point, new);
-                let by_squares = self.by_squares(parent, new, likelier.as_ref())?;
+                let by_squares = self.by_squares(parent, new, likelier.as_ref(), f64::NEG_INFINITY)?;
                 let begin: Vec<Start> = likelier.into_iter().chain([by_squares.start.clone()]).collect();
                 let rough = self.refit.roughly(&begin, &given.errors, best - HOPELESS)?;
                 Some(Trial { key: larger(parent, new), by_squares, rough })
@@ -355,17 +366,23 @@ impl<'r, 'a> Search<'r, 'a> {
             self.refit.least_squares(key, &[by_squares.start.clone(), rough.start.clone()])
         };
         let sets: Vec<FittedSet<'a>> = trials.par_iter().filter_map(fitted).collect();
-        sets.into_iter().for_each(|set| self.add(set));
+        self.add_all(sets);
     }
 
     /// Fits a set with more effects roughly by least squares: from the optimum of its parent by least squares, and from another
-    /// start.
-    fn by_squares(&self, parent: &FittedSet<'a>, new: &[&Screened], other: Option<&Start>) -> Option<Rough> {
+    /// start. Gives up where the log-likelihood cannot become as large as `least`.
+    fn by_squares(
+        &self,
+        parent: &FittedSet<'a>,
+        new: &[&Screened],
+        other: Option<&Start>,
+        least: f64,
+    ) -> Option<Rough> {
         let mut from = starts(parent, &parent.least_squares.point, new);
         from.extend(other.cloned());
-        let rough = self.refit.roughly(&from, &Errors::White, f64::NEG_INFINITY)?;
+        let rough = self.refit.roughly(&from, &Errors::White, least)?;
         let moved = self.refit.with_moved_states(&rough.start);
-        let again = moved.and_then(|moved| self.refit.roughly(&[moved], &Errors::White, f64::NEG_INFINITY));
+        let again = moved.and_then(|moved| self.refit.roughly(&[moved], &Errors::White, least));
         Some(again.filter(|again| again.log_likelihood > rough.log_likelihood).unwrap_or(rough))
     }
 
@@ -407,6 +424,22 @@ impl<'r, 'a> Search<'r, 'a> {
         self.add(set);
         self.sort();
         true
+    }
+
+    /// Adds sets, the simplest first; what is a simpler one in all but name is only noted.
+    fn add_all(&mut self, mut sets: Vec<FittedSet<'a>>) {
+        sets.sort_by_key(|set| set.parameters());
+        for set in sets {
+            match self.simpler(&set) {
+                Some(simpler) => self.aliases.push((set.key, simpler)),
+                None => self.add(set),
+            }
+        }
+    }
+
+    /// Returns true if a set was fitted, or is a simpler one in all but name.
+    fn is_known(&self, key: &Key) -> bool {
+        self.get(key).is_some() || self.aliases.iter().any(|(alias, _)| alias == key)
     }
 
     /// Fits a set under the error models that can bring it near the best one, and adds it.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use mops_core::{Role, math};
 
-use super::fitted_set::{FittedSet, Key, correlation, growth};
+use super::fitted_set::{FittedSet, Key, correlation, growth, surprise};
 use super::forecast::{Forecasts, with_free_starts};
 use super::search::Search;
 use crate::base;
@@ -52,8 +52,10 @@ pub struct Verdict {
     pub excluded: Vec<Key>,
     /// Sets that passed, with their posterior probabilities; those that are simpler ones in all but name under the keys of these.
     pub passed: Vec<(Key, f64)>,
-    /// True if a free curve on top of the set shows that most remains.
-    pub is_refused_by_curve: bool,
+    /// True if selection records contradict what the set and its error model expect.
+    pub is_contradicted: bool,
+    /// True if most remains: a free curve on top of the set shows it, selection records contradict, or the set is not first.
+    pub is_refused: bool,
     /// Conclusion.
     pub conclusion: Conclusion,
     /// Class and place of the effects of the set.
@@ -69,8 +71,8 @@ pub struct Verdict {
     pub remaining: Vec<Dependence>,
     /// Share of the error of the forecast above noise that the set removes.
     pub share: Option<f64>,
-    /// Gain of correlated errors over white noise of fitted size in log-likelihood at the declared model, nats: the larger one of
-    /// calibration and selection records.
+    /// Gain of correlated errors over white noise of fitted size in log-likelihood at the declared model on calibration records,
+    /// nats.
     pub lack_of_fit: f64,
     /// Largest root mean square error of a calibration or selection record at the declared model, in noises.
     pub largest_error: f64,
@@ -84,6 +86,9 @@ const SMALL: f64 = 0.3;
 
 /// Share of the forecast error that a set must remove where a curve on top of it fires, or where it is not first by evidence.
 const MOST: f64 = 0.8;
+
+/// Share of the forecast error without it that an effect must remove to be claimed. Basis: an assumption.
+const LEAST: f64 = 0.1;
 
 /// Posterior probability from which class and place are claimed, and the largest one that is reported if the set of highest
 /// evidence did not pass.
@@ -133,7 +138,13 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
     }
     // What is a simpler effect in all but name counts for that.
     let simpler = |key: &Key| search.get(key).and_then(|set| search.simpler(set));
-    let named: Vec<Key> = passed.iter().map(|key| simpler(key).unwrap_or_else(|| key.clone())).collect();
+    let mut named: Vec<Key> = passed.iter().map(|key| simpler(key).unwrap_or_else(|| key.clone())).collect();
+    for (_, simpler) in &search.aliases {
+        if passed.contains(simpler) {
+            named.push(simpler.clone());
+            passed.push(simpler.clone());
+        }
+    }
     let set = simplest(search, &named);
     // Posterior over the declared model and all sets that passed.
     let log = |key: &Key| search.get(key).map_or(f64::NEG_INFINITY, |set| search.log_posterior(set));
@@ -169,12 +180,18 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         log(&set) - log(&nothing)
     };
     let fires = remaining.first().is_some_and(|curve| curve.gain >= FIRES && curve.gain >= SMALL * gained());
-    // Where a set of higher evidence forecasts no better, there is more to it, too.
-    let explains = !fires && is_first || share.is_some_and(|share| share >= MOST);
+    let contradicted = !set.is_empty() && search.get(&set).is_some_and(is_contradicted);
+    // Where a set of higher evidence forecasts no better, or other records contradict, there is more to it, too.
+    let explains = !fires && !contradicted && is_first || share.is_some_and(|share| share >= MOST);
     let least = if forecasts.are_of_other_records() { CLAIMED } else { RUN_ON };
     let most = if is_first { 1.0 } else { CLAIMED };
+    // An effect that forecasts hardly better is a proposal.
+    let matters: Vec<Entry> = (0..set.len())
+        .filter(|&index| forecasts.share_of(search, &set, index).is_some_and(|share| share >= LEAST))
+        .map(|index| entry(search, &search.refit.candidates[set[index]]))
+        .collect();
     let state = |(entry, probability): (Entry, f64)| Stated {
-        is_claimed: probability >= least,
+        is_claimed: probability >= least && matters.contains(&entry),
         probability: (probability * (1.0 - OTHER)).min(most),
         entry,
     };
@@ -183,10 +200,10 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         || is_first && forecasts.share(search, &set).is_some_and(|share| share >= RUN_ON);
     let is_effect = explains && is_supported && stated.iter().any(|stated| stated.is_claimed);
     let declared_model = search.get(&nothing).expect("it was fitted first");
-    let (lack_of_fit, largest_error) = lacks(declared_model);
+    let lacks = lacks(declared_model);
     let conclusion = if is_effect {
         Conclusion::Effect
-    } else if lack_of_fit > search.significant && largest_error > MATTERS {
+    } else if lacks.iter().any(|(nats, error)| *nats > search.significant && *error > MATTERS) {
         Conclusion::Unexplained
     } else {
         Conclusion::None
@@ -195,7 +212,8 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         conclusion,
         stated,
         nothing: nothing_probability,
-        is_refused_by_curve: !explains,
+        is_contradicted: contradicted,
+        is_refused: !explains,
         excluded: excluded
             .into_iter()
             .chain(passed.into_iter().zip(named).filter(|(a, b)| a != b).map(|(a, _)| a))
@@ -206,9 +224,27 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         declared: on_declared,
         remaining,
         share,
-        lack_of_fit,
-        largest_error,
+        lack_of_fit: lacks[0].0,
+        largest_error: lacks.iter().map(|lack| lack.1).fold(0.0, f64::max),
     }
+}
+
+/// Returns true if the errors of selection records are larger than those of the calibration records, and other than the set and its
+/// error model expect.
+fn is_contradicted(set: &FittedSet<'_>) -> bool {
+    let forecast = || {
+        let pieces = base::pieces(set.fit.subject, |role| role == Role::Selection);
+        let (fit, point) = with_free_starts(set, &set.least_squares.point, pieces)?;
+        let residuals = fit.all(&point)?;
+        #[allow(clippy::cast_precision_loss)]
+        let count = residuals.iter().map(Vec::len).sum::<usize>().max(1) as f64;
+        let error = (residuals.iter().flatten().map(|r| r * r).sum::<f64>() / count).sqrt();
+        let outputs = set.under.iter().filter(|(kind, _)| *kind != ErrorModel::Force);
+        let surprises = outputs.filter_map(|(_, estimate)| surprise(&estimate.errors, &fit.pieces, &residuals));
+        Some((error, surprises.min_by(f64::total_cmp)?))
+    };
+    let expected = set.error().unwrap_or(f64::INFINITY).max(1.0);
+    forecast().is_some_and(|(error, surprise)| error > MATTERS * expected && surprise > FIRES)
 }
 
 /// Returns classes and places of the effects of a set, each once.
@@ -233,13 +269,13 @@ fn simplest(search: &Search<'_, '_>, passed: &[Key]) -> Key {
     passed.iter().filter(is_alike).min_by_key(|key| parameters(key)).unwrap_or(first).clone()
 }
 
-/// Returns the lack of fit of a model and its largest error of a record, over calibration and selection records. On these it is
-/// either correlation, or errors that are larger than on the former.
-fn lacks(set: &FittedSet<'_>) -> (f64, f64) {
+/// Returns the lack of fit of a model and its largest error of a record: on calibration records, then on selection records, if any.
+/// On these it is either correlation, or errors that are larger than on the former.
+fn lacks(set: &FittedSet<'_>) -> Vec<(f64, f64)> {
     let on_calibration = (set.lack_of_fit().unwrap_or(f64::INFINITY), set.largest_error().unwrap_or(f64::INFINITY));
     let pieces = base::pieces(set.fit.subject, |role| role == Role::Selection);
     if pieces.is_empty() {
-        return on_calibration;
+        return vec![on_calibration];
     }
     let on_selection = || {
         let (fit, point) = with_free_starts(set, &set.least_squares.point, pieces)?;
@@ -251,8 +287,7 @@ fn lacks(set: &FittedSet<'_>) -> (f64, f64) {
         let grown = growth((&set.fit.pieces, &own), (&fit.pieces, &residuals));
         Some((correlation(&fit.pieces, &residuals)?.max(grown), largest))
     };
-    let on_selection = on_selection().unwrap_or((f64::INFINITY, f64::INFINITY));
-    (on_calibration.0.max(on_selection.0), on_calibration.1.max(on_selection.1))
+    vec![on_calibration, on_selection().unwrap_or((f64::INFINITY, f64::INFINITY))]
 }
 
 /// Returns class and place of a candidate; what happens once in one record is a disturbance of that record.
