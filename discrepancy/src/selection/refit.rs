@@ -155,8 +155,8 @@ impl<'a> Refit<'a> {
     /// Fits a set under all error models, from its optimum by least squares and from those of the other error models, and makes
     /// sure that it fits no worse than the sets that it contains.
     /// The force error, which costs most, is left out if even with the most that it has gained so far over the others the evidence
-    /// would stay far below `best`.
-    pub fn under_error_models(&self, set: &mut FittedSet<'a>, nested: &[&FittedSet<'a>], best: f64) {
+    /// would stay below `least`.
+    pub fn under_error_models(&self, set: &mut FittedSet<'a>, nested: &[&FittedSet<'a>], least: f64) {
         let estimation = set.estimation(&self.nominal);
         let start = set.least_squares.point.clone();
         let from = |kind: ErrorModel, start: &Point, before: Option<&Errors>| {
@@ -184,7 +184,7 @@ impl<'a> Refit<'a> {
             let smaller = nested.iter().filter_map(|smaller| smaller.estimate(*kind));
             smaller.into_iter().any(|smaller| smaller.log_likelihood - WORSE >= estimate.log_likelihood)
         };
-        if at_output(&first) + advantage <= best - HOPELESS && !first.iter().any(is_behind) {
+        if at_output(&first) + advantage <= least && !first.iter().any(is_behind) {
             set.under = first;
             return;
         }

@@ -41,6 +41,9 @@ const BEHIND: f64 = 6.0;
 /// Most probable sets whose effects are exchanged for others of their class, one after the other.
 const POLISHED: usize = 3;
 
+/// Logarithm of the probability relative to a more probable set below which a set does not count: less than 1 %.
+pub const NEGLIGIBLE: f64 = 5.0;
+
 /// Difference in log-likelihood, nats, up to which two sets describe the records equally well.
 const SAME: f64 = 3.0;
 
@@ -316,7 +319,7 @@ impl<'r, 'a> Search<'r, 'a> {
             };
             let near: Vec<&Screened> = screened.iter().filter(is_near).take(SWAPS).collect();
             let sets: Vec<FittedSet<'a>> = near.par_iter().filter_map(fitted).collect();
-            self.add_all(sets);
+            self.add_all(sets, NEGLIGIBLE);
         }
         self.sort();
     }
@@ -366,7 +369,7 @@ impl<'r, 'a> Search<'r, 'a> {
             self.refit.least_squares(key, &[by_squares.start.clone(), rough.start.clone()])
         };
         let sets: Vec<FittedSet<'a>> = trials.par_iter().filter_map(fitted).collect();
-        self.add_all(sets);
+        self.add_all(sets, HOPELESS);
     }
 
     /// Fits a set with more effects roughly by least squares: from the optimum of its parent by least squares, and from another
@@ -421,18 +424,18 @@ impl<'r, 'a> Search<'r, 'a> {
         };
         let starts: Vec<_> = self.sets.iter().filter(contains).filter_map(reduced).collect();
         let Some(set) = self.refit.least_squares(key, &starts) else { return false };
-        self.add(set);
+        self.add(set, HOPELESS);
         self.sort();
         true
     }
 
     /// Adds sets, the simplest first; what is a simpler one in all but name is only noted.
-    fn add_all(&mut self, mut sets: Vec<FittedSet<'a>>) {
+    fn add_all(&mut self, mut sets: Vec<FittedSet<'a>>, margin: f64) {
         sets.sort_by_key(|set| set.parameters());
         for set in sets {
             match self.simpler(&set) {
                 Some(simpler) => self.aliases.push((set.key, simpler)),
-                None => self.add(set),
+                None => self.add(set, margin),
             }
         }
     }
@@ -442,13 +445,13 @@ impl<'r, 'a> Search<'r, 'a> {
         self.get(key).is_some() || self.aliases.iter().any(|(alias, _)| alias == key)
     }
 
-    /// Fits a set under the error models that can bring it near the best one, and adds it.
-    fn add(&mut self, set: FittedSet<'a>) {
+    /// Fits a set under the error models that can bring it within a margin of the highest evidence, nats, and adds it.
+    fn add(&mut self, set: FittedSet<'a>, margin: f64) {
         let best = self.sets.iter().map(FittedSet::log_evidence).fold(f64::NEG_INFINITY, f64::max);
-        self.add_under(set, best);
+        self.add_under(set, best - margin);
     }
 
-    fn add_under(&mut self, mut set: FittedSet<'a>, best: f64) {
+    fn add_under(&mut self, mut set: FittedSet<'a>, least: f64) {
         if self.get(&set.key).is_some() {
             return;
         }
@@ -459,7 +462,7 @@ impl<'r, 'a> Search<'r, 'a> {
         if nested.is_empty() {
             nested.extend(self.sets.iter().filter(|smaller| smaller.key.is_empty()));
         }
-        self.refit.under_error_models(&mut set, &nested, best);
+        self.refit.under_error_models(&mut set, &nested, least);
         if !set.under.is_empty() {
             self.sets.push(set);
         }

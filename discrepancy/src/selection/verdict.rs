@@ -6,7 +6,7 @@ use mops_core::{Role, math};
 
 use super::fitted_set::{FittedSet, Key, correlation, growth, surprise};
 use super::forecast::{Forecasts, with_free_starts};
-use super::search::Search;
+use super::search::{NEGLIGIBLE, Search};
 use crate::base;
 use crate::candidate::Candidate;
 use crate::estimation::ErrorModel;
@@ -100,9 +100,6 @@ const MATTERS: f64 = 1.1;
 /// Shares and probability that a set must have where only the ends of the calibration records are forecast.
 const RUN_ON: f64 = 0.8;
 
-/// Logarithm of the probability relative to the first set that passed below which a set does not count: less than 1 %.
-const NEGLIGIBLE: f64 = 5.0;
-
 /// Difference of log-evidence, nats, that is not worth more than a bare mention. Source: R. E. Kass, A. E. Raftery, Bayes factors,
 /// Journal of the American Statistical Association 90 (1995) 773, section 3.2.
 const BARE_MENTION: f64 = 1.0;
@@ -187,7 +184,12 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
     let most = if is_first { 1.0 } else { CLAIMED };
     // An effect that forecasts hardly better is a proposal.
     let matters: Vec<Entry> = (0..set.len())
-        .filter(|&index| forecasts.share_of(search, &set, index).is_some_and(|share| share >= LEAST))
+        .filter(|&index| {
+            // What happens once in one record can be told from what it lacks by another record only.
+            let is_once = search.refit.candidates[set[index]].only.is_some();
+            (forecasts.are_of_other_records() || !is_once)
+                && forecasts.share_of(search, &set, index).is_some_and(|share| share >= LEAST)
+        })
         .map(|index| entry(search, &search.refit.candidates[set[index]]))
         .collect();
     let state = |(entry, probability): (Entry, f64)| Stated {
