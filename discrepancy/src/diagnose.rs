@@ -7,7 +7,7 @@ use mops_core::{Effect, Role, Study, StudyError, Watch};
 
 use crate::meter::Meter;
 use crate::report::Findings;
-use crate::selection::{Forecasts, Search, decide, prepare};
+use crate::selection::{Forecasts, Search, decide, prepare, with_given};
 use crate::subject::Subject;
 
 /// Options of a diagnosis.
@@ -41,6 +41,8 @@ pub fn diagnose(
             .with_help("`mops simulate` shows what happens there; start nearer to what is plausible")
     };
     let (refit, declared) = prepare(&subject, effects, &simulations).ok_or_else(lost)?;
+    let nominal = declared.clone();
+    let declared = with_given(&refit, declared, &study.tasks().diagnosis.with)?;
     let mut search = Search::new(&refit, declared, options.max_effects, options.level);
     if search.sets[0].under.is_empty() {
         return Err(lost());
@@ -52,5 +54,6 @@ pub fn diagnose(
     let mut forecasts = Forecasts::new(has_selection);
     let verdict = decide(&mut search, &mut forecasts);
     simulations.stage("report", 0.95);
-    Ok(Findings { search: &search, forecasts: &forecasts, verdict: &verdict, is_stopped }.diagnosis())
+    Ok(Findings { nominal: &nominal, search: &search, forecasts: &forecasts, verdict: &verdict, is_stopped }
+        .diagnosis())
 }

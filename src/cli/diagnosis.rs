@@ -76,7 +76,7 @@ fn found(diagnosis: &Diagnosis) -> String {
                 strength.unit.clone(),
                 once(words::probability(found.probability)),
                 once(words::probability(found.class_probability)),
-                once(if found.claimed { "claimed" } else { "proposed" }.to_owned()),
+                once(words::status(found).to_owned()),
             ]);
         }
     }

@@ -137,6 +137,7 @@ pub(crate) fn coulomb() -> Diagnosis {
         probability: 0.9,
         class_probability: 0.95,
         claimed: true,
+        given: false,
         bic_gain: 2400.0,
         indistinguishable: vec![rival("stribeck-friction", 0.7), rival("quadratic-drag", 4.1)],
         stability: Some(Stability {

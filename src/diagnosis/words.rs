@@ -76,7 +76,7 @@ fn proposed(diagnosis: &Diagnosis) -> Option<String> {
     let proposed: Vec<String> = diagnosis
         .found
         .iter()
-        .filter(|found| !found.claimed)
+        .filter(|found| !found.claimed && !found.given)
         .map(|found| format!("`{}` {}", found.effect, at(&found.place)))
         .collect();
     (!proposed.is_empty()).then(|| format!("Not claimed, but the best description: {}.", list(&proposed)))
@@ -105,6 +105,15 @@ pub(crate) fn of_what(diagnosis: &Diagnosis) -> &'static str {
     match diagnosis.verdict {
         Verdict::Effect => "of class and place",
         Verdict::None | Verdict::Unexplained => "of the verdict",
+    }
+}
+
+/// Returns whether an effect is claimed, proposed or given.
+pub(crate) fn status(found: &Found) -> &'static str {
+    match (found.given, found.claimed) {
+        (true, _) => "given",
+        (false, true) => "claimed",
+        (false, false) => "proposed",
     }
 }
 

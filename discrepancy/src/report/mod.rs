@@ -32,6 +32,8 @@ const MOVED: f64 = 3.0;
 
 /// A search with its verdict.
 pub struct Findings<'f, 'r, 'a> {
+    /// Declared model without the effects that the study gives.
+    pub nominal: &'f FittedSet<'a>,
     /// Sets of effects.
     pub search: &'f Search<'r, 'a>,
     /// Forecasts of the sets that were tested.
@@ -48,7 +50,7 @@ impl<'a> Findings<'_, '_, 'a> {
         let Self { search, verdict, .. } = self;
         let nothing = Key::new();
         let chosen = if verdict.conclusion == Conclusion::None { &nothing } else { &verdict.set };
-        let declared = search.get(&nothing).expect("it was fitted first");
+        let declared = self.nominal;
         let set = search.get(chosen).expect("a set that passed was fitted");
         let (set, terms) = search.refit.without_terms(set);
         let set = &set;
@@ -74,7 +76,7 @@ impl<'a> Findings<'_, '_, 'a> {
         made.is_first = verdict.is_first || verdict.conclusion == Conclusion::None;
         made.is_stopped = self.is_stopped;
         made.converged = set.least_squares.converged;
-        made.explained_share = explained_share(&before, &after).filter(|_| !set.key.is_empty());
+        made.explained_share = explained_share(&before, &after).filter(|_| !set.added.is_empty());
         if made.verdict == Verdict::Unexplained {
             made.unexplained = made.depends_on.as_ref().map(|curve| unexplained(curve, &located));
         }
@@ -105,7 +107,7 @@ impl<'a> Findings<'_, '_, 'a> {
             Verdict::Effect => {
                 made.is_first
                     && !self.verdict.is_contradicted
-                    && made.found.iter().all(|found| found.claimed)
+                    && made.found.iter().all(|found| found.claimed || found.given)
                     && made.explained_share.is_none_or(|share| share > 0.0)
             }
             Verdict::None => true,
@@ -157,8 +159,9 @@ impl<'a> Findings<'_, '_, 'a> {
             class: effect.class().name().to_owned(),
             formula: effect.formula().to_owned(),
             strengths: parameters::strengths(set, index),
+            given: !set.key.contains(&position),
             probability: self.probability_of(position),
-            class_probability: stated.map_or(0.0, |stated| stated.probability),
+            class_probability: stated.map_or(f64::NAN, |stated| stated.probability),
             claimed: self.verdict.conclusion == Conclusion::Effect && stated.is_some_and(|stated| stated.is_claimed),
             bic_gain: smaller.map_or(f64::NAN, |smaller| 2.0 * (fitted.log_evidence() - smaller.log_evidence())),
             indistinguishable: self.rivals(fitted, position),

@@ -17,7 +17,7 @@ mod verdict;
 pub(crate) use baseline::baseline;
 pub(crate) use fitted_set::{FittedSet, Key, estimation};
 pub(crate) use forecast::{Forecasts, with_free_starts};
-pub(crate) use preparation::prepare;
+pub(crate) use preparation::{prepare, with_given};
 pub(crate) use refit::price;
 pub(crate) use screening::{Scene as Screening, Screened};
 pub(crate) use search::{Search, without};

@@ -307,9 +307,10 @@ impl<'r, 'a> Search<'r, 'a> {
                 single.index != key[k] && (!is_predicted || ALLOWANCE * single.gains[0] > white - HOPELESS || pays())
             };
             // Each is fitted with hyperparameters of its own: those of the set are narrow around its own optimum. Where the set
-            // lacks nothing, squares decide.
+            // lacks nothing, squares decide. A fit below the set without the effect has failed.
             let own = self.get(key).filter(|set| !self.lacks_something(set));
             let least = own.map_or(f64::NEG_INFINITY, |set| set.least_squares.log_likelihood - HOPELESS);
+            let least = least.max(parent.least_squares.log_likelihood);
             let fitted = |single: &&Screened| {
                 let new = [*single];
                 let likelier = likelier_output(&parent).and_then(|likelier| best_start(&parent, &likelier.point, &new));

@@ -1,6 +1,6 @@
 //! Selections on data that the tests compute themselves.
 
-use mops_core::{Hold, Input, Role, math};
+use mops_core::{Hold, Input, Role, Study, math};
 
 use super::baseline::baseline;
 use super::{Conclusion, Selection, compare, select};
@@ -8,6 +8,7 @@ use crate::estimation::ErrorModel;
 use crate::meter::Meter;
 use crate::subject::Subject;
 use crate::testing::{Record, catalogue, integrated, study, subject, white};
+use crate::{Options, diagnose};
 
 const OSCILLATOR: &str = r#"
 states     = { x = "m", v = "m/s" }
@@ -180,4 +181,20 @@ fn given_sets_are_fitted_from_smaller_ones_and_unknown_names_are_refused() {
         let refused = compare(&study, &effects, &names(&[unknown]));
         assert!(refused.is_err_and(|error| error.to_string().contains("cannot fit")), "{unknown:?}");
     }
+}
+
+#[test]
+fn given_effects_are_in_every_set_and_the_search_adds_others() {
+    let both = |x: f64, v: f64| spring(x, v) - 0.4 * v * v.abs();
+    let subject = recorded(both, 0.0, &BOTH, &[0.2, 5.0, 0.4, 0.1]);
+    let diagnosed = |with: &str| {
+        let mut parts = study(&subject).into_parts();
+        parts.tasks.diagnosis.with = vec![with.to_owned()];
+        diagnose(&Study::from_parts(parts), &catalogue(&TRIED), &Options { max_effects: 2, level: 0.05 }, &())
+    };
+    let found = diagnosed("cubic-stiffness@joint:x").expect("it simulates").found;
+    assert_eq!(found.iter().map(|f| f.effect.as_str()).collect::<Vec<_>>(), ["cubic-stiffness", "quadratic-drag"]);
+    assert!(found[0].given && !found[0].claimed && !found[1].given && found[1].claimed, "{found:?}");
+    let refused = diagnosed("cubic-stifness@joint:x").expect_err("there is no such effect");
+    assert!(refused.to_string().contains("no effect `cubic-stifness@joint:x`"), "{refused}");
 }

@@ -94,12 +94,16 @@ struct FoundEffect {
     strengths: Map<String, Value>,
     /// Estimates of its parameters, with their errors.
     details: Vec<StrengthValue>,
-    /// Probability that this effect, rather than another, is missing.
+    /// Probability that this effect, rather than another, is missing; null if none can be stated.
+    #[schemars(with = "Option<f64>")]
     probability: f64,
-    /// Probability that an effect of this class is missing at this place.
+    /// Probability that an effect of this class is missing at this place; null for a given effect.
+    #[schemars(with = "Option<f64>")]
     class_probability: f64,
-    /// True if class and place are claimed; otherwise the effect is a proposal.
+    /// True if class and place are claimed; otherwise the effect is a proposal, or given.
     claimed: bool,
+    /// True if the study gives the effect (`with`).
+    given: bool,
     /// Decrease of the BIC when the effect is added: twice the gain in log-evidence, which the BIC approximates.
     bic_gain: f64,
     /// Alternatives at the same place whose BIC is at most 6 higher.
@@ -263,6 +267,7 @@ impl FoundEffect {
             probability: found.probability,
             class_probability: found.class_probability,
             claimed: found.claimed,
+            given: found.given,
             bic_gain: found.bic_gain,
             indistinguishable: found.indistinguishable.clone(),
             stability: found.stability.clone(),

@@ -80,8 +80,10 @@ pub struct Found {
     pub probability: f64,
     /// Probability that an effect of this class is missing at this place.
     pub class_probability: f64,
-    /// True if class and place are claimed; otherwise the effect is a proposal.
+    /// True if class and place are claimed; otherwise the effect is a proposal, or given.
     pub claimed: bool,
+    /// True if the study gives the effect (`with`).
+    pub given: bool,
     /// Decrease of the BIC when the effect is added: twice the gain in log-evidence, which the BIC approximates.
     pub bic_gain: f64,
     /// Alternatives at the same place whose BIC is at most 6 higher.

@@ -112,13 +112,16 @@ impl From<String> for AxisTable {
 pub(super) struct DiagnosisSection {
     /// Maximum number of added effects; default 3.
     pub max_effects: Option<usize>,
-    /// False-alarm probability; default 0.01.
+    /// Significance level of the test for a lack of fit; default 0.05.
     pub level: Option<f64>,
     /// Kinds of effect to try; default is the whole catalogue (`mops list`).
     pub effects: Option<Vec<String>>,
     /// Kinds of effect to exclude.
     #[serde(default)]
     pub without: Vec<String>,
+    /// Effects that the model has in any case, `effect@place` each, such as `coulomb-friction@joint:phi`: the search adds others.
+    #[serde(default)]
+    pub with: Vec<String>,
 }
 
 /// Settings of `task = "pareto"` and `mops pareto`.
@@ -190,13 +193,13 @@ pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue, tasks: &mut TasksBuil
         tasks.sweep = Some(SweepBuilder { x: axis(section.x), y: section.y.map(axis), at: section.at });
     }
     if let Some(node) = root.child("diagnosis") {
-        let DiagnosisSection { max_effects, level, effects, without } = node.read()?;
+        let DiagnosisSection { max_effects, level, effects, without, with } = node.read()?;
         for (key, names) in [("effects", effects.as_deref().unwrap_or_default()), ("without", &without)] {
             check_effects(catalogue, names).map_err(|m| root.locate(&m.within(key).within("diagnosis")))?;
         }
         let usual = DiagnosisTask::default();
         let (max_effects, level) = (max_effects.unwrap_or(usual.max_effects), level.unwrap_or(usual.level));
-        tasks.diagnosis = DiagnosisTask { max_effects, level, effects, without };
+        tasks.diagnosis = DiagnosisTask { max_effects, level, effects, without, with };
     }
     if let Some(node) = root.child("pareto") {
         let ParetoSection { points } = node.read()?;

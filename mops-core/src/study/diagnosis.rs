@@ -19,11 +19,13 @@ pub struct DiagnosisTask {
     pub effects: Option<Vec<String>>,
     /// Kinds of effect to exclude.
     pub without: Vec<String>,
+    /// Effects that the model has in any case, `effect@place` each.
+    pub with: Vec<String>,
 }
 
 impl Default for DiagnosisTask {
     fn default() -> Self {
-        Self { max_effects: 3, level: 0.05, effects: None, without: Vec::new() }
+        Self { max_effects: 3, level: 0.05, effects: None, without: Vec::new(), with: Vec::new() }
     }
 }
 

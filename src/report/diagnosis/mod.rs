@@ -126,7 +126,7 @@ fn effect(found: &Found) -> Markup {
                     li { (words::strength(strength)) @if strength.interval95.is_some() { span class="quiet" { ", 95 % interval" } } }
                 }
                 li {
-                    (if found.claimed { "Claimed" } else { "Proposed, not claimed" }) ": probability of a " (found.class)
+                    (match words::status(found) { "claimed" => "Claimed", "given" => "Given by the study", _ => "Proposed, not claimed" }) ": probability of a " (found.class)
                     " effect here " strong { (words::probability(found.class_probability)) } ", of this one "
                     (words::probability(found.probability)) ". BIC lower by " (significant(found.bic_gain, 3)) "."
                 }
