@@ -136,6 +136,7 @@ pub(crate) fn coulomb() -> Diagnosis {
         strengths: vec![strength("c", 0.0124, "N m")],
         probability: 0.9,
         class_probability: 0.95,
+        alike: Vec::new(),
         claimed: true,
         given: false,
         bic_gain: 2400.0,

@@ -53,8 +53,12 @@ fn claims(diagnosis: &Diagnosis) -> Option<String> {
         let certainty = own.first().filter(|f| !f.class_probability.is_nan());
         let certainty =
             certainty.map_or_else(String::new, |f| format!(" (probability {})", probability(f.class_probability)));
+        // What the data cannot distinguish is one claim.
+        let alike = own.iter().flat_map(|found| &found.alike).filter_map(|other| other.split_once(" at "));
+        let alike: Vec<String> = alike.map(|(class, place)| format!("{class} {}", at(place))).collect();
+        let alike = if alike.is_empty() { String::new() } else { format!(", or {}", alike.join(", or ")) };
         let article = if class.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
-        format!("{article} {class} effect {}{certainty}, best described by {}", at(place), list(&names))
+        format!("{article} {class} effect {}{alike}{certainty}, best described by {}", at(place), list(&names))
     };
     (!entries.is_empty()).then(|| list(&entries.iter().map(claim).collect::<Vec<String>>()))
 }

@@ -162,6 +162,9 @@ impl<'a> Findings<'_, '_, 'a> {
             given: !set.key.contains(&position),
             probability: self.probability_of(position),
             class_probability: stated.map_or(f64::NAN, |stated| stated.probability),
+            alike: stated.map_or_else(Vec::new, |stated| {
+                stated.alike.iter().map(|entry| format!("{} at {}", entry.class, entry.place)).collect()
+            }),
             claimed: self.verdict.conclusion == Conclusion::Effect && stated.is_some_and(|stated| stated.is_claimed),
             bic_gain: smaller.map_or(f64::NAN, |smaller| 2.0 * (fitted.log_evidence() - smaller.log_evidence())),
             indistinguishable: self.rivals(fitted, position),

@@ -146,6 +146,22 @@ pub fn with_free_starts<'a>(set: &FittedSet<'a>, point: &Point, pieces: Vec<Piec
     Some((fit, point))
 }
 
+/// Fits a set to calibration and selection records together by least squares; `None` if they cannot be simulated.
+pub fn fitted_together<'a>(set: &FittedSet<'a>) -> Option<(Fit<'a>, Point)> {
+    let subject = set.fit.subject;
+    let start = set.start_at(&set.least_squares.point);
+    let pieces = base::pieces(subject, |role| role != Role::Validation);
+    let mut locals = base::first_locals(&pieces);
+    for (known, piece) in start.locals.iter().zip(&set.fit.pieces) {
+        if let Some(index) = pieces.iter().position(|p| p.measurement == piece.measurement) {
+            locals[index].clone_from(known);
+        }
+    }
+    let (fit, point, variant) = problem(subject, &start.added, pieces, &start.tuners, locals, &[], set.fit.simulations);
+    let point = estimation(subject, &fit, &variant, &start.added, &[], &point).least_squares(point)?.point;
+    Some((fit, point))
+}
+
 /// Returns the mean square error in noises at the ends of the calibration records, run on from least squares on their beginnings.
 fn run_on(set: &FittedSet<'_>) -> Option<f64> {
     let mut beginning = set.fit.clone();

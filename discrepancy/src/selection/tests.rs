@@ -198,3 +198,17 @@ fn given_effects_are_in_every_set_and_the_search_adds_others() {
     let refused = diagnosed("cubic-stifness@joint:x").expect_err("there is no such effect");
     assert!(refused.to_string().contains("no effect `cubic-stifness@joint:x`"), "{refused}");
 }
+
+#[test]
+fn effects_that_the_records_cannot_tell_apart_are_one_claim() {
+    // A position about which the spring pulls can be anywhere: a constant force is a bias of the sensor.
+    let subject = recorded(|_, _| 0.6, 0.0, &BOTH, &[0.2, 5.0, 0.4, 0.1]);
+    let tried = catalogue(&["constant-force", "sensor-bias", "input-bias", "quadratic-drag"]);
+    let verdict = select(&study(&subject), &tried).expect("it simulates").verdict;
+    assert_eq!(verdict.conclusion, Conclusion::Effect);
+    let stated = &verdict.stated[0];
+    let mut places: Vec<&str> = stated.alike.iter().chain([&stated.entry]).map(|entry| entry.place.as_str()).collect();
+    places.sort_unstable();
+    assert_eq!(places, ["actuator:u", "joint:x", "sensor:x"], "{verdict:?}");
+    assert!(stated.is_claimed && stated.probability >= 0.9, "{verdict:?}");
+}

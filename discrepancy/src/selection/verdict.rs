@@ -1,15 +1,13 @@
 //! What is claimed: the first set that the evidence and a forecast support, by class and place, and what remains.
 
-use std::collections::BTreeMap;
-
 use mops_core::{Role, math};
 
 use super::fitted_set::{FittedSet, Key, correlation, growth, surprise};
-use super::forecast::{Forecasts, with_free_starts};
+use super::forecast::{Forecasts, fitted_together};
 use super::search::{NEGLIGIBLE, Search};
-use crate::base;
 use crate::candidate::Candidate;
 use crate::estimation::ErrorModel;
+use crate::fit::dot;
 use mops_core::diagnosis::Dependence;
 
 /// Class of effects at a place.
@@ -37,7 +35,9 @@ pub enum Conclusion {
 pub struct Stated {
     /// Class and place.
     pub entry: Entry,
-    /// Posterior probability, with a share for what is in no catalogue.
+    /// Classes and places of effects in its place that the records cannot tell from it.
+    pub alike: Vec<Entry>,
+    /// Posterior probability of the entry or one that is alike, with a share for what is in no catalogue.
     pub probability: f64,
     /// True if the probability suffices for a claim; otherwise the effect is a proposal.
     pub is_claimed: bool,
@@ -104,6 +104,11 @@ const RUN_ON: f64 = 0.8;
 /// Journal of the American Statistical Association 90 (1995) 773, section 3.2.
 const BARE_MENTION: f64 = 1.0;
 
+/// Cosine of the changes of the outputs from which the records cannot tell two effects apart, and the posterior probability of a set
+/// from which it is compared.
+const ALIKE: f64 = 0.98;
+const SOME: f64 = 0.01;
+
 /// Probability that none of the candidates is right.
 pub const OTHER: f64 = 0.05;
 
@@ -148,18 +153,19 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
     let most = passed.iter().map(log).fold(declared, f64::max);
     let weight = |log: f64| math::exp(log - most);
     let total: f64 = weight(declared) + passed.iter().map(|key| weight(log(key))).sum::<f64>();
-    let mut by_entry: BTreeMap<Entry, f64> = BTreeMap::new();
-    for key in &passed {
-        for entry in entries_of(search, key) {
-            *by_entry.entry(entry).or_default() += weight(log(key)) / total;
-        }
-    }
     let nothing_probability = weight(declared) / total;
     let weights: Vec<(Key, f64)> =
         passed.iter().zip(&named).map(|(key, named)| (named.clone(), weight(log(key)) / total)).collect();
     let entries = entries_of(search, &set);
-    let probability = |entry: &Entry| by_entry.get(entry).copied().unwrap_or(0.0);
-    let entries: Vec<(Entry, f64)> = entries.into_iter().map(|e| (e.clone(), probability(&e))).collect();
+    let entries: Vec<(Entry, Vec<Entry>, f64)> = entries
+        .into_iter()
+        .map(|own| {
+            let alike = alike(search, &set, &own, &weights);
+            let counts = |key: &Key| entries_of(search, key).iter().any(|e| *e == own || alike.contains(e));
+            let probability = weights.iter().filter(|(key, _)| counts(key)).map(|(_, weight)| weight).sum();
+            (own, alike, probability)
+        })
+        .collect();
     let is_first = first.is_some_and(|first| {
         let own = entries_of(search, &set);
         !set.is_empty() && entries_of(search, &first).iter().all(|entry| own.contains(entry))
@@ -192,10 +198,11 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         })
         .map(|index| entry(search, &search.refit.candidates[set[index]]))
         .collect();
-    let state = |(entry, probability): (Entry, f64)| Stated {
+    let state = |(entry, alike, probability): (Entry, Vec<Entry>, f64)| Stated {
         is_claimed: probability >= least && matters.contains(&entry),
         probability: (probability * (1.0 - OTHER)).min(most),
         entry,
+        alike,
     };
     let stated: Vec<Stated> = entries.into_iter().map(state).collect();
     let is_supported = forecasts.are_of_other_records()
@@ -231,12 +238,11 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
     }
 }
 
-/// Returns true if the errors of selection records are larger than those of the calibration records, and other than the set and its
-/// error model expect.
+/// Returns true if the errors of calibration and selection records, fitted together, are larger than those of the calibration records
+/// alone, and other than the set and its error model expect.
 fn is_contradicted(set: &FittedSet<'_>) -> bool {
-    let forecast = || {
-        let pieces = base::pieces(set.fit.subject, |role| role == Role::Selection);
-        let (fit, point) = with_free_starts(set, &set.least_squares.point, pieces)?;
+    let together = || {
+        let (fit, point) = fitted_together(set)?;
         let residuals = fit.all(&point)?;
         #[allow(clippy::cast_precision_loss)]
         let count = residuals.iter().map(Vec::len).sum::<usize>().max(1) as f64;
@@ -246,7 +252,43 @@ fn is_contradicted(set: &FittedSet<'_>) -> bool {
         Some((error, surprises.min_by(f64::total_cmp)?))
     };
     let expected = set.error().unwrap_or(f64::INFINITY).max(1.0);
-    forecast().is_some_and(|(error, surprise)| error > MATTERS * expected && surprise > FIRES)
+    together().is_some_and(|(error, surprise)| error > MATTERS * expected && surprise > FIRES)
+}
+
+/// Returns classes and places of effects that the records cannot tell from those of an entry of a set: in place of one of them, what
+/// they change in the outputs is the same.
+fn alike(search: &Search<'_, '_>, set: &Key, own: &Entry, weights: &[(Key, f64)]) -> Vec<Entry> {
+    let candidates = &search.refit.candidates;
+    let mut all: Vec<Entry> = Vec::new();
+    for (key, _) in weights.iter().filter(|(_, weight)| *weight > SOME) {
+        let Some([replaced, new]) = swapped(search, set, key) else { continue };
+        let [theirs, replaced] = [new, replaced].map(|k| entry(search, &candidates[k]));
+        if replaced == *own && theirs != *own && !all.contains(&theirs) {
+            all.push(theirs);
+        }
+    }
+    all
+}
+
+/// Returns the effect of a set and that of another one in its place if nothing else differs, and the records cannot tell what the two
+/// change in the outputs apart.
+fn swapped(search: &Search<'_, '_>, set: &Key, other: &Key) -> Option<[usize; 2]> {
+    let only = |a: &Key, b: &Key| {
+        let mut own = a.iter().filter(|k| !b.contains(k));
+        own.next().copied().filter(|_| own.next().is_none())
+    };
+    let (replaced, new) = only(set, other).zip(only(other, set))?;
+    let residuals = |key: &Key| -> Option<Vec<f64>> {
+        let set = search.get(key)?;
+        Some(set.fit.all(&set.least_squares.point)?.concat())
+    };
+    let rest: Key = set.iter().copied().filter(|k| *k != replaced).collect();
+    let before = residuals(&rest)?;
+    let change =
+        |key: &Key| -> Option<Vec<f64>> { Some(residuals(key)?.iter().zip(&before).map(|(r, b)| r - b).collect()) };
+    let (ours, theirs) = (change(set)?, change(other)?);
+    let cosine = dot(&ours, &theirs) / (dot(&ours, &ours) * dot(&theirs, &theirs)).sqrt();
+    (cosine > ALIKE).then_some([replaced, new])
 }
 
 /// Returns classes and places of the effects of a set, each once.
@@ -258,7 +300,7 @@ fn entries_of(search: &Search<'_, '_>, key: &Key) -> Vec<Entry> {
 }
 
 /// Returns the first of the sets that passed, or the simplest one that says the same about as probably: with the fewest parameters
-/// among those of the same classes and places.
+/// among those of the same classes and places, and those that the records cannot tell from it.
 fn simplest(search: &Search<'_, '_>, passed: &[Key]) -> Key {
     let Some(first) = passed.first() else { return Key::new() };
     let log = |key: &Key| search.get(key).map_or(f64::NEG_INFINITY, |set| search.log_posterior(set));
@@ -266,21 +308,23 @@ fn simplest(search: &Search<'_, '_>, passed: &[Key]) -> Key {
         |key: &Key| -> usize { key.iter().map(|&k| search.refit.candidates[k].effect.parameters().len()).sum() };
     let entries = entries_of(search, first);
     let is_alike = |key: &&Key| {
-        key.len() == first.len() && log(key) > log(first) - BARE_MENTION && entries_of(search, key) == entries
+        key.len() == first.len()
+            && log(key) > log(first) - BARE_MENTION
+            && (entries_of(search, key) == entries || swapped(search, first, key).is_some())
     };
     passed.iter().filter(is_alike).min_by_key(|key| parameters(key)).unwrap_or(first).clone()
 }
 
-/// Returns the lack of fit of a model and its largest error of a record: on calibration records, then on selection records, if any.
-/// On these it is either correlation, or errors that are larger than on the former.
+/// Returns the lack of fit of a model and its largest error of a record: on calibration records, then on these and selection records
+/// together, if any. There it is either correlation, or errors that are larger than on the former alone.
 fn lacks(set: &FittedSet<'_>) -> Vec<(f64, f64)> {
     let on_calibration = (set.lack_of_fit().unwrap_or(f64::INFINITY), set.largest_error().unwrap_or(f64::INFINITY));
-    let pieces = base::pieces(set.fit.subject, |role| role == Role::Selection);
-    if pieces.is_empty() {
+    if !set.fit.subject.measurements.iter().any(|m| m.role == Role::Selection) {
         return vec![on_calibration];
     }
-    let on_selection = || {
-        let (fit, point) = with_free_starts(set, &set.least_squares.point, pieces)?;
+    // All parameters may move: what calibration records leave open is no lack of the model.
+    let together = || {
+        let (fit, point) = fitted_together(set)?;
         let residuals = fit.all(&point)?;
         #[allow(clippy::cast_precision_loss)]
         let rms = |r: &Vec<f64>| (r.iter().map(|r| r * r).sum::<f64>() / r.len().max(1) as f64).sqrt();
@@ -289,7 +333,7 @@ fn lacks(set: &FittedSet<'_>) -> Vec<(f64, f64)> {
         let grown = growth((&set.fit.pieces, &own), (&fit.pieces, &residuals));
         Some((correlation(&fit.pieces, &residuals)?.max(grown), largest))
     };
-    vec![on_calibration, on_selection().unwrap_or((f64::INFINITY, f64::INFINITY))]
+    vec![on_calibration, together().unwrap_or((f64::INFINITY, f64::INFINITY))]
 }
 
 /// Returns class and place of a candidate; what happens once in one record is a disturbance of that record.

@@ -100,6 +100,9 @@ struct FoundEffect {
     /// Probability that an effect of this class is missing at this place; null for a given effect.
     #[schemars(with = "Option<f64>")]
     class_probability: f64,
+    /// Other classes and places that the data cannot tell from these, as `class at kind:name`: `class_probability` is that of one of
+    /// them.
+    alike: Vec<String>,
     /// True if class and place are claimed; otherwise the effect is a proposal, or given.
     claimed: bool,
     /// True if the study gives the effect (`with`).
@@ -266,6 +269,7 @@ impl FoundEffect {
             details: found.strengths.clone(),
             probability: found.probability,
             class_probability: found.class_probability,
+            alike: found.alike.clone(),
             claimed: found.claimed,
             given: found.given,
             bic_gain: found.bic_gain,
