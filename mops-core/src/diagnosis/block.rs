@@ -100,7 +100,7 @@ struct FoundEffect {
     /// Probability that an effect of this class is missing at this place; null for a given effect.
     #[schemars(with = "Option<f64>")]
     class_probability: f64,
-    /// Other classes and places that the data cannot tell from these, as `class at kind:name`: `class_probability` is that of one of
+    /// Other classes and places that the data cannot distinguish from these, as `class at kind:name`: `class_probability` is that of one of
     /// them.
     alike: Vec<String>,
     /// True if class and place are claimed; otherwise the effect is a proposal, or given.

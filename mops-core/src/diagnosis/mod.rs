@@ -80,7 +80,7 @@ pub struct Found {
     pub probability: f64,
     /// Probability that an effect of this class is missing at this place.
     pub class_probability: f64,
-    /// Other classes and places that the data cannot tell from these, as `class at kind:name`: `class_probability` is that of one of
+    /// Other classes and places that the data cannot distinguish from these, as `class at kind:name`: `class_probability` is that of one of
     /// them.
     pub alike: Vec<String>,
     /// True if class and place are claimed; otherwise the effect is a proposal, or given.
