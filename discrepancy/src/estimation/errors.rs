@@ -170,6 +170,15 @@ impl Errors {
         }
     }
 
+    /// Returns the log-likelihood of residuals of records under an error model at the outputs.
+    pub fn log_likelihood(&self, pieces: &[Piece], channels: &Channels, residuals: Vec<Vec<f64>>) -> f64 {
+        let of = |(index, (piece, residuals)): (usize, (&Piece, Vec<f64>))| {
+            let mut columns = [residuals];
+            self.whiten(piece, channels, index, &mut columns) + columns[0].iter().map(|r| r * r).sum::<f64>()
+        };
+        -0.5 * pieces.iter().zip(residuals).enumerate().map(of).sum::<f64>()
+    }
+
     /// Returns the error model with the logarithm of its deviations changed.
     #[must_use]
     pub fn scaled(&self, by: f64) -> Self {

@@ -115,13 +115,7 @@ impl Estimation<'_> {
     /// Returns the log-likelihood at a point under an error model at the outputs whose hyperparameters are given; `None` if a
     /// simulation fails.
     pub fn log_likelihood(&self, errors: &Errors, point: &Point) -> Option<f64> {
-        let mut sum = 0.0;
-        for (index, (piece, residuals)) in self.fit.pieces.iter().zip(self.fit.all(point)?).enumerate() {
-            let mut columns = [residuals];
-            sum += errors.whiten(piece, &self.channels, index, &mut columns);
-            sum += columns[0].iter().map(|r| r * r).sum::<f64>();
-        }
-        Some(-0.5 * sum)
+        Some(errors.log_likelihood(&self.fit.pieces, &self.channels, self.fit.all(point)?))
     }
 
     /// Fits like [`Estimation::with`], but roughly, and gives up where the log-likelihood cannot become as large as `least`.

@@ -101,25 +101,29 @@ impl FittedSet<'_> {
 
     /// Returns the root mean square error of all records by least squares, in noises.
     pub fn error(&self) -> Option<f64> {
-        let all = self.fit.all(&self.least_squares.point)?;
-        let count: usize = all.iter().map(Vec::len).sum();
-        #[allow(clippy::cast_precision_loss)]
-        let mean = all.iter().flatten().map(|r| r * r).sum::<f64>() / count.max(1) as f64;
-        Some(mean.sqrt())
+        Some(rms(self.fit.all(&self.least_squares.point)?.iter().flatten()))
     }
 
     /// Returns the largest root mean square error of a record by least squares, in noises.
-    #[allow(clippy::cast_precision_loss)]
     pub fn largest_error(&self) -> Option<f64> {
-        let all = self.fit.all(&self.least_squares.point)?;
-        let of = |r: &Vec<f64>| (r.iter().map(|r| r * r).sum::<f64>() / r.len().max(1) as f64).sqrt();
-        Some(all.iter().map(of).fold(0.0, f64::max))
+        Some(largest(&self.fit.all(&self.least_squares.point)?))
     }
 
     /// Returns the values of the set at a point, to start another fit from.
     pub fn start_at(&self, point: &Point) -> Start {
         start_at(&self.added, &self.fit, &self.variant, point)
     }
+}
+
+/// Returns the root mean square of residuals.
+pub fn rms<'r>(residuals: impl Iterator<Item = &'r f64>) -> f64 {
+    let (sum, count) = residuals.fold((0.0, 0.0_f64), |(sum, count), r| (sum + r * r, count + 1.0));
+    (sum / count.max(1.0)).sqrt()
+}
+
+/// Returns the largest root mean square of the residuals of a record.
+pub fn largest(residuals: &[Vec<f64>]) -> f64 {
+    residuals.iter().map(|r| rms(r.iter())).fold(0.0, f64::max)
 }
 
 /// Returns the log-likelihood of the residuals of records under white noise, fitted to each channel.
@@ -157,23 +161,13 @@ pub fn growth(given: (&[Piece], &[Vec<f64>]), others: (&[Piece], &[Vec<f64>])) -
     squares(others.0, others.1).iter().enumerate().map(of).sum()
 }
 
-/// Returns the log-likelihood of given residuals of records under an error model at the outputs.
-fn log_likelihood(errors: &Errors, pieces: &[Piece], residuals: &[Vec<f64>]) -> f64 {
-    let channels = Channels::new(pieces);
-    let of = |(index, (piece, residuals)): (usize, (&Piece, &Vec<f64>))| {
-        let mut columns = [residuals.clone()];
-        errors.whiten(piece, &channels, index, &mut columns) + columns[0].iter().map(|r| r * r).sum::<f64>()
-    };
-    -0.5 * pieces.iter().zip(residuals).enumerate().map(of).sum::<f64>()
-}
-
 /// Returns the log-likelihood of given residuals of records under the likelier error model at the outputs that is fitted to them;
 /// `None` if neither can be fitted.
 fn correlated_log_likelihood(pieces: &[Piece], residuals: &[Vec<f64>]) -> Option<f64> {
+    let channels = Channels::new(pieces);
     let log = |kind| {
-        let channels = Channels::new(pieces);
         let fitted = Errors::fit(kind, pieces, &channels, residuals, Vec::new(), None, true)?;
-        Some(log_likelihood(&fitted.errors, pieces, residuals))
+        Some(fitted.errors.log_likelihood(pieces, &channels, residuals.to_vec()))
     };
     [ErrorModel::SmoothOutput, ErrorModel::RoughOutput].into_iter().filter_map(log).max_by(f64::total_cmp)
 }
@@ -187,9 +181,10 @@ pub fn correlation(pieces: &[Piece], residuals: &[Vec<f64>]) -> Option<f64> {
 /// Returns by how much residuals of other records are likelier under an error model of their own than under a given one at the
 /// outputs, nats; `None` if none can be fitted, or the records have other channels.
 pub fn surprise(errors: &Errors, pieces: &[Piece], residuals: &[Vec<f64>]) -> Option<f64> {
-    let is_of_all = matches!(errors, Errors::Output(errors) if errors.len() == Channels::new(pieces).count);
+    let channels = Channels::new(pieces);
+    let is_of_all = matches!(errors, Errors::Output(errors) if errors.len() == channels.count);
     let own = correlated_log_likelihood(pieces, residuals).filter(|_| is_of_all)?;
-    Some(own - log_likelihood(errors, pieces, residuals))
+    Some(own - errors.log_likelihood(pieces, &channels, residuals.to_vec()))
 }
 
 /// Returns the values of a set of effects at a point of its fit, to start another fit from.

@@ -114,8 +114,8 @@ impl<'a> Refit<'a> {
         Some(Rough { log_likelihood: best.1.log_likelihood, log_evidence: evidence(&best.1), start: best.0 })
     }
 
-    /// Returns a start in which initial states of effects are moved that no derivative has moved from 0, where that describes the
-    /// records clearly better; `None` if there are none. An actuator of limited rate that begins at its command follows at once:
+    /// Returns a start with other initial states of effects that no derivative has moved from 0, where these describe the records
+    /// clearly better; `None` if there are none. An actuator of limited rate that begins at its command follows at once:
     /// begun beside it, it catches up in a time in proportion to the distance, so that what it adds is of second order.
     pub fn with_moved_states(&self, start: &Start) -> Option<Start> {
         let (fit, point, variant) = self.problem(start);

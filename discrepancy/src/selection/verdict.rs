@@ -2,7 +2,7 @@
 
 use mops_core::{Role, math};
 
-use super::fitted_set::{FittedSet, Key, correlation, growth, surprise};
+use super::fitted_set::{FittedSet, Key, correlation, growth, largest, rms, surprise};
 use super::forecast::{Forecasts, fitted_together};
 use super::search::{NEGLIGIBLE, Search};
 use crate::candidate::Candidate;
@@ -244,9 +244,7 @@ fn is_contradicted(set: &FittedSet<'_>) -> bool {
     let together = || {
         let (fit, point) = fitted_together(set)?;
         let residuals = fit.all(&point)?;
-        #[allow(clippy::cast_precision_loss)]
-        let count = residuals.iter().map(Vec::len).sum::<usize>().max(1) as f64;
-        let error = (residuals.iter().flatten().map(|r| r * r).sum::<f64>() / count).sqrt();
+        let error = rms(residuals.iter().flatten());
         let outputs = set.under.iter().filter(|(kind, _)| *kind != ErrorModel::Force);
         let surprises = outputs.filter_map(|(_, estimate)| surprise(&estimate.errors, &fit.pieces, &residuals));
         Some((error, surprises.min_by(f64::total_cmp)?))
@@ -326,12 +324,9 @@ fn lacks(set: &FittedSet<'_>) -> Vec<(f64, f64)> {
     let together = || {
         let (fit, point) = fitted_together(set)?;
         let residuals = fit.all(&point)?;
-        #[allow(clippy::cast_precision_loss)]
-        let rms = |r: &Vec<f64>| (r.iter().map(|r| r * r).sum::<f64>() / r.len().max(1) as f64).sqrt();
-        let largest = residuals.iter().map(rms).fold(0.0, f64::max);
         let own = set.fit.all(&set.least_squares.point)?;
         let grown = growth((&set.fit.pieces, &own), (&fit.pieces, &residuals));
-        Some((correlation(&fit.pieces, &residuals)?.max(grown), largest))
+        Some((correlation(&fit.pieces, &residuals)?.max(grown), largest(&residuals)))
     };
     vec![on_calibration, together().unwrap_or((f64::INFINITY, f64::INFINITY))]
 }
