@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use mops::core::suggestion;
 use mops::{Catalogue, Diagnostic};
+use mops_testbed::Setting;
 
 use mops::terminal::{CommandError, Progress, print};
 
@@ -27,6 +28,18 @@ pub(super) struct Arguments {
     /// Number of cases with a missing effect that is not in the catalogue.
     #[arg(long, default_value_t = 20)]
     outside: usize,
+    /// Kinds of cases with another noise and with a model error in the background, in place of the four above.
+    ///
+    /// A: nothing is missing, white noise. B: nothing is missing, a model error in the background: a random force, a drifting
+    /// parameter or correlated noise of a sensor. C: one missing effect, white noise. D: one missing effect and a background of
+    /// 5 to 20 % of its size. S: a background that is the same function of the state in all experiments. Records are for
+    /// calibration, selection and validation.
+    #[arg(long, value_delimiter = ',', value_name = "KINDS", ignore_case = true,
+          conflicts_with_all = ["cases", "two", "none", "outside", "sizes", "folder"])]
+    kinds: Vec<Letter>,
+    /// Number of cases of each of these kinds.
+    #[arg(long, default_value_t = 120, value_name = "NUMBER", requires = "kinds")]
+    per_kind: usize,
     /// Plants, separated by commas [default: all].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     plants: Vec<String>,
@@ -60,6 +73,9 @@ pub(super) struct Arguments {
     /// Try only the missing effects, to measure the coverage of intervals without the search.
     #[arg(long = "told", conflicts_with = "folder")]
     known_effects: bool,
+    /// Remove the missing effects, under all accepted names, from the catalogue, to count wrong claims.
+    #[arg(long, conflicts_with_all = ["folder", "known_effects"])]
+    without_truth: bool,
     /// Diagnose the cases in a folder instead, each a folder with case.json and data files.
     #[arg(long, value_name = "DIR")]
     folder: Option<PathBuf>,
@@ -76,6 +92,33 @@ pub(super) struct Arguments {
 enum Rival {
     /// Refit of the model with each effect in turn; selection of the smallest BIC.
     BruteForce,
+}
+
+/// Kind of a case, by its letter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+enum Letter {
+    #[value(name = "A")]
+    A,
+    #[value(name = "B")]
+    B,
+    #[value(name = "C")]
+    C,
+    #[value(name = "D")]
+    D,
+    #[value(name = "S")]
+    S,
+}
+
+impl Letter {
+    fn kind(self) -> Kind {
+        Kind::Setting(match self {
+            Self::A => Setting::Exact,
+            Self::B => Setting::Background,
+            Self::C => Setting::Effect,
+            Self::D => Setting::EffectAndBackground,
+            Self::S => Setting::RepeatingBackground,
+        })
+    }
 }
 
 pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
@@ -100,8 +143,12 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     }
     let progress = Progress::of_cases(!arguments.quiet);
     let tools = Tools { catalogue, watch: &progress, seed: arguments.seed };
-    let comparisons =
-        Comparisons { brute_force: against, orders: arguments.orders, known_effects: arguments.known_effects };
+    let comparisons = Comparisons {
+        brute_force: against,
+        orders: arguments.orders,
+        known_effects: arguments.known_effects,
+        without_truth: arguments.without_truth,
+    };
     let results = diagnosis::run(&plan, tools, jobs, comparisons);
     progress.finish();
     let text = tables::all(&results);
@@ -124,14 +171,22 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
 
 /// Returns the plan of the benchmark, with names checked.
 fn plan(arguments: &Arguments) -> Result<Plan, Diagnostic> {
-    let all_plants: Vec<&str> = mops_testbed::plants().iter().map(|plant| plant.name).collect();
+    let plants = if arguments.kinds.is_empty() { mops_testbed::plants() } else { mops_testbed::disturbed_plants() };
+    let all_plants: Vec<&str> = plants.iter().map(|plant| plant.name).collect();
     let all_effects: Vec<&str> = mops_testbed::effects().iter().map(|effect| effect.name).collect();
-    let counts = [
-        (Kind::One, arguments.cases),
-        (Kind::Two, arguments.two),
-        (Kind::Nothing, arguments.none),
-        (Kind::Outside, arguments.outside),
-    ];
+    let counts = if arguments.kinds.is_empty() {
+        vec![
+            (Kind::One, arguments.cases),
+            (Kind::Two, arguments.two),
+            (Kind::Nothing, arguments.none),
+            (Kind::Outside, arguments.outside),
+        ]
+    } else {
+        let mut kinds = arguments.kinds.clone();
+        kinds.sort();
+        kinds.dedup();
+        kinds.into_iter().map(|letter| (letter.kind(), arguments.per_kind)).collect()
+    };
     if let Some(size) = arguments.sizes.iter().find(|&&size| !(size > 1.0 && size.is_finite())) {
         let fact = format!("expected sizes above 1 (errors of the nominal model, in units of the noise), found {size}");
         return Err(Diagnostic::new(fact).with_help("for example `--sizes 20,5,2,1.3`"));

@@ -3,6 +3,7 @@
 mod diagnosis;
 mod evidence;
 mod folder;
+mod kinds;
 mod suite;
 mod tables;
 

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::kinds::kinds;
 use crate::diagnosis::{Bin, Kind, Rate, Results, Row, brier, deciles, reliability, uniformity};
 use mops::terminal::table;
 
@@ -11,6 +12,7 @@ pub(super) fn all(results: &Results) -> String {
     for part in [
         effects(&results.rows),
         places(&results.rows),
+        kinds(&results.rows),
         summary(results),
         probabilities(&results.rows),
         p_values(&results.rows),
@@ -129,6 +131,10 @@ fn summary(results: &Results) -> String {
     let mut lines: Vec<Vec<String>> =
         kinds.iter().map(|(kind, name)| line(name, &|rows| rate_of_kind(rows, *kind))).collect();
     lines.retain(|line| !line[1].is_empty());
+    if lines.is_empty() {
+        // Only kinds with settings, which have their own table.
+        return unmade(results);
+    }
     let decided = |rows: &[Row]| {
         let rate = Rate::of(rows.iter().map(|row| row.judgement.decision));
         if rate.of == 0 { String::new() } else { percent(rate) }
@@ -144,12 +150,15 @@ fn summary(results: &Results) -> String {
     lines.push(line("simulations per case", &|rows| spread(rows, |answer| answer.1, 0)));
     let mut header = vec!["", "diagnosis"];
     header.extend(against.then_some("brute force"));
-    let mut text = table(&header, &[], lines);
-    if results.unmade > 0 {
-        writeln!(text, "{} requested cases could not be generated: their size cannot be reached", results.unmade)
-            .expect("a text takes everything");
+    table(&header, &[], lines) + &unmade(results)
+}
+
+/// Formats the number of requested cases that could not be generated.
+fn unmade(results: &Results) -> String {
+    match results.unmade {
+        0 => String::new(),
+        number => format!("{number} requested cases could not be generated: their size cannot be reached\n"),
     }
-    text
 }
 
 /// Formats the median and the 90 % quantile.
@@ -210,7 +219,7 @@ fn coverage(rows: &[Row]) -> String {
         let median = format!("{:.1} %", 100.0 * off[off.len() / 2]);
         vec![(*name).to_owned(), rate_of(&own.iter().map(|c| c.covers()).collect::<Vec<_>>()), median]
     });
-    let mut sizes: Vec<f64> = rows.iter().map(|row| row.size).collect();
+    let mut sizes: Vec<f64> = rows.iter().filter(|row| row.kind == Kind::One).map(|row| row.size).collect();
     sizes.sort_by(|a, b| b.total_cmp(a));
     sizes.dedup();
     let by_size = sizes.iter().filter_map(|&size| {
@@ -241,7 +250,7 @@ fn failures(rows: &[Row]) -> String {
 mod tests {
     use super::*;
     use crate::diagnosis::answers;
-    use crate::diagnosis::{Answer, Judgement};
+    use crate::diagnosis::{Answer, Judgement, Stated};
 
     fn row(kind: Kind, right: bool, answer: Result<Answer, String>) -> Row {
         let judgement = Judgement {
@@ -252,10 +261,22 @@ mod tests {
             place: right,
             both: None,
             covered: Vec::new(),
+            stated: Stated::default(),
         };
         let truth = vec![("coulomb-friction".to_owned(), "joint:phi".to_owned())];
         let (size, truth) = if kind == Kind::One { (5.0, truth) } else { (0.0, Vec::new()) };
-        Row { name: "case".into(), plant: "servo".into(), kind, size, truth, answer, judgement, agreeing: Vec::new() }
+        Row {
+            name: "case".into(),
+            plant: "servo".into(),
+            kind,
+            size,
+            background: None,
+            is_struck_out: false,
+            truth,
+            answer,
+            judgement,
+            agreeing: Vec::new(),
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use mops::discrepancy::Verdict;
 
-use super::tool::{Answer, Named};
+use super::tool::{Answer, Named, Statement};
 
 /// Returns an answer with the verdict `none`.
 pub(crate) fn nothing() -> Answer {
@@ -11,6 +11,11 @@ pub(crate) fn nothing() -> Answer {
         probability: 0.93,
         p_value: 0.43,
         found: Vec::new(),
+        statements: Vec::new(),
+        depends_on: None,
+        remaining: None,
+        records: Vec::new(),
+        declared: Vec::new(),
         set: Vec::new(),
         strengths: Vec::new(),
         unexplained_at: None,
@@ -27,6 +32,7 @@ pub(crate) fn coulomb() -> Answer {
         probability: 0.9997,
         p_value: 1e-9,
         found: vec![(there("coulomb-friction"), 0.97)],
+        statements: vec![Statement { entries: vec![there("dissipative")], probability: 0.95, claimed: true }],
         set: ["coulomb-friction", "quadratic-drag", "stribeck-friction"].map(there).to_vec(),
         strengths: vec![(0, "c".into(), 0.0124, Some([0.0118, 0.013]))],
         ..nothing()

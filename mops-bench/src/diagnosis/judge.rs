@@ -1,9 +1,9 @@
 //! Comparison of an answer with the truth.
 
 use mops::discrepancy::Verdict;
-use mops_testbed::{Trial, TrueEffect, Truth};
+use mops_testbed::{Disturbance, Trial, TrueEffect, Truth};
 
-use super::names::{names, strengths};
+use super::names::{class_of, coordinates, names, strengths};
 use super::plan::Kind;
 use super::tool::{Answer, Named};
 
@@ -45,6 +45,28 @@ pub(crate) struct Judgement {
     pub both: Option<bool>,
     /// Estimated parameters of true effects that were found.
     pub covered: Vec<Covered>,
+    /// Judgement of the statements on classes, places and coordinates.
+    pub stated: Stated,
+}
+
+/// Judgement of the statements on classes, places and coordinates, whatever the verdict.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Stated {
+    /// True if a true effect, or an equivalent one, is the first one found, claimed or proposed.
+    pub name: bool,
+    /// For each effect found: true if class and place, or others that the data cannot distinguish, are those of a true effect or of
+    /// an equivalent one.
+    pub entries: Vec<bool>,
+    /// For each effect found: true if the class is that of a true effect or of an equivalent one, at any place.
+    pub classes: Vec<bool>,
+    /// For each effect found: true if it is a true effect, or an equivalent one, at its place.
+    pub names: Vec<bool>,
+    /// True if what is missing depends on the stated coordinate; `None` if none is stated or none is right.
+    pub coordinate: Option<bool>,
+    /// True if the coordinate and its place are right.
+    pub coordinate_place: Option<bool>,
+    /// Estimated declared parameters.
+    pub declared: Vec<Covered>,
 }
 
 /// Case with its answer and judgement.
@@ -56,8 +78,13 @@ pub(crate) struct Row {
     pub plant: String,
     /// Kind of the case.
     pub kind: Kind,
-    /// Requested size; 0 if nothing is missing.
+    /// Requested size; 0 if nothing is missing. For the kinds with settings: the error of the refitted nominal model, in units of the
+    /// noise.
     pub size: f64,
+    /// Model error in the background.
+    pub background: Option<Disturbance>,
+    /// True if the true effects were removed from the catalogue.
+    pub is_struck_out: bool,
     /// True effects, by their names in the catalogue, and their places.
     pub truth: Vec<Named>,
     /// Answer of the tool, or the reason why there is none.
@@ -70,10 +97,11 @@ pub(crate) struct Row {
 
 /// Compares an answer with the truth.
 pub(crate) fn judge(truth: &Truth, answer: &Answer) -> Judgement {
-    let right = match truth.verdict {
-        "none" => Verdict::None,
-        "effect" => Verdict::Effect,
-        _ => Verdict::Unexplained,
+    let right: &[Verdict] = match truth.verdict {
+        "none" => &[Verdict::None],
+        "effect" => &[Verdict::Effect],
+        "unexplained" => &[Verdict::Unexplained],
+        _ => &[Verdict::None, Verdict::Unexplained],
     };
     let is = |effect: &TrueEffect, named: &Named| {
         names(&effect.class, &effect.strengths).contains(&named.0.as_str()) && effect.accepted_places.contains(&named.1)
@@ -90,7 +118,7 @@ pub(crate) fn judge(truth: &Truth, answer: &Answer) -> Judgement {
         truth.effects.iter().any(|effect| effect.accepted_places.contains(place))
             || truth.equivalents.iter().any(|(_, p)| p == place)
     };
-    let (verdict, first) = (answer.verdict == right, answer.first());
+    let (verdict, first) = (right.contains(&answer.verdict), answer.first());
     let place = match answer.verdict {
         Verdict::Unexplained => answer.unexplained_at.as_ref(),
         _ => first.map(|(_, place)| place),
@@ -105,12 +133,59 @@ pub(crate) fn judge(truth: &Truth, answer: &Answer) -> Judgement {
     });
     Judgement {
         verdict,
-        decision: verdict && (right != Verdict::Effect || first.is_some_and(same)),
+        decision: verdict && (answer.verdict != Verdict::Effect || first.is_some_and(same)),
         first: first.is_some_and(same),
         in_set: first.is_some() && answer.set.iter().any(same),
         place: place.is_some_and(placed),
         both: (truth.effects.len() > 1).then(|| verdict && truth.effects.iter().all(found)),
         covered: if verdict { covered.collect() } else { Vec::new() },
+        stated: stated(truth, answer, same),
+    }
+}
+
+/// Half width of a 95 % interval in standard errors.
+const NORMAL95: f64 = 1.959_964;
+
+/// Judges the statements of an answer; `same` recognises true effects and equivalent ones.
+fn stated(truth: &Truth, answer: &Answer, same: impl Fn(&Named) -> bool) -> Stated {
+    let of = |names: Vec<&str>| names.into_iter().filter_map(class_of).collect::<Vec<_>>();
+    let mut right: Vec<(Vec<&str>, &[String])> =
+        truth.effects.iter().map(|e| (of(names(&e.class, &e.strengths)), e.accepted_places.as_slice())).collect();
+    right.extend(truth.equivalents.iter().map(|(class, place)| (of(names(class, &[])), std::slice::from_ref(place))));
+    // A disturbance of one experiment is stated as such in place of its class.
+    let is_class = |classes: &[&str], class: &str| {
+        classes.iter().any(|c| *c == class || (*c == "time-varying" && class.starts_with("disturbance")))
+    };
+    let is_right = |class: &str, place: Option<&String>| {
+        right.iter().any(|(classes, places)| is_class(classes, class) && place.is_none_or(|p| places.contains(p)))
+    };
+    let depends_on = answer.depends_on.as_ref();
+    let coordinate = |effect: &TrueEffect, place: bool| {
+        depends_on.is_some_and(|found| {
+            coordinates(&effect.class).contains(&found.coordinate.as_str())
+                && (!place || found.places.iter().any(|place| effect.accepted_places.contains(place)))
+        })
+    };
+    let has_coordinate = truth.effects.iter().any(|effect| !coordinates(&effect.class).is_empty());
+    let judged = |place| {
+        (has_coordinate && depends_on.is_some()).then(|| truth.effects.iter().any(|effect| coordinate(effect, place)))
+    };
+    let declared = answer.declared.iter().filter_map(|(name, value, error)| {
+        let (_, truth) = truth.base_parameters.iter().find(|(known, _)| known == name)?;
+        let half = NORMAL95 * (*error)?;
+        Some(Covered { name: name.clone(), truth: *truth, value: *value, interval: [value - half, value + half] })
+    });
+    let of_entries = |judge: &dyn Fn(&Named) -> bool| -> Vec<bool> {
+        answer.statements.iter().map(|statement| statement.entries.iter().any(judge)).collect()
+    };
+    Stated {
+        name: answer.found.first().is_some_and(|(named, _)| same(named)),
+        entries: of_entries(&|(class, place)| is_right(class, Some(place))),
+        classes: of_entries(&|(class, _)| is_right(class, None)),
+        names: answer.found.iter().map(|(named, _)| same(named)).collect(),
+        coordinate: judged(false),
+        coordinate_place: judged(true),
+        declared: declared.collect(),
     }
 }
 
@@ -125,6 +200,7 @@ impl Row {
             place: false,
             both: None,
             covered: Vec::new(),
+            stated: Stated::default(),
         };
         let truth = trial.truth.effects.iter();
         let truth = truth.map(|e| {
@@ -136,6 +212,8 @@ impl Row {
             plant: trial.plant.clone(),
             kind,
             size,
+            background: trial.truth.background.clone(),
+            is_struck_out: false,
             truth: truth.collect(),
             judgement: answer.as_ref().map_or(nothing, |answer| judge(&trial.truth, answer)),
             answer,
@@ -164,6 +242,7 @@ mod tests {
             size: 5.0,
             noise_floor: Vec::new(),
             base_parameters: Vec::new(),
+            background: None,
             equivalents: vec![("constant-heat-gain".into(), "process:phi".into())],
         }
     }

@@ -18,14 +18,14 @@ use rand::seq::SliceRandom;
 
 use crate::parallel::each;
 pub(crate) use folder::{Cases, Reply, schema};
-#[cfg(test)]
-pub(crate) use judge::Judgement;
 pub(crate) use judge::Row;
+#[cfg(test)]
+pub(crate) use judge::{Judgement, Stated};
 pub(crate) use page::page;
 pub(crate) use plan::{Kind, Plan, Wish};
 pub(crate) use statistics::{Bin, Rate, brier, deciles, reliability, uniformity};
 pub(crate) use table::{csv, strengths};
-pub(crate) use tool::{Answer, Tools, spelt};
+pub(crate) use tool::{Answer, Statement, Tools, spelt};
 
 /// Results of the benchmark over simulated experiments.
 pub(crate) struct Results {
@@ -46,6 +46,8 @@ pub(crate) struct Comparisons {
     pub orders: u64,
     /// True to restrict the catalogue to the missing effects.
     pub known_effects: bool,
+    /// True to remove the missing effects from the catalogue.
+    pub without_truth: bool,
 }
 
 /// Runs a plan on `jobs` threads.
@@ -70,10 +72,19 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
 }
 
 fn answered(plan: &Plan, wish: &Wish, trial: &Trial, tools: Tools<'_>, comparisons: Comparisons) -> (Row, Option<Row>) {
-    let size = if wish.kind == Kind::Nothing { 0.0 } else { plan.nearest(trial.truth.size) };
-    let row = |answer| Row::new(trial, wish.kind, size, answer);
-    let missing = comparisons.known_effects.then(|| only(tools.catalogue, trial));
-    let tools = Tools { catalogue: missing.as_ref().unwrap_or(tools.catalogue), ..tools };
+    let size = match wish.kind {
+        Kind::Nothing => 0.0,
+        Kind::Setting(_) => trial.truth.size,
+        _ => plan.nearest(trial.truth.size),
+    };
+    let is_struck_out = comparisons.without_truth && !trial.truth.effects.is_empty();
+    let row = |answer| Row { is_struck_out, ..Row::new(trial, wish.kind, size, answer) };
+    let changed = if is_struck_out {
+        Some(without_truth(tools.catalogue, trial))
+    } else {
+        comparisons.known_effects.then(|| only(tools.catalogue, trial))
+    };
+    let tools = Tools { catalogue: changed.as_ref().unwrap_or(tools.catalogue), ..tools };
     let read = |tools: Tools<'_>| tools.study("study.toml", &trial.study, &tool::InMemory(&trial.files));
     let answer = |tools: Tools<'_>| {
         guarded(|| tools.diagnose(read(tools)?)).map(|(diagnosis, seconds)| Answer::of(&diagnosis, seconds))
@@ -96,6 +107,17 @@ fn only(catalogue: &Catalogue, trial: &Trial) -> Catalogue {
     let missing = |name| trial.truth.effects.iter().any(|e| names::names(&e.class, &e.strengths).contains(&name));
     let mut catalogue = catalogue.clone();
     catalogue.effects.retain(|effect| missing(effect.name()));
+    catalogue
+}
+
+/// Returns the catalogue without the missing effects and those equivalent to them, under all names that are accepted for them.
+fn without_truth(catalogue: &Catalogue, trial: &Trial) -> Catalogue {
+    let truth = &trial.truth;
+    let is_true = |name: &str| truth.effects.iter().any(|e| names::names(&e.class, &e.strengths).contains(&name));
+    let is_equivalent =
+        |name: &str| truth.equivalents.iter().any(|(class, _)| names::names(class, &[]).contains(&name));
+    let mut catalogue = catalogue.clone();
+    catalogue.effects.retain(|effect| !is_true(effect.name()) && !is_equivalent(effect.name()));
     catalogue
 }
 

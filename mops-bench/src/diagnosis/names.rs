@@ -25,6 +25,37 @@ pub(crate) fn names<'n>(class: &'n str, strengths: &[(String, f64)]) -> Vec<&'n 
     }
 }
 
+/// Returns the class of an effect of the catalogue.
+pub(crate) fn class_of(name: &str) -> Option<&'static str> {
+    effects().iter().find(|effect| effect.name() == name).map(|effect| effect.class().name())
+}
+
+/// Returns the coordinates on which the force of an effect of the test bed, or the change of its input, depends; empty if there is
+/// none.
+pub(crate) fn coordinates(class: &str) -> &'static [&'static str] {
+    match class {
+        "coulomb-friction"
+        | "stribeck-friction"
+        | "stiction"
+        | "asymmetric-friction"
+        | "dahl"
+        | "viscous-friction"
+        | "quadratic-drag"
+        | "cubic-damping" => &["speed"],
+        "position-dependent-friction" | "bouc-wen" => &["speed", "position", "position modulo one turn"],
+        "linear-stiffness" | "quadratic-stiffness" | "cubic-stiffness" | "cogging" | "end-stop" => {
+            &["position", "position modulo one turn"]
+        }
+        "backlash" => &["deflection", "position", "input"],
+        "leak" | "overflow" | "linear-loss" | "radiation-loss" => &["level"],
+        "input-saturation" | "input-dead-zone" | "input-asymmetry" | "input-quadratic" | "input-quantisation" => {
+            &["input"]
+        }
+        "input-delay" | "actuator-lag" => &["delayed input"],
+        _ => &[],
+    }
+}
+
 /// Returns a parameter by its name in the test bed; NaN if it does not exist.
 fn parameter(strengths: &[(String, f64)], wanted: &str) -> f64 {
     strengths.iter().find(|(name, _)| name == wanted).map_or(f64::NAN, |(_, value)| *value)

@@ -1,7 +1,9 @@
 //! Plan of the simulated cases.
 
 use mops::core::math;
-use mops_testbed::{Draw, Effect, Missing, Plant, Trial, effects, generate, outside, plants};
+use mops_testbed::{
+    Draw, Effect, Missing, NOMINAL, Plant, Setting, Trial, disturbed, effects, generate, outside, plants,
+};
 
 /// Number of attempts to generate a case, as not every effect reaches every size in every plant.
 const ATTEMPTS: u64 = 60;
@@ -17,6 +19,21 @@ pub(crate) enum Kind {
     Nothing,
     /// An effect that is not in the catalogue.
     Outside,
+    /// One effect or none, with or without a model error in the background.
+    Setting(Setting),
+}
+
+impl Kind {
+    /// Returns the name of the kind in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::One => "one",
+            Self::Two => "two",
+            Self::Nothing => "nothing",
+            Self::Outside => "outside",
+            Self::Setting(setting) => setting.letter(),
+        }
+    }
 }
 
 /// Plan of a benchmark.
@@ -29,7 +46,7 @@ pub(crate) struct Plan {
     /// Errors of the refitted nominal model, in units of the noise.
     pub sizes: Vec<f64>,
     /// Number of cases of each kind.
-    pub counts: [(Kind, usize); 4],
+    pub counts: Vec<(Kind, usize)>,
     /// Seed.
     pub seed: u64,
     /// Names of the selected cases; all if empty.
@@ -95,6 +112,9 @@ impl Plan {
     /// from those that the effect fits.
     pub fn make(&self, wish: &Wish) -> Option<Trial> {
         let Wish { kind, number } = *wish;
+        if let Kind::Setting(setting) = kind {
+            return self.make_setting(setting, number);
+        }
         let mut draw = Draw::new(self.seed, &format!("{kind:?} {number}"));
         let size = |among: usize| self.sizes[(number / among.max(1)) % self.sizes.len()];
         let fitting = |effect: &Effect| -> Vec<&'static Plant> {
@@ -135,6 +155,26 @@ impl Plan {
             }
         })
     }
+
+    /// Generates a case of a setting. Cases cycle through the plants, then through the effects of each in random order.
+    fn make_setting(&self, setting: Setting, number: usize) -> Option<Trial> {
+        let effects_of = |plant: &str| -> Vec<&'static str> {
+            let is_chosen =
+                |effect: &str| self.effects.iter().any(|name| Some(name.as_str()) == effect.split('@').next());
+            let own = NOMINAL.iter().filter(|nominal| nominal.plant == plant && is_chosen(nominal.effect));
+            own.flat_map(|nominal| std::iter::repeat_n(nominal.effect, nominal.weight)).collect()
+        };
+        let plants: Vec<(&String, Vec<&str>)> = self.plants.iter().map(|plant| (plant, effects_of(plant))).collect();
+        let plants: Vec<_> = plants.iter().filter(|(_, effects)| !effects.is_empty()).collect();
+        let (plant, effects) = plants.get(number % plants.len().max(1))?;
+        let mut order: Vec<&str> = effects.clone();
+        let mut draw = Draw::new(self.seed, &format!("{} effects of {plant}", setting.letter()));
+        for i in (1..order.len()).rev() {
+            order.swap(i, draw.below(i + 1));
+        }
+        let effect = order[number / plants.len() % order.len()];
+        (0..ATTEMPTS).find_map(|attempt| disturbed(setting, plant, effect, self.seed_of(number as u64, attempt)))
+    }
 }
 
 #[cfg(test)]
@@ -146,7 +186,7 @@ mod tests {
             plants: vec!["pendulum".into(), "servo".into()],
             effects: vec!["coulomb-friction".into(), "input-delay".into()],
             sizes: vec![5.0, 2.0],
-            counts: [(Kind::One, 4), (Kind::Two, 1), (Kind::Nothing, 2), (Kind::Outside, 1)],
+            counts: vec![(Kind::One, 4), (Kind::Two, 1), (Kind::Nothing, 2), (Kind::Outside, 1)],
             seed: 1,
             only: Vec::new(),
         }

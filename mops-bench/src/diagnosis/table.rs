@@ -1,9 +1,10 @@
 //! CSV tables of the cases, and of the estimated effect parameters with their true values.
 
 use super::judge::Row;
-use super::tool::spelt;
+use super::tool::{Answer, Dependence, RecordError, spelt};
+use mops::core::Role;
 
-const HEADER: [&str; 19] = [
+const HEADER: &[&str] = &[
     "case",
     "missing",
     "size",
@@ -22,12 +23,34 @@ const HEADER: [&str; 19] = [
     "p value",
     "seconds",
     "simulations",
+    "plant",
+    "background",
+    "background at",
+    "background share",
+    "background ratio",
+    "background time",
+    "truth struck out",
+    "named",
+    "named at",
+    "name right",
+    "class and place right",
+    "claimed",
+    "class probability",
+    "depends on",
+    "coordinate right",
+    "remaining",
+    "calibration before",
+    "calibration after",
+    "selection before",
+    "selection after",
+    "validation before",
+    "validation after",
     "failure",
 ];
 
 /// Returns the cases as CSV.
 pub(crate) fn csv(rows: &[Row]) -> String {
-    written(&HEADER, rows.iter().map(cells))
+    written(HEADER, rows.iter().map(cells))
 }
 
 /// Returns the parameters of true effects that were found as CSV: case, size, parameter, true value, estimate, interval.
@@ -57,7 +80,7 @@ fn cells(row: &Row) -> Vec<String> {
     };
     let mut cells = vec![
         row.name.clone(),
-        format!("{:?}", row.kind).to_lowercase(),
+        row.kind.name().to_owned(),
         row.size.to_string(),
         joined(|named| &named.0),
         joined(|named| &named.1),
@@ -79,12 +102,58 @@ fn cells(row: &Row) -> Vec<String> {
             format!("{:e}", a.p_value),
             format!("{:.3}", a.seconds),
             a.simulations.to_string(),
-            String::new(),
         ]),
+        Err(_) => cells.extend(std::iter::repeat_n(String::new(), 13)),
+    }
+    cells.extend(background(row));
+    match &row.answer {
+        Ok(answer) => cells.extend(statements(row, answer).into_iter().chain([String::new()])),
         Err(why) => {
-            cells.extend(std::iter::repeat_n(String::new(), HEADER.len() - 6));
+            cells.extend(std::iter::repeat_n(String::new(), HEADER.len() - cells.len() - 1));
             cells.push(why.clone());
         }
+    }
+    cells
+}
+
+fn background(row: &Row) -> Vec<String> {
+    let mut cells = vec![row.plant.clone()];
+    match &row.background {
+        Some(background) => cells.extend([
+            background.source.to_owned(),
+            background.at.clone(),
+            format!("{:.4}", background.share),
+            format!("{:.1}", background.ratio),
+            background.time.map_or_else(String::new, |time| format!("{time:.4}")),
+        ]),
+        None => cells.extend(std::iter::repeat_n(String::new(), 5)),
+    }
+    cells.push(row.is_struck_out.to_string());
+    cells
+}
+
+fn statements(row: &Row, answer: &Answer) -> Vec<String> {
+    let stated = &row.judgement.stated;
+    let joined = |texts: Vec<String>| texts.join("+");
+    let dependence = |found: &Option<Dependence>| {
+        found.as_ref().map_or_else(String::new, |d| format!("{} at {}", d.coordinate, d.places.join(" and ")))
+    };
+    let error = |role: Role, error: fn(&RecordError) -> f64| {
+        joined(answer.records.iter().filter(|r| r.role == role).map(|r| format!("{:.4}", error(r))).collect())
+    };
+    let mut cells = vec![
+        joined(answer.found.iter().map(|(named, _)| named.0.clone()).collect()),
+        joined(answer.found.iter().map(|(named, _)| named.1.clone()).collect()),
+        stated.name.to_string(),
+        joined(stated.entries.iter().map(bool::to_string).collect()),
+        joined(answer.statements.iter().map(|statement| statement.claimed.to_string()).collect()),
+        joined(answer.statements.iter().map(|statement| format!("{:.4}", statement.probability)).collect()),
+        dependence(&answer.depends_on),
+        stated.coordinate_place.map_or_else(String::new, |right| right.to_string()),
+        dependence(&answer.remaining),
+    ];
+    for role in [Role::Calibration, Role::Selection, Role::Validation] {
+        cells.extend([error(role, |record| record.before), error(role, |record| record.after)]);
     }
     cells
 }

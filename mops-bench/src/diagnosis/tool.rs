@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use mops::core::Quiet;
 use mops::core::file::{self, Files};
-use mops::discrepancy::{Diagnosis, Verdict, brute_force};
+use mops::core::{Quiet, Role, math};
+use mops::discrepancy::{Diagnosis, ExperimentError, Found, Verdict, brute_force};
 use mops::{Catalogue, Options, Study, Watch, solve};
 
 /// Common inputs of the tools.
@@ -72,6 +72,11 @@ impl Tools<'_> {
             p_value: f64::NAN,
             set: found.iter().map(|(named, _)| named.clone()).collect(),
             found,
+            statements: Vec::new(),
+            depends_on: None,
+            remaining: None,
+            records: Vec::new(),
+            declared: Vec::new(),
             strengths: Vec::new(),
             unexplained_at: None,
             simulations: done.simulations,
@@ -82,6 +87,42 @@ impl Tools<'_> {
 
 /// Effect and its place.
 pub(crate) type Named = (String, String);
+
+/// Statement on class and place of an effect found.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Statement {
+    /// Class and place of the effect, then those that the data cannot distinguish from these.
+    pub entries: Vec<Named>,
+    /// Probability that one of the entries is right.
+    pub probability: f64,
+    /// True if class and place are claimed.
+    pub claimed: bool,
+}
+
+/// Coordinate on which what is missing depends.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Dependence {
+    /// Coordinate, such as `speed`.
+    pub coordinate: String,
+    /// One place, or both of a force between two places.
+    pub places: Vec<String>,
+}
+
+/// Errors on an experiment, in units of the noise.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct RecordError {
+    /// Role of the experiment.
+    pub role: Role,
+    /// Error of the declared model.
+    pub before: f64,
+    /// Error with the effects found.
+    pub after: f64,
+    /// Number of samples of all channels.
+    pub samples: usize,
+}
+
+/// Estimate of a declared parameter: name, value, standard error.
+pub(crate) type Estimate = (String, f64, Option<f64>);
 
 /// Answer of a tool.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,6 +135,16 @@ pub(crate) struct Answer {
     pub p_value: f64,
     /// Missing effects, with their probabilities.
     pub found: Vec<(Named, f64)>,
+    /// Statements on class and place of these effects, in the same order; empty if the tool makes none.
+    pub statements: Vec<Statement>,
+    /// Coordinate on which what the declared model lacks depends.
+    pub depends_on: Option<Dependence>,
+    /// Coordinate on which what remains with the effects found depends.
+    pub remaining: Option<Dependence>,
+    /// Errors before and after, by experiment.
+    pub records: Vec<RecordError>,
+    /// Estimates of the declared parameters with the effects found.
+    pub declared: Vec<Estimate>,
     /// Effects that the data cannot distinguish from the first one, itself included.
     pub set: Vec<Named>,
     /// Parameters of the effects: index of the effect, name, value, interval.
@@ -104,6 +155,39 @@ pub(crate) struct Answer {
     pub simulations: usize,
     /// Time on one thread, in s.
     pub seconds: f64,
+}
+
+impl Statement {
+    fn of(found: &Found) -> Self {
+        let alike = found.alike.iter().filter_map(|entry| entry.split_once(" at "));
+        let alike = alike.map(|(class, place)| (class.to_owned(), place.to_owned()));
+        Self {
+            entries: std::iter::once((found.class.clone(), found.place.clone())).chain(alike).collect(),
+            probability: found.class_probability,
+            claimed: found.claimed,
+        }
+    }
+}
+
+impl Dependence {
+    fn of(found: &mops::discrepancy::Dependence) -> Self {
+        let places = std::iter::once(&found.place).chain(&found.other).cloned().collect();
+        Self { coordinate: found.coordinate.clone(), places }
+    }
+}
+
+/// Returns the errors before and after, by experiment.
+fn records(diagnosis: &Diagnosis) -> Vec<RecordError> {
+    let of = |(before, after): (&ExperimentError, &ExperimentError)| {
+        let own = diagnosis.predictions.iter().filter(|prediction| prediction.experiment == before.name);
+        RecordError {
+            role: before.role,
+            before: before.normalised,
+            after: after.normalised,
+            samples: own.map(|prediction| prediction.measured.len()).sum(),
+        }
+    };
+    diagnosis.before.iter().zip(&diagnosis.after).map(of).collect()
 }
 
 impl Answer {
@@ -125,6 +209,11 @@ impl Answer {
             probability: diagnosis.probability,
             p_value: diagnosis.p_value,
             found: found.iter().map(|f| ((f.effect.clone(), f.place.clone()), f.probability)).collect(),
+            statements: found.iter().map(Statement::of).collect(),
+            depends_on: diagnosis.depends_on.as_ref().map(Dependence::of),
+            remaining: diagnosis.remaining.as_ref().map(Dependence::of),
+            records: records(diagnosis),
+            declared: diagnosis.parameters.iter().map(|p| (p.name.clone(), p.after, p.std_error)).collect(),
             set,
             strengths: strengths.collect(),
             unexplained_at: diagnosis.unexplained.as_ref().map(|u| u.place.clone()),
@@ -141,6 +230,22 @@ impl Answer {
             all
         };
         self.verdict == other.verdict && named(self) == named(other)
+    }
+
+    /// Returns the ratio of the errors after and before on the experiments of a role; `None` without experiments or effects.
+    pub fn change(&self, role: Role) -> Option<f64> {
+        let own = || self.records.iter().filter(|record| record.role == role);
+        let squares = |error: fn(&RecordError) -> f64| own().map(|record| math::powi(error(record), 2)).sum::<f64>();
+        let is_known = own().next().is_some() && !self.found.is_empty();
+        is_known.then(|| (squares(|record| record.after) / squares(|record| record.before)).sqrt())
+    }
+
+    /// Returns true if the declared model exceeds the noise level on an experiment by more than a tenth, beyond chance: three
+    /// standard deviations of the root mean square of as many independent normal numbers.
+    #[allow(clippy::cast_precision_loss)]
+    pub fn exceeds_noise(&self) -> bool {
+        let chance = |samples: usize| 3.0 / (2.0 * samples as f64).sqrt();
+        self.records.iter().any(|record| record.before > 1.1 + chance(record.samples))
     }
 
     /// Returns the first effect; `None` if the verdict is not `effect`.

@@ -45,6 +45,8 @@ pub struct Bench {
     pub total: Vec<f64>,
     /// White noise, by experiment, output and sample.
     noise: Vec<Series>,
+    /// Names and roles of the experiments.
+    pub experiments: [(&'static str, &'static str); 3],
 }
 
 impl Bench {
@@ -70,7 +72,18 @@ impl Bench {
             white.iter().map(|s| (0..setup.samples).map(|_| s * normal.normal()).collect()).collect()
         });
         let noise = noise.collect();
-        Some(Self { plant, seed, label: label.to_owned(), p, guesses, setups, white, total, noise })
+        let experiments = EXPERIMENTS;
+        Some(Self { plant, seed, label: label.to_owned(), p, guesses, setups, white, total, noise, experiments })
+    }
+
+    /// Scales the white noise so that its standard deviation is `level` times that of the outputs' definitions.
+    pub fn set_noise(&mut self, level: f64) {
+        for (o, output) in self.plant.outputs.iter().enumerate() {
+            let factor = level * output.noise / self.white[o];
+            self.white[o] *= factor;
+            self.total[o] = math::hypot(self.white[o], output.lsb / 12.0_f64.sqrt());
+            self.noise.iter_mut().flat_map(|series| &mut series[o]).for_each(|v| *v *= factor);
+        }
     }
 
     /// Returns an effect by name, at a place where it fits.
@@ -109,9 +122,13 @@ impl Bench {
     /// Returns the error of the baseline model refitted to the calibration experiment. The fit starts from the last
     /// fit, or from the true values.
     pub fn error(&self, families: &Choice<'_>, strengths: &[f64], last: &mut Fitted) -> Option<f64> {
-        let measured = self.measured(0, &self.clean(0, families, strengths)?);
+        self.error_of(&self.measured(0, &self.clean(0, families, strengths)?), last)
+    }
+
+    /// Returns the error of the baseline model refitted to measurements of the calibration experiment.
+    pub fn error_of(&self, measured: &Series, last: &mut Fitted) -> Option<f64> {
         let setup = &self.setups[0];
-        let refit = |from: (&[f64], &[f64])| fit(self.plant, setup, &measured, &self.total, from);
+        let refit = |from: (&[f64], &[f64])| fit(self.plant, setup, measured, &self.total, from);
         let mut best = last.as_ref().and_then(|(p, x)| refit((p, x)));
         if best.is_none() {
             best = refit((&self.p, &setup.start));
@@ -150,9 +167,14 @@ impl Bench {
 
     /// Returns the data files and the noise in them.
     pub fn record(&self, families: &Choice<'_>, strengths: &[f64]) -> Option<Recorded> {
+        self.record_of(|e| self.clean(e, families, strengths))
+    }
+
+    /// Returns the data files and the noise in them, from the outputs of ideal sensors in each experiment.
+    pub fn record_of(&self, clean: impl Fn(usize) -> Option<Series>) -> Option<Recorded> {
         let (mut files, mut floors) = (Vec::new(), Vec::new());
-        for (e, (name, _)) in EXPERIMENTS.iter().enumerate() {
-            let clean = self.clean(e, families, strengths)?;
+        for (e, (name, _)) in self.experiments.iter().enumerate() {
+            let clean = clean(e)?;
             let measured = self.measured(e, &clean);
             // An effect may drive another experiment far away: such an experiment would not be realistic.
             let base = base_outputs(self.plant, &self.p, &self.setups[e].start, &self.setups[e], 4)?;

@@ -60,3 +60,53 @@ pub fn weather(draw: &mut Draw, samples: usize, dt: f64, mean: f64, swing: f64) 
         mean + walk + swing * math::sin(TAU * k as f64 * dt / 86_400.0 + phase)
     }))
 }
+
+/// Returns the number of samples of a record: twice `samples` for calibration, which is experiment 0.
+pub fn length(experiment: usize, samples: usize) -> usize {
+    if experiment == 0 { 2 * samples } else { samples }
+}
+
+/// Excitation with root mean square 1 within a band of frequencies, Hz: sines and filtered steps for calibration, sines
+/// of larger size for selection, filtered steps for validation.
+pub fn record(draw: &mut Draw, experiment: usize, (samples, dt): (usize, f64), band: (f64, f64)) -> Vec<f64> {
+    let unit = |v: Vec<f64>| {
+        let mean = v.iter().sum::<f64>() / v.len() as f64;
+        let spread = (v.iter().map(|v| math::powi(v - mean, 2)).sum::<f64>() / v.len() as f64).sqrt();
+        v.into_iter().map(|v| v / spread).collect::<Vec<f64>>()
+    };
+    let sines = |draw: &mut Draw| {
+        let lines: Vec<(f64, f64)> =
+            (0..7).map(|_| (TAU * draw.log_between(band.0, band.1), draw.between(0.0, TAU))).collect();
+        let sum = |k: usize| lines.iter().map(|(w, phase)| math::cos(w * k as f64 * dt + phase)).sum();
+        unit((0..samples).map(sum).collect())
+    };
+    let filtered = |draw: &mut Draw| {
+        let (decay, mut level, mut left, mut y) = (math::exp(-TAU * band.1 * dt), 0.0, 0, 0.0);
+        let step = |_| {
+            if left == 0 {
+                if draw.chance(0.9) {
+                    level = draw.between(-1.7, 1.7);
+                }
+                left = (3.0 * draw.between(0.15, 0.6) / (band.1 * dt)) as usize + 2;
+            }
+            left -= 1;
+            y = decay * y + (1.0 - decay) * level;
+            y
+        };
+        unit((0..samples).map(step).collect())
+    };
+    match experiment {
+        0 => {
+            let (a, b) = (sines(draw), filtered(draw));
+            unit(a.iter().zip(&b).map(|(a, b)| 0.6 * a + 0.8 * b).collect())
+        }
+        1 => sines(draw).into_iter().map(|v| 1.15 * v).collect(),
+        _ => filtered(draw),
+    }
+}
+
+/// Returns `factor u + offset`, limited to a range.
+pub fn scaled(u: &[f64], factor: f64, offset: f64, limits: Option<(f64, f64)>) -> Vec<f64> {
+    let (low, high) = limits.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+    shown(u.iter().map(|u| (factor * u + offset).clamp(low, high)))
+}

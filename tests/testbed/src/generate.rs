@@ -124,6 +124,7 @@ pub fn generate(plant: &str, missing: Missing<'_>, size: f64, seed: u64) -> Opti
             effects: true_effects,
             verdict,
             size: reached,
+            background: None,
             noise_floor: floors,
             base_parameters: plant.parameters.iter().zip(&bench.p).map(|(p, v)| (p.name.to_owned(), *v)).collect(),
         },

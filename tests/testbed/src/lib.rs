@@ -3,8 +3,11 @@
 //!
 //! A [`Trial`] is a study file, its data files and the truth. [`generate`] creates one from a plant, the effects
 //! missing in its baseline model, a size and a seed; the same four arguments give identical bits.
+//! [`disturbed`] creates one with a model error in the background.
 
+mod background;
 mod bench;
+mod disturbed;
 mod draw;
 mod effects;
 mod excitation;
@@ -21,6 +24,7 @@ mod strength;
 mod study;
 mod trial;
 
+pub use disturbed::{NOMINAL, Nominal, Setting, disturbed};
 pub use draw::Draw;
 pub use effects::{Effect, effects};
 pub use fit::{Fit, Series, fit};
@@ -28,6 +32,6 @@ pub use generate::{Missing, SIZES, generate};
 pub use law::{At, Dry, Installed, Law, Spot};
 pub use outside::outside;
 pub use plant::{Output, Parameter, Place, Plant, Setup};
-pub use plants::plants;
+pub use plants::{disturbed_plants, plants};
 pub use simulate::{base_outputs, base_states, outputs};
-pub use trial::{Trial, TrueEffect, Truth};
+pub use trial::{Disturbance, Trial, TrueEffect, Truth};

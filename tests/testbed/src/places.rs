@@ -59,6 +59,15 @@ pub fn equivalents(plant: &Plant, effects: &[TrueEffect]) -> Vec<(String, String
         // A wrong sensor gain appears as a wrong gravity.
         "ball" => &[&[("constant-force", "joint:y"), ("sensor-drift", "sensor:y"), ("sensor-gain", "sensor:y")]],
         "drive" => &[&[("constant-force", "joint:q1"), ("input-bias", "actuator:u")]],
+        "driven-pendulum" => &[
+            &[("constant-force", "joint:q"), ("input-bias", "actuator:u")],
+            &[("input-delay", "actuator:u"), ("sensor-delay", "sensor:q")],
+        ],
+        "two-masses" => &[&[("constant-force", "joint:q1"), ("input-bias", "actuator:u")]],
+        "cascade" => &[
+            &[("constant-force", "process:h1"), ("input-bias", "actuator:u")],
+            &[("input-delay", "actuator:u"), ("sensor-delay", "sensor:h2")],
+        ],
         "furuta-driven" => &[&[("constant-force", "joint:ph"), ("input-bias", "actuator:u")]],
         "tanks" => &[&[("constant-force", "process:h1"), ("input-bias", "actuator:u")]],
         "room" => &[&[

@@ -47,11 +47,13 @@ pub struct Traits {
     pub thermal: bool,
     /// True if the equations are linear in states and inputs.
     pub linear: bool,
+    /// States that no measurement determines: index, guess of the initial value, lower and upper bound.
+    pub unmeasured: &'static [(usize, [f64; 3])],
 }
 
 /// None of the properties.
 pub const PLAIN: Traits =
-    Traits { mass: None, spring: None, coupling: None, levels: false, thermal: false, linear: false };
+    Traits { mass: None, spring: None, coupling: None, levels: false, thermal: false, linear: false, unmeasured: &[] };
 
 /// Measured state.
 #[derive(Debug, Clone, Copy)]

@@ -71,8 +71,7 @@ pub fn text(plant: &Plant, declared: &Declared<'_>) -> String {
             })
             .collect();
         line(format!("channels = {{ {} }}", channels.join(", ")));
-        let free: Vec<String> = plant.states.iter().map(|(name, _)| format!("\"{name}\"")).collect();
-        line(format!("free     = [{}]\nrole     = \"{role}\"", free.join(", ")));
+        line(format!("free     = {}\nrole     = \"{role}\"", free(plant)));
     }
     line("\n[criteria]".to_owned());
     for output in plant.outputs {
@@ -80,4 +79,19 @@ pub fn text(plant: &Plant, declared: &Declared<'_>) -> String {
         line(format!("{name} = {{ normalised-error = {{ signal = \"{name}\" }}, demand = 1.0 }}"));
     }
     s
+}
+
+/// Returns the free initial states of an experiment: a list, or a table if a state is not determined by a measurement.
+fn free(plant: &Plant) -> String {
+    let unmeasured = plant.traits.unmeasured;
+    let one = |(i, (name, _)): (usize, &(&str, &str))| {
+        let guess = unmeasured.iter().find(|(state, _)| *state == i);
+        match guess {
+            Some((_, [start, min, max])) => format!("{name} = {{ start = {start}, min = {min}, max = {max} }}"),
+            None if unmeasured.is_empty() => format!("\"{name}\""),
+            None => format!("{name} = {{}}"),
+        }
+    };
+    let all: Vec<String> = plant.states.iter().enumerate().map(one).collect();
+    if unmeasured.is_empty() { format!("[{}]", all.join(", ")) } else { format!("{{ {} }}", all.join(", ")) }
 }

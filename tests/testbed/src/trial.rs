@@ -23,7 +23,7 @@ pub struct Trial {
 pub struct Truth {
     /// Missing effects; empty if nothing is missing.
     pub effects: Vec<TrueEffect>,
-    /// `effect`, `none` or `unexplained`.
+    /// `effect`, `none` or `unexplained`; `none or unexplained` if the only model error is in the background.
     pub verdict: &'static str,
     /// Error of the baseline model refitted to the calibration experiment; 1 is the noise level.
     pub size: f64,
@@ -32,8 +32,25 @@ pub struct Truth {
     pub noise_floor: Vec<(String, f64)>,
     /// True parameters of the baseline model.
     pub base_parameters: Vec<(String, f64)>,
+    /// Model error in the background, if there is one.
+    pub background: Option<Disturbance>,
     /// Effects and places that no data of this plant could distinguish from the true effect, if it is a single one.
     pub equivalents: Vec<(String, String)>,
+}
+
+/// Model error in the background of a case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Disturbance {
+    /// Source: `force`, `drift`, `coloured` or `state`.
+    pub source: &'static str,
+    /// Place of a force that depends on the state, or drifting parameter; empty otherwise.
+    pub at: String,
+    /// Deviation of the outputs that it causes, relative to that of an effect.
+    pub share: f64,
+    /// Deviation of the outputs that it causes, relative to the white noise.
+    pub ratio: f64,
+    /// Correlation time, s; `None` if it is a function of the state.
+    pub time: Option<f64>,
 }
 
 /// Missing effect.

@@ -2,9 +2,11 @@
 
 mod axis;
 mod ball;
+mod cascade;
 mod circuit;
 mod crane;
 mod drive;
+mod driven_pendulum;
 mod furuta;
 mod jacket;
 mod pendulum;
@@ -13,6 +15,7 @@ mod servo;
 mod spring;
 mod tanks;
 mod torsion;
+mod two_masses;
 
 use crate::plant::{Place, Plant};
 
@@ -34,6 +37,13 @@ pub fn plants() -> &'static [&'static Plant] {
         &jacket::PLANT,
         &circuit::PLANT,
     ]
+}
+
+/// Returns the plants of cases with a model error in the background.
+///
+/// Their records are short. The calibration record is as long as the two others together.
+pub fn disturbed_plants() -> &'static [&'static Plant] {
+    &[&driven_pendulum::PLANT, &two_masses::PLANT, &cascade::PLANT]
 }
 
 /// Creates an angle with viscous friction and without a spring in the baseline model.
