@@ -1,4 +1,5 @@
-//! Table of the diagnosis by kind of case, over cases with and without a model error in the background.
+//! Table of the diagnosis by kind of case, over cases with and without a model error in the background. Rates are counts with
+//! their 95 % intervals in %.
 
 use crate::diagnosis::{Answer, Kind, Rate, Row, Statement, brier};
 use mops::core::Role;
@@ -26,6 +27,9 @@ const MEASURES: &[Measure] = &[
     ("class and place claimed (verdict effect)", |all| rate(all, |case| Some(case.claims()))),
     ("true effect named first", |all| rate(all, |case| case.lacks_known().then_some(case.row.judgement.stated.name))),
     ("its class and place named first", |all| rate(all, |case| case.lacks_known().then(|| case.entry_right()))),
+    ("true effect in the stated set", |all| {
+        rate(all, |case| case.lacks_known().then_some(case.row.judgement.stated.in_set))
+    }),
     ("true effect named first and claimed", |all| {
         rate(all, |case| case.lacks_known().then(|| case.first_claimed() && case.row.judgement.stated.name))
     }),
@@ -33,6 +37,7 @@ const MEASURES: &[Measure] = &[
         rate(all, |case| case.lacks_known().then(|| case.first_claimed() && case.entry_right()))
     }),
     ("missed: nothing named", |all| rate(all, |case| case.lacks_known().then_some(!case.is_named()))),
+    ("wrong class and place claimed", |all| rate(all, |case| Some(case.claims_wrong_entry()))),
     ("certain and wrong, by class and place", |all| {
         rate(all, |case| Some(case.certain(|i| case.statements()[i].probability, &case.row.judgement.stated.entries)))
     }),
@@ -43,7 +48,10 @@ const MEASURES: &[Measure] = &[
     ("wrong class claimed", |all| rate(all, |case| case.lacks_effect().then(|| case.wrong_class(true)))),
     ("coordinate stated", |all| rate(all, |case| Some(case.answer.depends_on.is_some()))),
     ("coordinate right, of those stated", |all| rate(all, |case| case.row.judgement.stated.coordinate)),
-    ("coordinate and place right, of those stated", |all| rate(all, |case| case.row.judgement.stated.coordinate_place)),
+    ("its place right, of those stated", |all| rate(all, |case| case.row.judgement.stated.coordinate_place)),
+    ("coordinate and place right, of those stated", |all| {
+        rate(all, |case| case.row.judgement.stated.coordinate_and_place)
+    }),
     ("coordinate of what remains stated", |all| rate(all, |case| Some(case.answer.remaining.is_some()))),
     ("claims with a worse forecast of validation", |all| {
         rate(all, |case| case.claims().then(|| case.answer.change(Role::Validation).is_some_and(|c| c > WORSE)))
@@ -91,7 +99,8 @@ pub(super) fn kinds(rows: &[Row]) -> String {
     lines.extend(
         MEASURES.iter().map(|(name, measure)| line(name, answered.iter().map(|cases| measure(cases)).collect())),
     );
-    let header: Vec<&str> = [""].into_iter().chain(titles.iter().map(String::as_str)).collect();
+    let header: Vec<&str> =
+        ["counts (95 % intervals, %)"].into_iter().chain(titles.iter().map(String::as_str)).collect();
     table(&header, &[], lines)
 }
 
@@ -141,6 +150,12 @@ impl<'a> Case<'a> {
         classes.zip(self.statements()).any(|(right, statement)| !right && (statement.claimed || !only_claimed))
     }
 
+    /// Returns true if a class and place are claimed that are not those of a missing effect.
+    fn claims_wrong_entry(&self) -> bool {
+        let entries = self.row.judgement.stated.entries.iter();
+        entries.zip(self.statements()).any(|(right, statement)| !right && statement.claimed)
+    }
+
     /// Returns true if the true class and place are named first or, without a missing effect, nothing is claimed.
     fn is_right(&self) -> bool {
         if self.row.truth.is_empty() { !self.claims() } else { self.entry_right() }
@@ -167,7 +182,7 @@ fn shown(rate: Rate) -> String {
     if rate.of == 0 {
         return String::new();
     }
-    format!("{}/{} ({:.0} to {:.0} %)", rate.hits, rate.of, 100.0 * low, 100.0 * high)
+    format!("{}/{} ({:.0}-{:.0})", rate.hits, rate.of, 100.0 * low, 100.0 * high)
 }
 
 /// Formats the share of 95 % intervals that hold the true value.

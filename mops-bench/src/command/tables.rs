@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::kinds::kinds;
 use crate::diagnosis::{Bin, Kind, Rate, Results, Row, brier, deciles, reliability, uniformity};
 use mops::terminal::table;
+use mops_testbed::Setting;
 
 /// Formats all tables.
 pub(super) fn all(results: &Results) -> String {
@@ -189,7 +190,7 @@ fn line_of(bin: &Bin) -> Vec<String> {
 }
 
 fn p_values(rows: &[Row]) -> String {
-    let of_nothing = rows.iter().filter(|row| row.kind == Kind::Nothing);
+    let of_nothing = rows.iter().filter(|row| matches!(row.kind, Kind::Nothing | Kind::Setting(Setting::Exact)));
     let values: Vec<f64> = of_nothing.filter_map(|row| row.answer.as_ref().ok()).map(|a| a.p_value).collect();
     if values.is_empty() {
         return String::new();

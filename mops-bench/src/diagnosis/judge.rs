@@ -5,7 +5,7 @@ use mops_testbed::{Disturbance, Trial, TrueEffect, Truth};
 
 use super::names::{class_of, coordinates, names, strengths};
 use super::plan::Kind;
-use super::tool::{Answer, Named};
+use super::tool::{Answer, Dependence, Named};
 
 /// Estimated parameter of an effect, with its true value.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,10 +61,14 @@ pub(crate) struct Stated {
     pub classes: Vec<bool>,
     /// For each effect found: true if it is a true effect, or an equivalent one, at its place.
     pub names: Vec<bool>,
-    /// True if what is missing depends on the stated coordinate; `None` if none is stated or none is right.
+    /// True if a true effect, or an equivalent one, is among the effects that the data cannot distinguish from the first one.
+    pub in_set: bool,
+    /// True if what is missing depends on the stated coordinate; `None` if none is stated, or if it depends on none.
     pub coordinate: Option<bool>,
-    /// True if the coordinate and its place are right.
+    /// True if the place of the coordinate is right, that of a background which depends on the state included.
     pub coordinate_place: Option<bool>,
+    /// True if the coordinate and its place are right.
+    pub coordinate_and_place: Option<bool>,
     /// Estimated declared parameters.
     pub declared: Vec<Covered>,
 }
@@ -147,7 +151,7 @@ pub(crate) fn judge(truth: &Truth, answer: &Answer) -> Judgement {
 const NORMAL95: f64 = 1.959_964;
 
 /// Judges the statements of an answer; `same` recognises true effects and equivalent ones.
-fn stated(truth: &Truth, answer: &Answer, same: impl Fn(&Named) -> bool) -> Stated {
+fn stated(truth: &Truth, answer: &Answer, same: impl Fn(&Named) -> bool + Copy) -> Stated {
     let of = |names: Vec<&str>| names.into_iter().filter_map(class_of).collect::<Vec<_>>();
     let mut right: Vec<(Vec<&str>, &[String])> =
         truth.effects.iter().map(|e| (of(names(&e.class, &e.strengths)), e.accepted_places.as_slice())).collect();
@@ -160,16 +164,18 @@ fn stated(truth: &Truth, answer: &Answer, same: impl Fn(&Named) -> bool) -> Stat
         right.iter().any(|(classes, places)| is_class(classes, class) && place.is_none_or(|p| places.contains(p)))
     };
     let depends_on = answer.depends_on.as_ref();
-    let coordinate = |effect: &TrueEffect, place: bool| {
-        depends_on.is_some_and(|found| {
-            coordinates(&effect.class).contains(&found.coordinate.as_str())
-                && (!place || found.places.iter().any(|place| effect.accepted_places.contains(place)))
-        })
+    let effects = || truth.effects.iter().filter(|effect| !coordinates(&effect.class).is_empty());
+    let repeating = truth.background.as_ref().filter(|background| background.source == "state");
+    let is_over =
+        |effect: &TrueEffect, found: &Dependence| coordinates(&effect.class).contains(&found.coordinate.as_str());
+    let is_at = |effect: &TrueEffect, found: &Dependence| {
+        found.places.iter().any(|place| effect.accepted_places.contains(place))
     };
-    let has_coordinate = truth.effects.iter().any(|effect| !coordinates(&effect.class).is_empty());
-    let judged = |place| {
-        (has_coordinate && depends_on.is_some()).then(|| truth.effects.iter().any(|effect| coordinate(effect, place)))
+    let of_effects = |judge: &dyn Fn(&TrueEffect, &Dependence) -> bool| {
+        let found = depends_on.filter(|_| effects().next().is_some())?;
+        Some(effects().any(|effect| judge(effect, found)))
     };
+    let of_background = || Some(depends_on?.places.contains(&repeating?.at));
     let declared = answer.declared.iter().filter_map(|(name, value, error)| {
         let (_, truth) = truth.base_parameters.iter().find(|(known, _)| known == name)?;
         let half = NORMAL95 * (*error)?;
@@ -183,8 +189,10 @@ fn stated(truth: &Truth, answer: &Answer, same: impl Fn(&Named) -> bool) -> Stat
         entries: of_entries(&|(class, place)| is_right(class, Some(place))),
         classes: of_entries(&|(class, _)| is_right(class, None)),
         names: answer.found.iter().map(|(named, _)| same(named)).collect(),
-        coordinate: judged(false),
-        coordinate_place: judged(true),
+        in_set: answer.set.iter().any(same),
+        coordinate: of_effects(&is_over),
+        coordinate_place: of_effects(&is_at).or_else(of_background),
+        coordinate_and_place: of_effects(&|effect, found| is_over(effect, found) && is_at(effect, found)),
         declared: declared.collect(),
     }
 }

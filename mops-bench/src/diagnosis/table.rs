@@ -37,7 +37,7 @@ const HEADER: &[&str] = &[
     "claimed",
     "class probability",
     "depends on",
-    "coordinate right",
+    "coordinate and place right",
     "remaining",
     "calibration before",
     "calibration after",
@@ -149,7 +149,7 @@ fn statements(row: &Row, answer: &Answer) -> Vec<String> {
         joined(answer.statements.iter().map(|statement| statement.claimed.to_string()).collect()),
         joined(answer.statements.iter().map(|statement| format!("{:.4}", statement.probability)).collect()),
         dependence(&answer.depends_on),
-        stated.coordinate_place.map_or_else(String::new, |right| right.to_string()),
+        stated.coordinate_and_place.map_or_else(String::new, |right| right.to_string()),
         dependence(&answer.remaining),
     ];
     for role in [Role::Calibration, Role::Selection, Role::Validation] {
