@@ -252,6 +252,50 @@ mod tests {
         }
     }
 
+    fn bench() -> Bench {
+        Bench::draw(crate::plants::disturbed_plants()[1], 1, "test").expect("the plant does not diverge")
+    }
+
+    fn at(experiment: usize, t: f64) -> crate::law::At<'static> {
+        crate::law::At { t, experiment, q: 0.1, v: 0.2, x: &[0.1, 0.2, 0.15, 0.1], u: &[0.3], z: &[] }
+    }
+
+    /// Returns the force of the first law of a background in an experiment.
+    fn force(background: &Background, experiment: usize, t: f64) -> f64 {
+        background.laws(experiment, 0.1)[0].law.force.as_ref().expect("it is a force")(&at(experiment, t))
+    }
+
+    #[test]
+    fn a_random_force_differs_between_experiments_and_a_function_of_the_state_does_not() {
+        let (bench, mut draw) = (bench(), Draw::new(5, "test"));
+        let state = Background::draw(&bench, Class::Repeating, &mut draw).expect("it can be drawn");
+        assert_eq!(force(&state, 0, 1.0), force(&state, 2, 3.0));
+        let is_force = |b: &Background| b.source == "force";
+        let mut all = std::iter::repeat_with(|| Background::draw(&bench, Class::Random, &mut draw).unwrap());
+        let random = all.find(is_force).expect("most are forces");
+        assert!(force(&random, 0, 1.0) != force(&random, 1, 1.0) && force(&random, 0, 1.0) != force(&random, 0, 3.0));
+        // Every balance has its force.
+        assert_eq!(random.laws(0, 0.1).len(), 2);
+    }
+
+    #[test]
+    fn sources_have_their_probabilities_and_correlation_times_their_ranges() {
+        let (bench, mut draw) = (bench(), Draw::new(7, "test"));
+        let (dt, shortest) = (0.02, 249.0 * 0.02);
+        let draws: Vec<Background> =
+            (0..200).map(|_| Background::draw(&bench, Class::Random, &mut draw).unwrap()).collect();
+        for (source, probability, low, high) in [
+            ("force", 0.6_f64, 4.0 * dt, shortest / 10.0),
+            ("drift", 0.2, shortest / 6.0, shortest / 2.0),
+            ("coloured", 0.2, 2.0 * dt, shortest / 20.0),
+        ] {
+            let own: Vec<&Background> = draws.iter().filter(|b| b.source == source).collect();
+            let error = (probability * (1.0 - probability) / 200.0).sqrt();
+            assert!((own.len() as f64 / 200.0 - probability).abs() < 4.0 * error, "{} of {source}", own.len());
+            assert!(own.iter().all(|b| b.time.is_some_and(|time| (low..=high).contains(&time))), "{source}");
+        }
+    }
+
     #[test]
     fn a_function_of_the_state_has_unit_variance_and_the_correlation_length_of_its_waves() {
         let mut draw = Draw::new(3, "state");
