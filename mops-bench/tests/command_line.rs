@@ -95,6 +95,9 @@ fn a_wrong_command_line_gets_one_error_and_its_remedy() {
         (&["minimax", "--solver", "squp"], "there is no solver `squp`"),
         (&["diagnosis", "--plants", "servos"], "`servos`"),
         (&["diagnosis", "--sizes", "0.5"], "found 0.5"),
+        (&["diagnosis", "--kinds", "E"], "'E'"),
+        (&["diagnosis", "--kinds", "A", "--none", "3"], "--none"),
+        (&["diagnosis", "--kinds", "A", "--plants", "servo"], "`servo`"),
     ] {
         let done = bench(arguments).output().unwrap();
         let text = String::from_utf8(done.stderr).unwrap();

@@ -196,3 +196,65 @@ fn sorted_seconds(all: &[Case<'_>]) -> Vec<f64> {
     seconds.sort_by(f64::total_cmp);
     seconds
 }
+
+#[cfg(test)]
+mod tests {
+    use mops_testbed::Setting;
+
+    use super::*;
+    use crate::diagnosis::{Judgement, Stated, answers};
+
+    fn row(setting: Setting, answer: Result<Answer, String>, stated: Stated) -> Row {
+        let truth = vec![("coulomb-friction".to_owned(), "joint:phi".to_owned())];
+        Row {
+            name: "case".into(),
+            plant: "two-masses".into(),
+            kind: Kind::Setting(setting),
+            size: 10.0,
+            background: None,
+            is_struck_out: false,
+            truth: if setting.lacks_effect() { truth } else { Vec::new() },
+            judgement: Judgement {
+                verdict: answer.as_ref().is_ok_and(|answer| answer.found.is_empty() != setting.lacks_effect()),
+                stated,
+                ..Judgement::default()
+            },
+            answer,
+            agreeing: Vec::new(),
+        }
+    }
+
+    fn judged(right: bool) -> Stated {
+        Stated { name: right, entries: vec![right], classes: vec![right], names: vec![right], ..Stated::default() }
+    }
+
+    #[test]
+    fn rates_are_counted_by_kind_over_the_cases_that_they_concern() {
+        let coulomb = || Ok(answers::coulomb());
+        let nothing = || Ok(answers::nothing());
+        let rows = [
+            row(Setting::Exact, nothing(), Stated::default()),
+            row(Setting::Exact, coulomb(), judged(false)),
+            row(Setting::Effect, coulomb(), judged(true)),
+            row(Setting::Effect, nothing(), Stated::default()),
+            row(Setting::Effect, Err("it diverges".into()), Stated::default()),
+            Row { is_struck_out: true, ..row(Setting::Effect, coulomb(), judged(false)) },
+        ];
+        let text = kinds(&rows);
+        let cells = |of: &str| -> Vec<String> {
+            let line = text.lines().find(|line| line.trim().starts_with(of)).unwrap_or_else(|| panic!("{of}: {text}"));
+            let rest = line.trim()[of.len()..].split("  ").map(str::trim);
+            rest.filter(|cell| !cell.is_empty()).map(str::to_owned).collect()
+        };
+        assert_eq!(cells("cases"), ["2", "3", "1"]);
+        assert_eq!(cells("failed"), ["0", "1", "0"]);
+        assert_eq!(cells("class and place claimed (verdict effect)"), ["1/2 (1-99)", "1/2 (1-99)", "1/1 (2-100)"]);
+        assert_eq!(cells("true effect named first and claimed"), ["1/2 (1-99)"]);
+        assert_eq!(cells("missed: nothing named"), ["1/2 (1-99)"]);
+        assert_eq!(cells("wrong class claimed"), ["0/2 (0-84)", "1/1 (2-100)"]);
+        assert_eq!(cells("certain and wrong, by class and place"), ["1/2 (1-99)", "0/2 (0-84)", "1/1 (2-100)"]);
+        // 0.93 that nothing is missing, right; 0.95 for friction, wrong.
+        assert_eq!(cells("Brier score")[0], "0.454");
+        assert!(kinds(&[]).is_empty());
+    }
+}

@@ -28,7 +28,7 @@ impl Covered {
 }
 
 /// Judgement of an answer.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Judgement {
     /// True if the verdict is correct.
     pub verdict: bool,
@@ -200,16 +200,6 @@ fn stated(truth: &Truth, answer: &Answer, same: impl Fn(&Named) -> bool + Copy) 
 impl Row {
     /// Creates the row of a case from its answer.
     pub fn new(trial: &Trial, kind: Kind, size: f64, answer: Result<Answer, String>) -> Self {
-        let nothing = Judgement {
-            verdict: false,
-            decision: false,
-            first: false,
-            in_set: false,
-            place: false,
-            both: None,
-            covered: Vec::new(),
-            stated: Stated::default(),
-        };
         let truth = trial.truth.effects.iter();
         let truth = truth.map(|e| {
             let name = if e.class == "unknown" { e.formula.as_str() } else { names(&e.class, &e.strengths)[0] };
@@ -223,7 +213,7 @@ impl Row {
             background: trial.truth.background.clone(),
             is_struck_out: false,
             truth: truth.collect(),
-            judgement: answer.as_ref().map_or(nothing, |answer| judge(&trial.truth, answer)),
+            judgement: answer.as_ref().map(|answer| judge(&trial.truth, answer)).unwrap_or_default(),
             answer,
             agreeing: Vec::new(),
         }
@@ -278,6 +268,60 @@ mod tests {
         let none = truth("", "joint:phi", "none");
         assert!(!judge(&none, &answers::coulomb()).decision);
         assert!(judge(&none, &answers::nothing()).decision);
+    }
+
+    #[test]
+    fn a_statement_is_right_if_one_of_its_entries_is_that_of_the_truth() {
+        let mut answer = answers::coulomb();
+        let friction = truth("coulomb-friction", "joint:phi", "effect");
+        let right = judge(&friction, &answer).stated;
+        assert!(right.name && right.in_set && right.entries == [true] && right.classes == [true]);
+        // Constant heat gains are equivalent and have another class.
+        answer.statements[0].entries = vec![("bias".into(), "process:phi".into())];
+        assert_eq!(judge(&friction, &answer).stated.entries, [true]);
+        answer.statements[0].entries = vec![("elastic".into(), "joint:phi".into())];
+        let wrong = judge(&friction, &answer).stated;
+        assert!(wrong.name && wrong.entries == [false] && wrong.classes == [false]);
+        answer.statements[0].entries.push(("dissipative".into(), "joint:theta".into()));
+        let elsewhere = judge(&friction, &answer).stated;
+        assert!(elsewhere.entries == [false] && elsewhere.classes == [true]);
+    }
+
+    #[test]
+    fn a_coordinate_is_judged_with_its_place_where_what_is_missing_has_one() {
+        let mut answer = answers::unexplained();
+        let over = |coordinate: &str, place: &str| {
+            Some(Dependence { coordinate: coordinate.into(), places: vec![place.into()] })
+        };
+        let friction = truth("coulomb-friction", "joint:phi", "effect");
+        assert_eq!(judge(&friction, &answer).stated.coordinate, None);
+        for (coordinate, place, right, right_place) in [
+            ("speed", "joint:phi", true, true),
+            ("speed", "joint:theta", true, false),
+            ("input", "joint:phi", false, true),
+        ] {
+            answer.depends_on = over(coordinate, place);
+            let stated = judge(&friction, &answer).stated;
+            assert_eq!((stated.coordinate, stated.coordinate_place), (Some(right), Some(right_place)));
+            assert_eq!(stated.coordinate_and_place, Some(right && right_place));
+        }
+        // A bias has no coordinate; a background that depends on the state has a place only.
+        assert_eq!(judge(&truth("sensor-bias", "joint:phi", "effect"), &answer).stated.coordinate_place, None);
+        let mut repeating = truth("", "joint:phi", "none");
+        let background = Disturbance { source: "state", at: "joint:phi".into(), share: 0.1, ratio: 20.0, time: None };
+        repeating.background = Some(background);
+        let stated = judge(&repeating, &answer).stated;
+        assert_eq!((stated.coordinate, stated.coordinate_place), (None, Some(true)));
+    }
+
+    #[test]
+    fn with_only_a_background_any_verdict_but_an_effect_is_right() {
+        let background = truth("", "joint:phi", "none");
+        let background = Truth { verdict: "none or unexplained", ..background };
+        assert!(
+            judge(&background, &answers::nothing()).decision && judge(&background, &answers::unexplained()).decision
+        );
+        assert!(!judge(&background, &answers::coulomb()).decision);
     }
 
     #[test]

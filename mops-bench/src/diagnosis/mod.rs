@@ -127,3 +127,61 @@ fn shuffled(catalogue: &Catalogue, order: u64) -> Catalogue {
     catalogue.effects.shuffle(&mut stream(order, "order of the catalogue"));
     catalogue
 }
+
+#[cfg(test)]
+mod tests {
+    use mops_testbed::{NOMINAL, Setting, disturbed};
+
+    use super::*;
+
+    fn catalogue() -> Catalogue {
+        mops::catalogue()
+    }
+
+    #[test]
+    fn a_catalogue_without_the_truth_has_no_accepted_name_and_all_others() {
+        let all = catalogue();
+        for nominal in NOMINAL {
+            let make = |seed| disturbed(Setting::Effect, nominal.plant, nominal.effect, seed);
+            let trial = (1..20).find_map(make).expect("a seed gives a trial");
+            let rest = without_truth(&all, &trial);
+            let truth = &trial.truth;
+            let accepted: Vec<&str> = truth
+                .effects
+                .iter()
+                .flat_map(|effect| names::names(&effect.class, &effect.strengths))
+                .chain(truth.equivalents.iter().flat_map(|(class, _)| names::names(class, &[])))
+                .collect();
+            let struck_out: Vec<&str> =
+                all.effects.iter().map(|e| e.name()).filter(|name| accepted.contains(name)).collect();
+            assert!(!struck_out.is_empty(), "{}", trial.name);
+            assert!(rest.effects.iter().all(|effect| !accepted.contains(&effect.name())), "{}", trial.name);
+            assert_eq!(rest.effects.len() + struck_out.len(), all.effects.len());
+        }
+    }
+
+    #[test]
+    fn a_repaired_case_is_named_and_nothing_is_chosen_by_the_validation_record() {
+        let effect = "input-saturation@actuator:u";
+        let mut trial = (1..20).find_map(|seed| disturbed(Setting::Effect, "cascade", effect, seed)).expect("a trial");
+        let catalogue = only(&catalogue(), &trial);
+        let tools = Tools { catalogue: &catalogue, watch: &(), seed: 1 };
+        let diagnosed = |trial: &Trial| {
+            let study = tools.study("study.toml", &trial.study, &tool::InMemory(&trial.files)).unwrap();
+            let (diagnosis, _) = tools.diagnose(study).unwrap();
+            Row::new(trial, Kind::Setting(Setting::Effect), 0.0, Ok(Answer::of(&diagnosis, 1.0)))
+        };
+        let first = diagnosed(&trial);
+        assert!(first.judgement.first && first.judgement.stated.entries == [true], "{:?}", first.answer);
+        let answer = first.answer.unwrap();
+        assert!(answer.change(mops::core::Role::Validation).is_some_and(|change| change < 0.9));
+        // The last record, replaced by one of constant level.
+        let constant = |line: &str| format!("{},5.0\n", line.rsplit_once(',').expect("a line has several columns").0);
+        let (header, lines) = trial.files[2].1.split_once('\n').expect("a file has a header");
+        trial.files[2].1 = format!("{header}\n{}", lines.lines().map(constant).collect::<String>());
+        let second = diagnosed(&trial).answer.unwrap();
+        assert_eq!((&second.found, &second.statements), (&answer.found, &answer.statements));
+        assert_eq!((&second.strengths, &second.declared), (&answer.strengths, &answer.declared));
+        assert!(second.records[2].before > 2.0 * answer.records[2].before);
+    }
+}

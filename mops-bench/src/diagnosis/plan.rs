@@ -221,6 +221,24 @@ mod tests {
     }
 
     #[test]
+    fn cases_of_a_setting_cycle_through_the_plants_and_can_be_generated_again_by_their_names() {
+        let (setting, kind) = (Setting::EffectAndBackground, Kind::Setting(Setting::EffectAndBackground));
+        let plants = ["driven-pendulum", "cascade"].map(str::to_owned).to_vec();
+        let effects = ["coulomb-friction", "leak", "linear-loss"].map(str::to_owned).to_vec();
+        let plan = Plan { plants, effects, counts: vec![(kind, 6)], ..plan() };
+        let all: Vec<Trial> = plan.wishes().iter().map(|wish| plan.make(wish).expect("it can be made")).collect();
+        for (number, trial) in all.iter().enumerate() {
+            assert_eq!(trial.plant, plan.plants[number % 2]);
+            assert!(trial.name.starts_with(setting.letter()) && plan.effects.contains(&trial.truth.effects[0].class));
+        }
+        // Both effects of the cascade have one weight.
+        let leaks = all.iter().filter(|trial| trial.truth.effects[0].class == "leak").count();
+        assert!((1..=2).contains(&leaks), "{leaks}");
+        let only = Plan { only: vec![all[3].name.clone()], ..plan };
+        assert_eq!(only.named(), [all[3].clone()]);
+    }
+
+    #[test]
     fn the_same_plan_makes_the_same_cases() {
         let (plan, wish) = (plan(), Wish { kind: Kind::One, number: 3 });
         assert_eq!(plan.make(&wish), plan.make(&wish));

@@ -265,7 +265,23 @@ pub(crate) fn spelt(verdict: Verdict) -> &'static str {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::diagnosis::answers;
+
+    #[test]
+    fn errors_are_compared_by_role_and_with_the_noise_level() {
+        let record = |role, before, after| RecordError { role, before, after, samples: 200 };
+        let mut answer = answers::coulomb();
+        let both = [record(Role::Validation, 3.0, 1.5), record(Role::Validation, 4.0, 2.0)];
+        answer.records = [record(Role::Selection, 2.0, 3.0)].into_iter().chain(both).collect();
+        assert_eq!(answer.change(Role::Validation), Some(0.5));
+        assert_eq!((answer.change(Role::Selection), answer.change(Role::Calibration)), (Some(1.5), None));
+        // Of 200 numbers the root mean square has a standard deviation of 0.05.
+        for (before, exceeds) in [(1.24, false), (1.26, true)] {
+            answer.records = vec![record(Role::Selection, before, before)];
+            assert_eq!(answer.exceeds_noise(), exceeds);
+        }
+    }
 
     #[test]
     fn answers_agree_on_verdict_and_effects_whatever_their_order() {
