@@ -25,6 +25,7 @@ Start with:
   mops-bench minimax --solver sqp --solver auto --out bench    two solvers on a suite; open bench/index.html
   mops-bench minimax --against bench/results.json              compared with stored results
   mops-bench diagnosis --cases 20 --none 10                    the diagnosis on simulated experiments
+  mops-bench diagnosis --kinds A,B,C,D,S --per-kind 20         the same with model errors in the background
 
 Exit status: 0 done; 2 the command line is wrong; 3 the benchmark failed; 4 interrupted, with the finished cases kept."
 )]
