@@ -56,7 +56,7 @@ const MEASURES: &[Measure] = &[
     ("claims with a worse forecast of validation", |all| {
         rate(all, |case| case.claims().then(|| case.answer.change(Role::Validation).is_some_and(|c| c > WORSE)))
     }),
-    ("verdict none, residual above 1.1 noises", |all| {
+    ("verdict none, calibration error above 1.1 noises", |all| {
         rate(all, |case| Some(case.answer.verdict == Verdict::None && case.answer.exceeds_noise()))
     }),
     ("intervals of declared parameters, right answers", |all| intervals(all, |case| case.is_right())),

@@ -240,12 +240,14 @@ impl Answer {
         is_known.then(|| (squares(|record| record.after) / squares(|record| record.before)).sqrt())
     }
 
-    /// Returns true if the declared model exceeds the noise level on an experiment by more than a tenth, beyond chance: three
-    /// standard deviations of the root mean square of as many independent normal numbers.
+    /// Returns true if the declared model exceeds the noise level on a calibration record by more than a tenth, beyond chance: three
+    /// standard deviations of the root mean square of as many independent normal numbers. N.B.: on other records, errors of the
+    /// parameters alone may be larger than the noise.
     #[allow(clippy::cast_precision_loss)]
     pub fn exceeds_noise(&self) -> bool {
         let chance = |samples: usize| 3.0 / (2.0 * samples as f64).sqrt();
-        self.records.iter().any(|record| record.before > 1.1 + chance(record.samples))
+        let calibration = self.records.iter().filter(|record| record.role == Role::Calibration);
+        calibration.map(|record| record.before - chance(record.samples)).any(|least| least > 1.1)
     }
 
     /// Returns the first effect; `None` if the verdict is not `effect`.
@@ -278,7 +280,7 @@ mod tests {
         assert_eq!((answer.change(Role::Selection), answer.change(Role::Calibration)), (Some(1.5), None));
         // Of 200 numbers the root mean square has a standard deviation of 0.05.
         for (before, exceeds) in [(1.24, false), (1.26, true)] {
-            answer.records = vec![record(Role::Selection, before, before)];
+            answer.records = vec![record(Role::Selection, 5.0, 5.0), record(Role::Calibration, before, before)];
             assert_eq!(answer.exceeds_noise(), exceeds);
         }
     }
