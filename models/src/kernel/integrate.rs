@@ -10,6 +10,9 @@ use super::step_size::{StepSizes, first_step};
 use super::weights::Weights;
 use super::{Dynamics, Integrated, IntegrationMethod, Sink, Tolerance};
 
+/// Growth of the longest stable step over a step that does not show it.
+const RELAXED: f64 = 1.5;
+
 /// Input of a method: a step of length `h` from `x` at `t`.
 pub struct Attempt<'a, S> {
     pub(super) t: f64,
@@ -35,6 +38,12 @@ pub(super) trait Method<S: Scalar> {
 
     /// Computes the state after the step. Returns the weighted error norm, NaN if there is none.
     fn attempt<D: Dynamics<S> + ?Sized>(&mut self, f: &D, at: Attempt<'_, S>, next: &mut [S], work: &mut Work) -> f64;
+
+    /// Returns the longest step that damps all modes, estimated from the step last attempted; `None` for a method that damps them
+    /// in every step, or if the step does not show it.
+    fn stable_step(&self, _next: &[S], _weights: &Weights) -> Option<f64> {
+        None
+    }
 
     /// Moves to the start of the next step after the step was accepted.
     fn advance(&mut self);
@@ -87,6 +96,9 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
     // Rejected attempts at the current step.
     let mut rejected = 0;
     let damped = if M::IS_EXPLICIT { dynamics.damped_step() } else { f64::INFINITY };
+    // Longest step that damps all modes, as far as the accepted steps show it. The error alone does not limit a step at rest: there
+    // the tangents would grow while the state does not.
+    let mut stable = f64::INFINITY;
     let longest = dynamics.longest_step().min(damped).min(tolerance.max_step.unwrap_or(f64::INFINITY));
 
     let remembers = dynamics.remembers();
@@ -103,7 +115,7 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
         if remembers {
             stop = dynamics.next_break(t).min(end);
         }
-        proposed = proposed.min(longest);
+        proposed = proposed.min(longest).min(stable);
         // A step that would leave a sliver before the stop is lengthened to reach it. Cutting a step does not change
         // the proposed step size.
         let reaches = t + 1.01 * proposed >= stop;
@@ -134,6 +146,7 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
         if remembers {
             dynamics.accepted(&step);
         }
+        stable = method.stable_step(&next, &weights).unwrap_or(RELAXED * stable);
         let factor = sizes.after_acceptance(error, rejected > 0);
         proposed = if reaches { proposed.max(h * factor) } else { h * factor };
         rejected = 0;

@@ -125,6 +125,18 @@ impl Weights {
         Norm { floors, roughness, relative: self.relative, brief: BRIEF * self.span, h, sum: 0.0 }
     }
 
+    /// Returns the largest absolute value of a state so far, or its declared scale.
+    #[inline(always)]
+    pub(super) fn scale(&self, state: usize) -> f64 {
+        self.scales[state]
+    }
+
+    /// Returns the change of a rate that rounding of the states causes, per s.
+    #[inline(always)]
+    pub(super) fn roughness(&self, state: usize) -> f64 {
+        self.roughness[state]
+    }
+
     /// Returns the relative tolerance.
     pub(super) fn relative(&self) -> f64 {
         self.relative
