@@ -1,4 +1,4 @@
-//! Levenberg-Marquardt iteration within bounds: the core of the solver of that name and of the fits of the diagnosis.
+//! Levenberg-Marquardt iteration within bounds, by QR factorisation: the core of the solver of that name and of the fits of the diagnosis.
 
 use crate::math;
 use nalgebra::{DMatrix, DVector};
@@ -10,6 +10,8 @@ use nalgebra::{DMatrix, DVector};
 /// Bounds are handled by an active set: coordinates that the step would move beyond a bound are fixed there, and the step is
 /// recomputed.
 ///
+/// The step is that of least squares with the rows of `J` and of `sqrt(lambda) D`.
+///
 /// Source: J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978); damping by H. B.
 /// Nielsen, report IMM-REP-1999-05, Technical University of Denmark (1999).
 #[derive(Debug, Clone)]
@@ -18,6 +20,9 @@ pub struct LeastSquares {
     bounds: Vec<[f64; 2]>,
     residuals: DVector<f64>,
     jacobian: DMatrix<f64>,
+    /// Triangular factor `R` of the Jacobian `J = QR`, and `Q'r`.
+    factor: DMatrix<f64>,
+    target: DVector<f64>,
     /// Squared scale of every coordinate.
     scale: DVector<f64>,
     damping: f64,
@@ -47,7 +52,8 @@ impl LeastSquares {
     pub fn new(bounds: Vec<[f64; 2]>, point: Vec<f64>, residuals: DVector<f64>, jacobian: DMatrix<f64>) -> Self {
         let squared = jacobian.column_iter().map(|c| c.norm_squared().max(LEAST_SCALE));
         let scale = DVector::from_iterator(point.len(), squared);
-        Self { point, bounds, residuals, jacobian, scale, damping: 1e-3, damping_growth: 2.0 }
+        let (factor, target) = factorised(&residuals, &jacobian);
+        Self { point, bounds, residuals, jacobian, factor, target, scale, damping: 1e-3, damping_growth: 2.0 }
     }
 
     /// Returns the current point.
@@ -70,12 +76,12 @@ impl LeastSquares {
         &self.jacobian
     }
 
-    /// Computes the damped step; `None` if the normal equations are singular.
+    /// Computes the damped step; `None` if no step is finite.
     pub fn step(&self) -> Option<LeastSquaresStep> {
         self.step_with(self.damping)
     }
 
-    /// Computes the step with next to no damping; `None` if the normal equations are singular. Its predicted decrease is the
+    /// Computes the step with next to no damping; `None` if it is not finite. Its predicted decrease is the
     /// distance to the optimum where the problem is nearly linear.
     pub fn full_step(&self) -> Option<LeastSquaresStep> {
         self.step_with(1e-12)
@@ -95,9 +101,9 @@ impl LeastSquares {
 
     /// Increases the damping after a step that was not accepted. Returns false if no step can make progress any more.
     pub fn reject(&mut self) -> bool {
-        self.damping *= self.damping_growth;
+        self.damping = (self.damping * self.damping_growth).min(MOST_DAMPING);
         self.damping_growth *= 2.0;
-        self.damping <= MOST_DAMPING
+        self.damping < MOST_DAMPING
     }
 
     /// Moves to a point; `ratio` is the actual decrease of the sum of squares as a fraction of the predicted one.
@@ -105,6 +111,7 @@ impl LeastSquares {
         for (scale, column) in self.scale.iter_mut().zip(jacobian.column_iter()) {
             *scale = scale.max(column.norm_squared());
         }
+        (self.factor, self.target) = factorised(&residuals, &jacobian);
         (self.point, self.residuals, self.jacobian) = (point, residuals, jacobian);
         self.damping *= (1.0 - math::powi(2.0 * ratio - 1.0, 3)).max(1.0 / 3.0);
         self.damping_growth = 2.0;
@@ -133,13 +140,14 @@ impl LeastSquares {
             let indices: Vec<usize> = (0..n).filter(|&j| free[j]).collect();
             let mut step = fixed.clone();
             if !indices.is_empty() {
-                let part = self.jacobian.select_columns(&indices);
-                let target = &self.residuals + &self.jacobian * &fixed;
-                let mut normal = part.transpose() * &part;
+                let rows = self.factor.nrows();
+                let mut stacked = self.factor.select_columns(&indices).resize_vertically(rows + indices.len(), 0.0);
                 for (i, &j) in indices.iter().enumerate() {
-                    normal[(i, i)] += damping * self.scale[j];
+                    stacked[(rows + i, i)] = (damping * self.scale[j]).sqrt();
                 }
-                let solved = normal.cholesky()?.solve(&(-(part.transpose() * target)));
+                let target = -(&self.target + &self.factor * &fixed);
+                let (triangle, target) = factorised(&target.resize_vertically(rows + indices.len(), 0.0), &stacked);
+                let solved = triangle.solve_upper_triangular(&target).filter(|s| s.iter().all(|x| x.is_finite()))?;
                 for (i, &j) in indices.iter().enumerate() {
                     step[j] = solved[i];
                 }
@@ -157,6 +165,16 @@ impl LeastSquares {
         }
         None
     }
+}
+
+/// Returns the triangular factor `R` of a matrix `J = QR`, and `Q'r`. The condition of `J` is not squared, as by normal equations.
+fn factorised(residuals: &DVector<f64>, jacobian: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let qr = jacobian.clone().qr();
+    let mut target = residuals.clone();
+    qr.q_tr_mul(&mut target);
+    let factor = qr.r();
+    let rows = factor.nrows();
+    (factor, target.rows(0, rows).into_owned())
 }
 
 #[cfg(test)]
