@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
+use mops_core::diagnosis::both_places;
 use mops_core::math;
 use mops_core::{
-    Dimension, Effect, EffectParameter, InitialGrid, Interface, ParameterKind, Placement, Port, PortKind, PortState,
-    Unit,
+    Between, Dimension, Effect, EffectParameter, InitialGrid, Interface, ParameterKind, Placement, Port, PortKind,
+    PortState, Unit,
 };
 
 use crate::gap::Gap;
@@ -84,6 +85,11 @@ impl Candidate {
         self.effect.bind(&strengths).friction(&moving, &vec![0.0; self.effect.states()]).is_some()
     }
 
+    /// Its place; between two places of a kind both, as `joint:a with joint:b`.
+    pub fn places(&self) -> String {
+        both_places(&self.place(), self.companion.as_ref().map(ToString::to_string).as_deref())
+    }
+
     /// Its place as results spell it, `kind:name`.
     pub fn place(&self) -> String {
         self.port.to_string()
@@ -107,8 +113,9 @@ pub fn candidates(
         .filter(|port| seen(port))
         .filter_map(|port| port.kind(&interface.ports).map(|kind| (port, kind)))
         .collect();
+    let between = effects.iter().filter_map(Between::of);
     let mut all = Vec::new();
-    for effect in effects {
+    for effect in effects.iter().cloned().chain(between) {
         for (index, (port, kind)) in ports.iter().enumerate().filter(|(_, (_, kind))| effect.ports().contains(kind)) {
             let companions: Vec<Option<Port>> = match effect.second_port() {
                 None => vec![None],
@@ -121,7 +128,7 @@ pub fn candidates(
                 }
             };
             for companion in companions {
-                let candidate = Candidate { effect: Arc::clone(effect), port: (*port).clone(), companion, only: None };
+                let candidate = Candidate { effect: Arc::clone(&effect), port: (*port).clone(), companion, only: None };
                 if effect.is_one_off() {
                     all.extend(calibration.iter().map(|&only| Candidate { only: Some(only), ..candidate.clone() }));
                 } else {
@@ -162,6 +169,10 @@ const PERIODS_SEEN: f64 = 1.5;
 /// Samples that an event lasts at least, and the share of a record that it lasts at most.
 const SAMPLES_SEEN: f64 = 3.0;
 const EVENT_SHARE: f64 = 0.25;
+
+/// Shortest time constant, in samples: no record shows how fast a change is that is over, to 5e-5, at the next sample. Basis: an
+/// assumption.
+const FASTEST: f64 = 0.1;
 
 /// Sizes tried from one number of steps to the next.
 const PER_STEP: u32 = 4;
@@ -243,19 +254,24 @@ impl Sizes {
             }
             _ => [f64::NEG_INFINITY, f64::INFINITY],
         };
-        let [covered_low, covered_high] = self.covered(strength.kind);
+        let [covered_low, covered_high] = self.covered(strength);
         let (least, most) = (least.max(covered_low), most.min(covered_high));
         if least.max(low) < most.min(high) { [least.max(low), most.min(high)] } else { strength.bounds }
     }
 
     /// Smallest and largest value that the records can show: [`PERIODS_SEEN`] of what repeats, an event of at least
-    /// [`SAMPLES_SEEN`] samples and at most [`EVENT_SHARE`] of the record.
-    fn covered(&self, kind: ParameterKind) -> [f64; 2] {
+    /// [`SAMPLES_SEEN`] samples and at most [`EVENT_SHARE`] of the record, a time constant of at least [`FASTEST`] samples.
+    fn covered(&self, parameter: &EffectParameter) -> [f64; 2] {
         let periods = |length: f64| std::f64::consts::TAU * PERIODS_SEEN / length.max(f64::MIN_POSITIVE);
-        match kind {
+        match parameter.kind {
             ParameterKind::WaveNumber => [periods(self.range[1] - self.range[0]), f64::INFINITY],
             ParameterKind::Frequency => [periods(self.record), f64::INFINITY],
             ParameterKind::Duration => [SAMPLES_SEEN * self.sample, EVENT_SHARE * self.record],
+            ParameterKind::BuildUp => [FASTEST * self.sample / self.time * self.of(parameter.dimension), f64::INFINITY],
+            // Of a store: at a joint a stop yields by its stiffness, however fast.
+            ParameterKind::Steepness if self.stiffness.is_none() => {
+                [f64::NEG_INFINITY, 1.0 / (FASTEST * self.sample * self.mobility)]
+            }
             _ => [f64::NEG_INFINITY, f64::INFINITY],
         }
     }

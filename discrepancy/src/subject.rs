@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
-use mops_core::{Case, Dual, Effect, Job, Model, ParameterSource, Role, Scalar, Scale, Study, StudyError};
+use mops_core::{Case, Dual, Effect, Job, Model, ParameterSource, Port, Role, Scalar, Scale, Study, StudyError};
 
 use crate::candidate::{Candidate, candidates};
 use crate::hygiene::{noise_of, without_spikes};
@@ -221,6 +221,16 @@ impl Subject {
         measured.dedup();
         let calibration: Vec<usize> = (0..of.len()).filter(|&i| of[i].role == Role::Calibration).collect();
         candidates(effects, self.model.interface(), &measured, &calibration)
+    }
+
+    /// Whether the position of a joint, the state of a process, or a signal is measured.
+    pub fn is_measured(&self, port: &Port) -> bool {
+        let (Port::Joint { position: name, .. } | Port::Process { state: name, .. } | Port::Sensor { output: name }) =
+            port
+        else {
+            return false;
+        };
+        self.measurements.iter().flat_map(|m| &m.series).any(|series| series.name == *name)
     }
 
     /// Notes how many steps the declared model takes with these globals: candidates are allowed as many, and more.

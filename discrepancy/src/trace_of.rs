@@ -248,6 +248,7 @@ pub struct View<'a> {
     piece: &'a Piece,
     along: &'a Trajectory,
     here: Spot,
+    companion: Option<Spot>,
     /// At the nodes of the motion, at a sensor at its samples; nothing where the candidate does not act.
     seen: Vec<PortState<'a, f64>>,
     /// The input that an actuator commands.
@@ -262,7 +263,8 @@ impl<'a> View<'a> {
         piece: &'a Piece,
         along: &'a Trajectory,
     ) -> Option<Self> {
-        let mut view = Self { candidate, piece, along, here: Spot::Actuator(0), seen: Vec::new(), input: None };
+        let mut view =
+            Self { candidate, piece, along, here: Spot::Actuator(0), companion: None, seen: Vec::new(), input: None };
         if candidate.only.is_some_and(|only| only != piece.measurement) {
             return Some(view);
         }
@@ -274,6 +276,7 @@ impl<'a> View<'a> {
             Some(port) => Some(spot(port, model, piece)?),
             None => None,
         };
+        view.companion = companion;
         view.seen = match view.here {
             Spot::Sensor(series) => {
                 (0..along.predicted[series].len()).map(|k| view.at_sample(series, companion, k)).collect()
@@ -361,7 +364,11 @@ impl<'a> View<'a> {
         }
         let (column, mut signal) = self.signal(acting.as_ref())?;
         signal.iter_mut().for_each(|s| *s /= small);
-        Some(self.along.response(column, &signal))
+        let mut response = self.along.response(column, &signal);
+        if let Some((column, signal)) = self.onward(acting.as_ref()) {
+            response.iter_mut().zip(self.along.response(column, &signal)).for_each(|(r, onward)| *r += onward);
+        }
+        Some(response)
     }
 
     /// What the candidate at these strengths adds at its place, at the nodes of the motion or at the samples of a sensor, in the
@@ -412,6 +419,14 @@ impl<'a> View<'a> {
             Spot::Sensor(_) => return None,
         };
         Some((column, signal))
+    }
+
+    /// The signal that an effect adds at its second place, and its column; `None` where it adds nothing there.
+    fn onward(&self, acting: &dyn BoundEffect<f64>) -> Option<(usize, Vec<f64>)> {
+        let (Spot::Joint(w, ..) | Spot::Process(w, _)) = self.companion? else { return None };
+        let forward = self.along.forward[w];
+        let signal = self.followed(acting, |_, _| 0.0, |at, _, z| acting.onward(at, z) * forward);
+        signal.iter().any(|s| *s != 0.0).then(|| (self.along.inputs() + w, signal))
     }
 
     /// What is made of each moment, of the value of the effect there and of its states, which move on from moment to moment;

@@ -1,6 +1,8 @@
 //! Force with hysteresis.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::{power, sign};
@@ -28,6 +30,7 @@ impl Definition for BoucWen {
                                   a survey, Archives of Computational Methods in Engineering 16 (2009)";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const ACTS_BETWEEN: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("c", "yield force", Dimension::OUTPUT),
         EffectParameter::shape(
@@ -36,7 +39,8 @@ impl Definition for BoucWen {
             Dimension::POSITION,
             [1e-4, f64::INFINITY],
             InitialGrid::Scaled(&[0.05, 0.2, 0.7, 2.0]),
-        ),
+        )
+        .of_kind(ParameterKind::BuildUp),
         EffectParameter::shape(
             "sigma",
             "1/2: elastic unloading; larger: energy is dissipated immediately",

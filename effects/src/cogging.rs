@@ -24,6 +24,7 @@ impl Definition for Cogging {
         "D. C. Hanselman, Brushless Permanent Magnet Motor Design, 2nd edition (The Writers' Collective 2003)";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const IS_OVER_A_TURN: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("a", "amplitude", Dimension::OUTPUT),
         waves(InitialGrid::Plain(&[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 24.0])).kept(),

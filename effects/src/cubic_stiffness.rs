@@ -22,6 +22,7 @@ impl Definition for CubicStiffness {
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 4 (Duffing)";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const ACTS_BETWEEN: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed(
             "k",

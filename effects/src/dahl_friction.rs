@@ -1,7 +1,8 @@
 //! Dry friction with elastic presliding.
 
 use mops_core::{
-    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind,
+    PortState, Scalar,
 };
 
 use super::Definition;
@@ -32,7 +33,8 @@ impl Definition for DahlFriction {
             Dimension::POSITION,
             [1e-4, f64::INFINITY],
             InitialGrid::Scaled(&[0.01, 0.05, 0.2]),
-        ),
+        )
+        .of_kind(ParameterKind::BuildUp),
     ];
     const STATES: usize = 1;
     const RARITY: u8 = 2;

@@ -21,6 +21,7 @@ impl Definition for Eccentricity {
     const SOURCE: &'static str = "J. Fraden, Handbook of Modern Sensors, 5th edition (Springer 2016)";
     const CLASS: EffectClass = EffectClass::Periodic;
     const PORTS: &'static [PortKind] = &[PortKind::Sensor];
+    const IS_OVER_A_TURN: bool = true;
     // In rad, as the angle is, the amplitude is the offset of the centre divided by the radius of the scale. The bound
     // of half the radius is an assumption.
     const PARAMETERS: &'static [EffectParameter] =

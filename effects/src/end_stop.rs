@@ -27,6 +27,7 @@ impl Definition for EndStop {
     const CLASS: EffectClass = EffectClass::Elastic;
     const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Stops);
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const ACTS_BETWEEN: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("k", "stiffness of the stops", Dimension::OUTPUT.over(Dimension::POSITION))
             .restarted_from(&[1.0, 10.0]),

@@ -22,6 +22,7 @@ impl Definition for Imbalance {
     const SOURCE: &'static str = "J. P. Den Hartog, Mechanical Vibrations, 4th edition (McGraw-Hill 1956), chapter 6";
     const CLASS: EffectClass = EffectClass::Gravity;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const IS_OVER_A_TURN: bool = true;
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("a", "amplitude of the gravity torque", Dimension::OUTPUT), phase()];
 

@@ -107,6 +107,8 @@ pub trait Definition: Send + Sync + 'static {
     const SECOND_PORT: Option<PortKind> = None;
     /// Value of [`Effect::mutual`].
     const MUTUAL: bool = false;
+    /// Value of [`Effect::acts_between`].
+    const ACTS_BETWEEN: bool = false;
     /// Value of [`Effect::parameters`].
     const PARAMETERS: &'static [EffectParameter];
     /// Value of [`Effect::states`].
@@ -119,6 +121,8 @@ pub trait Definition: Send + Sync + 'static {
     const IS_INERTIAL: bool = false;
     /// Value of [`Effect::is_one_off`].
     const IS_ONE_OFF: bool = false;
+    /// Value of [`Effect::is_over_a_turn`].
+    const IS_OVER_A_TURN: bool = false;
     /// Value of [`Effect::is_sum`].
     const IS_SUM: bool = false;
     /// Value of [`Effect::characteristic`].
@@ -163,6 +167,9 @@ impl<D: Definition> Effect for Defined<D> {
     fn mutual(&self) -> bool {
         D::MUTUAL
     }
+    fn acts_between(&self) -> bool {
+        D::ACTS_BETWEEN
+    }
     fn parameters(&self) -> &'static [EffectParameter] {
         D::PARAMETERS
     }
@@ -180,6 +187,9 @@ impl<D: Definition> Effect for Defined<D> {
     }
     fn is_one_off(&self) -> bool {
         D::IS_ONE_OFF
+    }
+    fn is_over_a_turn(&self) -> bool {
+        D::IS_OVER_A_TURN
     }
     fn is_sum(&self) -> bool {
         D::IS_SUM

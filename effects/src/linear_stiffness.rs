@@ -21,6 +21,7 @@ impl Definition for LinearStiffness {
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 1";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const ACTS_BETWEEN: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("k", "force per displacement", Dimension::OUTPUT.over(Dimension::POSITION)),
         EffectParameter::shape(

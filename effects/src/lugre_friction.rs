@@ -1,7 +1,8 @@
 //! Dry friction of elastic bristles that slip.
 
 use mops_core::{
-    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind,
+    PortState, Scalar,
 };
 
 use super::Definition;
@@ -43,14 +44,16 @@ impl Definition for LugreFriction {
             Dimension::SPEED,
             NOT_NEGATIVE,
             InitialGrid::Scaled(&[0.05, 0.2]),
-        ),
+        )
+        .of_kind(ParameterKind::BuildUp),
         EffectParameter::shape(
             "y",
             "deflection of the bristles at high speed",
             Dimension::POSITION,
             [1e-4, f64::INFINITY],
             InitialGrid::Scaled(&[0.01, 0.05, 0.2]),
-        ),
+        )
+        .of_kind(ParameterKind::BuildUp),
         EffectParameter::shape(
             "tau",
             "damping of the bristles divided by their stiffness",

@@ -3,7 +3,7 @@
 use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
-use super::terms::{ANY, power};
+use super::terms::{ANY, over};
 
 /// Effect `overflow`.
 pub struct Overflow;
@@ -49,6 +49,10 @@ impl Definition for Overflow {
 
 impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
-        -self.k * power(at.q - self.level, self.n)
+        -self.k * over(at.q - self.level, self.n, at.closed)
+    }
+
+    fn gap(&self, at: &PortState<'_, S>) -> Option<S> {
+        (self.k.value() != 0.0).then(|| self.level - at.q)
     }
 }

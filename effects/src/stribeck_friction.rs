@@ -1,8 +1,8 @@
 //! Dry friction that decreases with speed.
 
 use mops_core::{
-    BoundEffect, Characteristic, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind,
-    PortState, Scalar,
+    BoundEffect, Characteristic, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, ParameterKind,
+    PortKind, PortState, Scalar,
 };
 
 use super::Definition;
@@ -43,7 +43,8 @@ impl Definition for StribeckFriction {
             Dimension::SPEED,
             NOT_NEGATIVE,
             InitialGrid::Scaled(&[0.03, 0.1, 0.3, 0.8]),
-        ),
+        )
+        .of_kind(ParameterKind::BuildUp),
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {

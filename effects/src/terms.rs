@@ -98,6 +98,16 @@ pub(super) fn power<S: Scalar>(x: S, exponent: S) -> S {
     if x.value() > 0.0 { (exponent * x.ln()).exp() } else { S::from(0.0) }
 }
 
+/// Returns `head^exponent` over an edge, 0 below it. `closed` selects one law until the step ends: with the exponent 1 the outflow
+/// bends at the edge.
+pub(super) fn over<S: Scalar>(head: S, exponent: S, closed: Option<bool>) -> S {
+    match closed {
+        Some(false) => S::from(0.0),
+        Some(true) if exponent.value() == 1.0 => head,
+        _ => power(head, exponent),
+    }
+}
+
 /// Returns the parameter for a start time in an experiment, s, with initial values at these fractions of the record.
 pub(super) const fn from(shares: &'static [f64]) -> EffectParameter {
     EffectParameter::shape("from", "start", Dimension::TIME, NOT_NEGATIVE, InitialGrid::Moments(shares))

@@ -1,6 +1,8 @@
 //! Spring with hysteresis.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;
@@ -23,6 +25,7 @@ impl Definition for TorsionalHysteresis {
     const SOURCE: &'static str = "P. R. Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14 (1976)";
     const CLASS: EffectClass = EffectClass::Elastic;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const ACTS_BETWEEN: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive(
             "k",
@@ -42,7 +45,8 @@ impl Definition for TorsionalHysteresis {
             Dimension::POSITION,
             [1e-4, f64::INFINITY],
             InitialGrid::Scaled(&[0.05, 0.3]),
-        ),
+        )
+        .of_kind(ParameterKind::BuildUp),
     ];
     const STATES: usize = 1;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::ONE];

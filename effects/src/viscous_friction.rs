@@ -20,6 +20,7 @@ impl Definition for ViscousFriction {
                                   compensation methods for the control of machines with friction, Automatica 30 (1994), section 2.1";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const ACTS_BETWEEN: bool = true;
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("d", "force per speed", Dimension::OUTPUT.over(Dimension::SPEED))];
     const RARITY: u8 = 0;

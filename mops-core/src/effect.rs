@@ -208,6 +208,9 @@ pub enum ParameterKind {
     Steepness,
     /// Shape, such as an exponent or a characteristic speed.
     Shape,
+    /// Displacement over which a force builds up, or speed over which it falls. If the motion passes it in a fraction of a sample,
+    /// data do not show how small it is.
+    BuildUp,
     /// Value in the range visited at the place, such as the level of an edge.
     Level,
     /// Angle of a periodic function.
@@ -227,6 +230,8 @@ pub enum ParameterKind {
 pub enum DeclaredTerm {
     /// Force that depends on the position of the joint or, for an effect between two joints, on that of the other.
     Spring,
+    /// Spring or damper between two joints: equal and opposite forces that depend on their relative position or speed.
+    Coupling,
 }
 
 /// Characteristic that a place has once at most: effects of one characteristic exclude each other there.
@@ -425,8 +430,8 @@ pub trait BoundEffect<S: Scalar> {
         None
     }
 
-    /// Returns the opening of a contact at a joint, negative while the contact is closed. The gap depends on positions and
-    /// speeds alone; an effect has one throughout a simulation or never. A simulation ends a step at its zero crossing, and
+    /// Returns the opening of a contact at a joint, or the height of an edge above the state of a process; negative while the contact
+    /// is closed, or the edge is below the state. The gap depends on positions and speeds, or on the state alone; an effect has one throughout a simulation or never. A simulation ends a step at its zero crossing, and
     /// tangents account for the event time. Within a step [`PortState::closed`] selects the law, also slightly beyond the crossing.
     fn gap(&self, _at: &PortState<'_, S>) -> Option<S> {
         None
@@ -498,6 +503,12 @@ pub trait Effect: Send + Sync {
         false
     }
 
+    /// Returns true if the effect of a joint may also act between two joints, as [`Between`](crate::Between). Not for dry
+    /// friction, nor for effects with a hysteresis state or proportional to an acceleration.
+    fn acts_between(&self) -> bool {
+        false
+    }
+
     /// Returns the parameters; the effect vanishes if the first is at its null value.
     fn parameters(&self) -> &'static [EffectParameter];
 
@@ -528,6 +539,11 @@ pub trait Effect: Send + Sync {
         false
     }
 
+    /// Returns true if the effect is periodic over the turn of an angle, in rad: a position or signal in m or V has none.
+    fn is_over_a_turn(&self) -> bool {
+        false
+    }
+
     /// Returns true if the effect is an exact sum of other effects of the catalogue. A diagnosis then looks for these, so that
     /// one model has one name.
     fn is_sum(&self) -> bool {
@@ -539,7 +555,7 @@ pub trait Effect: Send + Sync {
         None
     }
 
-    /// Returns the term of the declared model that the effect modifies; without that term it cannot act.
+    /// Returns the term of the declared model that the effect modifies or acts beside; without that term it is no candidate.
     fn modifies(&self) -> Option<DeclaredTerm> {
         None
     }

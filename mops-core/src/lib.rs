@@ -4,6 +4,7 @@
 //! Concrete criteria, models and solvers are not part of this crate; a [`Catalogue`] provides them.
 
 pub mod band_limited;
+mod between;
 mod cancellation;
 mod case;
 mod catalogue;
@@ -54,6 +55,7 @@ mod tuner;
 mod uncertainty;
 mod unit;
 
+pub use between::Between;
 pub use cancellation::{Cancellation, Halt};
 pub use case::Case;
 pub use catalogue::{

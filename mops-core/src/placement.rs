@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::between::Between;
 use crate::catalogue::Catalogue;
 use crate::diagnostic::suggestion;
 use crate::effect::Placement;
@@ -46,12 +47,10 @@ impl EffectBuilder {
                 .with_help(suggestion(&self.kind, catalogue.effects.iter().map(|effect| effect.name())))
         })?;
         let port = |key: &str, text: &str| Port::named(text, model).map_err(|m| m.within(key).within(&self.kind));
-        Ok(Placement {
-            name: self.name.clone(),
-            effect: Arc::clone(effect),
-            port: port("place", &self.place)?,
-            companion: self.companion.as_deref().map(|text| port("companion", text)).transpose()?,
-        })
+        let companion = self.companion.as_deref().map(|text| port("companion", text)).transpose()?;
+        let between = companion.as_ref().filter(|_| effect.second_port().is_none()).and_then(|_| Between::of(effect));
+        let effect = between.unwrap_or_else(|| Arc::clone(effect));
+        Ok(Placement { name: self.name.clone(), effect, port: port("place", &self.place)?, companion })
     }
 }
 

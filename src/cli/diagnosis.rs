@@ -68,7 +68,7 @@ fn found(diagnosis: &Diagnosis) -> String {
             let known = strength.interval95.is_some();
             rows.push(vec![
                 once(found.effect.clone()),
-                once(found.place.clone()),
+                once(found.places()),
                 strength.name.clone(),
                 significant(strength.value, 4),
                 if known { low } else { String::new() },
@@ -137,12 +137,12 @@ fn ranking(diagnosis: &Diagnosis) -> String {
 
 fn parameters(diagnosis: &Diagnosis) -> String {
     let rows = diagnosis.parameters.iter().map(|p| {
-        let error = p.std_error.map_or_else(String::new, |error| significant(error, 3));
+        let [low, high] = p.interval95.map_or_else(Default::default, |ends| ends.map(|end| significant(end, 4)));
         let change =
             if p.before == 0.0 { String::new() } else { format!("{:+.1} %", 100.0 * (p.after / p.before - 1.0)) };
-        vec![p.name.clone(), number(p.before), number(p.after), error, p.unit.clone(), change]
+        vec![p.name.clone(), number(p.before), number(p.after), low, high, p.unit.clone(), change]
     });
-    table(&["parameter", "before", "after", "std. error", "unit", "change"], &[1, 2, 3, 5], rows.collect())
+    table(&["parameter", "before", "after", "95 % from", "to", "unit", "change"], &[1, 2, 3, 4, 6], rows.collect())
 }
 
 fn noticeable(diagnosis: &Diagnosis) -> String {

@@ -19,7 +19,14 @@ pub(super) fn page(effect: &dyn Effect) -> String {
 /// Returns the class of an effect, its places, and its states.
 pub(super) fn facts(effect: &dyn Effect) -> Vec<String> {
     let places: Vec<&str> = effect.ports().iter().copied().map(place).collect();
-    let second = effect.second_port().map_or_else(String::new, |kind| format!(". Second port: {}", place(kind)));
+    let second = match effect.second_port() {
+        Some(kind) => format!(". Second port: {}", place(kind)),
+        None if effect.acts_between() => {
+            "; with a joint as `companion`, between two joints (relative position and speed, with the reaction)"
+                .to_owned()
+        }
+        None => String::new(),
+    };
     let mut facts = vec![format!("Class: {}. Acts at: {}{second}", effect.class().name(), places.join("; "))];
     if let Some(wider) = effect.form_of() {
         facts.push(format!("Special case of: {wider}"));

@@ -104,7 +104,14 @@ fn dependence(coordinate: &str, place: &str, gain: f64) -> Dependence {
 }
 
 fn moved(name: &str, before: f64, after: f64) -> ParameterMove {
-    ParameterMove { name: name.into(), unit: "kg m2".into(), before, after, std_error: Some(0.01 * after.abs()) }
+    ParameterMove {
+        name: name.into(),
+        unit: "kg m2".into(),
+        before,
+        after,
+        std_error: Some(0.01 * after.abs()),
+        interval95: Some([0.98 * after, 1.02 * after]),
+    }
 }
 
 /// Returns a diagnosis of Coulomb friction at `joint:phi`, from two experiments with two channels each.

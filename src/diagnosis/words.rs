@@ -45,10 +45,10 @@ pub(crate) fn verdict(diagnosis: &Diagnosis) -> String {
 /// Returns what is claimed: class and place, each with the effect that describes it best; `None` if nothing is.
 fn claims(diagnosis: &Diagnosis) -> Option<String> {
     let claimed: Vec<&Found> = diagnosis.found.iter().filter(|found| found.claimed).collect();
-    let mut entries: Vec<(&str, &str)> = claimed.iter().map(|f| (f.class.as_str(), f.place.as_str())).collect();
+    let mut entries: Vec<(String, String)> = claimed.iter().map(|f| (f.class.clone(), f.places())).collect();
     entries.dedup();
-    let claim = |(class, place): &(&str, &str)| {
-        let own: Vec<&&Found> = claimed.iter().filter(|f| f.class == *class && f.place == *place).collect();
+    let claim = |(class, place): &(String, String)| {
+        let own: Vec<&&Found> = claimed.iter().filter(|f| f.class == *class && f.places() == *place).collect();
         let names: Vec<String> = own.iter().map(|found| format!("`{}`", found.effect)).collect();
         let certainty = own.first().filter(|f| !f.class_probability.is_nan());
         let certainty =
@@ -81,7 +81,7 @@ fn proposed(diagnosis: &Diagnosis) -> Option<String> {
         .found
         .iter()
         .filter(|found| !found.claimed && !found.given)
-        .map(|found| format!("`{}` {}", found.effect, at(&found.place)))
+        .map(|found| format!("`{}` {}", found.effect, at(&found.places())))
         .collect();
     (!proposed.is_empty()).then(|| format!("Not claimed, but the best description: {}.", list(&proposed)))
 }
@@ -186,8 +186,13 @@ pub(crate) fn times(error: f64) -> String {
     if error.is_finite() && error < 100.0 { format!("{error:.2}") } else { significant(error, 3) }
 }
 
-/// Returns a place in words: ``in the joint `phi` ``.
+/// Returns a place in words: ``in the joint `phi` ``, of an effect on two of a kind ``between the joints `a` and `b` ``.
 pub(crate) fn at(place: &str) -> String {
+    if let Some((first, second)) = place.split_once(" with ") {
+        let name = |place: &str| place.split_once(':').map_or(place, |(_, name)| name).to_owned();
+        let between = if first.starts_with("joint:") { "between the joints" } else { "in the equations of" };
+        return format!("{between} `{}` and `{}`", name(first), name(second));
+    }
     match place.split_once(':') {
         Some(("joint", name)) => format!("in the joint `{name}`"),
         Some(("process", name)) => format!("in the equation of `{name}`"),
@@ -216,14 +221,14 @@ pub(crate) fn strength(strength: &StrengthValue) -> String {
 
 /// Returns sentences on an effect: its only experiment, held-out errors, alternatives and stability of the choice.
 pub(crate) fn remarks(found: &Found) -> Vec<String> {
-    let only = |only: &String| format!("`{}` {} acts in experiment `{only}` only.", found.effect, at(&found.place));
+    let only = |only: &String| format!("`{}` {} acts in experiment `{only}` only.", found.effect, at(&found.places()));
     let only = found.only.iter().map(only);
     only.chain(held_out_errors(found)).chain(alternatives(found)).chain(instability(found)).collect()
 }
 
 /// Returns sentences on the errors with and without an effect on held-out data.
 fn held_out_errors(found: &Found) -> Vec<String> {
-    let effect = format!("`{}` {}", found.effect, at(&found.place));
+    let effect = format!("`{}` {}", found.effect, at(&found.places()));
     let errors = |is: fn(f64, f64) -> bool| {
         let of_sign = found.held_back.iter().filter(|h| times(h.with) != times(h.without) && is(h.with, h.without));
         let error = |(k, h): (usize, &HeldBack)| {
@@ -253,7 +258,7 @@ fn instability(found: &Found) -> Option<String> {
     let others: Vec<String> = others.collect();
     (stability.share < 0.95 || !others.is_empty()).then(|| {
         let others = if others.is_empty() { String::new() } else { format!("; {}", list(&others)) };
-        let (effect, place, percent) = (&found.effect, at(&found.place), share(stability.share));
+        let (effect, place, percent) = (&found.effect, at(&found.places()), share(stability.share));
         format!("`{effect}` {place} is the best effect in {percent} of block bootstrap samples of the data{others}.")
     })
 }
@@ -267,7 +272,7 @@ fn alternatives(found: &Found) -> Option<String> {
     let likelier = rivals(|behind| behind <= -BARE_MENTION);
     let equal = rivals(|behind| behind.abs() < BARE_MENTION);
     let behind = rivals(|behind| behind >= BARE_MENTION);
-    let effect = format!("`{}` {}", found.effect, at(&found.place));
+    let effect = format!("`{}` {}", found.effect, at(&found.places()));
     let mut clauses = Vec::new();
     if !likelier.is_empty() {
         clauses.push(format!("the data favour {} over {effect}", list(&likelier)));

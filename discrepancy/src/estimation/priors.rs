@@ -83,7 +83,9 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
             ParameterKind::Level | ParameterKind::Strength => {
                 at_centre(added.sizes.range[1] - added.sizes.range[0], UNIFORM)
             }
-            ParameterKind::Shape | ParameterKind::WaveNumber | ParameterKind::Duration => at_centre(typical(), SHAPE),
+            ParameterKind::Shape | ParameterKind::BuildUp | ParameterKind::WaveNumber | ParameterKind::Duration => {
+                at_centre(typical(), SHAPE)
+            }
         }
     };
     let shared = fit.globals.iter().map(|global| match global.sets {

@@ -3,8 +3,8 @@
 use mops_core::Model;
 use mops_core::diagnosis::StrengthValue;
 
-use crate::estimation::{ErrorModel, FALL};
-use crate::fit::Sets;
+use crate::estimation::{ErrorModel, Estimate, FALL};
+use crate::fit::{Global, Sets};
 use crate::selection::{FittedSet, estimation};
 use crate::subject::Subject;
 use crate::variant::{Added, Variant, problem};
@@ -38,15 +38,19 @@ pub fn strengths(set: &FittedSet<'_>, index: usize) -> Vec<StrengthValue> {
             continue;
         }
         let Some(estimate) = likeliest else { continue };
-        let (centre, error) = (estimate.point.globals[g], estimate.deviations[g]);
-        let is_at_bound = global.bounds.contains(&centre) || global.bounds.contains(&value.value);
-        if error > 0.0 && error.is_finite() && !is_at_bound {
-            let end = |side: f64| (centre + side * QUANTILE * error).clamp(global.bounds[0], global.bounds[1]);
-            value.std_error = Some(error);
-            value.interval95 = Some([end(-1.0).min(value.value), end(1.0).max(value.value)]);
-        }
+        value.interval95 = interval(global, value.value, estimate, g);
+        value.std_error = value.interval95.map(|_| estimate.deviations[g]);
     }
     all
+}
+
+/// Returns the 95 % confidence interval of a parameter under an error model, widened to the value by least squares; `None` at a bound,
+/// or if the records do not determine it.
+pub fn interval(global: &Global, value: f64, estimate: &Estimate, index: usize) -> Option<[f64; 2]> {
+    let (centre, error) = (estimate.point.globals[index], estimate.deviations[index]);
+    let is_at_bound = global.bounds.contains(&centre) || global.bounds.contains(&value);
+    let end = |side: f64| (centre + side * QUANTILE * error).clamp(global.bounds[0], global.bounds[1]);
+    (error > 0.0 && error.is_finite() && !is_at_bound).then(|| [end(-1.0).min(value), end(1.0).max(value)])
 }
 
 /// Returns the range of the values of a parameter that no fit moves that the records allow, everything else fitted again; `None` if

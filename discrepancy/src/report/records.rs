@@ -1,5 +1,6 @@
 //! What a fitted model predicts for every record, and its errors.
 
+use super::parameters::interval;
 use mops_core::Role;
 use mops_core::diagnosis::{ExperimentError, ParameterMove, Prediction, WindowErrors};
 use mops_core::math;
@@ -164,7 +165,7 @@ impl<'s, 'a> Records<'s, 'a> {
     pub fn moves(&self, after: &Self) -> Vec<ParameterMove> {
         let point = |records: &Self| records.set.least_squares.point.globals.clone();
         let (then, now) = (point(self), point(after));
-        let deviations = after.set.likeliest().map(|(_, likeliest)| likeliest.deviations.clone());
+        let likeliest = after.set.likeliest().map(|(_, likeliest)| likeliest);
         let one = |(k, &tuner): (usize, &usize)| {
             let tuner = &self.subject().study.tuners()[tuner];
             ParameterMove {
@@ -172,7 +173,8 @@ impl<'s, 'a> Records<'s, 'a> {
                 unit: tuner.unit.to_string(),
                 before: then[k],
                 after: now[k],
-                std_error: deviations.as_ref().map(|all| all[k]).filter(|error| *error > 0.0),
+                std_error: likeliest.map(|likeliest| likeliest.deviations[k]).filter(|error| *error > 0.0),
+                interval95: likeliest.and_then(|likeliest| interval(&after.set.fit.globals[k], now[k], likeliest, k)),
             }
         };
         self.subject().globals.iter().enumerate().map(one).collect()

@@ -1,7 +1,8 @@
 //! Which candidates the records can tell at all, decided before any of them is fitted.
 
-use mops_core::{Characteristic, DeclaredTerm, InitialGrid, Port};
-use mops_models::WithEffects;
+use mops_core::{Characteristic, DeclaredTerm, InitialGrid, Port, Variable};
+use mops_models::{Moment, WithEffects};
+use nalgebra::DMatrix;
 
 use crate::candidate::Candidate;
 use crate::fit::Piece;
@@ -11,6 +12,9 @@ use crate::trajectory::Trajectory;
 
 /// Share of the nominal acceleration that a declared spring must have.
 const SPRING: f64 = 1e-3;
+
+/// Relative difference of two slopes up to which they are the same: rounding.
+const RECIPROCAL: f64 = 1e-6;
 
 /// Share of the largest speed below which a motion is at rest.
 const RESTS: f64 = 1e-3;
@@ -22,8 +26,8 @@ const VISIBLE: f64 = 2.0;
 const TOUCHED: usize = 3;
 const NEAR_LIMIT: f64 = 2.0;
 
-/// Returns true if the records show what a candidate needs: the term of the declared model that it modifies, a limit that was
-/// touched, visible steps.
+/// Returns true if the records show what a candidate needs: the term of the declared model that it modifies, an angle, a
+/// limit that was touched, visible steps.
 pub fn is_covered(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> bool {
     if candidate.effect.is_sum() {
         return false;
@@ -32,8 +36,14 @@ pub fn is_covered(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], 
     if modifies == Some(DeclaredTerm::Spring) && !has_spring(candidate, model, pieces, along) {
         return false;
     }
+    if modifies == Some(DeclaredTerm::Coupling) && !has_coupling(candidate, model, pieces, along) {
+        return false;
+    }
     if candidate.effect.characteristic() == Some(Characteristic::Stops) && !shows_stops(candidate, model, pieces, along)
     {
+        return false;
+    }
+    if candidate.effect.is_over_a_turn() && !is_angle(&candidate.port, model) {
         return false;
     }
     if !matches!(candidate.port, Port::Sensor { .. }) {
@@ -48,6 +58,19 @@ pub fn is_covered(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], 
         }),
         _ => true,
     }
+}
+
+/// Returns true if a position or signal is an angle, or may be one: a number without a unit.
+fn is_angle(port: &Port, model: &WithEffects) -> bool {
+    let states = model.model().equation_states();
+    let unit = |name: &String, of: &[Variable]| of.iter().find(|v| v.name == *name).map(|v| v.unit.clone());
+    let unit = match port {
+        Port::Joint { position, .. } => unit(position, &states),
+        Port::Sensor { output } => unit(output, &model.model().interface().signals),
+        Port::Process { state, .. } => unit(state, &states),
+        Port::Actuator { .. } => None,
+    };
+    unit.is_none_or(|unit| unit.is_angle() || unit.dimension().is_none())
 }
 
 /// Returns true if the declared force at a joint depends on its position, or on that of the companion.
@@ -65,6 +88,41 @@ fn has_spring(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], alon
     spring > SPRING * acceleration
 }
 
+/// Returns true if the declared model has a spring or a damper between the joints of a candidate: the force on each depends on the
+/// position or the speed of the other, by the same slope (reciprocity).
+fn has_coupling(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> bool {
+    let Some(piece) = pieces.first() else { return false };
+    let ports = &model.model().interface().ports;
+    let joints: Vec<(&Port, usize, usize, usize)> = ports
+        .iter()
+        .filter_map(|port| match spot(port, model, piece)? {
+            Spot::Joint(force, position, speed) => Some((port, force, position, speed)),
+            _ => None,
+        })
+        .collect();
+    let index = |port: &Port| joints.iter().position(|joint| joint.0 == port);
+    let Some((first, second)) = index(&candidate.port).zip(candidate.companion.as_ref().and_then(index)) else {
+        return false;
+    };
+    // Slopes of the forces on both by the position or the speed of the other, from the accelerations by the mass matrix.
+    let cross = |along: &Trajectory, m: &Moment, [of_first, of_second]: [usize; 2]| {
+        let mobility = DMatrix::from_fn(joints.len(), joints.len(), |i, j| {
+            let force = joints[j].1;
+            m.b[(joints[i].3, along.inputs() + force)] * along.forward[force]
+        });
+        let slopes = DMatrix::from_fn(joints.len(), 2, |i, j| m.a[(joints[i].3, [of_first, of_second][j])]);
+        mobility.lu().solve(&slopes).map(|k| [k[(first, 1)], k[(second, 0)]])
+    };
+    let is_reciprocal = |[a, b]: [f64; 2]| (a - b).abs() <= RECIPROCAL * a.abs().max(b.abs());
+    let is_coupled = |states: [usize; 2]| {
+        let of = |along: &Trajectory| along.moments.iter().map(|m| cross(along, m, states)).collect::<Option<Vec<_>>>();
+        let all: Option<Vec<Vec<[f64; 2]>>> = along.iter().map(of).collect();
+        let all = all.unwrap_or_default().concat();
+        all.iter().copied().all(is_reciprocal) && all.iter().any(|k| k[0] != 0.0)
+    };
+    is_coupled([joints[first].2, joints[second].2]) || is_coupled([joints[first].3, joints[second].3])
+}
+
 /// Returns true if a motion shows stops: it turns back at both ends, or comes to rest. A falling body turns back at its top only.
 fn shows_stops(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> bool {
     pieces.iter().zip(along).any(|(piece, along)| {
@@ -73,7 +131,7 @@ fn shows_stops(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], alo
             Some(Spot::Joint(_, _, other)) => Some(other),
             _ => None,
         };
-        let speed = |m: &mops_models::Moment| m.x[speed] - other.map_or(0.0, |other| m.x[other]);
+        let speed = |m: &Moment| m.x[speed] - other.map_or(0.0, |other| m.x[other]);
         let speeds: Vec<f64> = along.moments.iter().map(speed).collect();
         let still = RESTS * speeds.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         let turns = |sign: f64| {

@@ -27,8 +27,12 @@ pub struct Refit<'a> {
 /// Iterations of a first look at a start.
 const LOOK: usize = 5;
 
-/// Starts that are fitted; of more the likeliest ones are.
+/// Starts that are fitted to the end. Of more, the likeliest third is followed for an iteration, the best third of these for two more,
+/// and so on (successive halving).
+///
+/// Source: K. Jamieson, A. Talwalkar, Non-stochastic best arm identification and hyperparameter optimization, AISTATS (2016).
 const NEAREST: usize = 3;
+const KEPT: usize = 3;
 
 /// Distance of two optima in standard errors from which each is a start for the other's error model.
 const APART: f64 = 0.5;
@@ -48,8 +52,8 @@ const FOLLOW: usize = 2;
 /// Standard errors up to which a declared term may be 0.
 const UNCERTAIN: f64 = 2.0;
 
-/// Share of its strength with which an effect is added to the optimum of a set that contains it not.
-const FAINT: f64 = 0.05;
+/// Shares of its strength with which an effect is added to the optimum of a set that contains it not; without it where that fails.
+const FAINT: [f64; 2] = [0.05, 0.0];
 
 /// Set of effects that was fitted roughly under given hyperparameters.
 pub struct Rough {
@@ -90,26 +94,34 @@ impl<'a> Refit<'a> {
         Some(FittedSet { key: key.clone(), added, fit, variant, least_squares, under: Vec::new() })
     }
 
-    /// Fits a set roughly under an error model at the outputs whose hyperparameters are given, from the likeliest of the starts;
+    /// Fits a set roughly under an error model at the outputs whose hyperparameters are given, from the most promising of the starts;
     /// `None` if all fail. Gives up where the log-likelihood cannot become as large as `least`.
     pub fn roughly(&self, starts: &[Start], errors: &Errors, least: f64) -> Option<Rough> {
-        let mut looks: Vec<(f64, usize)> = Vec::new();
-        if starts.len() > NEAREST {
-            let of = |start: &Start| self.at(start, |estimation, _, point| estimation.log_likelihood(errors, &point));
-            let found: Vec<Option<f64>> = starts.par_iter().map(of).collect();
-            looks.extend(found.into_iter().enumerate().filter_map(|(k, log)| Some((log?, k))));
+        let mut left = starts.to_vec();
+        let mut iterations = 0;
+        while left.len() > NEAREST {
+            let further = |start: &Start| {
+                self.at(start, |estimation, variant, point| {
+                    if iterations == 0 {
+                        return Some((estimation.log_likelihood(errors, &point)?, start.clone()));
+                    }
+                    let found = estimation.with(errors, point, iterations)?;
+                    Some((found.log_likelihood, start_at(&start.added, estimation.fit, variant, &found.point)))
+                })
+            };
+            let mut looks: Vec<(f64, Start)> = left.par_iter().filter_map(further).collect();
             looks.sort_by(|a, b| b.0.total_cmp(&a.0));
-            looks.truncate(NEAREST);
-        } else {
-            looks.extend((0..starts.len()).map(|k| (0.0, k)));
+            looks.truncate(left.len().div_ceil(KEPT).max(NEAREST));
+            left = looks.into_iter().map(|look| look.1).collect();
+            iterations = (2 * iterations).max(1);
         }
-        let fitted = |&(_, k): &(f64, usize)| {
-            self.at(&starts[k], |estimation, variant, point| {
+        let fitted = |start: &Start| {
+            self.at(start, |estimation, variant, point| {
                 let found = estimation.roughly(errors, point, least)?;
-                Some((start_at(&starts[k].added, estimation.fit, variant, &found.point), found))
+                Some((start_at(&start.added, estimation.fit, variant, &found.point), found))
             })
         };
-        let all = looks.par_iter().filter_map(fitted).collect::<Vec<(Start, Estimate)>>();
+        let all = left.par_iter().filter_map(fitted).collect::<Vec<(Start, Estimate)>>();
         let best = all.into_iter().max_by(|a, b| evidence(&a.1).total_cmp(&evidence(&b.1)))?;
         Some(Rough { log_likelihood: best.1.log_likelihood, log_evidence: evidence(&best.1), start: best.0 })
     }
@@ -208,8 +220,10 @@ impl<'a> Refit<'a> {
                 if best.as_ref().is_some_and(|best| best.1.log_likelihood > theirs.log_likelihood - WORSE) {
                     continue;
                 }
-                let Some(point) = self.faintly(set, smaller, theirs) else { continue };
-                let again = from(kind, &point, Some(&theirs.errors));
+                // A very short lag may be too stiff to be simulated.
+                let again = FAINT
+                    .into_iter()
+                    .find_map(|share| from(kind, &self.faintly(set, smaller, theirs, share)?, Some(&theirs.errors)));
                 if let Some(again) = again {
                     let is_better = |best: &(ErrorModel, Estimate)| again.1.log_likelihood > best.1.log_likelihood;
                     if best.as_ref().is_none_or(is_better) {
@@ -262,8 +276,8 @@ impl<'a> Refit<'a> {
         (set, held)
     }
 
-    /// Returns the optimum of a smaller set with the further effects of a set added faintly.
-    fn faintly(&self, set: &FittedSet<'a>, smaller: &FittedSet<'a>, theirs: &Estimate) -> Option<Point> {
+    /// Returns the optimum of a smaller set with the further effects of a set added at a share of their strength.
+    fn faintly(&self, set: &FittedSet<'a>, smaller: &FittedSet<'a>, theirs: &Estimate, share: f64) -> Option<Point> {
         let known = smaller.start_at(&theirs.point);
         let own = set.start_at(&set.least_squares.point);
         let mut start = Start { added: Vec::new(), ..known.clone() };
@@ -274,8 +288,8 @@ impl<'a> Refit<'a> {
                 let first = &added.candidate.effect.parameters()[0];
                 let mut faint = added.clone();
                 match first.null_value {
-                    Some(null) if null.is_finite() => faint.strengths[0] = null + FAINT * (faint.strengths[0] - null),
-                    Some(_) => faint.strengths[0] /= FAINT,
+                    Some(null) if null.is_finite() => faint.strengths[0] = null + share * (faint.strengths[0] - null),
+                    Some(_) => faint.strengths[0] /= share,
                     None => {}
                 }
                 faint.strengths[0] = faint.strengths[0].clamp(first.bounds[0], first.bounds[1]);

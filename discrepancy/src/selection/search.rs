@@ -183,7 +183,8 @@ impl<'r, 'a> Search<'r, 'a> {
                 let parameters =
                     added[index].candidate.effect.parameters().iter().zip(&added[index].strengths).enumerate();
                 parameters.into_iter().skip(1).any(|(k, (parameter, value))| {
-                    !parameter.fixed && parameter.bounds.contains(value) && !self.is_wide(set, &added[index], index, k)
+                    let ends = added[index].sizes.bounds(parameter);
+                    !parameter.fixed && ends.contains(value) && !self.is_wide(set, &added[index], index, k)
                 })
             };
             let at_limit = (0..added.len()).filter(is_at_limit);
@@ -255,6 +256,15 @@ impl<'r, 'a> Search<'r, 'a> {
         let is_missed = key.is_empty() && self.lacks_something(&parent);
         let others = RAW + if is_missed { SINGLES.saturating_sub(singles.len()) } else { 0 };
         for other in raw.into_iter().take(others) {
+            if singles.iter().all(|single| single.index != other.index) {
+                singles.push(other);
+            }
+        }
+        // An edge or a stop bounds the motion on which its first order rests. Where nobody measures that motion, it is tried.
+        let bounds = |single: &&Screened| {
+            is_missed && all[single.index].has_restarts() && !self.refit.subject.is_measured(&all[single.index].port)
+        };
+        for other in screened.iter().filter(bounds) {
             if singles.iter().all(|single| single.index != other.index) {
                 singles.push(other);
             }

@@ -337,5 +337,5 @@ pub fn entry(search: &Search<'_, '_>, candidate: &Candidate) -> Entry {
         Some(only) => format!("disturbance in {}", search.refit.subject.measurements[only].name),
         None => candidate.effect.class().name().to_owned(),
     };
-    Entry { class, place: candidate.place() }
+    Entry { class, place: candidate.places() }
 }

@@ -1,10 +1,12 @@
 //! Where effects are tried, and at which values.
 
-use mops_core::{Dimension, EffectParameter, InitialGrid, ParameterKind};
+use mops_core::{Dimension, EffectParameter, InitialGrid, ParameterKind, math};
 use mops_effects::effects;
 
 use crate::candidate::{Candidate, Sizes, candidates};
-use crate::testing::{catalogue, model};
+use crate::meter::Meter;
+use crate::selection::prepare;
+use crate::testing::{Record, catalogue, model, subject};
 
 /// Two masses on a spring.
 const COUPLED: &str = r#"
@@ -30,6 +32,44 @@ fn of(text: &str, effect: &str) -> Vec<Candidate> {
 fn play_in_a_coupling_is_one_candidate_from_either_end() {
     assert_eq!(of(COUPLED, "coupling-play").len(), 1);
     assert_eq!(of(COUPLED, "cross-talk").len(), 2, "what one sensor gets of the other is not what that gets of it");
+}
+
+/// Returns the candidates that the records of two masses cover; `forces` are those on both, without the input.
+fn covered(unit: &str, forces: [&str; 2], effects: &[&str]) -> Vec<Candidate> {
+    let rate = format!("{unit}/s");
+    let text = format!(
+        r#"
+        states     = {{ x = "{unit}", v = "{rate}", y = "{unit}", w = "{rate}" }}
+        parameters = {{ k = "1/s^2" }}
+        der        = {{ x = "v", v = "{}", y = "w", w = "{}" }}
+        "#,
+        forces[0], forces[1]
+    );
+    // A light spring swings nearly so.
+    let times: Vec<f64> = (0..80).map(|k| 0.1 * f64::from(k)).collect();
+    let signal = |amplitude: f64| times.iter().map(|t| amplitude * math::cos(2.0 * t)).collect::<Vec<f64>>();
+    let signals = vec![("x", signal(1.0), 0.01), ("y", signal(-1.0), 0.01)];
+    let record = Record { inputs: Vec::new(), times: times.clone(), signals };
+    let subject = subject(&text, &[2.0, 1.0, 0.0, -1.0, 0.0], 4, vec![record]);
+    let meter = Meter::new(&());
+    prepare(&subject, &catalogue(effects), &meter).expect("it is simulated").0.candidates
+}
+
+#[test]
+fn a_spring_between_two_joints_is_tried_where_the_model_has_one() {
+    let between = |all: Vec<Candidate>| all.into_iter().filter(|candidate| candidate.companion.is_some()).count();
+    assert_eq!(between(of(COUPLED, "cubic-stiffness")), 1);
+    assert_eq!(between(of(COUPLED, "coulomb-friction")), 0, "dry friction holds one joint");
+    let springs = |forces| between(covered("m", forces, &["cubic-stiffness"]));
+    assert_eq!(springs(["-k*(x - y)", "k*(x - y)"]), 1);
+    assert_eq!(springs(["-k*x", "-k*y"]), 0);
+    assert_eq!(springs(["-k*x", "k*(x - y)"]), 0, "a force without a reaction is no spring");
+}
+
+#[test]
+fn what_repeats_by_the_turn_needs_an_angle() {
+    let count = |unit: &str| covered(unit, ["-k*x", "-k*y"], &["cogging", "eccentricity"]).len();
+    assert_eq!([count("m"), count("rad")], [0, 4]);
 }
 
 #[test]

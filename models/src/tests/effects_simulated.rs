@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mops_core::math;
 use mops_core::{
-    Analysis, Case, Effect, EffectParameter, Hold, Input, Job, Model, ModelOptions, Placement, Port, PortKind,
+    Analysis, Between, Case, Effect, EffectParameter, Hold, Input, Job, Model, ModelOptions, Placement, Port, PortKind,
 };
 use mops_effects::effects;
 
@@ -40,6 +40,12 @@ parameters = { m = "kg", k = "N/m" }
 der        = { x = "v", v = "m*v' = u - k*(x - y)", y = "w", w = "m*w' = k*(x - y)" }
 "#;
 
+/// Returns an effect of the catalogue; between two joints if it has a companion only there.
+fn effect(name: &str, has_companion: bool) -> Arc<dyn Effect> {
+    let effect = effects().into_iter().find(|e| e.name() == name).expect("it is in the catalogue");
+    if has_companion && effect.second_port().is_none() { Between::of(&effect).expect("it acts there") } else { effect }
+}
+
 /// Creates a model with one effect at a place.
 fn with(text: &str, name: &str, place: &str, companion: Option<&str>) -> WithEffects {
     let options: EquationsOptions = toml::from_str(text).expect("it is TOML");
@@ -49,7 +55,7 @@ fn with(text: &str, name: &str, place: &str, companion: Option<&str>) -> WithEff
     };
     let placement = Placement {
         name: "e".into(),
-        effect: effects().into_iter().find(|e| e.name() == name).expect("it is in the catalogue"),
+        effect: effect(name, companion.is_some()),
         port: port(place),
         companion: companion.map(port),
     };
@@ -471,8 +477,39 @@ fn everywhere() -> Vec<(WithEffects, &'static str, bool)> {
             };
             all.push((with(text, effect.name(), place, companion), effect.name(), process));
         }
+        if effect.acts_between() {
+            all.push((with(COUPLED, effect.name(), "joint:x", Some("joint:y")), effect.name(), false));
+        }
     }
     all
+}
+
+#[test]
+fn an_effect_between_two_joints_is_the_term_in_both_equations() {
+    let written = COUPLED.replace("k*(x - y)", "(k*(x - y) + 40 [N/m3]*(x - y - 0.1 [m])^3 + 0.3 [N s/m]*(v - w))");
+    let options: EquationsOptions = toml::from_str(&written).expect("it is TOML");
+    let written = options.build().expect("it is a model");
+    let cubic = with(COUPLED, "cubic-stiffness", "joint:x", Some("joint:y"));
+    let model: Arc<dyn Model> = Arc::new(cubic);
+    let ports = &model.interface().ports;
+    let port = |name: &str| ports.iter().find(|port| port.to_string() == name).expect("the port is there").clone();
+    let damper = Placement {
+        name: "d".into(),
+        effect: effect("viscous-friction", true),
+        port: port("joint:x"),
+        companion: Some(port("joint:y")),
+    };
+    let both = WithEffects::new(Arc::clone(&model), vec![damper]).expect("it fits");
+    // Mass, stiffness and initial states; then k and rest of the cubic spring, and the damping.
+    let own = [2.0, 3.0, 0.2, 0.0, -0.1, 0.5];
+    let all = [&own[..], &[40.0, 0.1, 0.3]].concat();
+    let names: Vec<&str> = both.interface().parameters.iter().map(|p| &*p.variable.name).collect();
+    assert_eq!(names[own.len()..], ["e.k", "e.rest", "d.d"]);
+    let times: Vec<f64> = (1..=30).map(|k| 0.1 * f64::from(k)).collect();
+    for signal in ["x", "y"] {
+        let as_written = values(written.as_ref(), &own, STEP, signal, &times);
+        close(&values(&both, &all, STEP, signal, &times), &as_written, 1e-7);
+    }
 }
 
 /// Returns parameters for which the effects are active within the range of the motion below.
@@ -511,10 +548,11 @@ fn every_effect_simulates_at_its_ports_with_tangents_that_agree_with_differences
         let values = if process { levels.iter().map(|u| u + 1.8).collect() } else { levels.clone() };
         let input = Input::Sampled { times: times.clone(), values, hold: Hold::Zero };
         let effect = Arc::clone(&model.placements()[0].effect);
-        let mut parameters = match name {
-            "coupling-play" => vec![2.0, 3.0, 0.1, 0.6, 0.0, 0.0],
-            _ if process => vec![2.0, 0.7, 0.8],
-            _ => vec![2.0, 0.1, 0.6],
+        let is_coupled = model.interface().parameters[1].variable.name == "k";
+        let mut parameters = match process {
+            _ if is_coupled => vec![2.0, 3.0, 0.1, 0.6, 0.0, 0.0],
+            true => vec![2.0, 0.7, 0.8],
+            false => vec![2.0, 0.1, 0.6],
         };
         let first = parameters.len();
         parameters.extend(acting(name, effect.as_ref()));

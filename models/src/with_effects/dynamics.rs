@@ -528,7 +528,7 @@ impl<'a, S: Opening> Driven<'a, S> {
     fn settle_gaps(&mut self, t: f64, x: &[S]) {
         for index in 0..self.actors.len() {
             let actor = &self.actors[index];
-            if !matches!(actor.place.site, Site::Joint { .. }) {
+            if !matches!(actor.place.site, Site::Joint { .. } | Site::Process { .. }) {
                 continue;
             }
             let gap = actor.acting.gap(&self.at(actor, t, x, &[], S::from(0.0)));
@@ -536,12 +536,18 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
     }
 
-    /// Switches a gap after its guard became negative. Returns true if the gap is now closed.
-    fn gap_switch(&mut self, number: usize) -> bool {
-        let mut gaps = self.actors.iter_mut().filter_map(|actor| actor.closed.as_mut());
-        let closed = gaps.nth(number).expect("the number is valid");
+    /// Switches a gap after its guard became negative. Returns what happened.
+    fn gap_switch(&mut self, number: usize) -> &'static str {
+        let mut gaps = self.actors.iter_mut().filter(|actor| actor.closed.is_some());
+        let actor = gaps.nth(number).expect("the number is valid");
+        let closed = actor.closed.as_mut().expect("the actor has a gap");
         *closed = !*closed;
-        *closed
+        match (actor.place.site, *closed) {
+            (Site::Process { .. }, true) => "a level rises above an edge",
+            (Site::Process { .. }, false) => "a level falls below an edge",
+            (_, true) => "a contact closes",
+            (_, false) => "a contact opens",
+        }
     }
 
     /// Handles a break of inputs. The time of a jump of a delayed input varies with the delay, and so does the state.
@@ -639,9 +645,9 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         let mut dx = vec![S::from(0.0); self.own];
         if index >= own {
             let what = if index >= gaps {
-                let closes = self.gap_switch(index - gaps);
+                let happened = self.gap_switch(index - gaps);
                 self.settle_contacts(t, x, None);
-                if closes { "a contact closes" } else { "a contact opens" }
+                happened
             } else if self.contact_switch(index - own, t, x) {
                 "a joint sticks"
             } else {

@@ -474,3 +474,31 @@ fn a_plant_of_ones_own_is_simulated_linearised_and_takes_effects_like_one_of_tex
     assert!((analysis.trace("theta").at(2.0) - 0.01 * math::cos(4.0)).abs() < 1e-6);
     assert!((tangents[0].trace("theta").at(2.0) - math::cos(4.0)).abs() < 1e-3);
 }
+
+#[test]
+fn tangents_of_a_stiff_overflow_stay_bounded() {
+    let tank = equations(
+        r#"
+        states     = { h = "m" }
+        inputs     = { u = "m/s" }
+        parameters = { c = "m^0.5/s" }
+        der        = { h = "h' = u - c*sqrt(max(h, 0 [m]))" }
+        "#,
+    );
+    let model = with(&tank, &[("overflow", "process:h")]).with_tolerance(1e-4);
+    let times: Vec<f64> = (0..500).map(|k| 4.0 * f64::from(k)).collect();
+    let values: Vec<f64> = (0..500).map(|k: i32| 0.1 + 0.08 * math::sin(f64::from(k) * f64::from(k))).collect();
+    let case =
+        Case { inputs: vec![("u".to_owned(), Input::Sampled { times, values, hold: Hold::Zero })], ..Case::default() };
+    // Outflow, initial level; k, level and exponent of the overflow.
+    let parameters = [0.03, 5.0, 29.0, 10.0, 1.0];
+    let job = Job { case: &case, parameters: &parameters, signals: &[0], horizon: 2000.0 };
+    let seed: Vec<f64> = (0..5).map(|k| f64::from(u8::from(k == 3))).collect();
+    let (value, tangents) = model.tangents(&job, &[seed]).expect("it has them").expect("it simulates");
+    let (value, tangent) = (value.trace("h"), tangents[0].trace("h"));
+    // A level follows the edge or stays below it: its derivative by the edge lies between 0 and 1.
+    let derivatives = (1..=500).map(|k| tangent.at(4.0 * f64::from(k)));
+    assert!(value.at(600.0) > 10.0, "it overflows");
+    let [low, high] = derivatives.fold([0.0_f64, 0.0_f64], |[low, high], d| [low.min(d), high.max(d)]);
+    assert!(low > -0.05 && high < 1.05 && high > 0.9, "{low} {high}");
+}

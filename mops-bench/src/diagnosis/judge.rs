@@ -147,9 +147,6 @@ pub(crate) fn judge(truth: &Truth, answer: &Answer) -> Judgement {
     }
 }
 
-/// Half width of a 95 % interval in standard errors.
-const NORMAL95: f64 = 1.959_964;
-
 /// Judges the statements of an answer; `same` recognises true effects and equivalent ones.
 fn stated(truth: &Truth, answer: &Answer, same: impl Fn(&Named) -> bool + Copy) -> Stated {
     let of = |names: Vec<&str>| names.into_iter().filter_map(class_of).collect::<Vec<_>>();
@@ -176,10 +173,9 @@ fn stated(truth: &Truth, answer: &Answer, same: impl Fn(&Named) -> bool + Copy) 
         Some(effects().any(|effect| judge(effect, found)))
     };
     let of_background = || Some(depends_on?.places.contains(&repeating?.at));
-    let declared = answer.declared.iter().filter_map(|(name, value, error)| {
+    let declared = answer.declared.iter().filter_map(|(name, value, interval)| {
         let (_, truth) = truth.base_parameters.iter().find(|(known, _)| known == name)?;
-        let half = NORMAL95 * (*error)?;
-        Some(Covered { name: name.clone(), truth: *truth, value: *value, interval: [value - half, value + half] })
+        Some(Covered { name: name.clone(), truth: *truth, value: *value, interval: (*interval)? })
     });
     let of_entries = |judge: &dyn Fn(&Named) -> bool| -> Vec<bool> {
         answer.statements.iter().map(|statement| statement.entries.iter().any(judge)).collect()

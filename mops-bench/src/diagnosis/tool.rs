@@ -121,8 +121,8 @@ pub(crate) struct RecordError {
     pub samples: usize,
 }
 
-/// Estimate of a declared parameter: name, value, standard error.
-pub(crate) type Estimate = (String, f64, Option<f64>);
+/// Estimate of a declared parameter: name, value, 95 % confidence interval.
+pub(crate) type Estimate = (String, f64, Option<[f64; 2]>);
 
 /// Answer of a tool.
 #[derive(Debug, Clone, PartialEq)]
@@ -213,7 +213,7 @@ impl Answer {
             depends_on: diagnosis.depends_on.as_ref().map(Dependence::of),
             remaining: diagnosis.remaining.as_ref().map(Dependence::of),
             records: records(diagnosis),
-            declared: diagnosis.parameters.iter().map(|p| (p.name.clone(), p.after, p.std_error)).collect(),
+            declared: diagnosis.parameters.iter().map(|p| (p.name.clone(), p.after, p.interval95)).collect(),
             set,
             strengths: strengths.collect(),
             unexplained_at: diagnosis.unexplained.as_ref().map(|u| u.place.clone()),

@@ -98,6 +98,23 @@ pub struct Found {
     pub held_back: Vec<HeldBack>,
 }
 
+impl Found {
+    /// Returns the place; for an effect between two places of a kind both, as `joint:a with joint:b`.
+    pub fn places(&self) -> String {
+        both_places(&self.place, self.companion.as_deref())
+    }
+}
+
+/// Returns a place, with its companion if both are joints or both are processes, as `joint:a with joint:b`: the effect then acts on
+/// both.
+pub fn both_places(place: &str, companion: Option<&str>) -> String {
+    let are = |kind: &str, other: &str| place.starts_with(kind) && other.starts_with(kind);
+    match companion {
+        Some(other) if are("joint:", other) || are("process:", other) => format!("{place} with {other}"),
+        _ => place.to_owned(),
+    }
+}
+
 /// Error on held-out data with and without an effect, all other parameters fitted to calibration data.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldBack {
@@ -280,8 +297,10 @@ pub struct ParameterMove {
     pub before: f64,
     /// Estimate in the augmented model.
     pub after: f64,
-    /// Standard error in the augmented model.
+    /// Standard error in the augmented model, under its likeliest error model.
     pub std_error: Option<f64>,
+    /// 95 % confidence interval under the likeliest error model, widened to `after`, which is estimated by least squares.
+    pub interval95: Option<[f64; 2]>,
 }
 
 /// Detection limit: the smallest parameter of an effect that would have been detected.

@@ -118,7 +118,7 @@ fn missing(diagnosis: &Diagnosis) -> Markup {
 fn effect(found: &Found) -> Markup {
     html! {
         div class="effect" {
-            h3 { (found.effect) " " (rich(&words::at(&found.place))) }
+            h3 { (found.effect) " " (rich(&words::at(&found.places()))) }
             @if let Some(companion) = &found.companion { p class="quiet" { "second place: " (rich(&words::at(companion))) } }
             p class="formula" { code { (found.formula) } }
             ul class="findings" {

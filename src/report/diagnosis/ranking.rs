@@ -115,7 +115,7 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> Markup {
                     th scope="col" { "parameter" }
                     th scope="col" class="number" { "nominal model" }
                     th scope="col" class="number" { "recalibrated model" }
-                    th scope="col" class="number" { "standard error" }
+                    th scope="col" class="number" { "95 % interval" }
                     th scope="col" { "unit" }
                     th scope="col" class="number" { "change" }
                     th scope="col" class="number" { "change / standard error" }
@@ -127,7 +127,7 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> Markup {
                         th scope="row" { (p.name) }
                         td class="number" { (number(p.before)) }
                         td class="number" { strong { (number(p.after)) } }
-                        td class="number" { @if let Some(error) = p.std_error { (significant(error, 3)) } @else { "not determined" } }
+                        td class="number" { @if let Some([low, high]) = p.interval95 { (significant(low, 4)) " to " (significant(high, 4)) } @else { "not determined" } }
                         td { (p.unit) }
                         td class="number" { @if p.before != 0.0 { (percent(p.after / p.before - 1.0)) } }
                         td class="number" { @if let Some(error) = p.std_error { (significant((p.after - p.before) / error, 2)) } }
