@@ -174,8 +174,11 @@ fn run_on(set: &FittedSet<'_>) -> Option<f64> {
         }
         piece.horizon = end;
     }
-    let fitted = estimation(set.fit.subject, &beginning, &set.variant, &set.added, &[], &set.least_squares.point)
-        .least_squares(set.least_squares.point.clone())?;
+    let estimation = estimation(set.fit.subject, &beginning, &set.variant, &set.added, &[], &set.least_squares.point);
+    // From the optimum of every error model: at a kink, one start may end early.
+    let starts = [&set.least_squares].into_iter().chain(set.under.iter().map(|(_, estimate)| estimate));
+    let fits = starts.filter_map(|start| estimation.least_squares(start.point.clone()));
+    let fitted = fits.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
     let mut errors = Vec::new();
     for ((index, piece), end) in set.fit.pieces.iter().enumerate().zip(&ends) {
         let residuals = set.fit.residuals(index, &fitted.point)?;

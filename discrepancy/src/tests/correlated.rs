@@ -67,6 +67,7 @@ fn where_noise_is_correlated_the_simpler_of_two_effects_is_found() {
         let told = diagnose(&study(&subject), &some, &options, &()).expect("it simulates");
         let names: Vec<_> = told.found.iter().map(|f| f.effect.as_str()).collect();
         assert_eq!(names, ["coulomb-friction"], "{label}");
-        assert!(told.found[0].indistinguishable.iter().all(|rival| rival.bic_behind > -0.1), "{label}");
+        // Of effects within one nat, two in the BIC, the simplest is named.
+        assert!(told.found[0].indistinguishable.iter().all(|rival| rival.bic_behind > -2.0), "{label}");
     }
 }
