@@ -45,11 +45,6 @@ impl Candidate {
         self.effect.name() == effect && self.place() == place
     }
 
-    /// Whether it is of the same class at the same place, and has fewer strengths.
-    pub fn is_simpler_than(&self, other: &Self) -> bool {
-        self.effect.class() == other.effect.class() && self.has_fewer_strengths_than(other)
-    }
-
     /// Whether it is at the same place, and has fewer strengths.
     pub fn has_fewer_strengths_than(&self, other: &Self) -> bool {
         self.port == other.port && self.effect.parameters().len() < other.effect.parameters().len()
