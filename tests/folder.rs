@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use assert_cmd::cargo::cargo_bin;
 use rusqlite::{Connection, OpenFlags};
@@ -77,11 +77,12 @@ fn unfinished(out: &Path) -> usize {
 
 /// Returns the number of points in a database; 0 if it does not exist.
 fn points(database: &Path) -> usize {
-    let count = || {
-        let connection = Connection::open_with_flags(database, OpenFlags::SQLITE_OPEN_READ_ONLY).ok()?;
-        connection.query_row("SELECT count(*) FROM points", [], |row| row.get::<_, i64>(0)).ok()
-    };
-    count().map_or(0, |count| usize::try_from(count).unwrap())
+    if !database.exists() {
+        return 0;
+    }
+    let connection = Connection::open_with_flags(database, OpenFlags::SQLITE_OPEN_READ_ONLY).unwrap();
+    let count = connection.query_row("SELECT count(*) FROM points", [], |row| row.get::<_, i64>(0));
+    usize::try_from(count.unwrap()).unwrap()
 }
 
 const SHORT: [&str; 7] = ["run", "pid-design", "--quiet", "--solver", "genetic", "--max-evaluations", "60"];
@@ -203,7 +204,11 @@ fn evaluations_wait_for_a_locked_database_and_are_written_after_its_release() {
     line.clear();
     std::io::BufRead::read_line(&mut stderr, &mut line).unwrap();
     assert!(line.contains("evaluations are written again"), "{line}");
-    assert!(points(&database) > committed);
+    let until = Instant::now() + Duration::from_secs(10);
+    while points(&database) <= committed {
+        assert!(Instant::now() < until, "no evaluation is written within ten seconds");
+        std::thread::yield_now();
+    }
     Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     std::io::Read::read_to_string(&mut stderr, &mut line).unwrap();
     assert!(!line.contains("incomplete"), "{line}");
