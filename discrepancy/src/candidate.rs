@@ -11,6 +11,7 @@ use mops_core::{
 
 use crate::gap::Gap;
 use crate::quantum::quantum;
+use crate::settings::settings;
 
 /// An effect at a place.
 #[derive(Clone)]
@@ -145,30 +146,6 @@ fn could_be_alike(port: &Port, companion: &Port, interface: &Interface) -> bool 
     state.zip(input).is_none_or(|(state, input)| state.variable.unit == input.unit)
 }
 
-/// Steps up to the largest value of which all sizes are tried: what is finer is read from samples, or as good as noise.
-const MOST_STEPS: u32 = 24;
-
-/// The finest steps, in units of the noise, that samples tell: there the mean cosine is `exp(-2 pi^2/5^2)`, 0.45.
-const NOISES_PER_STEP: f64 = 5.0;
-
-/// Frequencies tried from one number of periods in the record to the next, and most periods.
-const PER_PERIOD: f64 = 1.5;
-const MOST_PERIODS: f64 = 160.0;
-
-/// How many times the largest multiple tried of its typical size a shape may be, and how many widths beyond a range.
-pub(crate) const FARTHEST_SHAPE: f64 = 10.0;
-
-/// Periods that must be seen of what repeats along a position or in time.
-const PERIODS_SEEN: f64 = 1.5;
-
-/// Samples that an event lasts at least, and the share of a record that it lasts at most.
-const SAMPLES_SEEN: f64 = 3.0;
-const EVENT_SHARE: f64 = 0.25;
-
-/// Shortest time constant, in samples: no record shows how fast a change is that is over, to 5e-5, at the next sample. Basis: an
-/// assumption.
-const FASTEST: f64 = 0.1;
-
 /// Sizes tried from one number of steps to the next.
 const PER_STEP: u32 = 4;
 
@@ -233,7 +210,7 @@ impl Sizes {
     }
 
     /// Smallest and largest value of a strength in a fit: those that physics allows. A shape that is tried at multiples of its
-    /// typical size is besides no more than [`FARTHEST_SHAPE`] times the largest of them, and one that is tried within a range is
+    /// typical size is besides no more than `farthest` times the largest of them, and one that is tried within a range is
     /// no more than so many widths beyond it: farther off it does nothing, or stands for something else, as a force stands for
     /// a constant one that would yield after a path much longer than the motion.
     pub fn bounds(&self, strength: &EffectParameter) -> [f64; 2] {
@@ -241,10 +218,10 @@ impl Sizes {
         let [least, most] = match (strength.null_value, strength.grid) {
             (None, InitialGrid::Scaled(multiples)) => {
                 let largest = multiples.iter().copied().fold(0.0, f64::max) * self.of(strength.dimension);
-                [f64::NEG_INFINITY, FARTHEST_SHAPE * largest]
+                [f64::NEG_INFINITY, settings().farthest * largest]
             }
             (None, InitialGrid::Within(_)) => {
-                let beyond = FARTHEST_SHAPE * (self.range[1] - self.range[0]);
+                let beyond = settings().farthest * (self.range[1] - self.range[0]);
                 [self.range[0] - beyond, self.range[1] + beyond]
             }
             _ => [f64::NEG_INFINITY, f64::INFINITY],
@@ -257,15 +234,17 @@ impl Sizes {
     /// Smallest and largest value that the records can show: [`PERIODS_SEEN`] of what repeats, an event of at least
     /// [`SAMPLES_SEEN`] samples and at most [`EVENT_SHARE`] of the record, a time constant of at least [`FASTEST`] samples.
     fn covered(&self, parameter: &EffectParameter) -> [f64; 2] {
-        let periods = |length: f64| std::f64::consts::TAU * PERIODS_SEEN / length.max(f64::MIN_POSITIVE);
+        let periods = |length: f64| std::f64::consts::TAU * settings().periods_seen / length.max(f64::MIN_POSITIVE);
         match parameter.kind {
             ParameterKind::WaveNumber => [periods(self.range[1] - self.range[0]), f64::INFINITY],
             ParameterKind::Frequency => [periods(self.record), f64::INFINITY],
-            ParameterKind::Duration => [SAMPLES_SEEN * self.sample, EVENT_SHARE * self.record],
-            ParameterKind::BuildUp => [FASTEST * self.sample / self.time * self.of(parameter.dimension), f64::INFINITY],
+            ParameterKind::Duration => [settings().samples_seen * self.sample, settings().event_share * self.record],
+            ParameterKind::BuildUp => {
+                [settings().fastest * self.sample / self.time * self.of(parameter.dimension), f64::INFINITY]
+            }
             // Of a store: at a joint a stop yields by its stiffness, however fast.
             ParameterKind::Steepness if self.stiffness.is_none() => {
-                [f64::NEG_INFINITY, 1.0 / (FASTEST * self.sample * self.mobility)]
+                [f64::NEG_INFINITY, 1.0 / (settings().fastest * self.sample * self.mobility)]
             }
             _ => [f64::NEG_INFINITY, f64::INFINITY],
         }
@@ -300,12 +279,12 @@ impl Sizes {
             }
             InitialGrid::Plain(values) | InitialGrid::Jumps(values) => values.to_vec(),
             InitialGrid::Frequencies => {
-                let step = std::f64::consts::TAU / (PER_PERIOD * self.record);
+                let step = std::f64::consts::TAU / (settings().per_period * self.record);
                 let highest = self.highest_frequency();
                 (1..).map(|k| f64::from(k) * step).take_while(|&w| w <= highest).collect()
             }
             InitialGrid::Steps => {
-                let numbers = 1..=PER_STEP * (MOST_STEPS - 1);
+                let numbers = 1..=PER_STEP * (settings().most_steps - 1);
                 let sizes = numbers.map(|n| self.largest() / (1.0 + f64::from(n - 1) / f64::from(PER_STEP)));
                 sizes.chain(self.quantum).collect()
             }
@@ -317,7 +296,7 @@ impl Sizes {
 
     /// The highest frequency that is tried: four samples or a share of the record in a period, rad/s.
     pub fn highest_frequency(&self) -> f64 {
-        (0.5 * std::f64::consts::PI / self.sample).min(std::f64::consts::TAU * MOST_PERIODS / self.record)
+        (0.5 * std::f64::consts::PI / self.sample).min(std::f64::consts::TAU * settings().most_periods / self.record)
     }
 
     /// The typical size of a lag or delay: a tenth of the time in which the place moves, or ten samples if that is more, s.
@@ -327,7 +306,7 @@ impl Sizes {
 
     /// The size of finer steps, where samples tell it.
     pub fn quantum_of(&self, samples: &[f64], noise: f64) -> Option<f64> {
-        quantum(samples, NOISES_PER_STEP * noise, self.largest() / f64::from(MOST_STEPS))
+        quantum(samples, settings().noises_per_step * noise, self.largest() / f64::from(settings().most_steps))
     }
 
     fn largest(&self) -> f64 {

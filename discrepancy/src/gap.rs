@@ -1,19 +1,7 @@
 //! A gap in measured values: many samples at one value, and next to none on either side of it, as where a potentiometer is
 //! open.
 
-/// Within so many standard deviations of the noise samples show one value.
-const ONE: f64 = 2.5;
-
-/// Around many of these, so many: beyond them, and up to so many deviations, there are next to none about a gap, at most this
-/// share; about a motion in passing there are four fifths. So a gap of seven standard deviations to either side is told, into
-/// which the noise of the samples beside it reaches.
-const MANY: usize = 20;
-const NEAR: f64 = 4.5;
-const FEW: f64 = 0.15;
-
-/// Around fewer, at least so many, there are none up to so many deviations.
-const FEWEST: usize = 5;
-const FAR: f64 = 8.5;
+use crate::settings::settings;
 
 /// A gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,15 +25,16 @@ pub fn gap(values: &[f64], noise: f64) -> Option<Gap> {
     let around =
         |value: f64, apart: f64| [-apart, apart].map(|apart| sorted.partition_point(|v| *v < value + apart * noise));
     let alone = sorted.iter().filter_map(|value| {
-        let [first, end] = around(*value, ONE);
+        let [first, end] = around(*value, settings().gap_core);
         let core = end - first;
-        if core < FEWEST {
+        if core < settings().gap_samples[0] {
             return None;
         }
         let middle = (sums[end] - sums[first]) / core as f64;
-        let [[low, high], [lowest, highest]] = [NEAR, FAR].map(|apart| around(middle, apart));
-        let is_alone =
-            core >= MANY && (high - low).saturating_sub(core) as f64 <= FEW * core as f64 || highest - lowest == core;
+        let [[low, high], [lowest, highest]] = settings().gap_edges.map(|apart| around(middle, apart));
+        let is_alone = core >= settings().gap_samples[1]
+            && (high - low).saturating_sub(core) as f64 <= settings().gap_share * core as f64
+            || highest - lowest == core;
         let (next_below, next_above) = (sorted.get(low.checked_sub(1)?)?, sorted.get(high)?);
         let half_width = (middle - next_below).min(next_above - middle);
         is_alone.then_some(Gap { middle, half_width })

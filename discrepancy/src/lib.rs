@@ -21,6 +21,7 @@ mod quantum;
 mod report;
 mod scene;
 pub mod selection;
+mod settings;
 mod subject;
 #[cfg(test)]
 mod testing;
@@ -39,3 +40,4 @@ pub use mops_core::diagnosis::{
     ParameterMove, Prediction, Ranked, Removed, Rival, Rule, Stability, Step, StrengthValue, Unexplained, Verdict,
     WindowErrors, together,
 };
+pub use settings::{Settings, settings, use_settings};

@@ -6,11 +6,7 @@
 use mops_core::math;
 use std::f64::consts::TAU;
 
-/// The mean cosine from which values count as multiples of a quantum: that of values which scatter about them by a fifth.
-const CLEAR: f64 = 0.45;
-
-/// Of a quantum and its fractions, which do nearly as well, the largest is taken: the first of at least this share of the best.
-const NEARLY: f64 = 0.8;
+use crate::settings::settings;
 
 /// Values of the frequency in the width of a peak, and most of them in all: beyond, steps are finer than is looked for.
 const PER_PEAK: f64 = 6.0;
@@ -35,7 +31,8 @@ pub fn quantum(values: &[f64], finest: f64, coarsest: f64) -> Option<f64> {
     let means: Vec<f64> = frequencies.iter().map(|&frequency| mean(frequency)).collect();
     let best = means.iter().copied().fold(0.0, f64::max);
     let is_peak = |k: usize| k > 0 && means[k] >= means[k - 1] && (k + 1 == means.len() || means[k] > means[k + 1]);
-    let first = (0..means.len()).find(|&k| is_peak(k) && means[k] >= NEARLY * best && means[k] > CLEAR)?;
+    let first = (0..means.len())
+        .find(|&k| is_peak(k) && means[k] >= settings().quantum_share * best && means[k] > settings().quantum_cosine)?;
     Some(1.0 / highest_near(mean, frequencies[first], step))
 }
 

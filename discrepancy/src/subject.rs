@@ -7,6 +7,7 @@ use mops_core::{Case, Dual, Effect, Job, Model, ParameterSource, Port, Role, Sca
 
 use crate::candidate::{Candidate, candidates};
 use crate::hygiene::{noise_of, without_spikes};
+use crate::settings::settings;
 
 /// A measured signal.
 #[derive(Debug, Clone)]
@@ -75,16 +76,11 @@ pub struct Subject {
     pub tolerance: f64,
 }
 
-/// Error of a simulation step as a fraction of the noise, and the loosest relative tolerance. Basis: an assumption; an error of a
-/// few hundredths of the noise is indistinguishable from it.
-const EXACT: f64 = 0.03;
-const LOOSEST: f64 = 1e-5;
-
 /// Returns the relative tolerance of simulations that the noise of the most precise sensor, relative to its largest value, wants.
 fn tolerance(measurements: &[Measurement]) -> f64 {
     let of = |s: &Series| s.noise / s.values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     let finest = measurements.iter().flat_map(|m| &m.series).map(of).fold(f64::INFINITY, f64::min);
-    (EXACT * finest).min(LOOSEST)
+    (settings().step_error * finest).min(settings().loosest)
 }
 
 impl Subject {

@@ -9,6 +9,7 @@ use crate::base::globals;
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::{Fit, Global, Piece, Point, Sets};
 use crate::meter::Meter;
+use crate::settings::settings;
 use crate::subject::{Local, Subject};
 
 /// A candidate with strengths to start from.
@@ -80,15 +81,6 @@ pub struct Variant {
     pub first: Vec<usize>,
 }
 
-/// Steps of a simulation beyond which a candidate is too stiff to be worth it: so many for each sample, so many times those of the
-/// declared model, and a few more.
-const STEPS_PER_SAMPLE: f64 = 6.0;
-const TIMES_DECLARED: f64 = 3.0;
-const FEW_STEPS: f64 = 1000.0;
-
-/// Times as many steps for records that parameters are not fitted to.
-const OTHERS: f64 = 5.0;
-
 impl Variant {
     /// The declared model with these effects, to be simulated over pieces of experiments.
     ///
@@ -106,10 +98,11 @@ impl Variant {
         let densest = subject.measurements.iter().map(density).fold(0.0, f64::max);
         let horizon = pieces.iter().map(|piece| piece.horizon).fold(0.0, f64::max);
         let pace = subject.pace.get().copied().unwrap_or(0.0);
-        let limit = FEW_STEPS + horizon * (STEPS_PER_SAMPLE * densest + TIMES_DECLARED * pace);
+        let limit =
+            settings().few_steps + horizon * (settings().steps_per_sample * densest + settings().times_declared * pace);
         // Other records are simulated for few candidates.
         let is_other = |piece: &Piece| subject.measurements[piece.measurement].role != Role::Calibration;
-        let limit = if pieces.iter().any(is_other) { OTHERS * limit } else { limit };
+        let limit = if pieces.iter().any(is_other) { settings().other_records * limit } else { limit };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let limit = limit as usize;
         let model = model.with_step_limit(limit).with_tolerance(subject.tolerance);

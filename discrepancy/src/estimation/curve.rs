@@ -15,6 +15,7 @@ use super::errors::Errors;
 use super::estimate::{Estimate, Estimation};
 use super::scoring::log_determinant;
 use crate::fit::{Fit, Piece};
+use crate::settings::settings;
 use crate::trace_of::{Spot, spot};
 use crate::trajectory::Trajectory;
 
@@ -24,27 +25,8 @@ const BUMPS: usize = 6;
 /// Columns of a coordinate: the bumps, then the input itself at an input, else 0.
 const COLUMNS: usize = BUMPS + 1;
 
-/// Standard deviation of the gain of an input, beside which curves over that input are judged. A smaller gain together with
-/// smaller parameters of the plant makes every unknown force smaller, and would be taken for a dependence on the input.
-const GAIN: f64 = 1.0;
-
-/// Shares of the visited values that lie below the first and above the last centre.
-const OUTSIDE: f64 = 0.005;
-
-/// Standard deviations of the weights in nominal forces that are tried.
-const DEVIATIONS: [f64; 4] = [0.005, 0.02, 0.06, 0.2];
-
-/// Logarithms by which the deviation of the error model is tried smaller, as the curve may take over what it described.
-const SHRINKS: [f64; 6] = [0.0, -0.5, -1.0, -1.6, -2.3, -3.2];
-
-/// Nats taken off every gain for the choice of the deviations.
-const CHOICE: f64 = 2.3;
-
 /// Distance of neighbouring centres, relative to the values, up to which a coordinate does not move: rounding.
 const STILL: f64 = 1e-12;
-
-/// Turns that an angle must cover to be a coordinate modulo one turn too.
-const TURNS: f64 = 1.5;
 
 /// Points of a curve that is returned.
 const POINTS: usize = 41;
@@ -106,7 +88,8 @@ impl Estimation<'_> {
             })
             .collect();
         let precision: Vec<f64> = free.iter().map(|&k| self.priors[k].precision()).collect();
-        let grid: Vec<Option<Reduced>> = SHRINKS
+        let grid: Vec<Option<Reduced>> = settings()
+            .shrinks
             .par_iter()
             .map(|&shrink| self.reduced(&fit.pieces, &estimate.errors.scaled(shrink), &records, columns, &precision))
             .collect();
@@ -114,10 +97,10 @@ impl Estimation<'_> {
         let least = |a: &(f64, Vec<f64>), b: &(f64, Vec<f64>)| a.0.total_cmp(&b.0);
         let gain = |(s, shape): (usize, &Shape)| {
             let (without, _) = grid.iter().filter_map(|reduced| reduced.with_curve(s, None)).min_by(least)?;
-            let tried = grid.iter().flat_map(|reduced| DEVIATIONS.map(|d| reduced.with_curve(s, Some(d))));
+            let tried = grid.iter().flat_map(|reduced| settings().weights.map(|d| reduced.with_curve(s, Some(d))));
             let (penalty, mut weights) = tried.flatten().min_by(least)?;
             weights.truncate(BUMPS);
-            let gain = 0.5 * (without - penalty) - CHOICE;
+            let gain = 0.5 * (without - penalty) - settings().choice;
             Some(Dependence { gain, curve: shape.curve(&weights), ..shape.coordinate.names.clone() })
         };
         let mut curves: Vec<Dependence> = shapes.iter().enumerate().filter_map(gain).collect();
@@ -307,7 +290,7 @@ impl<'c> Shape<'c> {
             Value::Angle(state) => {
                 let range = |[low, high]: [f64; 2], m: &Moment| [low.min(m.x[*state]), high.max(m.x[*state])];
                 let [low, high] = moments().fold([f64::INFINITY, f64::NEG_INFINITY], range);
-                if high - low < TURNS * TAU {
+                if high - low < settings().periods_seen * TAU {
                     return None;
                 }
                 ((0..BUMPS).map(|b| b as f64 * TAU / count).collect(), TAU / count)
@@ -316,7 +299,7 @@ impl<'c> Shape<'c> {
                 let mut values: Vec<f64> = moments().map(|m| value.at(m)).collect();
                 values.sort_by(f64::total_cmp);
                 let quantile = |share: f64| values.get((share * (values.len() - 1) as f64).round() as usize).copied();
-                let (low, high) = (quantile(OUTSIDE)?, quantile(1.0 - OUTSIDE)?);
+                let (low, high) = (quantile(settings().outside)?, quantile(1.0 - settings().outside)?);
                 let step = (high - low) / (count - 1.0);
                 if step.is_nan() || step <= STILL * low.abs().max(high.abs()) {
                     return None;
@@ -392,7 +375,7 @@ impl Reduced {
     /// weights. The gain of an input is free in both.
     fn with_curve(&self, curve: usize, deviation: Option<f64>) -> Option<(f64, Vec<f64>)> {
         let (at, last) = (COLUMNS * curve, self.rest.nrows() - 1);
-        let deviation = |b: usize| if b == BUMPS { GAIN } else { deviation.unwrap_or(0.0) };
+        let deviation = |b: usize| if b == BUMPS { settings().input_gain } else { deviation.unwrap_or(0.0) };
         let matrix = DMatrix::from_fn(COLUMNS, COLUMNS, |a, b| {
             let unit = if a == b { 1.0 } else { 0.0 };
             unit + self.rest[(at + a, at + b)] * deviation(a) * deviation(b)

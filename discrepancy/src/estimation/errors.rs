@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use super::scoring::{Maximum, Score, maximise};
 use crate::error_models::{ForceError, Kernel, LinearisedMotion, OutputError};
 use crate::fit::{Piece, Residuals};
+use crate::settings::settings;
 
 /// Kind of an error model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,30 +107,8 @@ impl Channels {
     }
 }
 
-/// Prior standard deviation of the logarithm of a deviation.
-const DEVIATION: f64 = 1.5;
-
-/// Prior standard deviation of the logarithm of a noise level.
-const NOISE: f64 = 1.0;
-
-/// Smallest noise as a share of that of the sensor.
-const LEAST_NOISE: f64 = 0.3;
-
-/// Smallest correlation length in samples, and starts of the correlation length in samples.
-const SHORTEST: f64 = 0.3;
-const STARTS: [f64; 2] = [1.0, 10.0];
-
-/// Largest correlation length of a rough error as a share of the longest record.
-const LONGEST_ROUGH: f64 = 0.25;
-
 /// Largest number of hyperparameters of a force: with more channels there is no force error.
 const WIDEST: usize = 16;
-
-/// Range of a deviation of forces in nominal forces.
-const FORCES: [f64; 2] = [1e-6, 50.0];
-
-/// Range of an output deviation: share of the sensor's noise, and multiple of the larger of residual and noise.
-const OUTPUTS: [f64; 2] = [0.02, 100.0];
 
 /// Hyperparameters that were fitted, with what the evidence needs of them.
 #[derive(Debug, Clone)]
@@ -256,8 +235,8 @@ impl Errors {
         };
         let step = channels.shortest_step();
         let length = channels.length.iter().copied().fold(0.0, f64::max);
-        let lengths = [SHORTEST * step, length.max(2.0 * step)].map(math::ln);
-        let mut bounds = vec![FORCES.map(math::ln), lengths];
+        let lengths = [settings().shortest * step, length.max(2.0 * step)].map(math::ln);
+        let mut bounds = vec![settings().forces.map(math::ln), lengths];
         bounds.extend(std::iter::repeat_n(noise_bounds(rms(residuals)), channels.count));
         let mut starts: Vec<Vec<f64>> = Vec::new();
         if let Some(Self::Force(error, _)) = before {
@@ -265,7 +244,7 @@ impl Errors {
             starts.push([math::ln(error.deviation), math::ln(error.length)].into_iter().chain(noise).collect());
         }
         if thoroughly || starts.is_empty() {
-            for samples in STARTS {
+            for samples in settings().lengths {
                 for deviation in [0.02, 0.5] {
                     let noise = std::iter::repeat_n(0.0, channels.count);
                     starts.push([math::ln(deviation), math::ln(samples * step)].into_iter().chain(noise).collect());
@@ -297,8 +276,15 @@ impl Prior {
     fn new(lengths: [f64; 2], noise: &[f64]) -> Self {
         let half = 0.5 * math::ln(std::f64::consts::TAU);
         let range = lengths[1] - lengths[0];
-        let deviation = -math::ln(DEVIATION) - half;
-        let of_noise: f64 = noise.iter().map(|x| -0.5 * x * x / (NOISE * NOISE) - math::ln(NOISE) - half).sum();
+        let deviation = -math::ln(settings().deviation_prior) - half;
+        let of_noise: f64 = noise
+            .iter()
+            .map(|x| {
+                -0.5 * x * x / (settings().noise_prior * settings().noise_prior)
+                    - math::ln(settings().noise_prior)
+                    - half
+            })
+            .sum();
         Self { log: deviation - math::ln(range) + of_noise, length: 12.0 / (range * range) }
     }
 
@@ -306,7 +292,7 @@ impl Prior {
     fn log_determinant(&self, information: &DMatrix<f64>, channels: usize) -> f64 {
         debug_assert_eq!(information.nrows(), 2 + channels);
         let mut with = information.clone();
-        with[(0, 0)] += 1.0 / (DEVIATION * DEVIATION);
+        with[(0, 0)] += 1.0 / (settings().deviation_prior * settings().deviation_prior);
         with[(1, 1)] += self.length;
         super::scoring::log_determinant(&with)
     }
@@ -315,9 +301,9 @@ impl Prior {
 /// Adds the prior of the logarithms of noises, normal about 0, to a score.
 fn with_noise_prior(mut score: Score, x: &[f64], first: usize) -> Score {
     for k in first..x.len() {
-        score.log -= 0.5 * x[k] * x[k] / (NOISE * NOISE);
-        score.gradient[k] -= x[k] / (NOISE * NOISE);
-        score.information[(k, k)] += 1.0 / (NOISE * NOISE);
+        score.log -= 0.5 * x[k] * x[k] / (settings().noise_prior * settings().noise_prior);
+        score.gradient[k] -= x[k] / (settings().noise_prior * settings().noise_prior);
+        score.information[(k, k)] += 1.0 / (settings().noise_prior * settings().noise_prior);
     }
     score
 }
@@ -337,7 +323,7 @@ fn force_score<const N: usize>(x: &[f64], residuals: &[Vec<f64>], motions: &[Mot
 }
 
 fn noise_bounds(rms: f64) -> [f64; 2] {
-    [LEAST_NOISE, (1.5 * rms).max(3.0)].map(math::ln)
+    [settings().least_noise, (1.5 * rms).max(3.0)].map(math::ln)
 }
 
 /// Root mean square of all residuals.
@@ -390,17 +376,18 @@ fn fit_output(
     #[allow(clippy::cast_precision_loss)]
     let count = series.iter().map(|(times, _)| times.len()).sum::<usize>().max(1) as f64;
     let rms = (series.iter().flat_map(|(_, r)| r.iter()).map(|r| r * r).sum::<f64>() / count).sqrt();
-    let longest = if kernel == Kernel::OrnsteinUhlenbeck { LONGEST_ROUGH } else { 1.0 };
+    let longest = if kernel == Kernel::OrnsteinUhlenbeck { settings().longest_rough } else { 1.0 };
     let step = channels.step[channel];
-    let shortest = if kernel == Kernel::OrnsteinUhlenbeck { 1.0 } else { SHORTEST };
+    let shortest = if kernel == Kernel::OrnsteinUhlenbeck { 1.0 } else { settings().shortest };
     let lengths = [shortest * step, (longest * channels.length[channel]).max(2.0 * step)].map(math::ln);
-    let bounds = [[OUTPUTS[0], OUTPUTS[1] * rms.max(1.0)].map(math::ln), lengths, noise_bounds(rms)];
+    let bounds =
+        [[settings().outputs[0], settings().outputs[1] * rms.max(1.0)].map(math::ln), lengths, noise_bounds(rms)];
     let mut starts: Vec<Vec<f64>> = Vec::new();
     if let Some(before) = before {
         starts.push([before.deviation, before.length, before.noise].map(math::ln).to_vec());
     }
     if thoroughly || before.is_none() {
-        for samples in STARTS {
+        for samples in settings().lengths {
             starts.push(vec![math::ln(rms.max(0.1)), math::ln(samples * step), 0.0]);
         }
     }

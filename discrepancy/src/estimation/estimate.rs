@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::errors::{Channels, ErrorModel, Errors, Fitted, Motion};
 use crate::error_models::ForceError;
 use crate::fit::{Fit, Piece, Point, Residuals};
+use crate::settings::settings;
 use crate::trajectory::Trajectory;
 
 /// Prior of an unknown.
@@ -70,40 +71,11 @@ pub struct Estimation<'a> {
     pub log_choices: f64,
 }
 
-/// Rounds of parameters and hyperparameters, and iterations of the parameters in each.
-const ROUNDS: usize = 8;
-const ITERATIONS: usize = 10;
-
-/// Iterations of least squares.
-const LEAST_SQUARES: usize = 60;
-
-/// Iterations of a rough fit, and the decrease of log-likelihood that is predicted where it ends, nats.
-const ROUGH: usize = 30;
-const ROUGHLY: f64 = 0.1;
-
-/// Iterations in a row that each decrease the sum of squares by a smaller share after which a rough fit ends.
-const STALLED: usize = 5;
-const STALLS: f64 = 0.01;
-
-/// Largest expected ratio of an actual gain to that predicted to first order.
-pub const ALLOWANCE: f64 = 1.5;
-
-/// Predicted decrease of the sum of squares, relative to its mean per residual, below which a fit has converged.
-const CONVERGED: f64 = 0.01;
-
-/// Gain in log-likelihood, or decrease of a joint penalty, in nats below which rounds end.
-const SETTLED: f64 = 0.05;
-
-/// Iterations of a smoothed motion; trials of a step, and by how much each is shorter than the one before.
-const SMOOTHINGS: usize = 12;
-const TRIALS: usize = 6;
-const SHRINK: f64 = 0.4;
-
 /// Parameters and hyperparameters are fitted in turns.
 impl Estimation<'_> {
     /// Fits parameters and initial states by least squares.
     pub fn least_squares(&self, start: Point) -> Option<Estimate> {
-        self.with(&Errors::White, start, LEAST_SQUARES)
+        self.with(&Errors::White, start, settings().iterations)
     }
 
     /// Fits parameters and initial states under an error model at the outputs whose hyperparameters are given, in at most so many
@@ -120,7 +92,12 @@ impl Estimation<'_> {
 
     /// Fits like [`Estimation::with`], but roughly, and gives up where the log-likelihood cannot become as large as `least`.
     pub fn roughly(&self, errors: &Errors, start: Point, least: f64) -> Option<Estimate> {
-        let effort = Effort { iterations: ROUGH, negligible: 2.0 * ROUGHLY, least, is_rough: true };
+        let effort = Effort {
+            iterations: settings().rough_iterations,
+            negligible: 2.0 * settings().roughly,
+            least,
+            is_rough: true,
+        };
         self.given(errors, self.descend(self.fit, errors, start, effort)?)
     }
 
@@ -142,7 +119,7 @@ impl Estimation<'_> {
         let mut best: Option<(f64, Point, Fitted)> = None;
         let mut errors: Option<Errors> = None;
         let mut trials = 0;
-        for round in 0..ROUNDS {
+        for round in 0..settings().rounds {
             let motions = match kind {
                 ErrorModel::Force => self.motions(&mut fit, &point, errors.as_ref())?,
                 _ => Vec::new(),
@@ -154,7 +131,7 @@ impl Estimation<'_> {
             let known = errors.as_ref().or(before);
             let thoroughly = round == 0;
             let fitted = Errors::fit(kind, &self.fit.pieces, &self.channels, &residuals, motions, known, thoroughly)?;
-            let found = self.descend(&fit, &fitted.errors, point.clone(), Effort::of(ITERATIONS))?;
+            let found = self.descend(&fit, &fitted.errors, point.clone(), Effort::of(settings().round_iterations))?;
             let is_first = round == usize::from(kind == ErrorModel::Force);
             let gain = best.as_ref().filter(|_| !is_first).map_or(f64::INFINITY, |best| found.first - best.0);
             if gain > 0.0 {
@@ -164,10 +141,10 @@ impl Estimation<'_> {
             } else {
                 // The linear model was left: back towards the best point.
                 let (_, known, _) = best.as_ref()?;
-                point = between(known, &point, SHRINK);
+                point = between(known, &point, settings().shorter);
                 trials += 1;
             }
-            if gain.abs() < SETTLED && round > 1 || trials > TRIALS {
+            if gain.abs() < settings().settled && round > 1 || trials > settings().shortenings {
                 break;
             }
         }
@@ -190,11 +167,11 @@ impl Estimation<'_> {
         for piece in 0..fit.pieces.len() {
             let mut motion = self.linearised(fit, piece, point, before.map(|motions| &motions[piece]))?;
             if let Some(error) = error {
-                for _ in 0..SMOOTHINGS {
+                for _ in 0..settings().smoothings {
                     let Some(next) = self.smoothed(fit, piece, point, error, &motion) else { break };
                     let gain = next.1;
                     motion = next.0;
-                    if gain < SETTLED {
+                    if gain < settings().settled {
                         break;
                     }
                 }
@@ -227,7 +204,7 @@ impl Estimation<'_> {
         let joint = |residuals: &[f64], forces: &[f64]| noise(residuals) + error.penalty(&motion.linearised, forces);
         let now = joint(&residuals, &motion.forces);
         let mut share = 1.0;
-        for _ in 0..TRIALS {
+        for _ in 0..settings().shortenings {
             let forces: Vec<f64> = motion.forces.iter().zip(&wanted).map(|(f, w)| f + share * (w - f)).collect();
             let trial = Motion { forces, ..motion.clone() };
             self.push(fit, piece, &trial);
@@ -237,7 +214,7 @@ impl Estimation<'_> {
                     return Some((self.linearised(fit, piece, point, Some(&trial))?, gain));
                 }
             }
-            share *= SHRINK;
+            share *= settings().shorter;
         }
         None
     }
@@ -416,11 +393,12 @@ impl Estimation<'_> {
         let remaining = |iterate: &LeastSquares| iterate.full_step().map_or(f64::INFINITY, |full| full.predicted);
         let is_converged = |iterate: &LeastSquares| remaining(iterate) < negligible(iterate);
         let is_hopeless = |iterate: &LeastSquares| {
-            effort.least > f64::NEG_INFINITY && log(iterate) + ALLOWANCE * 0.5 * remaining(iterate) < effort.least
+            effort.least > f64::NEG_INFINITY
+                && log(iterate) + settings().allowance * 0.5 * remaining(iterate) < effort.least
         };
         let mut stalled = 0;
         for iteration in 0..effort.iterations {
-            if iteration > 1 && is_hopeless(&iterate) || effort.is_rough && stalled >= STALLED {
+            if iteration > 1 && is_hopeless(&iterate) || effort.is_rough && stalled >= settings().stalled {
                 break;
             }
             let before = iterate.sum();
@@ -441,7 +419,7 @@ impl Estimation<'_> {
                 _ if iterate.reject() => {}
                 _ => break,
             }
-            stalled = if iterate.sum() < (1.0 - STALLS) * before { 0 } else { stalled + 1 };
+            stalled = if iterate.sum() < (1.0 - settings().stalls) * before { 0 } else { stalled + 1 };
         }
         let converged = is_converged(&iterate);
         Some(Found { point: self.point(&values), iterate, free, scale, logarithms, samples, first, converged })
@@ -502,8 +480,8 @@ struct Effort {
 
 impl Effort {
     /// To the end, in at most so many iterations.
-    const fn of(iterations: usize) -> Self {
-        Self { iterations, negligible: CONVERGED, least: f64::NEG_INFINITY, is_rough: false }
+    fn of(iterations: usize) -> Self {
+        Self { iterations, negligible: settings().converged, least: f64::NEG_INFINITY, is_rough: false }
     }
 }
 

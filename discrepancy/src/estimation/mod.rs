@@ -8,6 +8,6 @@ mod scoring;
 mod steps;
 
 pub use errors::{Channels, ErrorModel, Errors, Motion};
-pub use estimate::{ALLOWANCE, Estimate, Estimation};
+pub use estimate::{Estimate, Estimation};
 pub(crate) use priors::{log_choices, nominal_rates, priors};
 pub(crate) use steps::FALL;

@@ -6,30 +6,10 @@ use mops_core::{Dimension, Job, ParameterKind, Port, math};
 
 use super::estimate::Prior;
 use crate::fit::{Fit, Global, Point, Sets};
+use crate::settings::settings;
 use crate::subject::{Local, Subject};
 use crate::trajectory::Trajectory;
 use crate::variant::{Added, Variant};
-
-/// Standard deviation of a declared parameter: in its logarithm where the study looks for that, else in its scale.
-const DECLARED: f64 = 1.5;
-
-/// Standard deviation of an initial state in its scale.
-const START: f64 = 3.0;
-
-/// Standard deviation of a parameter with a null value in its typical size at the place.
-const STRENGTH: f64 = 2.0;
-
-/// Standard deviation of the logarithm of a shape.
-const SHAPE: f64 = 1.0;
-
-/// Standard deviation of the logarithm of a steepness: of a contact or an edge, which data know from below only.
-const STEEPNESS: f64 = 2.0;
-
-/// Standard deviation of a gain without unit.
-const GAIN: f64 = 0.3;
-
-/// Standard deviation of an offset of a sensor as a share of its range.
-const OFFSET: f64 = 0.1;
 
 /// Standard deviation of a uniform distribution in its width: `1/sqrt(12)`.
 const UNIFORM: f64 = 0.288_675_134_594_812_9;
@@ -50,7 +30,7 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
     let at_centre = |stretch, deviation| Prior { stretch, deviation, centre: None, half: false };
     let declared = |k: usize, global: &Global| {
         let stretch = if global.log { subject.start()[k].abs() } else { global.scale };
-        at_centre(stretch, DECLARED)
+        at_centre(stretch, settings().declared_prior)
     };
     let of_effect = |parameter: usize| {
         let index =
@@ -66,14 +46,16 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
         };
         let typical = || added.strengths[position].abs().max(f64::MIN_POSITIVE);
         match of.kind {
-            ParameterKind::Steepness => at_centre(typical(), STEEPNESS),
+            ParameterKind::Steepness => at_centre(typical(), settings().steepness_prior),
             ParameterKind::Strength if of.null_value == Some(0.0) => match of.dimension {
-                Dimension::ONE => about_null(1.0, GAIN),
+                Dimension::ONE => about_null(1.0, settings().gain_prior),
                 Dimension::TIME => about_null(added.sizes.lag(), 1.0),
-                Dimension::OUTPUT if is_sensor => about_null(added.sizes.range[1] - added.sizes.range[0], OFFSET),
+                Dimension::OUTPUT if is_sensor => {
+                    about_null(added.sizes.range[1] - added.sizes.range[0], settings().offset_prior)
+                }
                 dimension => {
                     let scale = math::powi(heavier(added), dimension.output.into());
-                    about_null(added.sizes.of(dimension).abs() * scale, STRENGTH)
+                    about_null(added.sizes.of(dimension).abs() * scale, settings().strength_prior)
                 }
             },
             ParameterKind::Phase => at_centre(TAU, UNIFORM),
@@ -84,7 +66,7 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
                 at_centre(added.sizes.range[1] - added.sizes.range[0], UNIFORM)
             }
             ParameterKind::Shape | ParameterKind::BuildUp | ParameterKind::WaveNumber | ParameterKind::Duration => {
-                at_centre(typical(), SHAPE)
+                at_centre(typical(), settings().shape_prior)
             }
         }
     };
@@ -92,7 +74,7 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
         Sets::Tuner(k) => declared(k, global),
         Sets::Parameter(parameter) => of_effect(parameter),
     });
-    let start = |local: &Local| at_centre(local.scale, START);
+    let start = |local: &Local| at_centre(local.scale, settings().start_prior);
     shared.chain(fit.pieces.iter().flat_map(|piece| &piece.locals).map(start)).collect()
 }
 

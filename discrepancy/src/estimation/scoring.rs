@@ -1,5 +1,6 @@
 //! Maximum of a log-likelihood with bounds, by Fisher scoring.
 
+use crate::settings::settings;
 use mops_core::math;
 use nalgebra::{DMatrix, DVector};
 
@@ -23,15 +24,6 @@ pub struct Maximum {
     pub score: Score,
 }
 
-/// Predicted gain in nats below which the iteration ends.
-const SETTLED: f64 = 1e-3;
-
-/// Largest number of iterations.
-const ITERATIONS: usize = 60;
-
-/// Longest step of a logarithm.
-const LONGEST: f64 = 2.0;
-
 /// Damping, in shares of the diagonal of the information, beyond which no step can make progress.
 const MOST_DAMPING: f64 = 1e9;
 
@@ -47,7 +39,7 @@ pub fn maximise(start: &[f64], bounds: &[[f64; 2]], at: impl Fn(&[f64]) -> Score
         return None;
     }
     let mut damping = 1e-3;
-    for _ in 0..ITERATIONS {
+    for _ in 0..settings().iterations {
         let is_free = |k: &usize| {
             let (x, [low, high], slope) = (point[*k], bounds[*k], score.gradient[*k]);
             !(x <= low && slope < 0.0 || x >= high && slope > 0.0)
@@ -68,13 +60,13 @@ pub fn maximise(start: &[f64], bounds: &[[f64; 2]], at: impl Fn(&[f64]) -> Score
             continue;
         };
         let mut trial = point.clone();
-        let shrink = (LONGEST / step.amax()).min(1.0);
+        let shrink = (settings().longest_step / step.amax()).min(1.0);
         for (a, &k) in free.iter().enumerate() {
             trial[k] = (point[k] + shrink * step[a]).clamp(bounds[k][0], bounds[k][1]);
         }
         let moved = DVector::from_fn(point.len(), |k, _| trial[k] - point[k]);
         let predicted = score.gradient.dot(&moved) - 0.5 * moved.dot(&(&score.information * &moved));
-        if predicted < SETTLED {
+        if predicted < settings().fine {
             // A step that a bound shortens need not ascend; with more damping it follows the gradient.
             let is_clipped = free.iter().enumerate().any(|(a, &k)| trial[k] != point[k] + shrink * step[a]);
             if damping > MOST_DAMPING || damping < 1.0 && !is_clipped {

@@ -1,28 +1,14 @@
 //! Search over parameters that no derivative determines, as samples jump: the size of steps, the width of a gap, the force at which
 //! a joint breaks away.
 
+use crate::settings::settings;
 use mops_core::math;
 
 use super::errors::Errors;
 use super::estimate::{Estimate, Estimation};
 
-/// Trials for each parameter, halvings of the stride, and turns of all parameters.
-const TRIALS: usize = 24;
-const HALVINGS: i32 = 8;
-const TURNS: usize = 3;
-
-/// Iterations in which the other unknowns follow.
-const FOLLOW: usize = 2;
-
-/// Gain in log-likelihood of a turn, nats, below which the search ends.
-const SETTLED: f64 = 0.05;
-
 /// Decrease of log-likelihood at the ends of a 95 % interval: half the quantile of chi-squared with one degree of freedom.
 pub const FALL: f64 = 1.920_729;
-
-/// Doublings of the stride, and bisections, in the search for the end of an interval.
-const DOUBLINGS: i32 = 16;
-const BISECTIONS: usize = 6;
 
 impl Estimation<'_> {
     /// Improves an estimate by least squares by a compass search over the parameters that no derivative determines, in turns with
@@ -33,12 +19,12 @@ impl Estimation<'_> {
         let globals = &self.fit.globals;
         let stepped: Vec<usize> = (0..globals.len()).filter(|&k| globals[k].is_stepped()).collect();
         let mut best = found;
-        for _ in 0..if stepped.is_empty() { 0 } else { TURNS } {
+        for _ in 0..if stepped.is_empty() { 0 } else { settings().turns } {
             let before = best.log_likelihood;
             for &k in &stepped {
                 let mut halvings = 0;
-                for _ in 0..TRIALS {
-                    if halvings > HALVINGS {
+                for _ in 0..settings().trials {
+                    if halvings > settings().halvings {
                         break;
                     }
                     let stride = globals[k].scale * math::powi(0.5, halvings);
@@ -52,7 +38,7 @@ impl Estimation<'_> {
                     }
                 }
             }
-            if best.log_likelihood < before + SETTLED {
+            if best.log_likelihood < before + settings().settled {
                 break;
             }
             best = self.least_squares(best.point.clone()).unwrap_or(best);
@@ -72,15 +58,15 @@ impl Estimation<'_> {
         };
         let place = |by: f64| (value + by).clamp(global.bounds[0], global.bounds[1]);
         let end = |side: f64| {
-            let (mut inner, mut outer) = (0.0, side * global.scale * math::powi(0.5, HALVINGS));
-            let farthest = outer.abs() * math::powi(2.0, DOUBLINGS);
+            let (mut inner, mut outer) = (0.0, side * global.scale * math::powi(0.5, settings().halvings));
+            let farthest = outer.abs() * math::powi(2.0, settings().doublings);
             while is_within(outer) {
                 if global.bounds.contains(&place(outer)) || outer.abs() >= farthest {
                     return place(outer);
                 }
                 (inner, outer) = (outer, 2.0 * outer);
             }
-            for _ in 0..BISECTIONS {
+            for _ in 0..settings().bisections {
                 let middle = 0.5 * (inner + outer);
                 *(if is_within(middle) { &mut inner } else { &mut outer }) = middle;
             }
@@ -95,6 +81,6 @@ impl Estimation<'_> {
         let mut point = estimate.point.clone();
         let [low, high] = self.fit.globals[k].bounds;
         point.globals[k] = (point.globals[k] + by).clamp(low, high);
-        self.with(errors, point, FOLLOW)
+        self.with(errors, point, settings().follow)
     }
 }

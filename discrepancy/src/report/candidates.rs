@@ -5,13 +5,10 @@ use mops_core::diagnosis::{Ranked, Rival, Rule};
 use super::{Findings, first_of_each, parameters};
 use crate::estimation::Errors;
 use crate::selection::{Conclusion, FittedSet, Key, Screening, without};
+use crate::settings::settings;
 
 /// Candidates that were screened but not fitted, listed after the others.
 const SCREENED: usize = 20;
-
-/// Twice the log-evidence that an alternative may be behind to be listed. Source: R. E. Kass, A. E. Raftery, Bayes factors, Journal
-/// of the American Statistical Association 90 (1995) 773, section 3.2: from 6 on the evidence against it is strong.
-const STRONG: f64 = 6.0;
 
 impl<'a> Findings<'_, '_, 'a> {
     /// Returns the candidates that were fitted: the effects found first, then by probability and evidence; then those that were only
@@ -108,7 +105,7 @@ impl<'a> Findings<'_, '_, 'a> {
                 && *new != index
                 && candidates[*new].port == candidates[index].port;
             let behind = 2.0 * (search.log_posterior(set) - search.log_posterior(other));
-            (is_alternative && behind < STRONG).then_some((*new, behind))
+            (is_alternative && behind < settings().strong).then_some((*new, behind))
         });
         let others: Vec<(usize, f64)> = others.collect();
         let Some(parent) = search.get(&rest).filter(|_| !others.is_empty()) else { return Vec::new() };

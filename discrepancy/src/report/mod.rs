@@ -17,18 +17,9 @@ use self::records::Records;
 use crate::drawn::draw;
 use crate::locate::{Located, locate};
 use crate::scene::Scene;
-use crate::selection::{
-    Conclusion, FIRES, FittedSet, Forecasts, Key, OTHER, Search, Verdict as Decision, entry, price, without,
-};
+use crate::selection::{Conclusion, FittedSet, Forecasts, Key, Search, Verdict as Decision, entry, price, without};
+use crate::settings::settings;
 use crate::variant::Added;
-
-/// Gain in log-evidence, nats, beyond the prior of a candidate from which it would have been noticed. Basis: posterior odds of
-/// 20 to 1.
-const NOTICED: f64 = 3.0;
-
-/// Standard errors between the estimates by least squares and under the likeliest error model from which a parameter is moved by
-/// what the model lacks.
-const MOVED: f64 = 3.0;
 
 /// A search with its verdict.
 pub struct Findings<'f, 'r, 'a> {
@@ -124,7 +115,7 @@ impl<'a> Findings<'_, '_, 'a> {
                 let claimed = found.iter().filter(|found| found.claimed).map(|found| found.class_probability);
                 claimed.fold(1.0, f64::min)
             }
-            Conclusion::None => self.verdict.nothing * (1.0 - OTHER),
+            Conclusion::None => self.verdict.nothing * (1.0 - settings().other),
             Conclusion::Unexplained => f64::NAN,
         }
     }
@@ -139,7 +130,7 @@ impl<'a> Findings<'_, '_, 'a> {
     fn probability_of(&self, index: usize) -> f64 {
         let holding: Vec<f64> =
             self.verdict.passed.iter().filter(|(key, _)| key.contains(&index)).map(|(_, weight)| *weight).collect();
-        if holding.is_empty() { f64::NAN } else { holding.iter().sum::<f64>() * (1.0 - OTHER) }
+        if holding.is_empty() { f64::NAN } else { holding.iter().sum::<f64>() * (1.0 - settings().other) }
     }
 
     fn found(&self, set: &FittedSet<'a>, index: usize) -> Found {
@@ -236,7 +227,7 @@ impl<'a> Findings<'_, '_, 'a> {
     /// Returns the detection limits of the effects that are linear in their first parameter and no special events.
     fn noticeable(&self) -> Vec<Noticeable> {
         let search = self.search;
-        let needed: f64 = (2.0_f64 * (price(search.refit.candidates.len()) + NOTICED)).sqrt();
+        let needed: f64 = (2.0_f64 * (price(search.refit.candidates.len()) + settings().clearly)).sqrt();
         let of = |screened: &crate::selection::Screened| {
             let added = &screened.guesses[0];
             let strengths = parameters::of_candidate(search.refit.subject, added);
@@ -275,7 +266,7 @@ impl<'a> Findings<'_, '_, 'a> {
         if let Some((_, likeliest)) = set.likeliest() {
             for (k, moved) in made.parameters.iter().enumerate() {
                 let apart = (likeliest.point.globals[k] - moved.after).abs();
-                if moved.std_error.is_some_and(|error| apart > MOVED * error) {
+                if moved.std_error.is_some_and(|error| apart > settings().clearly * error) {
                     notes.push(format!("the model still lacks something that moves `{}`", moved.name));
                 }
             }
@@ -305,7 +296,7 @@ fn located(declared: &FittedSet<'_>) -> Vec<Located> {
 
 /// Returns the curve with the largest gain if it is significant.
 fn significant(curves: &[Dependence]) -> Option<Dependence> {
-    curves.first().filter(|curve| curve.gain >= FIRES).cloned()
+    curves.first().filter(|curve| curve.gain >= settings().fires).cloned()
 }
 
 fn unexplained(curve: &Dependence, located: &[Located]) -> Unexplained {

@@ -5,17 +5,7 @@ use mops_core::math;
 use mops_core::{Case, Input, Job};
 
 use crate::selection::FittedSet;
-
-/// Squared distance of two predictions, in squared noises, from which data distinguish them. Source: R. E. Kass, A. E. Raftery,
-/// Bayes factors, Journal of the American Statistical Association 90 (1995) 773, section 3.2: twice the logarithm of a Bayes
-/// factor from which the evidence is strong.
-const CLEARLY: f64 = 6.0;
-
-/// Ratio to the distance in the experiment as it was from which a variation is worth another experiment.
-const WORTH: f64 = 1.5;
-
-/// Factors by which inputs or start values are varied.
-const FACTORS: [f64; 4] = [0.3, 0.5, 2.0, 3.0];
+use crate::settings::settings;
 
 /// Largest angle that start values are varied to, rad: a turn further is the same.
 const HALF_A_TURN: f64 = std::f64::consts::PI;
@@ -29,13 +19,13 @@ pub fn separating(a: &FittedSet<'_>, b: &FittedSet<'_>, names: [&str; 2]) -> Opt
         let Some(now) = difference(a, b, piece, 1.0, 1.0) else { continue };
         let samples: usize = a.fit.pieces[piece].series.iter().map(|s| s.times.len()).sum();
         let driven = !a.fit.pieces[piece].case.inputs.is_empty();
-        for factor in FACTORS {
+        for factor in settings().variations {
             let inputs = driven.then_some((factor, 1.0, "its inputs"));
             for (input, start, what) in inputs.into_iter().chain([(1.0, factor, "its start values")]) {
                 let Some(then) = difference(a, b, piece, input, start) else { continue };
                 #[allow(clippy::cast_precision_loss)]
-                let is_telling = then * then * samples as f64 >= CLEARLY;
-                if is_telling && then > WORTH * now && best.as_ref().is_none_or(|(most, ..)| then > *most) {
+                let is_telling = then * then * samples as f64 >= settings().strong;
+                if is_telling && then > settings().worth * now && best.as_ref().is_none_or(|(most, ..)| then > *most) {
                     best = Some((then, now, format!("`{name}` again with {what} {factor} times as large")));
                 }
             }

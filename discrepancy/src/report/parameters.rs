@@ -6,12 +6,10 @@ use mops_core::diagnosis::StrengthValue;
 use crate::estimation::{ErrorModel, Estimate, FALL};
 use crate::fit::{Global, Sets};
 use crate::selection::{FittedSet, estimation};
+use crate::settings::settings;
 use crate::subject::Subject;
 use crate::variant::{Added, Variant, problem};
 use crate::windows::whole;
-
-/// Iterations in which everything else follows a parameter that no fit moves.
-const FOLLOW: usize = 20;
 
 /// Standard normal quantile at 0.975.
 const QUANTILE: f64 = 1.959_964;
@@ -71,7 +69,7 @@ fn allowed(set: &FittedSet<'_>, index: usize, k: usize) -> Option<[f64; 2]> {
         let (fit, point, variant) =
             problem(subject, &start.added, pieces, &start.tuners, start.locals.clone(), &[], set.fit.simulations);
         let estimation = estimation(subject, &fit, &variant, &start.added, &[], &point);
-        let Some(found) = estimation.with(&estimate.errors, point, FOLLOW) else { continue };
+        let Some(found) = estimation.with(&estimate.errors, point, settings().rough_iterations) else { continue };
         if found.log_likelihood > estimate.log_likelihood - FALL {
             range = [range[0].min(value), range[1].max(value)];
         }

@@ -8,20 +8,9 @@ use rayon::prelude::*;
 
 use crate::fit::{Fit, Point};
 use crate::selection::{FittedSet, with_free_starts};
+use crate::settings::settings;
 use crate::subject::{Measurement, Series, Subject};
 use crate::windows::{cut, whole};
-
-/// Periods in a window.
-///
-/// Source: H. G. Bock, Recent advances in parameter identification techniques for ODE, in Numerical Treatment of Inverse
-/// Problems (1983) 95, for windows; two to four periods keep the phase and still show slow changes.
-const PERIODS: f64 = 4.0;
-
-/// Largest number of windows in a record.
-const MOST_WINDOWS: f64 = 32.0;
-
-/// Distance from the mean in noises beyond which a crossing of the mean counts.
-const BEYOND: f64 = 3.0;
 
 /// A record as a model predicts it.
 struct Predicted {
@@ -223,18 +212,19 @@ fn predicted(fit: &Fit<'_>, point: &Point, piece: usize, m: &Measurement) -> Opt
     Some(Predicted { samples, starts })
 }
 
-/// Returns the number of windows of [`PERIODS`] periods in a record.
+/// Returns the number of windows of [`settings().window_periods`] periods in a record.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn windows_of(measurement: &Measurement) -> usize {
     let periods = measurement.series.iter().map(periods).fold(0.0, f64::max);
-    (periods / PERIODS).round().min(MOST_WINDOWS) as usize
+    (periods / settings().window_periods).round().min(settings().most_windows) as usize
 }
 
 /// Returns the number of periods in a series: half its crossings of the mean, without those within the noise.
 #[allow(clippy::cast_precision_loss)]
 fn periods(series: &Series) -> f64 {
     let mean = series.values.iter().sum::<f64>() / series.values.len().max(1) as f64;
-    let sides = series.values.iter().map(|v| v - mean).filter(|v| v.abs() > BEYOND * series.noise).map(|v| v > 0.0);
+    let sides =
+        series.values.iter().map(|v| v - mean).filter(|v| v.abs() > settings().clearly * series.noise).map(|v| v > 0.0);
     let sides: Vec<bool> = sides.collect();
     0.5 * sides.windows(2).filter(|pair| pair[0] != pair[1]).count() as f64
 }

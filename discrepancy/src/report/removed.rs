@@ -6,11 +6,9 @@ use mops_core::diagnosis::Removed;
 use crate::candidate::Candidate;
 use crate::fit::dot;
 use crate::selection::{FittedSet, Search};
+use crate::settings::settings;
 use crate::trace_of::{View, sizes};
 use crate::trajectory::Trajectory;
-
-/// Cosine similarity of the responses of the outputs from which a term acts at the place of an effect.
-const ALIKE: f64 = 0.999;
 
 /// Returns the declared terms, by their positions among the parameters of the study, with their places.
 pub fn removed(search: &Search<'_, '_>, declared: &FittedSet<'_>, terms: &[usize]) -> Vec<Removed> {
@@ -39,5 +37,5 @@ fn place(search: &Search<'_, '_>, declared: &FittedSet<'_>, term: usize) -> Opti
     let is_plain = |c: &&Candidate| c.effect.parameters().len() == 1 && c.only.is_none();
     let all = search.refit.candidates.iter().filter(is_plain).filter_map(likeness);
     let best = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (best.0 > ALIKE).then_some(best.1)
+    (best.0 > settings().same_place).then_some(best.1)
 }

@@ -8,23 +8,10 @@ use super::fitted_set::{Start, estimation};
 use crate::base;
 use crate::fit::{Piece, Point};
 use crate::meter::Meter;
+use crate::settings::settings;
 use crate::subject::Subject;
 use crate::variant::problem;
 use crate::windows::cut;
-
-/// Windows that each record is cut into, initial states free in each, one after the other; then the whole record.
-const WINDOWS: [usize; 3] = [8, 4, 2];
-
-/// Starts beside that of the study, from the box of the bounds.
-const SPREAD: usize = 8;
-
-/// Iterations from each start, and in each of the further windows.
-const FIRST: usize = 10;
-const FURTHER: usize = 30;
-
-/// Starts that are followed to the end: the best ones, and no two that have arrived at the same sum of squares, up to this share.
-const FOLLOWED: usize = 2;
-const SAME: f64 = 1e-3;
 
 /// Fitted values, and the sum of squares of the residuals in noises.
 struct Fitted {
@@ -52,29 +39,31 @@ pub fn baseline(subject: &Subject, simulations: &Meter<'_>) -> Option<Start> {
         let Point { globals, locals } = found.point;
         Some(Fitted { tuners: globals, locals, sum })
     };
-    let shortest = in_windows(WINDOWS[0]);
-    let first = |tuners: &Vec<f64>| fit(shortest.clone(), tuners, base::first_locals(&shortest), FIRST);
+    let shortest = in_windows(settings().windows);
+    let first =
+        |tuners: &Vec<f64>| fit(shortest.clone(), tuners, base::first_locals(&shortest), settings().round_iterations);
     let mut starts = vec![subject.start()];
     starts.extend(spread(subject));
     let mut begun: Vec<Fitted> = starts.par_iter().filter_map(first).collect();
     begun.sort_by(|a, b| a.sum.total_cmp(&b.sum));
-    begun.dedup_by(|later, earlier| later.sum <= (1.0 + SAME) * earlier.sum);
-    begun.truncate(FOLLOWED);
+    begun.dedup_by(|later, earlier| later.sum <= (1.0 + settings().same_optimum) * earlier.sum);
+    begun.truncate(settings().roots);
     let to_the_end = |begun: &Fitted| {
         let mut tuners = begun.tuners.clone();
         let mut starts = begin_of_records(&whole, &shortest, &begun.locals);
-        for count in &WINDOWS[1..] {
-            let windows = in_windows(*count);
+        for count in std::iter::successors(Some(settings().windows / 2), |count| Some(count / 2)).take_while(|c| *c > 1)
+        {
+            let windows = in_windows(count);
             let locals = base::first_locals(&windows);
-            let Some(fitted) = fit(windows.clone(), &tuners, locals, FURTHER) else { continue };
+            let Some(fitted) = fit(windows.clone(), &tuners, locals, settings().rough_iterations) else { continue };
             starts = begin_of_records(&whole, &windows, &fitted.locals);
             tuners = fitted.tuners;
         }
-        fit(whole.clone(), &tuners, starts, 2 * FURTHER)
+        fit(whole.clone(), &tuners, starts, 2 * settings().rough_iterations)
     };
     let mut ended: Vec<Fitted> = begun.par_iter().filter_map(to_the_end).collect();
     // Windows help a poor start; a good one may need none.
-    ended.extend(fit(whole.clone(), &subject.start(), base::first_locals(&whole), 2 * FURTHER));
+    ended.extend(fit(whole.clone(), &subject.start(), base::first_locals(&whole), 2 * settings().rough_iterations));
     let best = ended.into_iter().min_by(|a, b| a.sum.total_cmp(&b.sum))?;
     Some(Start { tuners: best.tuners, locals: best.locals, added: Vec::new() })
 }
@@ -105,6 +94,6 @@ fn spread(subject: &Subject) -> Vec<Vec<f64>> {
         let high = if high.is_finite() { high } else { start[k] + size };
         if globals[k].log && low > 0.0 { low * math::exp(u * math::ln(high / low)) } else { low + u * (high - low) }
     };
-    let points = draw(Sampling::Sobol, SPREAD, globals.len(), &mut random);
+    let points = draw(Sampling::Sobol, settings().spread, globals.len(), &mut random);
     points.iter().map(|point| point.iter().enumerate().map(place).collect()).collect()
 }

@@ -7,24 +7,12 @@ use nalgebra::DMatrix;
 use crate::candidate::Candidate;
 use crate::fit::Piece;
 use crate::quantum::quantum;
+use crate::settings::settings;
 use crate::trace_of::{Spot, spot};
 use crate::trajectory::Trajectory;
 
-/// Share of the nominal acceleration that a declared spring must have.
-const SPRING: f64 = 1e-3;
-
 /// Relative difference of two slopes up to which they are the same: rounding.
 const RECIPROCAL: f64 = 1e-6;
-
-/// Share of the largest speed below which a motion is at rest.
-const RESTS: f64 = 1e-3;
-
-/// Noises from which steps of samples are visible.
-const VISIBLE: f64 = 2.0;
-
-/// Samples within so many noises of the extreme value that a limit of a sensor must show.
-const TOUCHED: usize = 3;
-const NEAR_LIMIT: f64 = 2.0;
 
 /// Returns true if the records show what a candidate needs: the term of the declared model that it modifies, an angle, a
 /// limit that was touched, visible steps.
@@ -54,7 +42,7 @@ pub fn is_covered(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], 
         _ if first.null_value == Some(f64::INFINITY) => any_series(candidate, model, pieces, touches_limit),
         InitialGrid::Steps => any_series(candidate, model, pieces, |values, noise| {
             let largest = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-            quantum(values, VISIBLE * noise, largest).is_some()
+            quantum(values, settings().visible * noise, largest).is_some()
         }),
         _ => true,
     }
@@ -85,7 +73,7 @@ fn has_spring(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], alon
     let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0_f64, |most, v| most.max(v.abs()));
     let acceleration = largest(&mut moments().map(|m| m.rates[speed]));
     let spring = largest(&mut moments().map(|m| m.a[(speed, coordinate)] * m.x[position]));
-    spring > SPRING * acceleration
+    spring > settings().slight * acceleration
 }
 
 /// Returns true if the declared model has a spring or a damper between the joints of a candidate: the force on each depends on the
@@ -133,21 +121,21 @@ fn shows_stops(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], alo
         };
         let speed = |m: &Moment| m.x[speed] - other.map_or(0.0, |other| m.x[other]);
         let speeds: Vec<f64> = along.moments.iter().map(speed).collect();
-        let still = RESTS * speeds.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let still = settings().slight * speeds.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         let turns = |sign: f64| {
             let moving = speeds.iter().position(|v| sign * v > still);
             moving.is_some_and(|first| speeds[first..].iter().any(|v| sign * v <= still))
         };
         let is_at_rest = |speeds: &[f64]| speeds.iter().all(|v| v.abs() <= still);
         let moved = speeds.iter().position(|v| v.abs() > still).unwrap_or(speeds.len());
-        turns(1.0) && turns(-1.0) || speeds[moved..].windows(2 * TOUCHED).any(is_at_rest)
+        turns(1.0) && turns(-1.0) || speeds[moved..].windows(2 * settings().touched).any(is_at_rest)
     })
 }
 
 fn touches_limit(values: &[f64], noise: f64) -> bool {
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    let count = |limit: f64| values.iter().filter(|v| (*v - limit).abs() < NEAR_LIMIT * noise).count();
-    count(low) >= TOUCHED || count(high) >= TOUCHED
+    let count = |limit: f64| values.iter().filter(|v| (*v - limit).abs() < settings().visible * noise).count();
+    count(low) >= settings().touched || count(high) >= settings().touched
 }
 
 fn any_series(

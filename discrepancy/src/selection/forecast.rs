@@ -9,6 +9,7 @@ use super::search::{Search, without};
 use crate::base;
 use crate::estimation::ErrorModel;
 use crate::fit::{Fit, Piece, Point};
+use crate::settings::settings;
 use crate::variant::problem;
 
 /// What is forecast, with whose parameters.
@@ -21,9 +22,6 @@ pub enum Forecast {
     /// The ends of the calibration records, with the parameters of least squares for their beginnings.
     RunOn,
 }
-
-/// Share of a calibration record that parameters are fitted to where its end is forecast.
-const BEGINNING: f64 = 0.6;
 
 /// Forecasts, each computed once.
 pub struct Forecasts {
@@ -165,7 +163,7 @@ pub fn fitted_together<'a>(set: &FittedSet<'a>) -> Option<(Fit<'a>, Point)> {
 /// Returns the mean square error in noises at the ends of the calibration records, run on from least squares on their beginnings.
 fn run_on(set: &FittedSet<'_>) -> Option<f64> {
     let mut beginning = set.fit.clone();
-    let ends: Vec<f64> = beginning.pieces.iter().map(|piece| BEGINNING * piece.horizon).collect();
+    let ends: Vec<f64> = beginning.pieces.iter().map(|piece| settings().beginning * piece.horizon).collect();
     for (piece, &end) in beginning.pieces.iter_mut().zip(&ends) {
         for series in &mut piece.series {
             let count = series.times.partition_point(|&t| t <= end);

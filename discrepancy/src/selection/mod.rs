@@ -21,7 +21,7 @@ pub(crate) use preparation::{prepare, with_given};
 pub(crate) use refit::price;
 pub(crate) use screening::{Scene as Screening, Screened};
 pub(crate) use search::{Search, without};
-pub(crate) use verdict::{FIRES, OTHER, decide, entry};
+pub(crate) use verdict::{decide, entry};
 
 pub use report::{Selection, SetFit, SetOfEffects, compare, select};
 pub use verdict::{Conclusion, Entry, Stated, Verdict};

@@ -9,6 +9,7 @@ use crate::candidate::Candidate;
 use crate::estimation::{ErrorModel, Errors, Estimate, Estimation};
 use crate::fit::{Fit, Point};
 use crate::meter::Meter;
+use crate::settings::settings;
 use crate::subject::Subject;
 use crate::variant::{Variant, problem};
 
@@ -23,37 +24,6 @@ pub struct Refit<'a> {
     /// Counts simulations, and ends them.
     pub simulations: &'a Meter<'a>,
 }
-
-/// Iterations of a first look at a start.
-const LOOK: usize = 5;
-
-/// Starts that are fitted to the end. Of more, the likeliest third is followed for an iteration, the best third of these for two more,
-/// and so on (successive halving).
-///
-/// Source: K. Jamieson, A. Talwalkar, Non-stochastic best arm identification and hyperparameter optimization, AISTATS (2016).
-const NEAREST: usize = 3;
-const KEPT: usize = 3;
-
-/// Distance of two optima in standard errors from which each is a start for the other's error model.
-const APART: f64 = 0.5;
-
-/// Distance below the best log-likelihood or log-evidence, nats, from which a fit is given up: a rough fit of another set, further
-/// starts under the output errors, the force error.
-pub const HOPELESS: f64 = 15.0;
-
-/// Decrease of log-likelihood, nats, from which a set fits worse than one that it contains.
-const WORSE: f64 = 0.5;
-
-/// Distances from 0 at which an initial state of an effect is tried, in scales: the scale is a tenth of its typical size; and the
-/// iterations in which all else follows.
-const DISTANCES: [f64; 6] = [-5.0, 5.0, -10.0, 10.0, -20.0, 20.0];
-const FOLLOW: usize = 2;
-
-/// Standard errors up to which a declared term may be 0.
-const UNCERTAIN: f64 = 2.0;
-
-/// Shares of its strength with which an effect is added to the optimum of a set that contains it not; without it where that fails.
-const FAINT: [f64; 2] = [0.05, 0.0];
 
 /// Set of effects that was fitted roughly under given hyperparameters.
 pub struct Rough {
@@ -75,7 +45,7 @@ impl<'a> Refit<'a> {
 
     /// Fits a set by least squares: a few iterations from each start, then the best to the end. `None` if all fail.
     pub fn least_squares(&self, key: &Key, starts: &[Start]) -> Option<FittedSet<'a>> {
-        let first = |start: &Start| self.from(key, start, LOOK);
+        let first = |start: &Start| self.from(key, start, settings().look);
         let mut looks: Vec<FittedSet<'a>> = starts.par_iter().filter_map(first).collect();
         looks.sort_by(|a, b| b.least_squares.log_likelihood.total_cmp(&a.least_squares.log_likelihood));
         let mut best = looks.into_iter().next()?;
@@ -99,7 +69,7 @@ impl<'a> Refit<'a> {
     pub fn roughly(&self, starts: &[Start], errors: &Errors, least: f64) -> Option<Rough> {
         let mut left = starts.to_vec();
         let mut iterations = 0;
-        while left.len() > NEAREST {
+        while left.len() > settings().followed {
             let further = |start: &Start| {
                 self.at(start, |estimation, variant, point| {
                     if iterations == 0 {
@@ -111,7 +81,7 @@ impl<'a> Refit<'a> {
             };
             let mut looks: Vec<(f64, Start)> = left.par_iter().filter_map(further).collect();
             looks.sort_by(|a, b| b.0.total_cmp(&a.0));
-            looks.truncate(left.len().div_ceil(KEPT).max(NEAREST));
+            looks.truncate(left.len().div_ceil(settings().followed).max(settings().followed));
             left = looks.into_iter().map(|look| look.1).collect();
             iterations = (2 * iterations).max(1);
         }
@@ -139,7 +109,7 @@ impl<'a> Refit<'a> {
         let silent: Vec<(usize, usize)> = silent.filter(|&(piece, k)| is_silent(piece, k)).collect();
         let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, &start.added, &[], &point);
         // The other unknowns had made up for a state that begins elsewhere.
-        let followed = |point: Point| estimation.with(&Errors::White, point, FOLLOW);
+        let followed = |point: Point| estimation.with(&Errors::White, point, settings().follow);
         let mut best = if silent.is_empty() { None } else { followed(point.clone()) }?;
         let mut is_moved = false;
         for (piece, k) in silent {
@@ -148,9 +118,11 @@ impl<'a> Refit<'a> {
                 point.locals[piece][k] = distance * fit.pieces[piece].locals[k].scale;
                 followed(point)
             };
-            let tried: Vec<Estimate> = DISTANCES.par_iter().filter_map(trial).collect();
+            let tried: Vec<Estimate> = settings().distances.par_iter().filter_map(trial).collect();
             let likeliest = tried.into_iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
-            if let Some(moved) = likeliest.filter(|moved| moved.log_likelihood > best.log_likelihood + HOPELESS) {
+            if let Some(moved) =
+                likeliest.filter(|moved| moved.log_likelihood > best.log_likelihood + settings().hopeless)
+            {
                 (best, is_moved) = (moved, true);
             }
         }
@@ -194,7 +166,7 @@ impl<'a> Refit<'a> {
         // A set that fits worse than one it contains has not been fitted yet.
         let is_behind = |(kind, estimate): &(ErrorModel, Estimate)| {
             let smaller = nested.iter().filter_map(|smaller| smaller.estimate(*kind));
-            smaller.into_iter().any(|smaller| smaller.log_likelihood - WORSE >= estimate.log_likelihood)
+            smaller.into_iter().any(|smaller| smaller.log_likelihood - settings().worse >= estimate.log_likelihood)
         };
         if at_output(&first) + advantage <= least && !first.iter().any(is_behind) {
             set.under = first;
@@ -217,11 +189,11 @@ impl<'a> Refit<'a> {
                 .max_by(|a, b| evidence(&a.1).total_cmp(&evidence(&b.1)));
             for smaller in nested {
                 let Some(theirs) = smaller.estimate(kind) else { continue };
-                if best.as_ref().is_some_and(|best| best.1.log_likelihood > theirs.log_likelihood - WORSE) {
+                if best.as_ref().is_some_and(|best| best.1.log_likelihood > theirs.log_likelihood - settings().worse) {
                     continue;
                 }
                 // A very short lag may be too stiff to be simulated.
-                let again = FAINT
+                let again = [settings().faint, 0.0]
                     .into_iter()
                     .find_map(|share| from(kind, &self.faintly(set, smaller, theirs, share)?, Some(&theirs.errors)));
                 if let Some(again) = again {
@@ -253,7 +225,7 @@ impl<'a> Refit<'a> {
             let Some((kind, estimate)) = set.likeliest().cloned() else { break };
             let ([low, high], value) = (set.fit.globals[k].bounds, set.least_squares.point.globals[k]);
             let may_be_zero = low <= 0.0 && high >= 0.0 || self.subject.is_log(k) && low > 0.0;
-            if !may_be_zero || value > low && value.abs() > UNCERTAIN * estimate.deviations[k] {
+            if !may_be_zero || value > low && value.abs() > settings().uncertain * estimate.deviations[k] {
                 continue;
             }
             let all: Vec<usize> = held.iter().copied().chain([k]).collect();
@@ -309,7 +281,7 @@ fn same_choices(a: &crate::variant::Added, b: &crate::variant::Added) -> bool {
 /// Returns true if a shared parameter of two estimates differs by more than a share of its standard error.
 fn are_apart(estimation: &Estimation<'_>, a: &Estimate, b: &Estimate) -> bool {
     let globals = a.point.globals.iter().zip(&b.point.globals).zip(a.deviations.iter().zip(&b.deviations));
-    let apart = |((x, y), (s, t)): ((&f64, &f64), (&f64, &f64))| (x - y).abs() > APART * s.max(*t);
+    let apart = |((x, y), (s, t)): ((&f64, &f64), (&f64, &f64))| (x - y).abs() > settings().apart * s.max(*t);
     estimation.fit.globals.len() == a.point.globals.len() && globals.into_iter().any(apart)
 }
 

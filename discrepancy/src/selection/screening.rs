@@ -7,6 +7,7 @@ use super::fitted_set::FittedSet;
 use crate::candidate::Candidate;
 use crate::estimation::{Channels, Errors};
 use crate::fit::{Piece, dot};
+use crate::settings::settings;
 
 use crate::trace_of::{View, sizes_for};
 use crate::trajectory::Trajectory;
@@ -80,10 +81,6 @@ const NEW: f64 = 1e-7;
 
 /// Share of the squared length of a response that the unknowns must leave.
 const LEFT: f64 = 1e-9;
-
-/// Other guesses that are kept: at most so many, with at least such a share of the best gain.
-const OTHERS: usize = 2;
-const NEAR: f64 = 0.3;
 
 impl<'s> Scene<'s> {
     /// Looks at a set at its optimum by least squares, under error models at the outputs; `None` if a simulation fails.
@@ -225,8 +222,10 @@ impl<'s> Scene<'s> {
         found.sort_by(|a, b| b.correlated().total_cmp(&a.correlated()));
         let mut found = found.into_iter();
         let mut best = found.next()?;
-        let near = NEAR * best.correlated();
-        best.guesses.extend(found.filter(|o| o.correlated() > near).take(OTHERS).map(|o| o.guesses[0].clone()));
+        let near = settings().near_guess * best.correlated();
+        best.guesses.extend(
+            found.filter(|o| o.correlated() > near).take(settings().other_guesses).map(|o| o.guesses[0].clone()),
+        );
         Some(best)
     }
 

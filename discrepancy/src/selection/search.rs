@@ -4,51 +4,13 @@ use mops_core::{EffectClass, math};
 use rayon::prelude::*;
 
 use super::fitted_set::{FittedSet, Key, Start, evidence};
-use super::refit::{HOPELESS, Refit, Rough, price};
+use super::refit::{Refit, Rough, price};
 use super::screening::{Scene, Screened, pair_gain};
 use crate::candidate::Candidate;
-use crate::estimation::{ALLOWANCE, ErrorModel, Errors, Estimate};
+use crate::estimation::{ErrorModel, Errors, Estimate};
 use crate::fit::{Point, Sets};
+use crate::settings::settings;
 use crate::variant::Added;
-
-/// Candidates that are fitted after a screening: the best by gain under the correlated error models, and by gain in white noise.
-const SINGLES: usize = 8;
-const RAW: usize = 2;
-
-/// Candidates among which pairs are formed, and pairs that are fitted.
-const PAIRED: usize = 60;
-const PAIRS: usize = 10;
-
-/// Sets of an expansion that are fitted under all error models: single effects, pairs.
-const FULL: [usize; 2] = [4, 3];
-
-/// Sets that are fitted roughly at a time.
-const AT_A_TIME: usize = 4;
-
-/// Effects of the same class at the same place that are fitted in place of one.
-const SWAPS: usize = 8;
-
-/// Gain in log-likelihood, nats, that a pair must bring for each of its parameters beyond two to be fitted before another one.
-const PER_PARAMETER: f64 = 3.0;
-
-/// Sets that are expanded at a time, and in all.
-const BEAM: usize = 3;
-const EXPANSIONS: usize = 5;
-
-/// Logarithm of the posterior probability relative to the first set below which a set is not expanded.
-const BEHIND: f64 = 6.0;
-
-/// Most probable sets whose effects are exchanged for others of their class, one after the other.
-const POLISHED: usize = 3;
-
-/// Logarithm of the probability relative to a more probable set below which a set does not count: less than 1 %.
-pub const NEGLIGIBLE: f64 = 5.0;
-
-/// Difference in log-likelihood, nats, up to which two sets describe the records equally well.
-const SAME: f64 = 3.0;
-
-/// Gain in log-likelihood, nats, below which an effect under every error model does nothing.
-const INERT: f64 = 0.3;
 
 /// Sets that a search has fitted under all error models, the most probable first.
 pub struct Search<'r, 'a> {
@@ -103,10 +65,10 @@ impl<'r, 'a> Search<'r, 'a> {
     pub fn run(&mut self) {
         // Of sets with the same classes at the same places one is expanded.
         let mut expanded: Vec<Vec<(EffectClass, String)>> = Vec::new();
-        while expanded.len() < EXPANSIONS {
+        while expanded.len() < settings().expansions {
             let first = self.sets.first().map_or(f64::NEG_INFINITY, |set| self.log_posterior(set));
-            let best = self.sets.iter().take(BEAM).find(|set| {
-                let is_promising = self.log_posterior(set) > first - BEHIND || set.key.is_empty();
+            let best = self.sets.iter().take(settings().beam).find(|set| {
+                let is_promising = self.log_posterior(set) > first - settings().negligible || set.key.is_empty();
                 is_promising && set.key.len() < self.most && !expanded.contains(&self.kinds_of(&set.key))
             });
             let Some(key) = best.map(|set| set.key.clone()) else { break };
@@ -123,7 +85,7 @@ impl<'r, 'a> Search<'r, 'a> {
             expanded.push(self.kinds_of(&key));
         }
         let mut swapped: Vec<Key> = Vec::new();
-        while swapped.len() < POLISHED {
+        while swapped.len() < settings().beam {
             let Some(key) = self.sets.first().map(|set| set.key.clone()) else { break };
             if swapped.contains(&key) {
                 break;
@@ -162,9 +124,9 @@ impl<'r, 'a> Search<'r, 'a> {
             Some(own.log_likelihood - theirs.log_likelihood)
         };
         let subsets = (0..set.key.len()).filter_map(|k| self.get(&without(&set.key, k)));
-        subsets
-            .into_iter()
-            .any(|smaller| ErrorModel::ALL.into_iter().filter_map(|kind| gain(smaller, kind)).all(|gain| gain < INERT))
+        subsets.into_iter().any(|smaller| {
+            ErrorModel::ALL.into_iter().filter_map(|kind| gain(smaller, kind)).all(|gain| gain < settings().inert)
+        })
     }
 
     /// Returns true if an effect of a set is as strong as is physically possible.
@@ -222,7 +184,7 @@ impl<'r, 'a> Search<'r, 'a> {
             other.key.len() == set.key.len()
                 && rest.iter().all(|k| other.key.contains(k))
                 && new.is_some_and(|&k| candidates[k].has_fewer_strengths_than(candidate))
-                && theirs.is_some_and(|theirs| theirs.log_likelihood > estimate.log_likelihood - SAME)
+                && theirs.is_some_and(|theirs| theirs.log_likelihood > estimate.log_likelihood - settings().as_good)
         });
         matching.min_by_key(|set| set.parameters()).map(|simplest| simplest.key.clone())
     }
@@ -247,14 +209,15 @@ impl<'r, 'a> Search<'r, 'a> {
         }
         // What explains less than it costs is not fitted. On the declared model all may be nonlinear in what it explains.
         let price = price(kinds(all));
-        let pays = |gain: f64| ALLOWANCE * gain > price;
+        let pays = |gain: f64| settings().allowance * gain > price;
         let paying = || screened.iter().filter(|screened| pays(screened.correlated()));
-        let mut singles: Vec<&Screened> = paying().take(SINGLES).collect();
+        let mut singles: Vec<&Screened> = paying().take(settings().singles).collect();
         let mut raw: Vec<&Screened> = if key.is_empty() { screened.iter().collect() } else { paying().collect() };
         raw.sort_by(|a, b| b.gains[0].total_cmp(&a.gains[0]));
         // Where correlated errors take up whatever is missing, the gain in white noise is what there is.
         let is_missed = key.is_empty() && self.lacks_something(&parent);
-        let others = RAW + if is_missed { SINGLES.saturating_sub(singles.len()) } else { 0 };
+        let others =
+            settings().by_squares + if is_missed { settings().singles.saturating_sub(singles.len()) } else { 0 };
         for other in raw.into_iter().take(others) {
             if singles.iter().all(|single| single.index != other.index) {
                 singles.push(other);
@@ -274,11 +237,11 @@ impl<'r, 'a> Search<'r, 'a> {
         let pairs = if key.len() + 2 <= self.most { pairs(&screened, all) } else { Vec::new() };
         let pairs: Vec<Vec<&Screened>> =
             pairs.into_iter().filter(|(gain, _)| pays(gain - best)).map(|(_, pair)| pair).collect();
-        self.fit_best(&parent, &singles, FULL[0]);
+        self.fit_best(&parent, &singles, settings().in_full[0]);
         self.sort();
         // Where a set is found that lacks nothing, no pair is needed.
         if !pairs.is_empty() && self.sets.first().is_some_and(|set| self.lacks_something(set)) {
-            self.fit_best(&parent, &pairs, FULL[1]);
+            self.fit_best(&parent, &pairs, settings().in_full[1]);
             self.sort();
         }
         // What no longer pays goes.
@@ -311,15 +274,16 @@ impl<'r, 'a> Search<'r, 'a> {
             // The first-order gains of the others are trusted only if that of the effect itself predicts its actual gain.
             let [white, correlated] = self.get(key).map_or([0.0; 2], |set| gains(set, &parent));
             let own = screened.iter().find(|own| own.index == key[k]);
-            let is_predicted = own.is_some_and(|own| ALLOWANCE * own.gains[0] > white);
+            let is_predicted = own.is_some_and(|own| settings().allowance * own.gains[0] > white);
             let is_near = |single: &&Screened| {
-                let pays = || ALLOWANCE * single.correlated() > correlated - HOPELESS;
-                single.index != key[k] && (!is_predicted || ALLOWANCE * single.gains[0] > white - HOPELESS || pays())
+                let pays = || settings().allowance * single.correlated() > correlated - settings().hopeless;
+                single.index != key[k]
+                    && (!is_predicted || settings().allowance * single.gains[0] > white - settings().hopeless || pays())
             };
             // Each is fitted with hyperparameters of its own: those of the set are narrow around its own optimum. Where the set
             // lacks nothing, squares decide. A fit below the set without the effect has failed.
             let own = self.get(key).filter(|set| !self.lacks_something(set));
-            let least = own.map_or(f64::NEG_INFINITY, |set| set.least_squares.log_likelihood - HOPELESS);
+            let least = own.map_or(f64::NEG_INFINITY, |set| set.least_squares.log_likelihood - settings().hopeless);
             let least = least.max(parent.least_squares.log_likelihood);
             let fitted = |single: &&Screened| {
                 let new = [*single];
@@ -328,9 +292,9 @@ impl<'r, 'a> Search<'r, 'a> {
                 let is_hopeless = rough.log_likelihood < least;
                 if is_hopeless { None } else { self.refit.least_squares(&larger(&parent, &new), &[rough.start]) }
             };
-            let near: Vec<&Screened> = screened.iter().filter(is_near).take(SWAPS).collect();
+            let near: Vec<&Screened> = screened.iter().filter(is_near).take(settings().singles).collect();
             let sets: Vec<FittedSet<'a>> = near.par_iter().filter_map(fitted).collect();
-            self.add_all(sets, NEGLIGIBLE);
+            self.add_all(sets, settings().negligible);
         }
         self.sort();
     }
@@ -349,24 +313,24 @@ impl<'r, 'a> Search<'r, 'a> {
             #[allow(clippy::cast_precision_loss)]
             let price = added as f64 * price(kinds(&self.refit.candidates));
             let parent = self.refit.roughly(&[parent.start_at(&given.point)], &given.errors, f64::NEG_INFINITY);
-            parent.map_or(f64::NEG_INFINITY, |parent| parent.log_evidence + price / ALLOWANCE)
+            parent.map_or(f64::NEG_INFINITY, |parent| parent.log_evidence + price / settings().allowance)
         };
         let mut trials: Vec<Trial> = Vec::new();
         // In groups: what earlier groups have reached decides which fits are hopeless.
-        for group in new.chunks(AT_A_TIME) {
+        for group in new.chunks(settings().at_a_time) {
             let best = trials.iter().map(|trial| trial.rough.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
             let of = |new: &&Vec<&Screened>| {
                 let likelier = best_start(parent, &given.point, new);
                 let by_squares = self.by_squares(parent, new, likelier.as_ref(), f64::NEG_INFINITY)?;
                 let begin: Vec<Start> = likelier.into_iter().chain([by_squares.start.clone()]).collect();
-                let rough = self.refit.roughly(&begin, &given.errors, best - HOPELESS)?;
+                let rough = self.refit.roughly(&begin, &given.errors, best - settings().hopeless)?;
                 Some(Trial { key: larger(parent, new), by_squares, rough })
             };
             let found: Vec<Option<Trial>> = group.par_iter().map(of).collect();
             trials.extend(found.into_iter().flatten());
         }
         let best = trials.iter().map(|trial| trial.rough.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-        let least = least.max(best - HOPELESS);
+        let least = least.max(best - settings().hopeless);
         trials.sort_by(|a, b| b.rough.log_evidence.total_cmp(&a.rough.log_evidence));
         let worth = trials.iter().take_while(|trial| trial.rough.log_evidence > least).count().min(full);
         let mut rest = trials.split_off(worth);
@@ -374,13 +338,15 @@ impl<'r, 'a> Search<'r, 'a> {
             // Correlated errors may take up what is missing; squares cannot.
             rest.sort_by(|a, b| b.by_squares.log_evidence.total_cmp(&a.by_squares.log_evidence));
             let leading = trials.iter().map(|trial| trial.by_squares.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-            trials.extend(rest.into_iter().take(RAW).filter(|trial| trial.by_squares.log_evidence > leading));
+            trials.extend(
+                rest.into_iter().take(settings().by_squares).filter(|trial| trial.by_squares.log_evidence > leading),
+            );
         }
         let fitted = |Trial { key, by_squares, rough }: &Trial| {
             self.refit.least_squares(key, &[by_squares.start.clone(), rough.start.clone()])
         };
         let sets: Vec<FittedSet<'a>> = trials.par_iter().filter_map(fitted).collect();
-        self.add_all(sets, HOPELESS);
+        self.add_all(sets, settings().hopeless);
     }
 
     /// Fits a set with more effects roughly by least squares: from the optimum of its parent by least squares, and from another
@@ -435,7 +401,7 @@ impl<'r, 'a> Search<'r, 'a> {
         };
         let starts: Vec<_> = self.sets.iter().filter(contains).filter_map(reduced).collect();
         let Some(set) = self.refit.least_squares(key, &starts) else { return false };
-        self.add(set, HOPELESS);
+        self.add(set, settings().hopeless);
         self.sort();
         true
     }
@@ -543,7 +509,7 @@ fn output_errors(set: &FittedSet<'_>) -> Vec<Errors> {
 /// Returns the best pairs by their normal equations.
 fn pairs<'s>(screened: &'s [Screened], candidates: &[Candidate]) -> Vec<(f64, Vec<&'s Screened>)> {
     let repeats = screened.iter().filter(|screened| candidates[screened.index].only.is_none());
-    let among: Vec<&Screened> = repeats.take(PAIRED).collect();
+    let among: Vec<&Screened> = repeats.take(settings().paired).collect();
     #[allow(clippy::cast_precision_loss)]
     let further = |a: usize, b: usize| {
         let count = |k: usize| candidates[among[k].index].effect.parameters().len();
@@ -553,10 +519,10 @@ fn pairs<'s>(screened: &'s [Screened], candidates: &[Candidate]) -> Vec<(f64, Ve
         .into_par_iter()
         .flat_map_iter(|a| (0..a).map(move |b| (a, b)))
         .filter(|&(a, b)| can_be_together(&candidates[among[a].index], &candidates[among[b].index]))
-        .map(|(a, b)| (pair_gain(among[a], among[b]) - PER_PARAMETER * further(a, b), a, b))
+        .map(|(a, b)| (pair_gain(among[a], among[b]) - settings().per_parameter * further(a, b), a, b))
         .collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
-    all.into_iter().take(PAIRS).map(|(gain, a, b)| (gain, vec![among[b], among[a]])).collect()
+    all.into_iter().take(settings().pairs).map(|(gain, a, b)| (gain, vec![among[b], among[a]])).collect()
 }
 
 /// Returns true if two candidates may act at once: a place has each characteristic once at most.

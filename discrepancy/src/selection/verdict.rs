@@ -4,10 +4,11 @@ use mops_core::{Role, math};
 
 use super::fitted_set::{FittedSet, Key, correlation, growth, largest, rms, surprise};
 use super::forecast::{Forecasts, fitted_together};
-use super::search::{NEGLIGIBLE, Search};
+use super::search::Search;
 use crate::candidate::Candidate;
 use crate::estimation::ErrorModel;
 use crate::fit::dot;
+use crate::settings::settings;
 use mops_core::diagnosis::Dependence;
 
 /// Class of effects at a place.
@@ -78,39 +79,7 @@ pub struct Verdict {
     pub largest_error: f64,
 }
 
-/// Gain of a curve in nats from which it fires.
-pub const FIRES: f64 = 6.0;
-
-/// Share of the gain of the set up to which a curve is small.
-const SMALL: f64 = 0.3;
-
-/// Share of the forecast error that a set must remove where a curve on top of it fires, or where it is not first by evidence.
-const MOST: f64 = 0.8;
-
-/// Share of the forecast error without it that an effect must remove to be claimed. Basis: an assumption.
-const LEAST: f64 = 0.1;
-
-/// Posterior probability from which class and place are claimed, and the largest one that is reported if the set of highest
-/// evidence did not pass.
-const CLAIMED: f64 = 0.9;
-
-/// Error of a record, in noises, above which a significant lack of fit matters.
-const MATTERS: f64 = 1.1;
-
-/// Shares and probability that a set must have where only the ends of the calibration records are forecast.
-const RUN_ON: f64 = 0.8;
-
-/// Difference of log-evidence, nats, that is not worth more than a bare mention. Source: R. E. Kass, A. E. Raftery, Bayes factors,
-/// Journal of the American Statistical Association 90 (1995) 773, section 3.2.
-const BARE_MENTION: f64 = 1.0;
-
-/// Cosine of the changes of the outputs from which the records cannot tell two effects apart, and the posterior probability of a set
-/// from which it is compared.
-const ALIKE: f64 = 0.98;
 const SOME: f64 = 0.01;
-
-/// Probability that none of the candidates is right.
-pub const OTHER: f64 = 0.05;
 
 /// Decides on the sets of a search.
 pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict {
@@ -134,7 +103,7 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
             break;
         }
         if forecasts.passes(search, key) {
-            least = least.max(posterior - NEGLIGIBLE);
+            least = least.max(posterior - settings().negligible);
             passed.push(key.clone());
         }
     }
@@ -182,37 +151,39 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         let log = |key: &Key| search.get(key).and_then(|set| set.likeliest()).map_or(0.0, |l| l.1.log_likelihood);
         log(&set) - log(&nothing)
     };
-    let fires = remaining.first().is_some_and(|curve| curve.gain >= FIRES && curve.gain >= SMALL * gained());
+    let fires = remaining
+        .first()
+        .is_some_and(|curve| curve.gain >= settings().fires && curve.gain >= settings().small * gained());
     let contradicted = !set.is_empty() && search.get(&set).is_some_and(is_contradicted);
     // Where a set of higher evidence forecasts no better, or other records contradict, there is more to it, too.
-    let explains = !fires && !contradicted && is_first || share.is_some_and(|share| share >= MOST);
-    let least = if forecasts.are_of_other_records() { CLAIMED } else { RUN_ON };
-    let most = if is_first { 1.0 } else { CLAIMED };
+    let explains = !fires && !contradicted && is_first || share.is_some_and(|share| share >= settings().most);
+    let least = if forecasts.are_of_other_records() { settings().claimed } else { settings().most };
+    let most = if is_first { 1.0 } else { settings().claimed };
     // An effect that forecasts hardly better is a proposal.
     let matters: Vec<Entry> = (0..set.len())
         .filter(|&index| {
             // What happens once in one record can be told from what it lacks by another record only.
             let is_once = search.refit.candidates[set[index]].only.is_some();
             (forecasts.are_of_other_records() || !is_once)
-                && forecasts.share_of(search, &set, index).is_some_and(|share| share >= LEAST)
+                && forecasts.share_of(search, &set, index).is_some_and(|share| share >= settings().least)
         })
         .map(|index| entry(search, &search.refit.candidates[set[index]]))
         .collect();
     let state = |(entry, alike, probability): (Entry, Vec<Entry>, f64)| Stated {
         is_claimed: probability >= least && matters.contains(&entry),
-        probability: (probability * (1.0 - OTHER)).min(most),
+        probability: (probability * (1.0 - settings().other)).min(most),
         entry,
         alike,
     };
     let stated: Vec<Stated> = entries.into_iter().map(state).collect();
     let is_supported = forecasts.are_of_other_records()
-        || is_first && forecasts.share(search, &set).is_some_and(|share| share >= RUN_ON);
+        || is_first && forecasts.share(search, &set).is_some_and(|share| share >= settings().most);
     let is_effect = explains && is_supported && stated.iter().any(|stated| stated.is_claimed);
     let declared_model = search.get(&nothing).expect("it was fitted first");
     let lacks = lacks(declared_model);
     let conclusion = if is_effect {
         Conclusion::Effect
-    } else if lacks.iter().any(|(nats, error)| *nats > search.significant && *error > MATTERS) {
+    } else if lacks.iter().any(|(nats, error)| *nats > search.significant && *error > settings().matters) {
         Conclusion::Unexplained
     } else {
         Conclusion::None
@@ -250,7 +221,7 @@ fn is_contradicted(set: &FittedSet<'_>) -> bool {
         Some((error, surprises.min_by(f64::total_cmp)?))
     };
     let expected = set.error().unwrap_or(f64::INFINITY).max(1.0);
-    together().is_some_and(|(error, surprise)| error > MATTERS * expected && surprise > FIRES)
+    together().is_some_and(|(error, surprise)| error > settings().matters * expected && surprise > settings().fires)
 }
 
 /// Returns classes and places of effects that the records cannot tell from those of an entry of a set: in place of one of them, what
@@ -286,7 +257,7 @@ fn swapped(search: &Search<'_, '_>, set: &Key, other: &Key) -> Option<[usize; 2]
         |key: &Key| -> Option<Vec<f64>> { Some(residuals(key)?.iter().zip(&before).map(|(r, b)| r - b).collect()) };
     let (ours, theirs) = (change(set)?, change(other)?);
     let cosine = dot(&ours, &theirs) / (dot(&ours, &ours) * dot(&theirs, &theirs)).sqrt();
-    (cosine > ALIKE).then_some([replaced, new])
+    (cosine > settings().alike).then_some([replaced, new])
 }
 
 /// Returns classes and places of the effects of a set, each once.
@@ -307,7 +278,7 @@ fn simplest(search: &Search<'_, '_>, passed: &[Key]) -> Key {
     let entries = entries_of(search, first);
     let is_alike = |key: &&Key| {
         key.len() == first.len()
-            && log(key) > log(first) - BARE_MENTION
+            && log(key) > log(first) - settings().bare_mention
             && (entries_of(search, key) == entries || swapped(search, first, key).is_some())
     };
     passed.iter().filter(is_alike).min_by_key(|key| parameters(key)).unwrap_or(first).clone()

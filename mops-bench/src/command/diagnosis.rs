@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use mops::core::suggestion;
+use mops::discrepancy::{Settings, use_settings};
 use mops::{Catalogue, Diagnostic};
 use mops_testbed::Setting;
 
@@ -76,6 +77,9 @@ pub(super) struct Arguments {
     /// Remove the missing effects, under all accepted names, from the catalogue, to count wrong claims.
     #[arg(long, conflicts_with_all = ["folder", "known_effects"])]
     without_truth: bool,
+    /// Multiply settings of the diagnosis by a factor, separated by commas, to see what depends on them.
+    #[arg(long, value_delimiter = ',', value_name = "NAME=FACTOR")]
+    scale: Vec<String>,
     /// Diagnose the cases in a folder instead, each a folder with case.json and data files.
     #[arg(long, value_name = "DIR")]
     folder: Option<PathBuf>,
@@ -125,6 +129,8 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = arguments.jobs.map_or(cores, usize::from);
     let against = arguments.against.is_some();
+    let scaled = arguments.scale.iter().try_fold(Settings::default(), scaled)?;
+    use_settings(scaled).expect("no diagnosis has begun");
     if let Some(cases) = &arguments.folder {
         let progress = Progress::of_cases(!arguments.quiet);
         let tools = Tools { catalogue, watch: &progress, seed: arguments.seed };
@@ -167,6 +173,21 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         write(folder, "index.html", &diagnosis::page(&text, &tables::stated(&results.rows)))?;
     }
     Ok(progress.status())
+}
+
+/// Returns the settings of the diagnosis with another one multiplied by its factor.
+fn scaled(settings: Settings, change: &String) -> Result<Settings, Diagnostic> {
+    let parts = change.split_once('=').and_then(|(name, factor)| Some((name, factor.parse::<f64>().ok()?)));
+    let Some((name, factor)) = parts.filter(|(_, factor)| factor.is_finite()) else {
+        return Err(
+            Diagnostic::new(format!("expected NAME=FACTOR, found `{change}`")).with_help("for example `fires=2`")
+        );
+    };
+    let unknown = || {
+        let names = Settings::NAMES.iter().copied();
+        Diagnostic::new(format!("the diagnosis has no setting `{name}`")).with_help(suggestion(name, names))
+    };
+    settings.scaled(name, factor).ok_or_else(unknown)
 }
 
 /// Returns the plan of the benchmark, with names checked.
