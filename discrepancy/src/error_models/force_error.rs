@@ -5,7 +5,7 @@ use mops_core::{Dual, Scalar, math};
 
 use super::likelihood::{LN_TWO_PI, Likelihood};
 use super::output_error::matern_penalty;
-use super::process::{Matern32, Process};
+use super::process::{Matern32, Process, Steps};
 use crate::fit::dot;
 
 /// Motion of a plant over one record, linearised from sample to sample: `x[k+1] = F[k] x[k] + G[k] f[k]`, `r = H x + D f`.
@@ -217,7 +217,6 @@ enum Event<'a, S> {
 /// Recursion of the covariance of states, forces and rates of forces, which depends on no residual.
 struct Recursion<'a, S, P> {
     motion: &'a LinearisedMotion,
-    process: &'a P,
     /// Variance of the white noise of each channel.
     noise: Vec<S>,
     /// Covariance, row by row: states first, then each force with its rate.
@@ -226,8 +225,8 @@ struct Recursion<'a, S, P> {
     /// Buffers: for products with the covariance, and for one of its rows before and after a step.
     product: Vec<S>,
     row: [Vec<S>; 2],
-    /// Last time from sample to sample, with the transition of a force and the covariance of its noise over it.
-    step: Option<(f64, KernelStep<S>, KernelStep<S>)>,
+    /// Steps of a force from sample to sample.
+    steps: Steps<'a, S, P, 2>,
 }
 
 impl<'a, S: Scalar, P: Process<S, 2>> Recursion<'a, S, P> {
@@ -245,7 +244,7 @@ impl<'a, S: Scalar, P: Process<S, 2>> Recursion<'a, S, P> {
         let noise = noise.iter().map(|&noise| noise * noise).collect();
         let (gain, product) = (vec![zero; size], vec![zero; size * size]);
         let row = [gain.clone(), gain.clone()];
-        Self { motion, process, noise, covariance, gain, product, row, step: None }
+        Self { motion, noise, covariance, gain, product, row, steps: Steps::new(process) }
     }
 
     fn run(mut self, mut on: impl FnMut(Event<'_, S>)) {
@@ -296,10 +295,7 @@ impl<'a, S: Scalar, P: Process<S, 2>> Recursion<'a, S, P> {
     /// Moves the covariance from a sample to the next one; returns the transition of the forces.
     fn predict(&mut self, k: usize) -> KernelStep<S> {
         let (states, size) = (self.motion.states, self.gain.len());
-        let dt = self.motion.times[k + 1] - self.motion.times[k];
-        let known = self.step.filter(|(of, ..)| *of == dt);
-        let (_, kernel, noise) =
-            *self.step.insert(known.unwrap_or_else(|| (dt, self.process.transition(dt), self.process.noise(dt))));
+        let (kernel, noise) = self.steps.over(self.motion.times[k + 1] - self.motion.times[k]);
         // With the transition T of all: first T P, then (T P) T', by columns of the transposed product.
         let [before, after] = &mut self.row;
         for b in 0..size {

@@ -3,7 +3,7 @@
 use mops_core::{Dual, Scalar, math};
 
 use super::likelihood::{LN_TWO_PI, Likelihood};
-use super::process::{Matern32, OrnsteinUhlenbeck, Process};
+use super::process::{Matern32, OrnsteinUhlenbeck, Process, Steps};
 
 /// Covariance of the correlated part of an output error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,11 +92,11 @@ impl<S: Scalar, const D: usize> Filter<S, D> {
         let mut variances = Vec::with_capacity(count);
         let noise = noise * noise;
         let mut p = process.stationary();
+        let mut steps = Steps::new(process);
         for (k, &time) in times.iter().enumerate() {
-            let dt = if k == 0 { 0.0 } else { time - times[k - 1] };
-            let f = process.transition(dt);
+            let (f, added) = steps.over(if k == 0 { 0.0 } else { time - times[k - 1] });
             if k > 0 {
-                p = predicted(&f, &p, &process.noise(dt));
+                p = predicted(&f, &p, &added);
             }
             let variance = p[0][0] + noise;
             let gain: [S; D] = std::array::from_fn(|a| p[a][0] / variance);

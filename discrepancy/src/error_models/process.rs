@@ -17,6 +17,29 @@ pub trait Process<S: Scalar, const D: usize> {
     fn noise(&self, dt: f64) -> [[S; D]; D];
 }
 
+/// Steps of a process: transition and noise over a step, kept for the next one if that is as long.
+pub struct Steps<'p, S, P, const D: usize> {
+    process: &'p P,
+    last: Option<(f64, [[S; D]; D], [[S; D]; D])>,
+}
+
+/// Relative difference of two steps up to which they are as long: the rounding of time stamps.
+const AS_LONG: f64 = 1e-9;
+
+impl<'p, S: Scalar, P: Process<S, D>, const D: usize> Steps<'p, S, P, D> {
+    pub fn new(process: &'p P) -> Self {
+        Self { process, last: None }
+    }
+
+    /// Returns transition and noise over a step.
+    pub fn over(&mut self, dt: f64) -> ([[S; D]; D], [[S; D]; D]) {
+        let known = self.last.filter(|(of, ..)| (of - dt).abs() <= AS_LONG * dt);
+        let (_, transition, noise) =
+            *self.last.insert(known.unwrap_or_else(|| (dt, self.process.transition(dt), self.process.noise(dt))));
+        (transition, noise)
+    }
+}
+
 /// Ornstein-Uhlenbeck process: covariance `deviation^2 exp(-d/length)` at the distance `d` in s.
 #[derive(Debug, Clone, Copy)]
 pub struct OrnsteinUhlenbeck<S> {

@@ -126,8 +126,12 @@ impl<'a> Findings<'_, '_, 'a> {
         candidates.iter().position(|candidate| candidate.is(&added.candidate)).expect("effects are candidates")
     }
 
-    /// Returns the posterior probability that an effect is missing; NaN if no set that holds it passed.
+    /// Returns the posterior probability that an effect is missing; NaN if no set that holds it passed, or more is missing than what
+    /// these describe.
     fn probability_of(&self, index: usize) -> f64 {
+        if self.verdict.is_refused || self.verdict.is_description {
+            return f64::NAN;
+        }
         let holding: Vec<f64> =
             self.verdict.passed.iter().filter(|(key, _)| key.contains(&index)).map(|(_, weight)| *weight).collect();
         if holding.is_empty() { f64::NAN } else { holding.iter().sum::<f64>() * (1.0 - settings().other) }
@@ -152,7 +156,9 @@ impl<'a> Findings<'_, '_, 'a> {
             strengths: parameters::strengths(set, index),
             given: !set.key.contains(&position),
             probability: self.probability_of(position),
-            class_probability: stated.map_or(f64::NAN, |stated| stated.probability),
+            class_probability: stated
+                .filter(|_| !self.verdict.is_refused)
+                .map_or(f64::NAN, |stated| stated.probability),
             alike: stated.map_or_else(Vec::new, |stated| {
                 stated.alike.iter().map(|entry| format!("{} at {}", entry.class, entry.place)).collect()
             }),

@@ -57,6 +57,8 @@ pub struct Verdict {
     pub is_contradicted: bool,
     /// True if most remains: a free curve on top of the set shows it, selection records contradict, or the set is not first.
     pub is_refused: bool,
+    /// True if a free curve on top of the set fires: its effects are the best description of what is missing, no more.
+    pub is_description: bool,
     /// Conclusion.
     pub conclusion: Conclusion,
     /// Class and place of the effects of the set.
@@ -194,6 +196,7 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         nothing: nothing_probability,
         is_contradicted: contradicted,
         is_refused: !explains,
+        is_description: fires,
         excluded: excluded
             .into_iter()
             .chain(passed.into_iter().zip(named).filter(|(a, b)| a != b).map(|(a, _)| a))

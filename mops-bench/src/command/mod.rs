@@ -1,5 +1,6 @@
 //! The command line of `mops-bench`.
 
+mod ablation;
 mod diagnosis;
 mod evidence;
 mod folder;
@@ -43,6 +44,8 @@ enum Benchmark {
     ///
     /// Ctrl-C ends the benchmark and keeps the finished cases.
     Diagnosis(diagnosis::Arguments),
+    /// Repeat the diagnosis of simulated experiments with one setting after the other halved and doubled.
+    Ablation(ablation::Arguments),
     /// Compare given sets of effects by evidence under three error models, and by their errors on other records.
     Evidence(evidence::Arguments),
     /// Print the JSON schema of case.json, the format of the cases of `diagnosis --folder`.
@@ -60,6 +63,7 @@ enum Benchmark {
 pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
     let done = match Arguments::parse().benchmark {
         Benchmark::Diagnosis(arguments) => diagnosis::bench(catalogue, &arguments),
+        Benchmark::Ablation(arguments) => ablation::ablation(&arguments),
         Benchmark::Evidence(arguments) => evidence::evidence(catalogue, &arguments),
         Benchmark::Schema => print(&crate::diagnosis::schema()).map(|()| ExitCode::SUCCESS),
         Benchmark::Table { file } => suite::markdown(&file),
