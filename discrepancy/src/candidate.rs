@@ -171,7 +171,7 @@ pub struct Sizes {
     pub record: f64,
     /// Time between samples, s.
     pub sample: f64,
-    /// Size of the steps in which samples come, finer than [`MOST_STEPS`]; `None` where they do not, or nobody looked.
+    /// Size of the steps in which samples come, finer than those that are tried; `None` where they do not, or nobody looked.
     pub quantum: Option<f64>,
     /// A gap that samples show; `None` where they do not, or nobody looked.
     pub gap: Option<Gap>,
@@ -231,11 +231,14 @@ impl Sizes {
         if least.max(low) < most.min(high) { [least.max(low), most.min(high)] } else { strength.bounds }
     }
 
-    /// Smallest and largest value that the records can show: [`PERIODS_SEEN`] of what repeats, an event of at least
-    /// [`SAMPLES_SEEN`] samples and at most [`EVENT_SHARE`] of the record, a time constant of at least [`FASTEST`] samples.
+    /// Smallest and largest value that the records can show: enough periods of what repeats, an event of some samples that is not
+    /// most of the record, a time constant that is not much less than a sample, a stop that is left again.
     fn covered(&self, parameter: &EffectParameter) -> [f64; 2] {
         let periods = |length: f64| std::f64::consts::TAU * settings().periods_seen / length.max(f64::MIN_POSITIVE);
+        let within = |share: f64| self.range[0] + share * (self.range[1] - self.range[0]);
         match parameter.kind {
+            ParameterKind::LowerEdge => [f64::NEG_INFINITY, within(1.0 - settings().free_of_it)],
+            ParameterKind::UpperEdge => [within(settings().free_of_it), f64::INFINITY],
             ParameterKind::WaveNumber => [periods(self.range[1] - self.range[0]), f64::INFINITY],
             ParameterKind::Frequency => [periods(self.record), f64::INFINITY],
             ParameterKind::Duration => [settings().samples_seen * self.sample, settings().event_share * self.record],

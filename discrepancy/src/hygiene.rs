@@ -2,32 +2,60 @@
 
 use mops_core::math;
 
-/// Standard deviation of the noise of a channel, without a model: from what local parabolas over seven samples leave, by the
-/// median absolute deviation, so that a few jumps do not count. `None` where fewer samples, or samples that never change, tell
-/// nothing of it.
+use crate::settings::settings;
+
+/// Returns the standard deviation of the noise of a sensor from its records: the median of that of each, at least that of its
+/// quantisation. `None` if there are too few samples, or they never change.
+pub fn noise_of(records: &[(&[f64], &[f64])]) -> Option<f64> {
+    let mut all: Vec<f64> = records.iter().filter_map(|(times, values)| noise_of_record(times, values)).collect();
+    all.sort_by(f64::total_cmp);
+    // Fast motion looks like noise: of two, the smaller one.
+    let median = *all.get(all.len().checked_sub(1)? / 2)?;
+    Some(step(records).map_or(median, |step| median.max(step / 12.0_f64.sqrt())))
+}
+
+/// Returns the standard deviation of the noise of a record: what local parabolas over seven samples leave, by the median absolute
+/// deviation, so that a few jumps do not count.
 ///
 /// Source: T. Gasser, L. Sroka, C. Jennen-Steinmetz, Residual variance and residual pattern in nonlinear regression,
 /// Biometrika 73 (1986) 625; P. Rousseeuw, A. Leroy, Robust Regression and Outlier Detection (1987), section 4.4 (1.4826).
 #[allow(clippy::cast_precision_loss)]
-pub fn noise_of(times: &[f64], values: &[f64]) -> Option<f64> {
-    let mut left: Vec<f64> = (3..values.len().saturating_sub(3))
-        .filter_map(|i| {
-            let x: Vec<f64> = (i - 3..=i + 3).map(|k| times[k] - times[i]).collect();
-            let others: Vec<usize> = (0..7).filter(|&k| k != 3).collect();
-            let (predicted, leverage) = parabola(&others, &x, &values[i - 3..=i + 3])?;
-            Some((values[i] - predicted).abs() / (1.0 + leverage).sqrt())
-        })
-        .collect();
+fn noise_of_record(times: &[f64], values: &[f64]) -> Option<f64> {
+    let of = |i: usize| {
+        let x: Vec<f64> = (i - 3..=i + 3).map(|k| times[k] - times[i]).collect();
+        let others: Vec<usize> = (0..7).filter(|&k| k != 3).collect();
+        let (predicted, leverage) = parabola(&others, &x, &values[i - 3..=i + 3])?;
+        Some((values[i] - predicted).abs() / (1.0 + leverage).sqrt())
+    };
+    let mut left: Vec<f64> = (3..values.len().saturating_sub(3)).filter_map(of).collect();
     left.sort_by(f64::total_cmp);
     let median = left.get(left.len() / 2)?;
     // Coarse quantisation leaves many exact zeros: then the root mean square says more.
     let rms = (left.iter().map(|r| r * r).sum::<f64>() / left.len() as f64).sqrt();
     let robust = 1.4826 * median;
     let noise = if robust > 0.1 * rms { robust } else { rms };
-    // What rounding leaves of a constant is none.
     let largest = values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-    (noise > 1e-12 * largest).then_some(noise)
+    (noise > ROUNDING * largest).then_some(noise)
 }
+
+/// Share of the largest value up to which a difference is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Returns the quantisation step of records: the smallest difference of two samples, if most differences are multiples of it.
+#[allow(clippy::cast_precision_loss)]
+fn step(records: &[(&[f64], &[f64])]) -> Option<f64> {
+    let largest = records.iter().flat_map(|(_, values)| *values).fold(0.0, |m: f64, v| m.max(v.abs()));
+    let differences = |(_, values): &(&[f64], &[f64])| -> Vec<f64> {
+        values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|d| *d > ROUNDING * largest).collect()
+    };
+    let all: Vec<f64> = records.iter().flat_map(differences).collect();
+    let step = all.iter().copied().reduce(f64::min)?;
+    let is_multiple = |d: &&f64| (*d / step - (*d / step).round()).abs() < MULTIPLE;
+    (all.iter().filter(is_multiple).count() as f64 >= settings().quantised * all.len() as f64).then_some(step)
+}
+
+/// Distance from a whole number up to which a ratio of differences is one: the rounding of decimals.
+const MULTIPLE: f64 = 0.05;
 
 /// The value at 0 of the parabola through the chosen samples, and the sum of the squares of the weights that give it.
 fn parabola(chosen: &[usize], x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
@@ -89,7 +117,7 @@ mod tests {
     #[test]
     fn the_noise_on_a_sine_is_found() {
         let (times, values) = samples(0.02);
-        let noise = noise_of(&times, &values).expect("samples tell it");
+        let noise = noise_of(&[(&times, &values)]).expect("samples show it");
         assert!((noise - 0.02).abs() < 0.005, "{noise}");
     }
 
@@ -112,8 +140,20 @@ mod tests {
     }
 
     #[test]
+    fn records_of_a_sensor_share_a_noise_and_it_is_not_below_that_of_its_steps() {
+        let (times, values) = samples(0.02);
+        let [short, long] = [100, 400].map(|n| (&times[..n], &values[..n]));
+        let noise = noise_of(&[short, long]).unwrap();
+        assert!((noise - 0.02).abs() < 0.005, "{noise}");
+        // A ramp of a step every tenth sample: local parabolas leave little.
+        let stairs: Vec<f64> = (0..400).map(|k| 0.3 * f64::from(k / 10)).collect();
+        let noise = noise_of(&[(&times, &stairs)]).unwrap();
+        assert!(noise >= 0.3 / 12.0_f64.sqrt(), "{noise}");
+    }
+
+    #[test]
     fn few_samples_and_samples_that_never_change_tell_no_noise() {
         let (times, values) = samples(0.02);
-        assert!(noise_of(&times[..6], &values[..6]).is_none() && noise_of(&times, &[1.5; 400]).is_none());
+        assert!(noise_of(&[(&times[..6], &values[..6])]).is_none() && noise_of(&[(&times, &[1.5; 400])]).is_none());
     }
 }

@@ -139,6 +139,11 @@ settings! {
     /// Share of the best guess's gain that another guess must have to be kept. Basis: an assumption.
     near_guess: f64 = 0.3;
 
+    // Records.
+
+    /// Share of the differences of samples that must be multiples of the smallest one for a quantisation. Basis: the studies.
+    quantised: f64 = 0.9;
+
     // Starts of a fit.
 
     /// Iterations of a first look at a start. Basis: an assumption.
@@ -282,6 +287,8 @@ settings! {
     samples_seen: f64 = 3.0;
     /// Share of a record that an event lasts at most. Basis: the studies.
     event_share: f64 = 0.25;
+    /// Share of the range visited that is free of a stop or an overflow: what always acts is a spring or a loss. Basis: an assumption.
+    free_of_it: f64 = 0.25;
     /// Samples at a limit. Basis: the studies.
     touched: usize = 3;
     /// Noises within which samples are at a limit, and from which steps of samples are visible. Basis: the studies.
@@ -316,6 +323,9 @@ settings! {
     gap_share: f64 = 0.15;
 
     // Report.
+
+    /// Ratio from which the noise of a sensor is another than the study has. Basis: the studies.
+    wrong_noise: f64 = 1.5;
 
     /// Periods in a window of a record. Source: H. G. Bock, Recent advances in parameter identification techniques for ODE, in
     /// Numerical Treatment of Inverse Problems (1983) 95, for windows; two to four periods keep the phase and still show slow changes.

@@ -119,10 +119,22 @@ impl Subject {
             })
             .collect();
         let mut notes = Vec::new();
-        // By signal and unit, of every experiment that gives none.
-        let mut estimated: BTreeMap<(String, String), Vec<(String, f64)>> = BTreeMap::new();
+        let channels = || {
+            let cases = jobs.iter().map(|&job| &study.cases()[study.jobs()[job].case]);
+            cases.flat_map(|case| case.experiment.iter().flat_map(|e| &e.channels).map(move |channel| (case, channel)))
+        };
+        // One noise for each sensor, of all experiments that give none.
+        let estimated = |signal: &str| {
+            let of = channels().filter(|(_, channel)| channel.signal == signal);
+            let records: Vec<(&[f64], &[f64])> = of.map(|(_, c)| (&c.times[..], &c.values[..])).collect();
+            noise_of(&records)
+        };
+        let mut estimates: BTreeMap<&str, Option<f64>> = BTreeMap::new();
+        for (_, channel) in channels() {
+            estimates.entry(&channel.signal).or_insert_with(|| estimated(&channel.signal));
+        }
         let mut measurements = Vec::new();
-        for job in jobs {
+        for &job in &jobs {
             let plan = &study.jobs()[job];
             let case = &study.cases()[plan.case];
             let experiment = case.experiment.as_ref().expect("it was looked for");
@@ -130,7 +142,7 @@ impl Subject {
             for channel in &experiment.channels {
                 let signals = &model.interface().signals;
                 let signal = signals.iter().position(|s| s.name == channel.signal).expect("checked by the study");
-                let estimate = noise_of(&channel.times, &channel.values);
+                let estimate = estimates[channel.signal.as_str()];
                 let noise = channel.noise.or(estimate).ok_or_else(|| {
                     let fact = "too few samples, or samples that never change, tell nothing of the noise";
                     StudyError::new(format!("experiments.{}.channels.{}", case.name, channel.signal), fact)
@@ -148,9 +160,6 @@ impl Subject {
                         .push(format!("{dropped} {samples} of `{}` in `{}` {are} left out", channel.signal, case.name));
                 }
                 let (name, unit) = (channel.signal.clone(), signals[signal].unit.to_string());
-                if channel.noise.is_none() {
-                    estimated.entry((name.clone(), unit.clone())).or_default().push((case.name.clone(), noise));
-                }
                 series.push(Series { signal, name, unit, times, values, noise });
             }
             let horizon = series.iter().filter_map(|s| s.times.last().copied()).fold(0.0, f64::max);
@@ -179,19 +188,22 @@ impl Subject {
                 horizon,
             });
         }
-        for ((signal, unit), sizes) in estimated {
-            let least = sizes.iter().map(|(_, size)| *size).fold(f64::INFINITY, f64::min);
-            let most = sizes.iter().map(|(_, size)| *size).fold(0.0, f64::max);
-            let size = if least < most { format!("{least:.3e} to {most:.3e}") } else { format!("{least:.3e}") };
-            let experiments = match (sizes.len(), measurements.len()) {
+        for (signal, noise) in estimates.iter().filter_map(|(signal, noise)| Some((signal, (*noise)?))) {
+            let without: Vec<&str> = channels()
+                .filter(|(_, channel)| channel.signal == *signal && channel.noise.is_none())
+                .map(|(case, _)| case.name.as_str())
+                .collect();
+            let Some(unit) = model.interface().signals.iter().find(|s| s.name == *signal).map(|s| &s.unit) else {
+                continue;
+            };
+            let experiments = match (without.len(), measurements.len()) {
+                (0, _) => continue,
                 (1, 1) => String::new(),
-                (count, all) if count == all => format!(" in each of {count} experiments"),
-                _ => {
-                    format!(" in {}", sizes.iter().map(|(name, _)| format!("`{name}`")).collect::<Vec<_>>().join(", "))
-                }
+                (count, all) if count == all => format!(" of {count} experiments"),
+                _ => format!(" of {}", without.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")),
             };
             notes.push(format!(
-                "the noise of `{signal}` was estimated from neighbouring samples{experiments}: {size} {unit}"
+                "the noise of `{signal}` was estimated from neighbouring samples{experiments}: {noise:.3e} {unit}"
             ));
         }
         if !measurements.iter().any(|m| m.role == Role::Calibration) {

@@ -1,7 +1,8 @@
 //! Elastic end stops with dampers that cannot pull.
 
 use mops_core::{
-    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind,
+    PortState, Scalar,
 };
 
 use super::Definition;
@@ -37,14 +38,16 @@ impl Definition for EndStop {
             Dimension::POSITION,
             ANY,
             InitialGrid::Within(&[-0.05, 0.0, 0.05, 0.2]),
-        ),
+        )
+        .of_kind(ParameterKind::LowerEdge),
         EffectParameter::shape(
             "high",
             "position of the upper stop",
             Dimension::POSITION,
             ANY,
             InitialGrid::Within(&[0.8, 0.95, 1.0, 1.05]),
-        ),
+        )
+        .of_kind(ParameterKind::UpperEdge),
         EffectParameter::shape(
             "tau",
             "damping of the stops divided by their stiffness",

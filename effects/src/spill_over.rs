@@ -1,6 +1,8 @@
 //! Overflow above a level into another store.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::{ANY, NOT_NEGATIVE, over};
@@ -34,7 +36,8 @@ impl Definition for SpillOver {
             Dimension::POSITION,
             ANY,
             InitialGrid::Within(&[0.5, 0.7, 0.85, 0.95]),
-        ),
+        )
+        .of_kind(ParameterKind::UpperEdge),
         EffectParameter::shape(
             "n",
             "exponent: 1 for a plain edge, 3/2 for a rectangular weir",

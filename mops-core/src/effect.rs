@@ -211,8 +211,12 @@ pub enum ParameterKind {
     /// Displacement over which a force builds up, or speed over which it falls. If the motion passes it in a fraction of a sample,
     /// data do not show how small it is.
     BuildUp,
-    /// Value in the range visited at the place, such as the level of an edge.
+    /// Value in the range visited at the place, such as the neutral position of a spring.
     Level,
+    /// Value below which a stop acts: above it, part of the range visited is free of it.
+    LowerEdge,
+    /// Value above which a stop or an overflow acts: below it, part of the range visited is free of it.
+    UpperEdge,
     /// Angle of a periodic function.
     Phase,
     /// Wave number along a position: 2 pi divided by the period.

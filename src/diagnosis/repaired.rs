@@ -42,20 +42,14 @@ pub(crate) fn repaired(original: &Original<'_>, diagnosis: &Diagnosis, locate: &
     text.into_text()
 }
 
-/// Adds the missing noise of channels, and criteria if there are none. Entries of the user are kept.
+/// Adds the noise of sensors without one, and criteria if there are none. Entries of the user are kept.
 fn noise_and_criteria(text: &mut TomlText, diagnosis: &Diagnosis) {
     let without = text.keys(&["criteria"]).is_empty();
     for p in diagnosis.predictions.iter().filter(|p| p.noise.is_finite() && p.noise > 0.0) {
         let channel = ["experiments", &p.experiment, "channels", &p.signal];
-        let noise = ["experiments", &p.experiment, "channels", &p.signal, "noise"];
-        if text.has(&noise) || !text.has(&channel) {
-            continue;
-        }
-        match text.words(&channel) {
-            Some(column) => {
-                text.set(&channel, &format!("{{ column = {}, noise = {} }}", quoted(&column), number(p.noise)))
-            }
-            None => text.set(&noise, &number(p.noise)),
+        let own = [&channel[..], &["noise"]].concat();
+        if text.has(&channel) && !text.has(&own) && !text.has(&["sensors", &p.signal]) {
+            text.set(&["sensors", &p.signal, "noise"], &number(p.noise));
         }
     }
     for p in diagnosis.predictions.iter().filter(|_| without) {

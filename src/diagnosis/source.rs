@@ -17,8 +17,6 @@ pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String 
     let mut imports = vec!["StudyBuilder", "Study", "Task", "TunerBuilder"];
     let tuners = entries(&study, "tuners").map(|(name, tuner)| entry(name, &self::tuner(tuner)));
     let tuners = items(tuners.collect(), 8);
-    imports.extend(["Quantity", "Scale", "Unit"].iter().filter(|name| tuners.contains(&format!("{name}::"))));
-    imports.sort_unstable();
 
     let (mut constants, mut taken) = (String::new(), HashSet::new());
     let mut list = |section: &str, make: &dyn Fn(&str, &str) -> String| -> Vec<String> {
@@ -36,6 +34,12 @@ pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String 
     let cases = items(cases, 8);
     let criteria = list("criteria", &|name, text| entry(name, &format!("file::criterion(&catalogue, {text})?")));
     let criteria = items(criteria, 8);
+    let noise = |(signal, sensor): (&str, &Value)| sensor.get("noise").map(|noise| entry(signal, &quantity(noise)));
+    let sensors: Vec<String> = entries(&study, "sensors").filter_map(noise).collect();
+    let sensors = if sensors.is_empty() { String::new() } else { format!("        sensors: {},\n", items(sensors, 8)) };
+    let quantities = format!("{tuners}{sensors}");
+    imports.extend(["Quantity", "Scale", "Unit"].iter().filter(|name| quantities.contains(&format!("{name}::"))));
+    imports.sort_unstable();
     let seed = study.get("study").and_then(|s| s.get("seed")).and_then(Value::as_integer);
     let seed = seed.map_or_else(String::new, |seed| format!("        seed: {seed},\n"));
 
@@ -75,7 +79,7 @@ pub fn study() -> Result<Study, Box<dyn Error>> {{
         task: Task::Calibration,
 {seed}        tuners: {tuners},
         cases: {cases},
-        criteria: {criteria},
+{sensors}        criteria: {criteria},
         models,
         ..StudyBuilder::default()
     }};
@@ -153,6 +157,16 @@ fn unique(name: String, taken: &mut HashSet<String>) -> String {
     names.into_iter().find(|name| taken.insert(name.clone())).expect("some number is free")
 }
 
+/// Returns the code of a quantity.
+fn quantity(value: &Value) -> String {
+    match value {
+        Value::String(text) => format!("Quantity::parse({text:?})?"),
+        Value::Integer(value) => format!("{value}.0.into()"),
+        Value::Float(value) => format!("{value:?}.into()"),
+        other => other.to_string(),
+    }
+}
+
 /// Returns the code of a tuner.
 fn tuner(tuner: &Value) -> String {
     let Some(table) = tuner.as_table() else { return "TunerBuilder::default()".to_owned() };
@@ -167,12 +181,6 @@ fn tuner(tuner: &Value) -> String {
     if let (Some(start), Some(min), Some(max), true) = (number("start"), number("min"), number("max"), plain) {
         return format!("TunerBuilder::new({start:?}, {min:?}, {max:?}){}", if log { ".log()" } else { "" });
     }
-    let quantity = |value: &Value| match value {
-        Value::String(text) => format!("Quantity::parse({text:?})?"),
-        Value::Integer(value) => format!("{value}.0.into()"),
-        Value::Float(value) => format!("{value:?}.into()"),
-        other => other.to_string(),
-    };
     let mut fields = Vec::new();
     for (key, value) in table {
         let text = value.as_str().unwrap_or_default();

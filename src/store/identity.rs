@@ -99,7 +99,9 @@ impl Difference {
         let path: Vec<&str> = self.path.iter().map(String::as_str).collect();
         match path.as_slice() {
             ["study", "solver", "max-evaluations"] => Meaning::Budget,
-            ["study", "models" | "cases", ..] | ["mops" | "data" | "program" | "rows", ..] => Meaning::Values,
+            ["study", "models" | "cases" | "sensors", ..] | ["mops" | "data" | "program" | "rows", ..] => {
+                Meaning::Values
+            }
             ["tuners", ..] => Meaning::Values,
             ["study", "experiments", _, "role"] => Meaning::Path,
             ["study", "experiments", ..] => Meaning::Values,

@@ -124,6 +124,15 @@ pub struct Fitted {
 }
 
 impl Errors {
+    /// Returns the standard deviation of the white noise of a channel in units of that of its sensor.
+    pub fn noise(&self, channel: usize) -> f64 {
+        match self {
+            Self::White => 1.0,
+            Self::Output(errors) => errors[channel].noise,
+            Self::Force(error, _) => error.noise[channel],
+        }
+    }
+
     /// Whitens columns over the residuals of a record in place; returns the sum of `ln S + ln 2 pi`.
     pub fn whiten(&self, piece: &Piece, channels: &Channels, index: usize, columns: &mut [Vec<f64>]) -> f64 {
         match self {

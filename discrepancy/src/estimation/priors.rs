@@ -62,7 +62,7 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
             ParameterKind::Instant => at_centre(added.sizes.record, UNIFORM),
             ParameterKind::Frequency => at_centre(added.sizes.highest_frequency(), UNIFORM),
             // A limit that vanishes at infinity lies somewhere in the range, too.
-            ParameterKind::Level | ParameterKind::Strength => {
+            ParameterKind::Level | ParameterKind::LowerEdge | ParameterKind::UpperEdge | ParameterKind::Strength => {
                 at_centre(added.sizes.range[1] - added.sizes.range[0], UNIFORM)
             }
             ParameterKind::Shape | ParameterKind::BuildUp | ParameterKind::WaveNumber | ParameterKind::Duration => {

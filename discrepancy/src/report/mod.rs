@@ -269,6 +269,7 @@ impl<'a> Findings<'_, '_, 'a> {
         if made.verdict == Verdict::Effect && !made.is_first {
             notes.push("a set of higher evidence forecasts worse than a smaller one".to_owned());
         }
+        notes.extend(wrong_noise(set));
         if let Some((_, likeliest)) = set.likeliest() {
             for (k, moved) in made.parameters.iter().enumerate() {
                 let apart = (likeliest.point.globals[k] - moved.after).abs();
@@ -279,6 +280,12 @@ impl<'a> Findings<'_, '_, 'a> {
         }
         notes
     }
+}
+
+/// Returns notes on sensors whose noise is another than the study has.
+fn wrong_noise(set: &FittedSet<'_>) -> Vec<String> {
+    let wrong = set.noises().into_iter().filter(|(_, ratio)| math::ln(*ratio).abs() > math::ln(settings().wrong_noise));
+    wrong.map(|(signal, ratio)| format!("the noise of `{signal}` is about {ratio:.2} times its noise level")).collect()
 }
 
 /// Returns the name of an effect in the augmented model.

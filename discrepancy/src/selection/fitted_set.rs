@@ -1,5 +1,7 @@
 //! A set of effects, fitted to the calibration records.
 
+use std::collections::BTreeMap;
+
 use mops_core::math;
 
 use crate::candidate::Candidate;
@@ -97,6 +99,22 @@ impl FittedSet<'_> {
         let (_, likeliest) = self.likeliest()?;
         let white = white_log_likelihood(&self.fit.pieces, &self.fit.all(&self.least_squares.point)?);
         Some(likeliest.log_likelihood - white)
+    }
+
+    /// Returns the standard deviation of the white noise of each sensor in noise levels, under the likelier of the smooth error models:
+    /// a rough one takes part of it for an error of the model.
+    pub fn noises(&self) -> Vec<(String, f64)> {
+        let smooth =
+            self.under.iter().filter(|(kind, _)| *kind != ErrorModel::RoughOutput).map(|(_, estimate)| estimate);
+        let Some(likelier) = smooth.max_by(|a, b| evidence(a).total_cmp(&evidence(b))) else { return Vec::new() };
+        let channels = Channels::new(&self.fit.pieces);
+        let mut all: BTreeMap<String, f64> = BTreeMap::new();
+        for (index, piece) in self.fit.pieces.iter().enumerate() {
+            for (k, series) in piece.series.iter().enumerate() {
+                all.insert(series.name.clone(), likelier.errors.noise(channels.of(index, k)));
+            }
+        }
+        all.into_iter().collect()
     }
 
     /// Returns the root mean square error of all records by least squares, in noises.

@@ -81,7 +81,7 @@ impl<'a> Refit<'a> {
             };
             let mut looks: Vec<(f64, Start)> = left.par_iter().filter_map(further).collect();
             looks.sort_by(|a, b| b.0.total_cmp(&a.0));
-            looks.truncate(left.len().div_ceil(settings().followed).max(settings().followed));
+            looks.truncate(left.len().div_ceil(3).max(settings().followed));
             left = looks.into_iter().map(|look| look.1).collect();
             iterations = (2 * iterations).max(1);
         }

@@ -40,7 +40,7 @@ use crate::model::{AnalysisKind, Interface};
 use crate::study::{CaseBuilder, CriterionBuilder, ModelBuilder, Study, StudyBuilder, TunerBuilder};
 use crate::study_error::StudyError;
 use crate::unit::{Quantity, Unit};
-use sections::{CaseOptions, CriterionCommon, ModelCommon, SolverCommon, StudySection, TunerSection};
+use sections::{CaseOptions, CriterionCommon, ModelCommon, SensorSection, SolverCommon, StudySection, TunerSection};
 use tree::{Node, Text};
 
 /// Source of data files: a folder, or the program itself.
@@ -164,7 +164,7 @@ pub fn read(
 fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Result<StudyFile, Diagnostic> {
     let root = text.parse()?;
     let files = &content::Listed::new(files);
-    let tables = ["study", "models", "tuners", "cases", "experiments", "criteria", "solver"];
+    let tables = ["study", "models", "tuners", "cases", "experiments", "sensors", "criteria", "solver"];
     root.check_keys(&[&tables[..], &tasks::TABLES[..]].concat())?;
     let study: StudySection = root.required("study", "add [study] with name = \"...\"")?.read()?;
 
@@ -192,6 +192,10 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
                 .with_help("rename one of them: results are listed by these names"));
         }
         draft.cases.push(experiment::read(name, &node, files)?);
+    }
+    for (signal, node) in root.table("sensors")? {
+        let SensorSection { noise } = node.read()?;
+        draft.sensors.push((signal, noise));
     }
     for (name, node) in root.table("criteria")? {
         draft.criteria.push((name, read_criterion(catalogue, &node)?));

@@ -10,8 +10,8 @@ use super::robustness::{
     MonteCarloSection, RobustSection, UncertainSection, UncertainTable, UncertaintySection, WorstCaseSection,
 };
 use super::sections::{
-    CaseOptions, CriterionCommon, EffectSection, ExperimentSection, ModelCommon, SolverCommon, StudySection,
-    TunerSection,
+    CaseOptions, CriterionCommon, EffectSection, ExperimentSection, ModelCommon, SensorSection, SolverCommon,
+    StudySection, TunerSection,
 };
 use super::tasks::{DiagnosisSection, ExcitationSection, ParetoSection, SensitivitySection, SweepSection};
 use crate::catalogue::{Catalogue, schema_of};
@@ -41,6 +41,7 @@ pub fn study_schema(catalogue: &Catalogue) -> Value {
             "tuners": value(schema_of::<Entries<TunerSection>>()),
             "cases": named(case),
             "experiments": value(schema_of::<Entries<ExperimentSection>>()),
+            "sensors": value(schema_of::<Entries<SensorSection>>()),
             "criteria": named(one_kind(value(schema_of::<CriterionCommon>()), criteria, true)),
             "solver": one_kind(value(schema_of::<SolverCommon>()), solvers, false),
             "excitation": value(schema_of::<ExcitationSection>()),
@@ -148,6 +149,7 @@ pub fn tables() -> Vec<(&'static str, Schema)> {
         ("tuners", schema_of::<TunerSection>()),
         ("cases", schema_of::<CaseOptions>()),
         ("experiments", schema_of::<ExperimentSection>()),
+        ("sensors", schema_of::<SensorSection>()),
         ("criteria", schema_of::<CriterionCommon>()),
         ("solver", schema_of::<SolverCommon>()),
         ("excitation", schema_of::<ExcitationSection>()),

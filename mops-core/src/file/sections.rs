@@ -281,6 +281,14 @@ pub(super) struct ResponseTable {
     pub decibel: bool,
 }
 
+/// Sensor of a signal that experiments measure.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct SensorSection {
+    /// Standard deviation of the noise, in all experiments whose channel gives none; a number is in the unit of the signal.
+    pub noise: Quantity,
+}
+
 /// Column of a measured signal, and its conversion to the signal of the model.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]

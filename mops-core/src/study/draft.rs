@@ -26,6 +26,8 @@ pub struct StudyBuilder {
     pub tuners: Vec<(String, TunerBuilder)>,
     /// Cases and experiments.
     pub cases: Vec<CaseBuilder>,
+    /// Standard deviations of the noise of sensors, by signal, for all channels without a noise of their own.
+    pub sensors: Vec<(String, Quantity)>,
     /// Criteria, by name.
     pub criteria: Vec<(String, CriterionBuilder)>,
     /// Settings of the tasks other than design and calibration.

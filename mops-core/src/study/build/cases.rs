@@ -9,7 +9,7 @@ use crate::experiment::{Channel, Experiment, Input, ResponseData};
 use crate::model::{AnalysisKind, Parameter, Variable};
 use crate::study::draft::{CaseBuilder, ChannelBuilder, Measured};
 use crate::study_error::StudyError;
-use crate::unit::Unit;
+use crate::unit::{Quantity, Unit};
 
 pub(super) fn build_case(draft: &CaseBuilder, models: &Models, warnings: &mut Vec<String>) -> Result<Case, StudyError> {
     warnings.extend(draft.warnings.iter().cloned());
@@ -200,6 +200,40 @@ fn build_response(draft: &ResponseData, models: &Models) -> Result<ResponseData,
     Ok(ResponseData { values, unit: None, ..draft.clone() })
 }
 
+/// Gives the noise of its sensor to each channel without one.
+pub(super) fn with_sensors(
+    mut drafts: Vec<CaseBuilder>,
+    sensors: &[(String, Quantity)],
+    models: &Models,
+) -> Result<Vec<CaseBuilder>, StudyError> {
+    let mut channels: Vec<&mut ChannelBuilder> =
+        drafts.iter_mut().filter_map(|case| case.measured.as_mut()).flat_map(|m| &mut m.channels).collect();
+    for (signal, noise) in sensors {
+        let mut own = channels.iter_mut().filter(|channel| channel.signal == *signal).peekable();
+        if own.peek().is_none() {
+            let fact = format!("no experiment has a channel `{signal}`");
+            let measured = channels.iter().map(|channel| channel.signal.as_str());
+            return Err(StudyError::new(signal, fact).with_help(suggestion(signal, measured)));
+        }
+        own.filter(|channel| channel.noise.is_none()).for_each(|channel| channel.noise = Some(noise.clone()));
+        let known = models.iter().flat_map(|(_, model)| &model.interface().signals);
+        if let Some(variable) = known.into_iter().find(|variable| variable.name == *signal) {
+            standard_deviation(noise, &variable.unit).map_err(|m| m.within(signal))?;
+        }
+    }
+    Ok(drafts)
+}
+
+/// Returns the standard deviation of a noise in the unit of its signal.
+fn standard_deviation(noise: &Quantity, unit: &Unit) -> Result<f64, StudyError> {
+    let value = converted(noise, &unit.difference()).map_err(|m| m.within("noise"))?;
+    if !(value.is_finite() && value > 0.0) {
+        return Err(StudyError::new("noise", format!("a standard deviation must be positive, not {value}"))
+            .with_help("omit `noise` if it is unknown; `mops data` estimates it"));
+    }
+    Ok(value)
+}
+
 fn build_channel(draft: &ChannelBuilder, to: &Unit) -> Result<Channel, StudyError> {
     let unit = draft.unit.as_ref().unwrap_or(to);
     if !unit.is_compatible(to) {
@@ -207,17 +241,7 @@ fn build_channel(draft: &ChannelBuilder, to: &Unit) -> Result<Channel, StudyErro
         return Err(StudyError::new("column", fact)
             .with_help("choose another column, or correct the unit in the file header or in `unit`"));
     }
-    let noise = match &draft.noise {
-        None => None,
-        Some(noise) => {
-            let value = converted(noise, &to.difference()).map_err(|m| m.within("noise"))?;
-            if !(value.is_finite() && value > 0.0) {
-                return Err(StudyError::new("noise", format!("a standard deviation must be positive, not {value}"))
-                    .with_help("omit `noise` if it is unknown; `mops data` estimates it"));
-            }
-            Some(value)
-        }
-    };
+    let noise = draft.noise.as_ref().map(|noise| standard_deviation(noise, to)).transpose()?;
     let samples = draft.times.iter().zip(&draft.values).filter(|(_, value)| value.is_finite());
     let in_model = |value: f64| unit.convert(value, to).expect("the units are compatible");
     let (times, values): (Vec<f64>, Vec<f64>) = samples.map(|(&t, &value)| (t, in_model(value))).unzip();

@@ -16,7 +16,7 @@ use crate::model::{Interface, Model};
 use crate::study::draft::{CaseBuilder, StudyBuilder};
 use crate::study::{JobPlan, Study, Task, Tasks, diagnosis, tasks};
 use crate::study_error::StudyError;
-use cases::{assumed_units, build_case};
+use cases::{assumed_units, build_case, with_sensors};
 use criteria::add_rows;
 use jobs::{complete, job};
 use tuners::{build_tuner, check_use, free_start, tie_tuners};
@@ -52,6 +52,8 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
     } else {
         draft.cases
     };
+    distinct("sensors", draft.sensors.iter().map(|(signal, _)| signal))?;
+    let drafts = with_sensors(drafts, &draft.sensors, &models).map_err(|m| m.within("sensors"))?;
     let cases: Vec<Case> = drafts
         .iter()
         .map(|case| build_case(case, &models, &mut warnings).map_err(|m| m.within(&case.name).within(section(case))))
