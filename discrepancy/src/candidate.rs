@@ -239,6 +239,7 @@ impl Sizes {
         match parameter.kind {
             ParameterKind::LowerEdge => [f64::NEG_INFINITY, within(1.0 - settings().free_of_it)],
             ParameterKind::UpperEdge => [within(settings().free_of_it), f64::INFINITY],
+            ParameterKind::Damping => [f64::NEG_INFINITY, self.time],
             ParameterKind::WaveNumber => [periods(self.range[1] - self.range[0]), f64::INFINITY],
             ParameterKind::Frequency => [periods(self.record), f64::INFINITY],
             ParameterKind::Duration => [settings().samples_seen * self.sample, settings().event_share * self.record],
@@ -251,6 +252,13 @@ impl Sizes {
             }
             _ => [f64::NEG_INFINITY, f64::INFINITY],
         }
+    }
+
+    /// Returns true if the records show a value of a parameter: it is not at an end of what they cover, beyond which the effect would
+    /// be another one. A time too short for them is none.
+    pub fn shows(&self, parameter: &EffectParameter, value: f64) -> bool {
+        matches!(parameter.kind, ParameterKind::BuildUp | ParameterKind::Steepness)
+            || !self.covered(parameter).into_iter().any(|end| end == value)
     }
 
     /// The values of a strength that are tried.

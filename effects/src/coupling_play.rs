@@ -1,7 +1,8 @@
 //! Elastic coupling with backlash.
 
 use mops_core::{
-    BoundEffect, DeclaredTerm, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+    BoundEffect, DeclaredTerm, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind,
+    PortState, Scalar,
 };
 
 use super::Definition;
@@ -53,7 +54,8 @@ impl Definition for CouplingPlay {
             Dimension::TIME,
             NOT_NEGATIVE,
             InitialGrid::Plain(&[0.0]),
-        ),
+        )
+        .of_kind(ParameterKind::Damping),
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {

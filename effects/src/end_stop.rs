@@ -54,7 +54,8 @@ impl Definition for EndStop {
             Dimension::TIME,
             NOT_NEGATIVE,
             InitialGrid::Plain(&[0.0]),
-        ),
+        )
+        .of_kind(ParameterKind::Damping),
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {

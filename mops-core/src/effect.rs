@@ -217,6 +217,8 @@ pub enum ParameterKind {
     LowerEdge,
     /// Value above which a stop or an overflow acts: below it, part of the range visited is free of it.
     UpperEdge,
+    /// Damping of a contact divided by its stiffness: shorter than the time in which the place moves, else the contact is a damper.
+    Damping,
     /// Angle of a periodic function.
     Phase,
     /// Wave number along a position: 2 pi divided by the period.

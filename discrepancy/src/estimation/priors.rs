@@ -58,6 +58,7 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
                     about_null(added.sizes.of(dimension).abs() * scale, settings().strength_prior)
                 }
             },
+            ParameterKind::Damping => Prior { centre: Some(0.0), half: true, ..at_centre(added.sizes.time, 1.0) },
             ParameterKind::Phase => at_centre(TAU, UNIFORM),
             ParameterKind::Instant => at_centre(added.sizes.record, UNIFORM),
             ParameterKind::Frequency => at_centre(added.sizes.highest_frequency(), UNIFORM),

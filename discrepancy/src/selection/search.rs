@@ -129,9 +129,13 @@ impl<'r, 'a> Search<'r, 'a> {
         })
     }
 
-    /// Returns true if an effect of a set is as strong as is physically possible.
+    /// Returns true if an effect of a set is as strong as is physically possible, or at an end of what the records cover.
     pub fn is_at_limit(&self, set: &FittedSet<'a>) -> bool {
-        set.start_at(&set.least_squares.point).added.iter().any(Added::is_at_limit)
+        let is_shown = |added: &Added| {
+            let mut parameters = added.candidate.effect.parameters().iter().zip(&added.strengths);
+            parameters.all(|(parameter, value)| added.sizes.shows(parameter, *value))
+        };
+        set.start_at(&set.least_squares.point).added.iter().any(|added| added.is_at_limit() || !is_shown(added))
     }
 
     /// Returns the set in whose name a set counts: itself, or the one with a simpler effect in place of one of its effects that is at
