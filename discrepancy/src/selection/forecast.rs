@@ -3,11 +3,12 @@
 use std::collections::HashMap;
 
 use mops_core::Role;
+use rayon::prelude::*;
 
 use super::fitted_set::{FittedSet, Key, estimation};
 use super::search::{Search, without};
 use crate::base;
-use crate::estimation::ErrorModel;
+use crate::estimation::{ErrorModel, Errors, Estimate};
 use crate::fit::{Fit, Piece, Point};
 use crate::settings::settings;
 use crate::variant::problem;
@@ -49,12 +50,14 @@ impl Forecasts {
     /// parameters of each kind.
     pub fn passes(&mut self, search: &mut Search<'_, '_>, key: &Key) -> bool {
         let passes = Self::rivals(key).into_iter().all(|rival| {
-            search.ensure(&rival)
-                && self.kinds.clone().into_iter().all(|kind| {
+            search.ensure(&rival) && {
+                self.forecast(search, &[key, &rival]);
+                self.kinds.clone().into_iter().all(|kind| {
                     let own = self.error(search, key, kind);
                     let theirs = self.error(search, &rival, kind);
                     own.is_some_and(|own| theirs.is_none_or(|theirs| own < theirs))
                 })
+            }
         });
         self.passed.insert(key.clone(), passes);
         passes
@@ -102,17 +105,28 @@ impl Forecasts {
         rivals
     }
 
+    /// Forecasts by sets, at once.
+    fn forecast(&mut self, search: &Search<'_, '_>, keys: &[&Key]) {
+        let all = keys.iter().flat_map(|key| self.kinds.iter().map(|kind| ((*key).clone(), *kind)));
+        let new: Vec<(Key, Forecast)> = all.filter(|forecast| !self.known.contains_key(forecast)).collect();
+        let errors: Vec<Option<f64>> = new.par_iter().map(|(key, kind)| error(search, key, *kind)).collect();
+        self.known.extend(new.into_iter().zip(errors));
+    }
+
     /// Returns the mean square error of a forecast in noises; `None` if it fails.
     fn error(&mut self, search: &Search<'_, '_>, key: &Key, kind: Forecast) -> Option<f64> {
-        *self.known.entry((key.clone(), kind)).or_insert_with(|| {
-            let set = search.get(key)?;
-            let others = || base::pieces(set.fit.subject, |role| role == Role::Selection);
-            match kind {
-                Forecast::LeastSquares => free_run(set, &set.least_squares.point, others()),
-                Forecast::SmoothOutput => free_run(set, &set.estimate(ErrorModel::SmoothOutput)?.point, others()),
-                Forecast::RunOn => run_on(set),
-            }
-        })
+        *self.known.entry((key.clone(), kind)).or_insert_with(|| error(search, key, kind))
+    }
+}
+
+/// Returns the mean square error of a forecast by a set, in noises; `None` if it fails.
+fn error(search: &Search<'_, '_>, key: &Key, kind: Forecast) -> Option<f64> {
+    let set = search.get(key)?;
+    let others = || base::pieces(set.fit.subject, |role| role == Role::Selection);
+    match kind {
+        Forecast::LeastSquares => free_run(set, &set.least_squares.point, others()),
+        Forecast::SmoothOutput => free_run(set, &set.estimate(ErrorModel::SmoothOutput)?.point, others()),
+        Forecast::RunOn => run_on(set),
     }
 }
 
@@ -175,8 +189,11 @@ fn run_on(set: &FittedSet<'_>) -> Option<f64> {
     let estimation = estimation(set.fit.subject, &beginning, &set.variant, &set.added, &[], &set.least_squares.point);
     // From the optimum of every error model: at a kink, one start may end early.
     let starts = [&set.least_squares].into_iter().chain(set.under.iter().map(|(_, estimate)| estimate));
-    let fits = starts.filter_map(|start| estimation.least_squares(start.point.clone()));
-    let fitted = fits.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
+    let starts: Vec<&Point> = starts.map(|start| &start.point).collect();
+    let look = |start: &&Point| estimation.with(&Errors::White, (*start).clone(), settings().look);
+    let looks: Vec<Estimate> = starts.par_iter().filter_map(look).collect();
+    let best = looks.into_iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
+    let fitted = if best.converged { best } else { estimation.least_squares(best.point)? };
     let mut errors = Vec::new();
     for ((index, piece), end) in set.fit.pieces.iter().enumerate().zip(&ends) {
         let residuals = set.fit.residuals(index, &fitted.point)?;

@@ -12,6 +12,9 @@ use crate::fit::{Point, Sets};
 use crate::settings::settings;
 use crate::variant::Added;
 
+/// Sets that are fitted under the error models at once. Those before them decide for which of them this is hopeless.
+const TOGETHER: usize = 2;
+
 /// Sets that a search has fitted under all error models, the most probable first.
 pub struct Search<'r, 'a> {
     /// Fits sets.
@@ -387,7 +390,7 @@ impl<'r, 'a> Search<'r, 'a> {
                 }
             }
         }
-        best.map(|set| self.add_under(set, f64::NEG_INFINITY)).is_some()
+        best.map(|set| self.add_under(vec![set], f64::NEG_INFINITY)).is_some()
     }
 
     /// Makes sure that a set is fitted under all error models. Returns false if it cannot be.
@@ -405,7 +408,7 @@ impl<'r, 'a> Search<'r, 'a> {
         };
         let starts: Vec<_> = self.sets.iter().filter(contains).filter_map(reduced).collect();
         let Some(set) = self.refit.least_squares(key, &starts) else { return false };
-        self.add(set, settings().hopeless);
+        self.add(vec![set], settings().hopeless);
         self.sort();
         true
     }
@@ -413,11 +416,15 @@ impl<'r, 'a> Search<'r, 'a> {
     /// Adds sets, the simplest first; what is a simpler one in all but name is only noted.
     fn add_all(&mut self, mut sets: Vec<FittedSet<'a>>, margin: f64) {
         sets.sort_by_key(|set| set.parameters());
-        for set in sets {
-            match self.simpler(&set) {
-                Some(simpler) => self.aliases.push((set.key, simpler)),
-                None => self.add(set, margin),
-            }
+        let mut sets = sets.into_iter().peekable();
+        while sets.peek().is_some() {
+            let (simpler, new): (Vec<_>, Vec<_>) = sets
+                .by_ref()
+                .take(TOGETHER)
+                .map(|set| (self.simpler(&set), set))
+                .partition(|(alias, _)| alias.is_some());
+            self.aliases.extend(simpler.into_iter().filter_map(|(alias, set)| Some((set.key, alias?))));
+            self.add(new.into_iter().map(|(_, set)| set).collect(), margin);
         }
     }
 
@@ -426,27 +433,29 @@ impl<'r, 'a> Search<'r, 'a> {
         self.get(key).is_some() || self.aliases.iter().any(|(alias, _)| alias == key)
     }
 
-    /// Fits a set under the error models that can bring it within a margin of the highest evidence, nats, and adds it.
-    fn add(&mut self, set: FittedSet<'a>, margin: f64) {
+    /// Fits sets under the error models that can bring them within a margin of the highest evidence, nats, and adds them.
+    fn add(&mut self, sets: Vec<FittedSet<'a>>, margin: f64) {
         let best = self.sets.iter().map(FittedSet::log_evidence).fold(f64::NEG_INFINITY, f64::max);
-        self.add_under(set, best - margin);
+        self.add_under(sets, best - margin);
     }
 
-    fn add_under(&mut self, mut set: FittedSet<'a>, least: f64) {
-        if self.get(&set.key).is_some() {
-            return;
-        }
-        let contained = |smaller: &&FittedSet<'a>| {
-            smaller.key.len() + 1 == set.key.len() && smaller.key.iter().all(|k| set.key.contains(k))
+    fn add_under(&mut self, sets: Vec<FittedSet<'a>>, least: f64) {
+        let fitted = |mut set: FittedSet<'a>| {
+            if self.get(&set.key).is_some() {
+                return None;
+            }
+            let contained = |smaller: &&FittedSet<'a>| {
+                smaller.key.len() + 1 == set.key.len() && smaller.key.iter().all(|k| set.key.contains(k))
+            };
+            let mut nested: Vec<&FittedSet<'a>> = self.sets.iter().filter(contained).collect();
+            if nested.is_empty() {
+                nested.extend(self.sets.iter().filter(|smaller| smaller.key.is_empty()));
+            }
+            self.refit.under_error_models(&mut set, &nested, least);
+            (!set.under.is_empty()).then_some(set)
         };
-        let mut nested: Vec<&FittedSet<'a>> = self.sets.iter().filter(contained).collect();
-        if nested.is_empty() {
-            nested.extend(self.sets.iter().filter(|smaller| smaller.key.is_empty()));
-        }
-        self.refit.under_error_models(&mut set, &nested, least);
-        if !set.under.is_empty() {
-            self.sets.push(set);
-        }
+        let fitted: Vec<FittedSet<'a>> = sets.into_par_iter().filter_map(fitted).collect();
+        self.sets.extend(fitted);
     }
 
     fn sort(&mut self) {
