@@ -49,18 +49,23 @@ impl Forecasts {
     /// Returns true if a set forecasts better than the declared model and than every set with one effect less, with the
     /// parameters of each kind.
     pub fn passes(&mut self, search: &mut Search<'_, '_>, key: &Key) -> bool {
-        let passes = Self::rivals(key).into_iter().all(|rival| {
-            search.ensure(&rival) && {
-                self.forecast(search, &[key, &rival]);
-                self.kinds.clone().into_iter().all(|kind| {
-                    let own = self.error(search, key, kind);
-                    let theirs = self.error(search, &rival, kind);
-                    own.is_some_and(|own| theirs.is_none_or(|theirs| own < theirs))
-                })
-            }
-        });
+        let (known, new): (Vec<Key>, Vec<Key>) =
+            Self::rivals(key).into_iter().partition(|key| search.get(key).is_some());
+        let passes = self.beats(search, key, &known) && search.ensure(&new) && self.beats(search, key, &new);
         self.passed.insert(key.clone(), passes);
         passes
+    }
+
+    /// Returns true if a set forecasts better than all rivals.
+    fn beats(&mut self, search: &Search<'_, '_>, key: &Key, rivals: &[Key]) -> bool {
+        rivals.iter().all(|rival| {
+            self.forecast(search, &[key, rival]);
+            self.kinds.clone().into_iter().all(|kind| {
+                let own = self.error(search, key, kind);
+                let theirs = self.error(search, rival, kind);
+                own.is_some_and(|own| theirs.is_none_or(|theirs| own < theirs))
+            })
+        })
     }
 
     /// Returns whether a set passes, if it was tested.

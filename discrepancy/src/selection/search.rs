@@ -253,16 +253,15 @@ impl<'r, 'a> Search<'r, 'a> {
         }
         // What no longer pays goes.
         let Some(first) = self.sets.first().map(|set| set.key.clone()) else { return };
-        for k in 0..first.len() {
-            self.ensure(&without(&first, k));
-        }
+        let smaller: Vec<Key> = (0..first.len()).map(|k| without(&first, k)).collect();
+        self.ensure(&smaller);
     }
 
     /// Fits the sets in which an effect is exchanged for another of its class at its place.
     fn swap(&mut self, key: &Key) {
         for k in 0..key.len() {
             let smaller = without(key, k);
-            if !self.ensure(&smaller) {
+            if !self.ensure(std::slice::from_ref(&smaller)) {
                 continue;
             }
             let parent = self.get(&smaller).expect("it was fitted").clone();
@@ -393,24 +392,26 @@ impl<'r, 'a> Search<'r, 'a> {
         best.map(|set| self.add_under(vec![set], f64::NEG_INFINITY)).is_some()
     }
 
-    /// Makes sure that a set is fitted under all error models. Returns false if it cannot be.
-    pub fn ensure(&mut self, key: &Key) -> bool {
-        if self.get(key).is_some() {
-            return true;
-        }
-        let contains = |set: &&FittedSet<'a>| key.iter().all(|k| set.key.contains(k)) && set.key.len() == key.len() + 1;
-        let reduced = |larger: &FittedSet<'a>| {
-            let extra = larger
-                .added
-                .iter()
-                .position(|added| !key.iter().any(|&k| self.refit.candidates[k].is(&added.candidate)))?;
+    /// Makes sure that sets are fitted under all error models, from sets with one effect more. Returns false if one cannot be.
+    pub fn ensure(&mut self, keys: &[Key]) -> bool {
+        let unknown: Vec<&Key> = keys.iter().filter(|key| self.get(key).is_none()).collect();
+        let reduced = |larger: &FittedSet<'a>, key: &Key| {
+            let is_extra = |added: &Added| !key.iter().any(|&k| self.refit.candidates[k].is(&added.candidate));
+            let contains = key.iter().all(|k| larger.key.contains(k)) && larger.key.len() == key.len() + 1;
+            let extra = larger.added.iter().position(is_extra).filter(|_| contains)?;
             Some(larger.start_at(&larger.least_squares.point).without(extra))
         };
-        let starts: Vec<_> = self.sets.iter().filter(contains).filter_map(reduced).collect();
-        let Some(set) = self.refit.least_squares(key, &starts) else { return false };
-        self.add(vec![set], settings().hopeless);
-        self.sort();
-        true
+        let fitted = |key: &&Key| {
+            let starts: Vec<Start> = self.sets.iter().filter_map(|larger| reduced(larger, key)).collect();
+            self.refit.least_squares(key, &starts)
+        };
+        let sets: Vec<FittedSet<'a>> = unknown.par_iter().filter_map(fitted).collect();
+        let is_complete = sets.len() == unknown.len();
+        if !sets.is_empty() {
+            self.add(sets, settings().hopeless);
+            self.sort();
+        }
+        is_complete
     }
 
     /// Adds sets, the simplest first; what is a simpler one in all but name is only noted.
