@@ -255,10 +255,12 @@ impl Sizes {
     }
 
     /// Returns true if the records show a value of a parameter: it is not at an end of what they cover, beyond which the effect would
-    /// be another one. A time too short for them is none.
+    /// be another one. A time that is shorter or longer than they show is still a time.
     pub fn shows(&self, parameter: &EffectParameter, value: f64) -> bool {
-        matches!(parameter.kind, ParameterKind::BuildUp | ParameterKind::Steepness)
-            || !self.covered(parameter).into_iter().any(|end| end == value)
+        let [low, high] = self.covered(parameter);
+        let is_time =
+            matches!(parameter.kind, ParameterKind::BuildUp | ParameterKind::Steepness | ParameterKind::Duration);
+        is_time || value > low && value < high
     }
 
     /// The values of a strength that are tried.

@@ -195,7 +195,7 @@ settings! {
     stalled: usize = 5;
     /// Share of the sum of squares. Basis: an assumption.
     stalls: f64 = 0.01;
-    /// Gain in log-likelihood, or decrease of a penalty, below which rounds end, nats. Basis: an assumption.
+    /// Gain in log-likelihood, or decrease of a penalty, below which rounds end, nats. Basis: the studies.
     settled: f64 = 0.05;
     /// Predicted gain below which the search of hyperparameters ends, nats. Basis: an assumption.
     fine: f64 = 1e-3;

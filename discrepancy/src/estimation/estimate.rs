@@ -3,6 +3,7 @@
 use mops_core::{Hold, Input, LeastSquares, Port, math};
 use mops_models::WithEffects;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::errors::{Channels, ErrorModel, Errors, Fitted, Motion};
 use crate::error_models::ForceError;
@@ -163,22 +164,20 @@ impl Estimation<'_> {
             Some(Errors::Force(error, motions)) => (Some(error), Some(motions)),
             _ => (None, None),
         };
-        let mut motions = Vec::with_capacity(fit.pieces.len());
-        for piece in 0..fit.pieces.len() {
-            let mut motion = self.linearised(fit, piece, point, before.map(|motions| &motions[piece]))?;
-            if let Some(error) = error {
-                for _ in 0..settings().smoothings {
-                    let Some(next) = self.smoothed(fit, piece, point, error, &motion) else { break };
-                    let gain = next.1;
-                    motion = next.0;
-                    if gain < settings().settled {
-                        break;
-                    }
+        let of = |piece: usize| {
+            let mut fit = fit.clone();
+            let mut motion = self.linearised(&mut fit, piece, point, before.map(|motions| &motions[piece]))?;
+            for _ in 0..error.map_or(0, |_| settings().smoothings) {
+                let Some(next) = self.smoothed(&mut fit, piece, point, error?, &motion) else { break };
+                motion = next.0;
+                if next.1 < settings().settled {
+                    break;
                 }
             }
-            self.push(fit, piece, &motion);
-            motions.push(motion);
-        }
+            Some(motion)
+        };
+        let motions: Vec<Motion> = (0..fit.pieces.len()).into_par_iter().map(of).collect::<Option<_>>()?;
+        motions.iter().enumerate().for_each(|(piece, motion)| self.push(fit, piece, motion));
         Some(motions)
     }
 

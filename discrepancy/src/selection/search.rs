@@ -252,8 +252,12 @@ impl<'r, 'a> Search<'r, 'a> {
             self.sort();
         }
         // What no longer pays goes.
-        let Some(first) = self.sets.first().map(|set| set.key.clone()) else { return };
-        let smaller: Vec<Key> = (0..first.len()).map(|k| without(&first, k)).collect();
+        let best = self.sets.first().map_or(f64::NEG_INFINITY, |first| self.log_posterior(first));
+        let near = self.sets.iter().take_while(|set| self.log_posterior(set) > best - settings().negligible);
+        let smaller = near.take(settings().beam).flat_map(|set| (0..set.key.len()).map(|k| without(&set.key, k)));
+        let mut smaller: Vec<Key> = smaller.collect();
+        smaller.sort();
+        smaller.dedup();
         self.ensure(&smaller);
     }
 
