@@ -52,6 +52,16 @@ fn a_noise_without_a_unit_is_in_the_unit_of_its_column() {
 }
 
 #[test]
+fn a_channel_without_noise_has_that_of_its_sensor() {
+    let error = |noise: &str, settings: &[&str]| run(noise, settings)["criteria"][0]["value"].as_f64();
+    let own = error("noise = 0.2", &[]);
+    assert_eq!(own, error("", &["sensors.th.noise=\"0.2 deg\""]));
+    assert_eq!(own, error("noise = 0.2", &["sensors.th.noise=7"]));
+    let in_radians = format!("sensors.th.noise={}", 0.2_f64.to_radians());
+    assert!((error("", &[&in_radians]).unwrap() / own.unwrap() - 1.0).abs() < 1e-12);
+}
+
+#[test]
 fn a_setting_that_is_not_toml_is_a_string() {
     let sensitivity = run("noise = 0.2", &["study.task=sensitivity"]);
     assert_eq!(sensitivity["task"], "sensitivity");

@@ -556,6 +556,12 @@ fn experiments_that_contradict_their_data() {
                 "normalised-error = { signal = \"phi\" }",
             ),
             calibration("a noise in a unit that does not fit", "noise = 0.003", "noise = \"3 mm\""),
+            calibration(
+                "a sensor that no experiment has",
+                "[criteria]",
+                "[sensors]\nthetta = { noise = 0.003 }\n\n[criteria]",
+            ),
+            calibration("a sensor without noise", "[criteria]", "[sensors]\nphi = { noise = \"0 rad\" }\n\n[criteria]"),
             calibration("a unit that does not fit the signal", "noise = 0.003", "unit = \"N m\""),
             calibration("a column of another kind than its signal", "phi = \"arm\"", "phi = \"torque\""),
             calibration("a column of another kind than its input", "u = \"torque\"", "u = \"arm\""),

@@ -57,10 +57,15 @@ fn claims(diagnosis: &Diagnosis) -> Option<String> {
         let alike = own.iter().flat_map(|found| &found.alike).filter_map(|other| other.split_once(" at "));
         let alike: Vec<String> = alike.map(|(class, place)| format!("{class} {}", at(place))).collect();
         let alike = if alike.is_empty() { String::new() } else { format!(", or {}", alike.join(", or ")) };
-        let article = if class.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
-        format!("{article} {class} effect {}{alike}{certainty}, best described by {}", at(place), list(&names))
+        format!("{} {}{alike}{certainty}, best described by {}", self::class(class), at(place), list(&names))
     };
     (!entries.is_empty()).then(|| list(&entries.iter().map(claim).collect::<Vec<String>>()))
+}
+
+/// Returns an effect of a class with its article: `an elastic effect`.
+pub(crate) fn class(class: &str) -> String {
+    let article = if class.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+    format!("{article} {class} effect")
 }
 
 /// Returns a sentence on the share of the held-out error that the effects explain.
@@ -71,7 +76,7 @@ fn explained(diagnosis: &Diagnosis) -> Option<String> {
         errors.into_iter().all(|error| error.is_some_and(f64::is_finite))
     };
     let role = [Role::Validation, Role::Selection].into_iter().find(is_known)?;
-    let most = if explained < 0.5 { "; most remains unexplained" } else { "" };
+    let most = if diagnosis.explains_most() { "" } else { "; most remains unexplained" };
     Some(format!("The effects found explain {} of the squared error on {} data{most}.", share(explained), role.name()))
 }
 

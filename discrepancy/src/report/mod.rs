@@ -99,7 +99,7 @@ impl<'a> Findings<'_, '_, 'a> {
                 made.is_first
                     && !self.verdict.is_contradicted
                     && made.found.iter().all(|found| found.claimed || found.given)
-                    && made.explained_share.is_none_or(|share| share > 0.0)
+                    && made.explains_most()
             }
             Verdict::None => true,
             Verdict::Unexplained => false,

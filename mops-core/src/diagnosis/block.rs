@@ -97,7 +97,7 @@ struct FoundEffect {
     /// Probability that this effect, rather than another, is missing; null if none can be stated.
     #[schemars(with = "Option<f64>")]
     probability: f64,
-    /// Probability that an effect of this class is missing at this place; null for a given effect.
+    /// Probability that an effect of this class is missing at this place; null for a given effect, or if most remains to be explained.
     #[schemars(with = "Option<f64>")]
     class_probability: f64,
     /// Other classes and places that the data cannot distinguish from these, as `class at kind:name`: `class_probability` is that of one of

@@ -76,9 +76,9 @@ pub struct Found {
     pub formula: String,
     /// Estimates of its parameters.
     pub strengths: Vec<StrengthValue>,
-    /// Probability that this effect, rather than another, is missing.
+    /// Probability that this effect, rather than another, is missing; NaN if more is missing than it describes.
     pub probability: f64,
-    /// Probability that an effect of this class is missing at this place.
+    /// Probability that an effect of this class is missing at this place; NaN for a given effect, or if most remains to be explained.
     pub class_probability: f64,
     /// Other classes and places that the data cannot distinguish from these, as `class at kind:name`: `class_probability` is that of one of
     /// them.
@@ -102,6 +102,13 @@ impl Found {
     /// Returns the place; for an effect between two places of a kind both, as `joint:a with joint:b`.
     pub fn places(&self) -> String {
         both_places(&self.place, self.companion.as_deref())
+    }
+}
+
+impl Diagnosis {
+    /// Returns true if the effects found explain at least half of the squared error on held-out data, or there are none of these.
+    pub fn explains_most(&self) -> bool {
+        self.explained_share.is_none_or(|share| share >= 0.5)
     }
 }
 

@@ -119,16 +119,22 @@ fn effect(found: &Found) -> Markup {
     html! {
         div class="effect" {
             h3 { (found.effect) " " (rich(&words::at(&found.places()))) }
-            @if let Some(companion) = &found.companion { p class="quiet" { "second place: " (rich(&words::at(companion))) } }
+            @if let Some(companion) = found.companion.as_ref().filter(|_| found.places() == found.place) {
+                p class="quiet" { "second place: " (rich(&words::at(companion))) }
+            }
             p class="formula" { code { (found.formula) } }
             ul class="findings" {
                 @for strength in &found.strengths {
                     li { (words::strength(strength)) @if strength.interval95.is_some() { span class="quiet" { ", 95 % interval" } } }
                 }
                 li {
-                    (match words::status(found) { "claimed" => "Claimed", "given" => "Given by the study", _ => "Proposed, not claimed" }) ": probability of a " (found.class)
-                    " effect here " strong { (words::probability(found.class_probability)) } ", of this one "
-                    (words::probability(found.probability)) ". BIC lower by " (significant(found.bic_gain, 3)) "."
+                    (match words::status(found) { "claimed" => "Claimed", "given" => "Given by the study", _ => "Proposed, not claimed" })
+                    @if found.class_probability.is_finite() {
+                        ": probability of " (words::class(&found.class)) " here "
+                        strong { (words::probability(found.class_probability)) }
+                        @if found.probability.is_finite() { ", of this one " (words::probability(found.probability)) }
+                    }
+                    ". BIC lower by " (significant(found.bic_gain, 3)) "."
                 }
                 @for text in words::remarks(found) { li { (rich(&text)) } }
             }
