@@ -347,8 +347,8 @@ pub fn settings() -> &'static Settings {
 
 /// Sets the settings of this process, for an ablation.
 ///
-/// # Errors
-/// Returns the settings if they are in use already.
-pub fn use_settings(settings: Settings) -> Result<(), Settings> {
-    SETTINGS.set(settings)
+/// # Panics
+/// If settings are in use already.
+pub fn use_settings(settings: Settings) {
+    assert!(SETTINGS.set(settings).is_ok(), "settings are in use already");
 }

@@ -123,11 +123,17 @@ impl Subject {
             let cases = jobs.iter().map(|&job| &study.cases()[study.jobs()[job].case]);
             cases.flat_map(|case| case.experiment.iter().flat_map(|e| &e.channels).map(move |channel| (case, channel)))
         };
-        // One noise for each sensor, of all experiments that give none.
+        // One noise for each sensor, for all experiments that give none. Validation decides nothing, unless there is nothing else.
         let estimated = |signal: &str| {
-            let of = channels().filter(|(_, channel)| channel.signal == signal);
-            let records: Vec<(&[f64], &[f64])> = of.map(|(_, c)| (&c.times[..], &c.values[..])).collect();
-            noise_of(&records)
+            let of_roles = |only_validation: bool| {
+                let is_of = |case: &Case| {
+                    case.experiment.as_ref().is_some_and(|e| (e.role == Role::Validation) == only_validation)
+                };
+                let of = channels().filter(|(case, channel)| channel.signal == signal && is_of(case));
+                let records: Vec<(&[f64], &[f64])> = of.map(|(_, c)| (&c.times[..], &c.values[..])).collect();
+                noise_of(&records)
+            };
+            of_roles(false).or_else(|| of_roles(true))
         };
         let mut estimates: BTreeMap<&str, Option<f64>> = BTreeMap::new();
         for (_, channel) in channels() {

@@ -20,8 +20,11 @@ pub trait Process<S: Scalar, const D: usize> {
 /// Steps of a process: transition and noise over a step, kept for the next one if that is as long.
 pub struct Steps<'p, S, P, const D: usize> {
     process: &'p P,
-    last: Option<(f64, [[S; D]; D], [[S; D]; D])>,
+    last: Option<Step<S, D>>,
 }
+
+/// Length of a step, s, with the transition and the noise over it.
+type Step<S, const D: usize> = (f64, [[S; D]; D], [[S; D]; D]);
 
 /// Relative difference of two steps up to which they are as long: the rounding of time stamps.
 const AS_LONG: f64 = 1e-9;

@@ -32,7 +32,7 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
         let stretch = if global.log { subject.start()[k].abs() } else { global.scale };
         at_centre(stretch, settings().declared_prior)
     };
-    let of_effect = |parameter: usize| {
+    let of_effect = |parameter: usize, value: f64| {
         let index =
             variant.first.iter().rposition(|&first| first <= parameter).expect("parameters of effects come last");
         let (added, position) = (&added[index], parameter - variant.first[index]);
@@ -44,7 +44,12 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
             centre: of.null_value,
             half: of.null_value.is_some_and(|null| of.bounds.contains(&null)),
         };
-        let typical = || added.strengths[position].abs().max(f64::MIN_POSITIVE);
+        // Not narrower than the smallest size that is tried: a shape of next to nothing has a price, too.
+        let typical = || {
+            let tried = added.sizes.values(of.dimension, of.grid, added.sizes.bounds(of));
+            let least = tried.into_iter().map(f64::abs).filter(|size| *size > 0.0).fold(f64::INFINITY, f64::min);
+            value.abs().max(if least.is_finite() { least } else { f64::MIN_POSITIVE })
+        };
         match of.kind {
             ParameterKind::Steepness => at_centre(typical(), settings().steepness_prior),
             ParameterKind::Strength if of.null_value == Some(0.0) => match of.dimension {
@@ -71,9 +76,9 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
             }
         }
     };
-    let shared = fit.globals.iter().map(|global| match global.sets {
+    let shared = fit.globals.iter().zip(&point.globals).map(|(global, &value)| match global.sets {
         Sets::Tuner(k) => declared(k, global),
-        Sets::Parameter(parameter) => of_effect(parameter),
+        Sets::Parameter(parameter) => of_effect(parameter, value),
     });
     let start = |local: &Local| at_centre(local.scale, settings().start_prior);
     shared.chain(fit.pieces.iter().flat_map(|piece| &piece.locals).map(start)).collect()

@@ -15,11 +15,11 @@ der        = { th = "w", w = "w' = -g*sin(th) - b*w" }
 const NOISE: f64 = 0.002;
 const FRICTION: f64 = 0.8;
 
-/// The pendulum let go at an angle, with dry friction of the same size at rest as in motion, for so many samples.
-fn let_go(samples: usize) -> Diagnosis {
+/// The pendulum let go at an angle, with dry friction of the same size at rest as in motion, for so many samples with this noise.
+fn let_go(samples: usize, noise: &str) -> Diagnosis {
     let rates =
         |_: f64, x: &[f64; 2]| [x[1], -17.7 * math::sin(x[0]) - 0.15 * x[1] - FRICTION * math::tanh(x[1] / 1e-3)];
-    let record = Record::of_first("th", &integrated(rates, [0.8, 0.0], 0.01, samples), 0.01, NOISE, "let go");
+    let record = Record::of_first("th", &integrated(rates, [0.8, 0.0], 0.01, samples), 0.01, NOISE, noise);
     let subject = subject(PENDULUM, &[23.3, 0.24, -1.0, 0.0], 2, vec![record]);
     let some = catalogue(&["coulomb-friction", "stiction", "stribeck-friction"]);
     let options = Options { max_effects: 2, level: 0.01 };
@@ -57,16 +57,20 @@ fn first_of(told: &Diagnosis) -> (&Found, Vec<&str>) {
 #[test]
 fn a_break_away_that_the_data_tell_nothing_of_is_as_likely_as_before_and_a_fall_that_they_rule_out_is_not() {
     // Until it rests, and a while longer.
-    let told = let_go(742);
-    let (found, rivals) = first_of(&told);
-    assert_eq!(found.effect, "coulomb-friction");
-    assert_eq!(rivals, ["stiction"], "{:?}", told.ranked);
-    assert!(found.probability < 0.9 && found.indistinguishable[0].bic_behind < 3.0, "{found:?}");
+    let all: Vec<Diagnosis> = (0..5).map(|k| let_go(742, &format!("let go {k}"))).collect();
+    for told in &all {
+        let (found, rivals) = first_of(told);
+        assert_eq!((found.effect.as_str(), rivals[0]), ("coulomb-friction", "stiction"), "{:?}", told.ranked);
+        assert!(found.probability < 0.9 && found.indistinguishable[0].bic_behind < 3.0, "{found:?}");
+    }
+    // In some, noise looks like a small fall.
+    let ruled_out = all.iter().filter(|told| first_of(told).1.len() == 1).count();
+    assert!(ruled_out >= 3, "{ruled_out} of 5");
 }
 
 #[test]
 fn where_the_motion_never_ends_a_break_away_is_as_likely_as_before() {
-    let told = let_go(250);
+    let told = let_go(250, "let go");
     let (found, rivals) = first_of(&told);
     assert_eq!(found.effect, "coulomb-friction");
     assert!(rivals.contains(&"stiction") && found.probability < 0.9, "{:?}", told.ranked);

@@ -130,7 +130,7 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     let jobs = arguments.jobs.map_or(cores, usize::from);
     let against = arguments.against.is_some();
     let scaled = arguments.scale.iter().try_fold(Settings::default(), scaled)?;
-    use_settings(scaled).expect("no diagnosis has started");
+    use_settings(scaled);
     if let Some(cases) = &arguments.folder {
         let progress = Progress::of_cases(!arguments.quiet);
         let tools = Tools { catalogue, watch: &progress, seed: arguments.seed };
