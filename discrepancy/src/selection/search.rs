@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::fitted_set::{FittedSet, Key, Start, evidence};
 use super::refit::{Refit, Rough, price};
 use super::screening::{Scene, Screened, pair_gain};
+use super::verdict::is_contradicted;
 use crate::candidate::Candidate;
 use crate::estimation::{ErrorModel, Errors, Estimate};
 use crate::fit::{Point, Sets};
@@ -51,9 +52,10 @@ impl<'r, 'a> Search<'r, 'a> {
         }
     }
 
-    /// Returns true if correlated errors are significantly likelier than white noise at the optimum of a set.
+    /// Returns true if correlated errors are significantly likelier than white noise at the optimum of a set, or selection records
+    /// contradict it.
     fn lacks_something(&self, set: &FittedSet<'_>) -> bool {
-        set.lack_of_fit().is_none_or(|nats| nats > self.significant)
+        set.lack_of_fit().is_none_or(|nats| nats > self.significant) || is_contradicted(set)
     }
 
     /// Notes the most probable set if it has changed.

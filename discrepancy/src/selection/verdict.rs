@@ -214,7 +214,7 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
 
 /// Returns true if the errors of calibration and selection records, fitted together, are larger than those of the calibration records
 /// alone, and other than the set and its error model expect.
-fn is_contradicted(set: &FittedSet<'_>) -> bool {
+pub(super) fn is_contradicted(set: &FittedSet<'_>) -> bool {
     let together = || {
         let (fit, point) = fitted_together(set)?;
         let residuals = fit.all(&point)?;
