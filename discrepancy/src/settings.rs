@@ -1,7 +1,7 @@
-//! Settings of the diagnosis: every threshold, size of a search and prior, with its unit and what it rests on.
+//! Settings of the diagnosis: thresholds, sizes of searches and priors, each with its unit and its basis.
 //!
-//! "Studies" are the simulated data sets and recordings of the page on the method; an "assumption" has not been varied. What of
-//! them decides is in the page on the ablation.
+//! "The studies" are the simulated data sets and recordings on which the method was tried first; an "assumption" has not been varied.
+//! `mops-bench ablation` shows what an answer depends on.
 
 use std::sync::OnceLock;
 
@@ -215,11 +215,11 @@ settings! {
     turns: usize = 3;
     /// Doublings of the stride in the search for the end of an interval. Basis: an assumption.
     doublings: i32 = 16;
-    /// Bisections in the same. Basis: an assumption.
+    /// Bisections in the search for the end of an interval. Basis: an assumption.
     bisections: usize = 6;
     /// Steps of a simulation of a candidate for each sample, beyond which it is too stiff. Basis: an assumption.
     steps_per_sample: f64 = 6.0;
-    /// The same, as a multiple of those of the declared model. Basis: an assumption.
+    /// Steps of a simulation of a candidate beyond which it is too stiff, relative to those of the declared model. Basis: an assumption.
     times_declared: f64 = 3.0;
     /// Steps of a simulation of a candidate beside these. Basis: an assumption.
     few_steps: f64 = 1000.0;

@@ -49,8 +49,8 @@ fn pushed() -> Diagnosis {
 }
 
 /// What is found, and what the data are said not to tell from it.
-fn first_of(told: &Diagnosis) -> (&Found, Vec<&str>) {
-    let found = &told.found[0];
+fn first_of(diagnosis: &Diagnosis) -> (&Found, Vec<&str>) {
+    let found = &diagnosis.found[0];
     (found, found.indistinguishable.iter().map(|r| r.effect.as_str()).collect())
 }
 
@@ -58,30 +58,30 @@ fn first_of(told: &Diagnosis) -> (&Found, Vec<&str>) {
 fn a_break_away_that_the_data_tell_nothing_of_is_as_likely_as_before_and_a_fall_that_they_rule_out_is_not() {
     // Until it rests, and a while longer.
     let all: Vec<Diagnosis> = (0..5).map(|k| let_go(742, &format!("let go {k}"))).collect();
-    for told in &all {
-        let (found, rivals) = first_of(told);
-        assert_eq!((found.effect.as_str(), rivals[0]), ("coulomb-friction", "stiction"), "{:?}", told.ranked);
+    for diagnosis in &all {
+        let (found, rivals) = first_of(diagnosis);
+        assert_eq!((found.effect.as_str(), rivals[0]), ("coulomb-friction", "stiction"), "{:?}", diagnosis.ranked);
         assert!(found.probability < 0.9 && found.indistinguishable[0].bic_behind < 3.0, "{found:?}");
     }
     // In some, noise looks like a small fall.
-    let ruled_out = all.iter().filter(|told| first_of(told).1.len() == 1).count();
+    let ruled_out = all.iter().filter(|diagnosis| first_of(diagnosis).1.len() == 1).count();
     assert!(ruled_out >= 3, "{ruled_out} of 5");
 }
 
 #[test]
 fn where_the_motion_never_ends_a_break_away_is_as_likely_as_before() {
-    let told = let_go(250, "let go");
-    let (found, rivals) = first_of(&told);
+    let diagnosis = let_go(250, "let go");
+    let (found, rivals) = first_of(&diagnosis);
     assert_eq!(found.effect, "coulomb-friction");
-    assert!(rivals.contains(&"stiction") && found.probability < 0.9, "{:?}", told.ranked);
+    assert!(rivals.contains(&"stiction") && found.probability < 0.9, "{:?}", diagnosis.ranked);
 }
 
 #[test]
 #[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
 fn a_break_away_that_the_data_tell_costs_the_whole() {
     // It breaks away at every reversal of the push.
-    let told = pushed();
-    let (found, rivals) = first_of(&told);
+    let diagnosis = pushed();
+    let (found, rivals) = first_of(&diagnosis);
     assert_eq!(found.effect, "coulomb-friction");
-    assert!(rivals.is_empty() && found.probability > 0.9, "{:?}", told.ranked);
+    assert!(rivals.is_empty() && found.probability > 0.9, "{:?}", diagnosis.ranked);
 }
