@@ -82,7 +82,7 @@ impl Estimation<'_> {
     /// Fits parameters and initial states under an error model at the outputs whose hyperparameters are given, in at most so many
     /// iterations. The evidence is that for these hyperparameters.
     pub fn with(&self, errors: &Errors, start: Point, iterations: usize) -> Option<Estimate> {
-        self.given(errors, self.descend(self.fit, errors, start, Effort::of(iterations))?)
+        self.given(errors, self.descend(self.fit, errors, start, None, Effort::of(iterations))?)
     }
 
     /// Returns the log-likelihood at a point under an error model at the outputs whose hyperparameters are given; `None` if a
@@ -99,7 +99,7 @@ impl Estimation<'_> {
             least,
             is_rough: true,
         };
-        self.given(errors, self.descend(self.fit, errors, start, effort)?)
+        self.given(errors, self.descend(self.fit, errors, start, None, effort)?)
     }
 
     fn given(&self, errors: &Errors, found: Found) -> Option<Estimate> {
@@ -108,8 +108,15 @@ impl Estimation<'_> {
         Some(self.concluded(log_likelihood, found, given))
     }
 
-    /// Fits parameters, initial states and hyperparameters of an error model; `before` is one of the kind to start from.
-    pub fn under(&self, kind: ErrorModel, start: Point, before: Option<&Errors>) -> Option<Estimate> {
+    /// Fits parameters, initial states and hyperparameters of an error model; `before` is one of the kind to start from, and `known`
+    /// are the residuals with their slopes at the start, which only the force error computes itself.
+    pub fn under(
+        &self,
+        kind: ErrorModel,
+        start: Point,
+        before: Option<&Errors>,
+        mut known: Option<Vec<Residuals>>,
+    ) -> Option<Estimate> {
         if kind == ErrorModel::Force && self.nominal.is_empty() {
             return None;
         }
@@ -117,7 +124,7 @@ impl Estimation<'_> {
         let mut point = start;
         // Where the likelihood is largest so far. That of a force counts along the motion that it has smoothed, not along the
         // first one without it.
-        let mut best: Option<(f64, Point, Fitted)> = None;
+        let mut best: Option<(f64, Point, Fitted, Vec<Residuals>)> = None;
         let mut errors: Option<Errors> = None;
         let mut trials = 0;
         for round in 0..settings().rounds {
@@ -125,32 +132,34 @@ impl Estimation<'_> {
                 ErrorModel::Force => self.motions(&mut fit, &point, errors.as_ref())?,
                 _ => Vec::new(),
             };
-            let mut residuals = fit.all(&point)?;
-            for (residuals, motion) in residuals.iter_mut().zip(&motions) {
-                *residuals = motion.without_force(residuals);
-            }
-            let known = errors.as_ref().or(before);
+            let mut all = match known.take().filter(|_| kind != ErrorModel::Force) {
+                Some(all) => all,
+                None => fit.slopes(&point)?,
+            };
+            all.iter_mut().zip(&motions).for_each(|(piece, motion)| piece.r = motion.without_force(&piece.r));
+            let residuals: Vec<Vec<f64>> = all.iter().map(|piece| piece.r.clone()).collect();
             let thoroughly = round == 0;
-            let fitted = Errors::fit(kind, &self.fit.pieces, &self.channels, &residuals, motions, known, thoroughly)?;
-            let found = self.descend(&fit, &fitted.errors, point.clone(), Effort::of(settings().round_iterations))?;
+            let last = errors.as_ref().or(before);
+            let fitted = Errors::fit(kind, &self.fit.pieces, &self.channels, &residuals, motions, last, thoroughly)?;
+            let effort = Effort::of(settings().round_iterations);
+            let found = self.descend(&fit, &fitted.errors, point.clone(), Some(all.clone()), effort)?;
             let is_first = round == usize::from(kind == ErrorModel::Force);
             let gain = best.as_ref().filter(|_| !is_first).map_or(f64::INFINITY, |best| found.first - best.0);
             if gain > 0.0 {
                 errors = Some(fitted.errors.clone());
-                best = Some((found.first, point, fitted));
-                (point, trials) = (found.point, 0);
+                best = Some((found.first, point, fitted, all));
+                (point, trials, known) = (found.point, 0, Some(found.all));
             } else {
                 // The linear model was left: back towards the best point.
-                let (_, known, _) = best.as_ref()?;
-                point = between(known, &point, settings().shorter);
+                point = between(&best.as_ref()?.1, &point, settings().shorter);
                 trials += 1;
             }
             if gain.abs() < settings().settled && round > 1 || trials > settings().shortenings {
                 break;
             }
         }
-        let (_, point, fitted) = best?;
-        let found = self.descend(&self.along(&fitted.errors), &fitted.errors, point, Effort::of(0))?;
+        let (_, point, fitted, all) = best?;
+        let found = self.descend(&self.along(&fitted.errors), &fitted.errors, point, Some(all), Effort::of(0))?;
         Some(self.concluded(found.log_likelihood(), found, fitted))
     }
 
@@ -343,8 +352,16 @@ impl Estimation<'_> {
     }
 
     /// Minimises the sum of squares of the whitened residuals in linear, scaled coordinates, with that of the distances of unknowns
-    /// from the centres of their priors.
-    fn descend(&self, fit: &Fit<'_>, errors: &Errors, start: Point, effort: Effort) -> Option<Found> {
+    /// from the centres of their priors. `known` are the residuals with their slopes at the start, without the force of the error
+    /// model.
+    fn descend(
+        &self,
+        fit: &Fit<'_>,
+        errors: &Errors,
+        start: Point,
+        known: Option<Vec<Residuals>>,
+        effort: Effort,
+    ) -> Option<Found> {
         let unknowns = self.unknowns();
         let free = self.free();
         let mut values = self.values(&start);
@@ -362,26 +379,33 @@ impl Estimation<'_> {
             free.iter().zip(&scale).zip(&bounds).map(|((&k, s), b)| (values[k] / s).clamp(b[0], b[1])).collect();
         place(&mut values, &z);
         // Unknowns about whose value something is known; least squares is without priors.
-        let known: Vec<(usize, Prior)> = match errors {
+        let centred: Vec<(usize, Prior)> = match errors {
             Errors::White => Vec::new(),
             _ => free.iter().map(|&k| self.priors[k]).enumerate().filter(|(_, p)| p.centre.is_some()).collect(),
         };
-        let whitened = |values: &[f64]| {
+        let look = |values: &[f64]| {
             let mut all = fit.slopes(&self.point(values))?;
             errors.take_force_out_of(&mut all);
-            let (logarithms, mut residuals, mut jacobian) = self.whitened(errors, &all, &free, &scale);
+            Some(all)
+        };
+        let whitened = |values: &[f64], all: &[Residuals]| {
+            let (logarithms, mut residuals, mut jacobian) = self.whitened(errors, all, &free, &scale);
             let samples = residuals.len();
-            residuals = residuals.resize_vertically(samples + known.len(), 0.0);
-            jacobian = jacobian.resize_vertically(samples + known.len(), 0.0);
-            for (row, (a, prior)) in known.iter().enumerate() {
+            residuals = residuals.resize_vertically(samples + centred.len(), 0.0);
+            jacobian = jacobian.resize_vertically(samples + centred.len(), 0.0);
+            for (row, (a, prior)) in centred.iter().enumerate() {
                 let width = prior.stretch * prior.deviation;
                 residuals[samples + row] = (values[free[*a]] - prior.centre.unwrap_or(0.0)) / width;
                 jacobian[(samples + row, *a)] = scale[*a] / width;
             }
-            Some((logarithms, residuals, jacobian))
+            (logarithms, residuals, jacobian)
         };
-        let (logarithms, residuals, jacobian) = whitened(&values)?;
-        let samples = residuals.len() - known.len();
+        let mut all = match known.filter(|_| self.point(&values) == start) {
+            Some(all) => all,
+            None => look(&values)?,
+        };
+        let (logarithms, residuals, jacobian) = whitened(&values, &all);
+        let samples = residuals.len() - centred.len();
         let mut iterate = LeastSquares::new(bounds, z, residuals, jacobian);
         #[allow(clippy::cast_precision_loss)]
         let negligible = |iterate: &LeastSquares| {
@@ -407,12 +431,12 @@ impl Estimation<'_> {
             }
             let mut trial = values.clone();
             place(&mut trial, &step.to);
-            let there = whitened(&trial);
-            let sum = there.as_ref().map_or(f64::INFINITY, |(_, residuals, _)| residuals.norm_squared());
+            let there = look(&trial).map(|all| (whitened(&trial, &all), all));
+            let sum = there.as_ref().map_or(f64::INFINITY, |((_, residuals, _), _)| residuals.norm_squared());
             let ratio = (iterate.sum() - sum) / step.predicted;
             match there {
-                Some((_, residuals, jacobian)) if step.predicted > 0.0 && LeastSquares::accepts(ratio) => {
-                    values = trial;
+                Some(((_, residuals, jacobian), there)) if step.predicted > 0.0 && LeastSquares::accepts(ratio) => {
+                    (values, all) = (trial, there);
                     iterate.accept(step.to, residuals, jacobian, ratio);
                 }
                 _ if iterate.reject() => {}
@@ -421,7 +445,7 @@ impl Estimation<'_> {
             stalled = if iterate.sum() < (1.0 - settings().stalls) * before { 0 } else { stalled + 1 };
         }
         let converged = is_converged(&iterate);
-        Some(Found { point: self.point(&values), iterate, free, scale, logarithms, samples, first, converged })
+        Some(Found { point: self.point(&values), all, iterate, free, scale, logarithms, samples, first, converged })
     }
 
     /// Returns the sum of logarithms of variances, the whitened residuals of all records, and their derivatives by the free
@@ -487,6 +511,8 @@ impl Effort {
 /// End of a descent.
 struct Found {
     point: Point,
+    /// Residuals with their slopes there, without the force of the error model.
+    all: Vec<Residuals>,
     iterate: LeastSquares,
     free: Vec<usize>,
     scale: Vec<f64>,

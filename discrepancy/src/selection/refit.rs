@@ -143,8 +143,10 @@ impl<'a> Refit<'a> {
     pub fn under_error_models(&self, set: &mut FittedSet<'a>, nested: &[&FittedSet<'a>], least: f64) {
         let estimation = set.estimation(&self.nominal);
         let start = set.least_squares.point.clone();
+        let slopes = set.fit.slopes(&start);
         let from = |kind: ErrorModel, start: &Point, before: Option<&Errors>| {
-            Some((kind, estimation.under(kind, start.clone(), before)?))
+            let known = slopes.clone().filter(|_| *start == set.least_squares.point);
+            Some((kind, estimation.under(kind, start.clone(), before, known)?))
         };
         let errors_of = |kind: ErrorModel| {
             let estimates = nested.iter().filter_map(|nested| nested.estimate(kind));
@@ -236,7 +238,7 @@ impl<'a> Refit<'a> {
             let (fit, point, variant) = problem(self.subject, &added, pieces, &tuners, locals, &all, self.simulations);
             let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, &added, &self.nominal, &point);
             let Some(least_squares) = estimation.least_squares(point) else { continue };
-            let Some(under) = estimation.under(kind, least_squares.point.clone(), Some(&estimate.errors)) else {
+            let Some(under) = estimation.under(kind, least_squares.point.clone(), Some(&estimate.errors), None) else {
                 continue;
             };
             if evidence(&under) > evidence(&estimate) {

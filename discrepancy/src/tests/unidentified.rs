@@ -20,7 +20,7 @@ fn of_ratios_that_alone_are_known_no_part_is_certain() {
     let simulations = Meter::new(&());
     let (fit, variant, point, _) = fitted(&subject, &simulations);
     let estimation = estimation(&subject, &fit, &variant, &[], &[], &point);
-    let found = estimation.under(ErrorModel::SmoothOutput, point, None).expect("it simulates");
+    let found = estimation.under(ErrorModel::SmoothOutput, point, None, None).expect("it simulates");
     let error = |k: usize| found.deviations[k] / found.point.globals[k].abs();
     assert!((0..3).all(|k| error(k) > 0.2), "{:?}", [0, 1, 2].map(error));
 }

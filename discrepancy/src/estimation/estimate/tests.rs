@@ -65,7 +65,7 @@ fn under_white_noise_all_error_models_agree_with_least_squares() {
         let jacobian = DMatrix::from_columns(&columns);
         let covariance = (jacobian.transpose() * &jacobian).try_inverse().expect("identifiable");
         for kind in ErrorModel::ALL {
-            let found = estimation.under(kind, point.clone(), None).expect("it simulates");
+            let found = estimation.under(kind, point.clone(), None, None).expect("it simulates");
             assert!(found.converged, "{kind:?}");
             for k in 0..2 {
                 let deviation = covariance[(k, k)].sqrt();
@@ -84,8 +84,8 @@ fn an_unknown_force_is_found_and_parameters_keep_their_intervals() {
     let force = |t: f64| 0.3 * math::sin(1.3 * t);
     let subject = measured(OSCILLATOR, |x| x, force);
     estimate(&subject, |estimation, point| {
-        let found = estimation.under(ErrorModel::Force, point.clone(), None).expect("it simulates");
-        let output = estimation.under(ErrorModel::SmoothOutput, point.clone(), None).expect("it simulates");
+        let found = estimation.under(ErrorModel::Force, point.clone(), None, None).expect("it simulates");
+        let output = estimation.under(ErrorModel::SmoothOutput, point.clone(), None, None).expect("it simulates");
         assert!(found.log_evidence > output.log_evidence, "{:?} {:?}", found.log_evidence, output.log_evidence);
         for k in 0..2 {
             let (value, deviation) = (found.point.globals[k], found.deviations[k]);
@@ -119,7 +119,7 @@ fn the_smoothed_force_is_the_force_that_acted() {
 fn a_linear_plant_needs_no_second_linearisation() {
     let subject = measured(OSCILLATOR, |x| x, |t| 0.3 * math::sin(1.3 * t));
     estimate(&subject, |estimation, point| {
-        let found = estimation.under(ErrorModel::Force, point.clone(), None).expect("it simulates");
+        let found = estimation.under(ErrorModel::Force, point.clone(), None, None).expect("it simulates");
         let mut fit = estimation.fit.clone();
         let without = fit.all(&found.point).expect("it simulates");
         let motions = estimation.motions(&mut fit, &found.point, Some(&found.errors)).expect("it simulates");
@@ -154,7 +154,7 @@ fn the_smoothed_motion_of_a_nonlinear_plant_follows_the_measurement() {
 fn the_evidence_does_not_depend_on_the_scales_of_the_search() {
     let subject = measured(OSCILLATOR, |x| x, |_| 0.0);
     estimate(&subject, |estimation, point| {
-        let found = estimation.under(ErrorModel::SmoothOutput, point.clone(), None).expect("it simulates");
+        let found = estimation.under(ErrorModel::SmoothOutput, point.clone(), None, None).expect("it simulates");
         let mut fit = estimation.fit.clone();
         fit.globals.iter_mut().for_each(|global| global.scale *= 7.0);
         let scaled = Estimation {
@@ -165,7 +165,7 @@ fn the_evidence_does_not_depend_on_the_scales_of_the_search() {
             priors: estimation.priors.clone(),
             log_choices: 0.0,
         };
-        let again = scaled.under(ErrorModel::SmoothOutput, point.clone(), None).expect("it simulates");
+        let again = scaled.under(ErrorModel::SmoothOutput, point.clone(), None, None).expect("it simulates");
         let (a, b) = (found.log_evidence.expect("finite"), again.log_evidence.expect("finite"));
         assert!((a - b).abs() < 1e-2, "{a} {b}");
     });
@@ -176,7 +176,7 @@ fn largest_curves(subject: &Subject) -> Vec<(String, f64)> {
     let found = std::cell::RefCell::new(Vec::new());
     estimate(subject, |estimation, point| {
         for kind in ErrorModel::ALL {
-            let estimate = estimation.under(kind, point.clone(), None).expect("it simulates");
+            let estimate = estimation.under(kind, point.clone(), None, None).expect("it simulates");
             let curves = estimation.curves(&estimate).expect("it simulates");
             found.borrow_mut().push((curves[0].to_string(), curves[0].gain));
         }
