@@ -44,6 +44,11 @@ const LEAST_SCALE: f64 = 1e-30;
 /// Ratio of actual to predicted decrease up to which a step is rejected.
 const REJECTED: f64 = 1e-4;
 
+/// Largest factor of the damping by which a single ratio shortens a step.
+///
+/// Source: J. J. More, B. S. Garbow, K. E. Hillstrom, User guide for MINPACK-1, report ANL-80-74 (1980), `lmder`.
+const MOST_GROWTH: f64 = 10.0;
+
 /// Damping beyond which no step can make progress.
 const MOST_DAMPING: f64 = 1e12;
 
@@ -54,6 +59,18 @@ impl LeastSquares {
         let scale = DVector::from_iterator(point.len(), squared);
         let (factor, target) = factorised(&residuals, &jacobian);
         Self { point, bounds, residuals, jacobian, factor, target, scale, damping: 1e-3, damping_growth: 2.0 }
+    }
+
+    /// Begins with a damping that an iteration nearby has ended with.
+    #[must_use]
+    pub fn damped(mut self, damping: f64) -> Self {
+        self.damping = damping;
+        self
+    }
+
+    /// Returns the damping `lambda` of the next step.
+    pub fn damping(&self) -> f64 {
+        self.damping
     }
 
     /// Returns the current point.
@@ -99,9 +116,12 @@ impl LeastSquares {
         ratio > REJECTED
     }
 
-    /// Increases the damping after a step that was not accepted. Returns false if no step can make progress any more.
-    pub fn reject(&mut self) -> bool {
-        self.damping = (self.damping * self.damping_growth).min(MOST_DAMPING);
+    /// Increases the damping after a step that was not accepted; `ratio` is that of actual to predicted decrease, of which the
+    /// parabola through both sums of squares has its minimum at the share `1/(2 - ratio)` of the step. Returns false if no step
+    /// can make progress any more.
+    pub fn reject(&mut self, ratio: f64) -> bool {
+        let shorter = if ratio.is_nan() { MOST_GROWTH } else { (2.0 - ratio).min(MOST_GROWTH) };
+        self.damping = (self.damping * self.damping_growth.max(shorter)).min(MOST_DAMPING);
         self.damping_growth *= 2.0;
         self.damping < MOST_DAMPING
     }
@@ -199,7 +219,7 @@ mod tests {
             if LeastSquares::accepts(ratio) {
                 iterate.accept(step.to, residuals, jacobian, ratio);
             } else {
-                iterate.reject();
+                iterate.reject(ratio);
             }
         }
         iterate

@@ -137,7 +137,7 @@ impl Solver for Local {
         let actual = if answer.scaled.is_some() { sum - answer.merit.objective } else { f64::NEG_INFINITY };
         let ratio = actual / step.predicted;
         if !LeastSquares::accepts(ratio) {
-            return Ok(if state.iterate.reject() { Progress::Continue } else { state.termination() });
+            return Ok(if state.iterate.reject(ratio) { Progress::Continue } else { state.termination() });
         }
         let Some(at) = oracle.linearise(&step.to, 1.0)? else { return Ok(Progress::Stalled) };
         let (jacobian, residuals) = matrices(&at);

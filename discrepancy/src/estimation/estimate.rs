@@ -82,7 +82,7 @@ impl Estimation<'_> {
     /// Fits parameters and initial states under an error model at the outputs whose hyperparameters are given, in at most so many
     /// iterations. The evidence is that for these hyperparameters.
     pub fn with(&self, errors: &Errors, start: Point, iterations: usize) -> Option<Estimate> {
-        self.given(errors, self.descend(self.fit, errors, start, None, Effort::of(iterations))?)
+        self.given(errors, self.descend(self.fit, errors, Begin::at(start), Effort::of(iterations))?)
     }
 
     /// Returns the log-likelihood at a point under an error model at the outputs whose hyperparameters are given; `None` if a
@@ -97,9 +97,9 @@ impl Estimation<'_> {
             iterations: settings().rough_iterations,
             negligible: 2.0 * settings().roughly,
             least,
-            is_rough: true,
+            stalls: |sum| settings().stalls * sum,
         };
-        self.given(errors, self.descend(self.fit, errors, start, None, effort)?)
+        self.given(errors, self.descend(self.fit, errors, Begin::at(start), effort)?)
     }
 
     fn given(&self, errors: &Errors, found: Found) -> Option<Estimate> {
@@ -122,6 +122,7 @@ impl Estimation<'_> {
         }
         let mut fit = self.fit.clone();
         let mut point = start;
+        let mut damping = None;
         // Where the likelihood is largest so far. That of a force counts along the motion that it has smoothed, not along the
         // first one without it.
         let mut best: Option<(f64, Point, Fitted, Vec<Residuals>)> = None;
@@ -141,8 +142,9 @@ impl Estimation<'_> {
             let thoroughly = round == 0;
             let last = errors.as_ref().or(before);
             let fitted = Errors::fit(kind, &self.fit.pieces, &self.channels, &residuals, motions, last, thoroughly)?;
-            let effort = Effort::of(settings().round_iterations);
-            let found = self.descend(&fit, &fitted.errors, point.clone(), Some(all.clone()), effort)?;
+            let begin = Begin { point: point.clone(), all: Some(all.clone()), damping };
+            let found = self.descend(&fit, &fitted.errors, begin, Effort::round())?;
+            damping = Some(found.iterate.damping());
             let is_first = round == usize::from(kind == ErrorModel::Force);
             let gain = best.as_ref().filter(|_| !is_first).map_or(f64::INFINITY, |best| found.first - best.0);
             if gain > 0.0 {
@@ -159,7 +161,8 @@ impl Estimation<'_> {
             }
         }
         let (_, point, fitted, all) = best?;
-        let found = self.descend(&self.along(&fitted.errors), &fitted.errors, point, Some(all), Effort::of(0))?;
+        let begin = Begin { point, all: Some(all), damping };
+        let found = self.descend(&self.along(&fitted.errors), &fitted.errors, begin, Effort::of(0))?;
         Some(self.concluded(found.log_likelihood(), found, fitted))
     }
 
@@ -352,19 +355,11 @@ impl Estimation<'_> {
     }
 
     /// Minimises the sum of squares of the whitened residuals in linear, scaled coordinates, with that of the distances of unknowns
-    /// from the centres of their priors. `known` are the residuals with their slopes at the start, without the force of the error
-    /// model.
-    fn descend(
-        &self,
-        fit: &Fit<'_>,
-        errors: &Errors,
-        start: Point,
-        known: Option<Vec<Residuals>>,
-        effort: Effort,
-    ) -> Option<Found> {
+    /// from the centres of their priors.
+    fn descend(&self, fit: &Fit<'_>, errors: &Errors, begin: Begin, effort: Effort) -> Option<Found> {
         let unknowns = self.unknowns();
         let free = self.free();
-        let mut values = self.values(&start);
+        let mut values = self.values(&begin.point);
         // Scales of the size of the values keep steps and bounds in proportion.
         let scale: Vec<f64> = free.iter().map(|&k| positive(unknowns[k].1)).collect();
         let bounds: Vec<[f64; 2]> = free.iter().zip(&scale).map(|(&k, s)| unknowns[k].0.map(|b| b / s)).collect();
@@ -400,13 +395,16 @@ impl Estimation<'_> {
             }
             (logarithms, residuals, jacobian)
         };
-        let mut all = match known.filter(|_| self.point(&values) == start) {
+        let mut all = match begin.all.filter(|_| self.point(&values) == begin.point) {
             Some(all) => all,
             None => look(&values)?,
         };
         let (logarithms, residuals, jacobian) = whitened(&values, &all);
         let samples = residuals.len() - centred.len();
         let mut iterate = LeastSquares::new(bounds, z, residuals, jacobian);
+        if let Some(damping) = begin.damping {
+            iterate = iterate.damped(damping);
+        }
         #[allow(clippy::cast_precision_loss)]
         let negligible = |iterate: &LeastSquares| {
             effort.negligible * (iterate.sum() / iterate.residuals().len().max(1) as f64).max(1.0)
@@ -421,11 +419,11 @@ impl Estimation<'_> {
         };
         let mut stalled = 0;
         for iteration in 0..effort.iterations {
-            if iteration > 1 && is_hopeless(&iterate) || effort.is_rough && stalled >= settings().stalled {
+            if iteration > 1 && is_hopeless(&iterate) || stalled >= settings().stalled {
                 break;
             }
             let before = iterate.sum();
-            let Some(step) = iterate.step() else { if iterate.reject() { continue } else { break } };
+            let Some(step) = iterate.step() else { if iterate.reject(f64::NAN) { continue } else { break } };
             if step.predicted < negligible(&iterate) && is_converged(&iterate) {
                 break;
             }
@@ -439,10 +437,10 @@ impl Estimation<'_> {
                     (values, all) = (trial, there);
                     iterate.accept(step.to, residuals, jacobian, ratio);
                 }
-                _ if iterate.reject() => {}
+                _ if iterate.reject(ratio) => {}
                 _ => break,
             }
-            stalled = if iterate.sum() < (1.0 - settings().stalls) * before { 0 } else { stalled + 1 };
+            stalled = if before - iterate.sum() > (effort.stalls)(before) { 0 } else { stalled + 1 };
         }
         let converged = is_converged(&iterate);
         Some(Found { point: self.point(&values), all, iterate, free, scale, logarithms, samples, first, converged })
@@ -497,14 +495,34 @@ struct Effort {
     negligible: f64,
     /// Log-likelihood that it must be able to reach.
     least: f64,
-    /// True if it ends where it stalls.
-    is_rough: bool,
+    /// Decrease of a sum of squares that is none: after several of these in a row it ends.
+    stalls: fn(f64) -> f64,
 }
 
 impl Effort {
     /// To the end, in at most so many iterations.
     fn of(iterations: usize) -> Self {
-        Self { iterations, negligible: settings().converged, least: f64::NEG_INFINITY, is_rough: false }
+        Self { iterations, negligible: settings().converged, least: f64::NEG_INFINITY, stalls: |_| f64::NEG_INFINITY }
+    }
+
+    /// As far as rounds of parameters and hyperparameters go.
+    fn round() -> Self {
+        Self { stalls: |_| 2.0 * settings().settled, ..Self::of(settings().round_iterations) }
+    }
+}
+
+/// Beginning of a descent.
+struct Begin {
+    point: Point,
+    /// Residuals with their slopes there, without the force of the error model, where they are known.
+    all: Option<Vec<Residuals>>,
+    /// Damping at the end of an earlier descent.
+    damping: Option<f64>,
+}
+
+impl Begin {
+    fn at(point: Point) -> Self {
+        Self { point, all: None, damping: None }
     }
 }
 
