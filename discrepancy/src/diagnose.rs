@@ -7,7 +7,7 @@ use mops_core::{Effect, Role, Study, StudyError, Watch};
 
 use crate::meter::Meter;
 use crate::report::Findings;
-use crate::selection::{Forecasts, Search, decide, prepare, with_given};
+use crate::selection::{align, Forecasts, Search, decide, prepare, with_given};
 use crate::subject::Subject;
 
 /// Options of a diagnosis.
@@ -42,18 +42,39 @@ pub fn diagnose(
     };
     let (refit, declared) = prepare(&subject, effects, &simulations).ok_or_else(lost)?;
     let nominal = declared.clone();
-    let declared = with_given(&refit, declared, &study.tasks().diagnosis.with)?;
-    let mut search = Search::new(&refit, declared, options.max_effects, options.level);
-    if search.sets[0].under.is_empty() {
-        return Err(lost());
+    let has_selection = subject.measurements.iter().any(|m| m.role == Role::Selection);
+    let mut forecasts = Forecasts::new(has_selection);
+    let begun = |refit, declared| {
+        let declared = with_given(refit, declared, &study.tasks().diagnosis.with)?;
+        let mut search = Search::new(refit, declared, options.max_effects, options.level);
+        if search.sets[0].under.is_empty() {
+            return Err(lost());
+        }
+        search.begin();
+        Ok(search)
+    };
+    let mut search = begun(&refit, declared)?;
+    // With inputs that act at other times it begins anew.
+    let aligned = align(&search, forecasts.kinds());
+    let (aligned, alignment) = aligned.map_or((None, Vec::new()), |(subject, inputs)| (Some(subject), inputs));
+    let prepared = aligned.as_ref().and_then(|subject| prepare(subject, effects, &simulations));
+    let (refit, declared) = prepared.unzip();
+    let alignment = if refit.is_some() { alignment } else { Vec::new() };
+    if let Some((refit, declared)) = refit.as_ref().zip(declared) {
+        search = begun(refit, declared)?;
     }
     search.run();
     let is_stopped = simulations.conclude();
     simulations.stage("forecasts", 0.85);
-    let has_selection = subject.measurements.iter().any(|m| m.role == Role::Selection);
-    let mut forecasts = Forecasts::new(has_selection);
     let verdict = decide(&mut search, &mut forecasts);
     simulations.stage("report", 0.95);
-    Ok(Findings { nominal: &nominal, search: &search, forecasts: &forecasts, verdict: &verdict, is_stopped }
-        .diagnosis())
+    let findings = Findings {
+        nominal: &nominal,
+        alignment: &alignment,
+        search: &search,
+        forecasts: &forecasts,
+        verdict: &verdict,
+        is_stopped,
+    };
+    Ok(findings.diagnosis())
 }

@@ -144,6 +144,9 @@ settings! {
     /// Share of the differences of samples that must be multiples of the smallest one for a quantisation. Basis: the studies.
     quantised: f64 = 0.9;
 
+    /// Largest number of samples by which a recorded input may act before its time stamps. Basis: the studies.
+    earlier: i32 = 3;
+
     // Starts of a fit.
 
     /// Iterations of a first look at a start. Basis: an assumption.

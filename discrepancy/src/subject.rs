@@ -59,6 +59,7 @@ pub struct Measurement {
 }
 
 /// What is diagnosed.
+#[derive(Clone)]
 pub struct Subject {
     /// The study.
     pub study: Arc<Study>,

@@ -1,6 +1,7 @@
 //! How a search for missing effects goes wrong, one file for each way, on experiments whose truth is known.
 
 mod absorbed;
+mod aligned;
 mod bounds;
 mod candidates;
 mod correlated;

@@ -9,7 +9,7 @@ mod removed;
 use std::collections::BTreeMap;
 
 use mops_core::diagnosis::{
-    Change, Dependence, Diagnosis, ForecastOf, Found, HeldBack, Noticeable, Step, StrengthValue, Unexplained, Verdict,
+    Alignment, Change, Dependence, Diagnosis, ForecastOf, Found, HeldBack, Noticeable, Step, StrengthValue, Unexplained, Verdict,
 };
 use mops_core::{Role, math};
 
@@ -25,6 +25,8 @@ use crate::variant::Added;
 pub struct Findings<'f, 'r, 'a> {
     /// Declared model without the effects that the study gives.
     pub nominal: &'f FittedSet<'a>,
+    /// Recorded inputs that act at other times than the study says.
+    pub alignment: &'f [Alignment],
     /// Sets of effects.
     pub search: &'f Search<'r, 'a>,
     /// Forecasts of the sets that were tested.
@@ -50,6 +52,7 @@ impl<'a> Findings<'_, '_, 'a> {
         draw(&mut located, set);
 
         let mut made = Diagnosis::default();
+        made.alignment = self.alignment.to_vec();
         made.verdict = match verdict.conclusion {
             Conclusion::Effect => Verdict::Effect,
             Conclusion::Unexplained => Verdict::Unexplained,
@@ -67,7 +70,9 @@ impl<'a> Findings<'_, '_, 'a> {
         made.is_first = verdict.is_first || verdict.conclusion == Conclusion::None;
         made.is_stopped = self.is_stopped;
         made.converged = set.least_squares.converged;
-        made.explained_share = explained_share(&before, &after).filter(|_| !set.added.is_empty());
+        let aligned = search.get(&nothing).filter(|_| !self.alignment.is_empty()).map(Records::new);
+        made.explained_share =
+            explained_share(aligned.as_ref().unwrap_or(&before), &after).filter(|_| !set.added.is_empty());
         if made.verdict == Verdict::Unexplained {
             made.unexplained = made.depends_on.as_ref().map(|curve| unexplained(curve, &located));
         }

@@ -41,6 +41,11 @@ impl Forecasts {
         Self { kinds, known: HashMap::new(), passed: HashMap::new() }
     }
 
+    /// Returns what is forecast.
+    pub fn kinds(&self) -> &[Forecast] {
+        &self.kinds
+    }
+
     /// Returns true if other records are forecast.
     pub fn are_of_other_records(&self) -> bool {
         self.kinds.len() > 1
@@ -126,7 +131,11 @@ impl Forecasts {
 
 /// Returns the mean square error of a forecast by a set, in noises; `None` if it fails.
 fn error(search: &Search<'_, '_>, key: &Key, kind: Forecast) -> Option<f64> {
-    let set = search.get(key)?;
+    error_of(search.get(key)?, kind)
+}
+
+/// Returns the mean square error of a forecast by a fitted set, in noises; `None` if it fails.
+pub fn error_of(set: &FittedSet<'_>, kind: Forecast) -> Option<f64> {
     let others = || base::pieces(set.fit.subject, |role| role == Role::Selection);
     match kind {
         Forecast::LeastSquares => free_run(set, &set.least_squares.point, others()),

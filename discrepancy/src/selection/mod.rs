@@ -1,5 +1,6 @@
 //! Which effects a model lacks: sets of effects, fitted under the error models, compared by evidence and by forecast.
 
+mod alignment;
 mod baseline;
 mod coverage;
 mod fitted_set;
@@ -15,6 +16,7 @@ mod verdict;
 
 #[cfg(test)]
 pub(crate) use baseline::baseline;
+pub(crate) use alignment::align;
 pub(crate) use fitted_set::{FittedSet, Key, estimation};
 pub(crate) use forecast::{Forecasts, with_free_starts};
 pub(crate) use preparation::{prepare, with_given};

@@ -96,6 +96,7 @@ pub fn select(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<Selection, S
     let tried = |effect: &&Arc<dyn Effect>| study.tasks().diagnosis.tries(effect.name());
     let effects: Vec<Arc<dyn Effect>> = effects.iter().filter(tried).cloned().collect();
     with_search(study, &effects, |search| {
+        search.begin();
         search.run();
         Ok(())
     })

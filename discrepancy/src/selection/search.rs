@@ -54,7 +54,7 @@ impl<'r, 'a> Search<'r, 'a> {
 
     /// Returns true if correlated errors are significantly likelier than white noise at the optimum of a set, or selection records
     /// contradict it.
-    fn lacks_something(&self, set: &FittedSet<'_>) -> bool {
+    pub fn lacks_something(&self, set: &FittedSet<'_>) -> bool {
         set.lack_of_fit().is_none_or(|nats| nats > self.significant) || is_contradicted(set)
     }
 
@@ -66,25 +66,30 @@ impl<'r, 'a> Search<'r, 'a> {
         }
     }
 
-    /// Expands the most probable sets until they have all been.
+    /// Adds single effects and pairs to the declared model.
+    pub fn begin(&mut self) {
+        self.refit.simulations.stage("single effects and pairs", 0.15);
+        self.expand(&Key::new());
+        self.note();
+    }
+
+    /// Expands the most probable sets until they have all been; the declared model has been.
     pub fn run(&mut self) {
         // Of sets with the same classes at the same places one is expanded.
-        let mut expanded: Vec<Vec<(EffectClass, String)>> = Vec::new();
+        let mut expanded: Vec<Vec<(EffectClass, String)>> = vec![Vec::new()];
         while expanded.len() < settings().expansions {
             let first = self.sets.first().map_or(f64::NEG_INFINITY, |set| self.log_posterior(set));
             let best = self.sets.iter().take(settings().beam).find(|set| {
-                let is_promising = self.log_posterior(set) > first - settings().negligible || set.key.is_empty();
+                let is_promising = self.log_posterior(set) > first - settings().negligible;
                 is_promising && set.key.len() < self.most && !expanded.contains(&self.kinds_of(&set.key))
             });
             let Some(key) = best.map(|set| set.key.clone()) else { break };
-            // Effects are added to the declared model in any case, and then as long as something is lacking.
-            if !key.is_empty() && !self.sets.first().is_some_and(|set| self.lacks_something(set)) {
+            if !self.sets.first().is_some_and(|set| self.lacks_something(set)) {
                 break;
             }
             #[allow(clippy::cast_precision_loss)]
             let done = 0.15 + 0.12 * expanded.len() as f64;
-            let what = if key.is_empty() { "single effects and pairs" } else { "further effects" };
-            self.refit.simulations.stage(what, done);
+            self.refit.simulations.stage("further effects", done);
             self.expand(&key);
             self.note();
             expanded.push(self.kinds_of(&key));
@@ -505,7 +510,7 @@ struct Trial {
 }
 
 /// Returns the fit of a set under the output error under which it has more evidence.
-fn likelier_output<'s>(set: &'s FittedSet<'_>) -> Option<&'s Estimate> {
+pub fn likelier_output<'s>(set: &'s FittedSet<'_>) -> Option<&'s Estimate> {
     let outputs = set.under.iter().filter(|(kind, _)| *kind != ErrorModel::Force);
     outputs.map(|(_, estimate)| estimate).max_by(|a, b| evidence(a).total_cmp(&evidence(b)))
 }
@@ -583,7 +588,7 @@ pub fn without(key: &Key, index: usize) -> Key {
 }
 
 /// Returns the number of candidates that the prior counts: one that acts in a single record counts once for all records.
-fn kinds(candidates: &[Candidate]) -> usize {
+pub fn kinds(candidates: &[Candidate]) -> usize {
     let same = |a: &Candidate, b: &Candidate| {
         a.effect.name() == b.effect.name() && a.port == b.port && a.companion == b.companion
     };

@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::{
-    Dependence, Diagnosis, Evidence, ExperimentError, ForecastOf, Found, HeldBack, Noticeable, ParameterMove, Ranked,
+    Alignment, Dependence, Diagnosis, Evidence, ExperimentError, ForecastOf, Found, HeldBack, Noticeable, ParameterMove, Ranked,
     Removed, Rival, Rule, Stability, Step, StrengthValue, Unexplained, Verdict,
 };
 use crate::experiment::Role;
@@ -23,6 +23,8 @@ pub(crate) struct Block {
     probability: f64,
     /// p-value of the residual's structure without a missing effect.
     p_value: f64,
+    /// Recorded inputs that act at other times than the study says, or are held otherwise; effects are found with these.
+    alignment: Vec<Alignment>,
     /// Effects added to the model, claimed or proposed.
     found: Vec<FoundEffect>,
     /// Share of the squared error of the declared model, in noises, that the effects found remove from validation data, else
@@ -251,6 +253,7 @@ impl Block {
             starts: starts.iter().map(start).collect(),
             noticeable: noticeable.iter().map(DetectionLimit::of).collect(),
             evidence: evidence.iter().map(PlaceEvidence::of).collect(),
+            alignment: diagnosis.alignment.clone(),
             notes: diagnosis.notes.clone(),
             simulations: diagnosis.simulations,
         }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 pub(crate) use block::{Block, serialize};
 
-use crate::experiment::Role;
+use crate::experiment::{Hold, Role};
 
 /// Verdict on the model.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -169,6 +169,17 @@ pub enum Rule {
     Curve,
     /// Another effect is more probable.
     Probability,
+}
+
+/// Recorded input that acts at other times than its study says, or is held otherwise between its samples.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Alignment {
+    /// The input.
+    pub input: String,
+    /// Time that is added to its time stamps, s: below 0 it acts earlier.
+    pub shift: f64,
+    /// Interpolation between its samples.
+    pub hold: Hold,
 }
 
 /// Coordinate on which a missing force or a change of an input depends, determined without a catalogue.
@@ -437,6 +448,8 @@ pub struct Diagnosis {
     pub probability: f64,
     /// p-value of the residual's structure without a missing effect.
     pub p_value: f64,
+    /// Recorded inputs that act at other times than the study says. Effects are found with these.
+    pub alignment: Vec<Alignment>,
     /// Effects added.
     pub found: Vec<Found>,
     /// Share of the squared error of the declared model, in noises, that the effects found remove from validation data, else
