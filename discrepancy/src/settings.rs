@@ -88,11 +88,9 @@ settings! {
     matters: f64 = 1.1;
     /// Share of a calibration record that parameters are fitted to where its end is forecast. Basis: the studies.
     beginning: f64 = 0.6;
-    /// Difference of log-evidence that is not worth more than a bare mention, nats. Source: R. E. Kass, A. E. Raftery, Bayes
+    /// Twice a difference of log-evidence from which it is strong: of sets that differ less, the simplest is named. Also the squared
+    /// distance of two predictions, in squared noises, from which data distinguish them. Source: R. E. Kass, A. E. Raftery, Bayes
     /// factors, Journal of the American Statistical Association 90 (1995) 773, section 3.2.
-    bare_mention: f64 = 1.0;
-    /// Twice a log-evidence from which it is strong; also the squared distance of two predictions, in squared noises, from which data
-    /// distinguish them. Source: Kass and Raftery (1995), section 3.2.
     strong: f64 = 6.0;
     /// Cosine of the changes of the outputs from which the records cannot tell two effects apart. Basis: an assumption.
     alike: f64 = 0.98;
@@ -243,6 +241,8 @@ settings! {
     lengths: [f64; 2] = [1.0, 10.0];
     /// Largest correlation length of a rough error, as a share of the longest record. Basis: the studies.
     longest_rough: f64 = 0.25;
+    longest_smooth: f64 = 1.0;
+    longest_force: f64 = 1.0;
     /// Range of the deviation of forces, nominal forces. Basis: an assumption.
     forces: [f64; 2] = [1e-6, 50.0];
     /// Range of an output deviation: share of the sensor's noise, and multiple of the larger of residual and noise. Basis: an

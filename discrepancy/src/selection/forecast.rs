@@ -155,7 +155,8 @@ pub fn free_run(set: &FittedSet<'_>, point: &Point, pieces: Vec<Piece>) -> Optio
     mean_square(fit.all(&point)?.into_iter().flatten())
 }
 
-/// Fits the initial states of records, with the parameters of a point; `None` if there are none, or they cannot be simulated.
+/// Fits the initial states of records, with the parameters of a point, to whole records and to beginnings that grow: the better of
+/// both; `None` if there are none, or they cannot be simulated.
 pub fn with_free_starts<'a>(set: &FittedSet<'a>, point: &Point, pieces: Vec<Piece>) -> Option<(Fit<'a>, Point)> {
     if pieces.is_empty() {
         return None;
@@ -168,8 +169,36 @@ pub fn with_free_starts<'a>(set: &FittedSet<'a>, point: &Point, pieces: Vec<Piec
     for (global, value) in fit.globals.iter_mut().zip(&mut point.globals) {
         global.bounds = [*value; 2];
     }
-    let point = estimation(subject, &fit, &variant, &start.added, &[], &point).least_squares(point)?.point;
-    Some((fit, point))
+    let fitted = |fit: &Fit<'a>, from: &Point, iterations: usize| {
+        let estimation = estimation(subject, fit, &variant, &start.added, &[], &point);
+        estimation.with(&Errors::White, from.clone(), iterations)
+    };
+    let mut grown = point.clone();
+    let shares = std::iter::successors(Some(2 * settings().windows), |windows| Some(windows / 2));
+    for windows in shares.take_while(|windows| *windows > 1) {
+        #[allow(clippy::cast_precision_loss)]
+        let beginning = beginning(&fit, 1.0 / windows as f64);
+        if let Some(found) = fitted(&beginning, &grown, settings().look) {
+            grown = found.point;
+        }
+    }
+    let ends = [&grown, &point].into_iter().filter_map(|start| fitted(&fit, start, settings().iterations));
+    let best = ends.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?.point;
+    Some((fit, best))
+}
+
+/// Returns a fit to the beginnings of its records.
+fn beginning<'a>(fit: &Fit<'a>, share: f64) -> Fit<'a> {
+    let mut beginning = fit.clone();
+    for piece in &mut beginning.pieces {
+        piece.horizon *= share;
+        for series in &mut piece.series {
+            let count = series.times.partition_point(|&t| t <= piece.horizon);
+            series.times.truncate(count);
+            series.values.truncate(count);
+        }
+    }
+    beginning
 }
 
 /// Fits a set to calibration and selection records together by least squares; `None` if they cannot be simulated.
@@ -190,16 +219,8 @@ pub fn fitted_together<'a>(set: &FittedSet<'a>) -> Option<(Fit<'a>, Point)> {
 
 /// Returns the mean square error in noises at the ends of the calibration records, run on from least squares on their beginnings.
 fn run_on(set: &FittedSet<'_>) -> Option<f64> {
-    let mut beginning = set.fit.clone();
-    let ends: Vec<f64> = beginning.pieces.iter().map(|piece| settings().beginning * piece.horizon).collect();
-    for (piece, &end) in beginning.pieces.iter_mut().zip(&ends) {
-        for series in &mut piece.series {
-            let count = series.times.partition_point(|&t| t <= end);
-            series.times.truncate(count);
-            series.values.truncate(count);
-        }
-        piece.horizon = end;
-    }
+    let beginning = beginning(&set.fit, settings().beginning);
+    let ends: Vec<f64> = beginning.pieces.iter().map(|piece| piece.horizon).collect();
     let estimation = estimation(set.fit.subject, &beginning, &set.variant, &set.added, &[], &set.least_squares.point);
     // From the optimum of every error model: at a kink, one start may end early.
     let starts = [&set.least_squares].into_iter().chain(set.under.iter().map(|(_, estimate)| estimate));

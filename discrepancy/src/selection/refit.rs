@@ -56,6 +56,11 @@ impl<'a> Refit<'a> {
         Some(best)
     }
 
+    /// Returns a set at a start, without a fit; `None` if it cannot be simulated there.
+    pub fn at_start(&self, key: &Key, start: &Start) -> Option<FittedSet<'a>> {
+        self.from(key, start, 0)
+    }
+
     fn from(&self, key: &Key, start: &Start, iterations: usize) -> Option<FittedSet<'a>> {
         let added = start.added.clone();
         let (fit, point, variant) = self.problem(start);
@@ -208,15 +213,25 @@ impl<'a> Refit<'a> {
             best
         };
         let kinds: Vec<ErrorModel> = first.iter().map(|(kind, _)| *kind).collect();
-        let under: Vec<(ErrorModel, Estimate)> = kinds.par_iter().filter_map(|&kind| best(kind)).collect();
-        // Correlated errors are more patient with a poor start than least squares is.
-        set.under = under;
-        let again = set
-            .likeliest()
-            .and_then(|(_, likeliest)| set.estimation(&self.nominal).least_squares(likeliest.point.clone()));
-        if let Some(again) = again.filter(|again| again.log_likelihood > set.least_squares.log_likelihood) {
-            set.least_squares = again;
+        let mut under: Vec<(ErrorModel, Estimate)> = kinds.par_iter().filter_map(|&kind| best(kind)).collect();
+        // Correlated errors are more patient with a poor start than least squares is, which then is a start for them.
+        let mut least_squares = set.least_squares.clone();
+        for _ in 0..settings().turns {
+            let likeliest = under.iter().max_by(|a, b| evidence(&a.1).total_cmp(&evidence(&b.1)));
+            let again = likeliest.and_then(|(_, likeliest)| estimation.least_squares(likeliest.point.clone()));
+            let Some(again) = again.filter(|again| again.log_likelihood > least_squares.log_likelihood) else { break };
+            let gain = again.log_likelihood - least_squares.log_likelihood;
+            least_squares = again;
+            if gain <= settings().worse {
+                break;
+            }
+            let restarted = |own: (ErrorModel, Estimate)| {
+                let again = from(own.0, &least_squares.point, None);
+                again.filter(|(_, again)| evidence(again) > evidence(&own.1)).unwrap_or(own)
+            };
+            under = under.into_par_iter().map(restarted).collect();
         }
+        (set.under, set.least_squares) = (under, least_squares);
     }
 
     /// Returns a set without the declared terms that its effects make superfluous, and their positions among the parameters of the

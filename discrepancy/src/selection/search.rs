@@ -115,6 +115,12 @@ impl<'r, 'a> Search<'r, 'a> {
         kinds
     }
 
+    /// Returns the position of a candidate among the effects of a set.
+    fn position(&self, set: &FittedSet<'a>, index: usize) -> usize {
+        let is_it = |added: &Added| self.refit.candidates[index].is(&added.candidate);
+        set.added.iter().position(is_it).expect("the set holds it")
+    }
+
     /// Returns a fitted set.
     pub fn get(&self, key: &Key) -> Option<&FittedSet<'a>> {
         self.sets.iter().find(|set| set.key == *key)
@@ -270,6 +276,7 @@ impl<'r, 'a> Search<'r, 'a> {
         smaller.sort();
         smaller.dedup();
         self.ensure(&smaller);
+        self.correct(&smaller);
     }
 
     /// Returns those of some candidates that pay on the declared model under the force error alone: screening, which is under
@@ -299,7 +306,12 @@ impl<'r, 'a> Search<'r, 'a> {
             if !self.ensure(std::slice::from_ref(&smaller)) {
                 continue;
             }
-            let parent = self.get(&smaller).expect("it was fitted").clone();
+            let (Some(set), Some(parent)) = (self.get(key), self.get(&smaller).cloned()) else { continue };
+            // Where the set is at its optimum, what an effect does is all that is missing without it.
+            let start = set.start_at(&set.least_squares.point).without(self.position(set, key[k]));
+            let white = set.least_squares.log_likelihood;
+            let Some(rest) = self.refit.at_start(&smaller, &start) else { continue };
+            let white = white - rest.least_squares.log_likelihood;
             let all = &self.refit.candidates;
             let alike = |&index: &usize| {
                 let (this, other) = (&all[key[k]], &all[index]);
@@ -309,17 +321,14 @@ impl<'r, 'a> Search<'r, 'a> {
             let is_new = |index: &usize| !self.is_known(&with(&smaller, *index));
             let others: Vec<usize> = (0..all.len()).filter(alike).filter(fits).filter(is_new).collect();
             let wanted = with(&others, key[k]);
-            let known = output_errors(&parent);
-            let Some(scene) = Scene::new(&parent, &known) else { continue };
+            let Some(scene) = Scene::new(&rest, &[Errors::White]) else { continue };
             let screened = scene.screen(all, &wanted);
             // The first-order gains of the others are trusted only if that of the effect itself predicts its actual gain.
-            let [white, correlated] = self.get(key).map_or([0.0; 2], |set| gains(set, &parent));
             let own = screened.iter().find(|own| own.index == key[k]);
             let is_predicted = own.is_some_and(|own| settings().allowance * own.gains[0] > white);
             let is_near = |single: &&Screened| {
-                let pays = || settings().allowance * single.correlated() > correlated - settings().hopeless;
-                single.index != key[k]
-                    && (!is_predicted || settings().allowance * single.gains[0] > white - settings().hopeless || pays())
+                let gain = settings().allowance * single.gains[0];
+                single.index != key[k] && (!is_predicted || gain > white - settings().hopeless)
             };
             // Each is fitted with hyperparameters of its own: those of the set are narrow around its own optimum. Where the set
             // lacks nothing, squares decide. A fit below the set without the effect has failed.
@@ -329,7 +338,7 @@ impl<'r, 'a> Search<'r, 'a> {
             let fitted = |single: &&Screened| {
                 let new = [*single];
                 let likelier = likelier_output(&parent).and_then(|likelier| best_start(&parent, &likelier.point, &new));
-                let rough = self.by_squares(&parent, &new, likelier.as_ref(), least)?;
+                let rough = self.by_squares(&rest, &new, likelier.as_ref(), least)?;
                 let is_hopeless = rough.log_likelihood < least;
                 if is_hopeless { None } else { self.refit.least_squares(&larger(&parent, &new), &[rough.start]) }
             };
@@ -430,14 +439,8 @@ impl<'r, 'a> Search<'r, 'a> {
     /// Makes sure that sets are fitted under all error models, from sets with one effect more. Returns false if one cannot be.
     pub fn ensure(&mut self, keys: &[Key]) -> bool {
         let unknown: Vec<&Key> = keys.iter().filter(|key| self.get(key).is_none()).collect();
-        let reduced = |larger: &FittedSet<'a>, key: &Key| {
-            let is_extra = |added: &Added| !key.iter().any(|&k| self.refit.candidates[k].is(&added.candidate));
-            let contains = key.iter().all(|k| larger.key.contains(k)) && larger.key.len() == key.len() + 1;
-            let extra = larger.added.iter().position(is_extra).filter(|_| contains)?;
-            Some(larger.start_at(&larger.least_squares.point).without(extra))
-        };
         let fitted = |key: &&Key| {
-            let starts: Vec<Start> = self.sets.iter().filter_map(|larger| reduced(larger, key)).collect();
+            let starts: Vec<Start> = self.sets.iter().filter_map(|larger| self.reduced(larger, key)).collect();
             self.refit.least_squares(key, &starts)
         };
         let sets: Vec<FittedSet<'a>> = unknown.par_iter().filter_map(fitted).collect();
@@ -447,6 +450,49 @@ impl<'r, 'a> Search<'r, 'a> {
             self.sort();
         }
         is_complete
+    }
+
+    /// Returns the values of a set at its optimum without the effect that another one lacks; `None` if that is not one effect less.
+    fn reduced(&self, larger: &FittedSet<'a>, key: &Key) -> Option<Start> {
+        let is_extra = |added: &Added| !key.iter().any(|&k| self.refit.candidates[k].is(&added.candidate));
+        let contains = key.iter().all(|k| larger.key.contains(k)) && larger.key.len() == key.len() + 1;
+        let extra = larger.added.iter().position(is_extra).filter(|_| contains)?;
+        Some(larger.start_at(&larger.least_squares.point).without(extra))
+    }
+
+    /// Fits those of some sets again that describe the records worse than a probable set with one effect more does without that
+    /// effect: these were in another basin.
+    fn correct(&mut self, keys: &[Key]) {
+        let best = self.sets.first().map_or(f64::NEG_INFINITY, |first| self.log_posterior(first));
+        let corrected = |key: &Key| {
+            let known = self.get(key)?;
+            let near = self.sets.iter().filter(|set| self.log_posterior(set) > best - settings().negligible);
+            let is_better = |start: &Start| {
+                let there = self.refit.at_start(key, start);
+                there.is_some_and(|there| {
+                    there.least_squares.log_likelihood > known.least_squares.log_likelihood + settings().worse
+                })
+            };
+            let starts: Vec<Start> = near.filter_map(|larger| self.reduced(larger, key)).filter(is_better).collect();
+            let mut again = self.refit.least_squares(key, &starts)?;
+            self.refit.under_error_models(&mut again, &self.nested(key), f64::NEG_INFINITY);
+            (again.log_evidence() > known.log_evidence()).then_some(again)
+        };
+        let corrected: Vec<FittedSet<'a>> = keys.par_iter().filter_map(corrected).collect();
+        for again in corrected {
+            self.sets.retain(|set| set.key != again.key);
+            self.sets.push(again);
+        }
+        self.sort();
+    }
+
+    /// Returns the fitted sets with one effect less, or else the declared model.
+    fn nested(&self, key: &Key) -> Vec<&FittedSet<'a>> {
+        let contained =
+            |smaller: &&FittedSet<'a>| smaller.key.len() + 1 == key.len() && smaller.key.iter().all(|k| key.contains(k));
+        let nested: Vec<&FittedSet<'a>> = self.sets.iter().filter(contained).collect();
+        let declared = self.sets.iter().filter(|set| set.key.is_empty() && nested.is_empty() && !key.is_empty());
+        nested.iter().copied().chain(declared).collect()
     }
 
     /// Adds sets, the simplest first; what is a simpler one in all but name is only noted.
@@ -480,13 +526,7 @@ impl<'r, 'a> Search<'r, 'a> {
             if self.get(&set.key).is_some() {
                 return None;
             }
-            let contained = |smaller: &&FittedSet<'a>| {
-                smaller.key.len() + 1 == set.key.len() && smaller.key.iter().all(|k| set.key.contains(k))
-            };
-            let mut nested: Vec<&FittedSet<'a>> = self.sets.iter().filter(contained).collect();
-            if nested.is_empty() {
-                nested.extend(self.sets.iter().filter(|smaller| smaller.key.is_empty()));
-            }
+            let nested = self.nested(&set.key);
             self.refit.under_error_models(&mut set, &nested, least);
             (!set.under.is_empty()).then_some(set)
         };
@@ -513,13 +553,6 @@ struct Trial {
 pub fn likelier_output<'s>(set: &'s FittedSet<'_>) -> Option<&'s Estimate> {
     let outputs = set.under.iter().filter(|(kind, _)| *kind != ErrorModel::Force);
     outputs.map(|(_, estimate)| estimate).max_by(|a, b| evidence(a).total_cmp(&evidence(b)))
-}
-
-/// Returns by how much a set is likelier than another one in white noise, and under the likelier error model of each at the
-/// outputs, nats.
-fn gains(set: &FittedSet<'_>, smaller: &FittedSet<'_>) -> [f64; 2] {
-    let log = |set| likelier_output(set).map_or(f64::NEG_INFINITY, |estimate| estimate.log_likelihood);
-    [set.least_squares.log_likelihood - smaller.least_squares.log_likelihood, log(set) - log(smaller)]
 }
 
 /// Returns a set with one more candidate.

@@ -271,7 +271,7 @@ fn entries_of(search: &Search<'_, '_>, key: &Key) -> Vec<Entry> {
     entries
 }
 
-/// Returns the first of the sets that passed, or the simplest one that says the same about as probably: with the fewest parameters
+/// Returns the first of the sets that passed, or the simplest one that says the same, unless the evidence for the first is strong: with the fewest parameters
 /// among those of the same classes and places, and those that the records cannot tell from it.
 fn simplest(search: &Search<'_, '_>, passed: &[Key]) -> Key {
     let Some(first) = passed.first() else { return Key::new() };
@@ -281,7 +281,7 @@ fn simplest(search: &Search<'_, '_>, passed: &[Key]) -> Key {
     let entries = entries_of(search, first);
     let is_alike = |key: &&Key| {
         key.len() == first.len()
-            && log(key) > log(first) - settings().bare_mention
+            && log(key) > log(first) - 0.5 * settings().strong
             && (entries_of(search, key) == entries || swapped(search, first, key).is_some())
     };
     passed.iter().filter(is_alike).min_by_key(|key| parameters(key)).unwrap_or(first).clone()
