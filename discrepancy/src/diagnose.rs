@@ -7,7 +7,7 @@ use mops_core::{Effect, Role, Study, StudyError, Watch};
 
 use crate::meter::Meter;
 use crate::report::Findings;
-use crate::selection::{align, Forecasts, Search, decide, prepare, with_given};
+use crate::selection::{Forecasts, Search, align, decide, prepare, with_given};
 use crate::subject::Subject;
 
 /// Options of a diagnosis.

@@ -241,8 +241,6 @@ settings! {
     lengths: [f64; 2] = [1.0, 10.0];
     /// Largest correlation length of a rough error, as a share of the longest record. Basis: the studies.
     longest_rough: f64 = 0.25;
-    longest_smooth: f64 = 1.0;
-    longest_force: f64 = 1.0;
     /// Range of the deviation of forces, nominal forces. Basis: an assumption.
     forces: [f64; 2] = [1e-6, 50.0];
     /// Range of an output deviation: share of the sensor's noise, and multiple of the larger of residual and noise. Basis: an

@@ -244,7 +244,7 @@ impl Errors {
         };
         let step = channels.shortest_step();
         let length = channels.length.iter().copied().fold(0.0, f64::max);
-        let lengths = [settings().shortest * step, (settings().longest_force * length).max(2.0 * step)].map(math::ln);
+        let lengths = [settings().shortest * step, length.max(2.0 * step)].map(math::ln);
         let mut bounds = vec![settings().forces.map(math::ln), lengths];
         bounds.extend(std::iter::repeat_n(noise_bounds(rms(residuals)), channels.count));
         let mut starts: Vec<Vec<f64>> = Vec::new();
@@ -385,7 +385,7 @@ fn fit_output(
     #[allow(clippy::cast_precision_loss)]
     let count = series.iter().map(|(times, _)| times.len()).sum::<usize>().max(1) as f64;
     let rms = (series.iter().flat_map(|(_, r)| r.iter()).map(|r| r * r).sum::<f64>() / count).sqrt();
-    let longest = if kernel == Kernel::OrnsteinUhlenbeck { settings().longest_rough } else { settings().longest_smooth };
+    let longest = if kernel == Kernel::OrnsteinUhlenbeck { settings().longest_rough } else { 1.0 };
     let step = channels.step[channel];
     let shortest = if kernel == Kernel::OrnsteinUhlenbeck { 1.0 } else { settings().shortest };
     let lengths = [shortest * step, (longest * channels.length[channel]).max(2.0 * step)].map(math::ln);

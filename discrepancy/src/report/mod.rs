@@ -9,7 +9,8 @@ mod removed;
 use std::collections::BTreeMap;
 
 use mops_core::diagnosis::{
-    Alignment, Change, Dependence, Diagnosis, ForecastOf, Found, HeldBack, Noticeable, Step, StrengthValue, Unexplained, Verdict,
+    Alignment, Change, Dependence, Diagnosis, ForecastOf, Found, HeldBack, Noticeable, Step, StrengthValue,
+    Unexplained, Verdict,
 };
 use mops_core::{Role, math};
 

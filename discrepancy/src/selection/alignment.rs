@@ -43,7 +43,8 @@ pub fn align(search: &Search<'_, '_>, kinds_of_forecast: &[Forecast]) -> Option<
     let trial = |index: usize| {
         let subject = subject.aligned(&alternatives[index]);
         let refit = Refit { subject: &subject, candidates: Vec::new(), nominal: nominal(), simulations };
-        let Rough { start, log_evidence, .. } = refit.roughly(&starts[..1], &likelier.errors, likelier.log_likelihood)?;
+        let Rough { start, log_evidence, .. } =
+            refit.roughly(&starts[..1], &likelier.errors, likelier.log_likelihood)?;
         Some((log_evidence, index, start))
     };
     let tried: Vec<(f64, usize, Start)> = (0..alternatives.len()).into_par_iter().filter_map(trial).collect();

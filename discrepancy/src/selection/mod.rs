@@ -14,9 +14,9 @@ mod search;
 mod tests;
 mod verdict;
 
+pub(crate) use alignment::align;
 #[cfg(test)]
 pub(crate) use baseline::baseline;
-pub(crate) use alignment::align;
 pub(crate) use fitted_set::{FittedSet, Key, estimation};
 pub(crate) use forecast::{Forecasts, with_free_starts};
 pub(crate) use preparation::{prepare, with_given};

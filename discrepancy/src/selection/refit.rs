@@ -184,7 +184,7 @@ impl<'a> Refit<'a> {
             let own = first.iter().find(|(of, _)| *of == kind).map(|(_, estimate)| estimate);
             let mut found: Vec<(ErrorModel, Estimate)> = Vec::new();
             for (_, other) in first.iter().filter(|(of, _)| *of != kind && kind != ErrorModel::Force) {
-                if own.is_none_or(|own| are_apart(&estimation, own, other)) {
+                if own.is_none_or(|own| are_apart(&estimation, own, other, settings().apart)) {
                     found.extend(from(kind, &other.point, own.map(|own| &own.errors)));
                 }
             }
@@ -295,10 +295,10 @@ fn same_choices(a: &crate::variant::Added, b: &crate::variant::Added) -> bool {
     parameters.filter(|(_, p)| p.fixed || p.grid.jumps()).all(|(k, _)| a.strengths[k] == b.strengths[k])
 }
 
-/// Returns true if a shared parameter of two estimates differs by more than a share of its standard error.
-fn are_apart(estimation: &Estimation<'_>, a: &Estimate, b: &Estimate) -> bool {
+/// Returns true if a shared parameter of two estimates differs by more than so many standard errors.
+pub fn are_apart(estimation: &Estimation<'_>, a: &Estimate, b: &Estimate, errors: f64) -> bool {
     let globals = a.point.globals.iter().zip(&b.point.globals).zip(a.deviations.iter().zip(&b.deviations));
-    let apart = |((x, y), (s, t)): ((&f64, &f64), (&f64, &f64))| (x - y).abs() > settings().apart * s.max(*t);
+    let apart = |((x, y), (s, t)): ((&f64, &f64), (&f64, &f64))| (x - y).abs() > errors * s.max(*t);
     estimation.fit.globals.len() == a.point.globals.len() && globals.into_iter().any(apart)
 }
 

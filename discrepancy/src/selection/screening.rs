@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::fitted_set::FittedSet;
 use crate::candidate::Candidate;
 use crate::estimation::{Channels, Errors};
-use crate::fit::{Piece, dot};
+use crate::fit::{Piece, Point, dot};
 use crate::settings::settings;
 
 use crate::trace_of::{View, sizes_for};
@@ -37,6 +37,16 @@ impl Screened {
     /// Returns the cosine of the responses of two candidates in white noise, without what the unknowns take up.
     pub fn likeness(&self, other: &Self) -> f64 {
         dot(&self.directions[0].values, &other.directions[0].values).abs()
+    }
+
+    /// Joins what was screened of the same candidate at another point: the likelier of both leads.
+    fn join(&mut self, mut other: Self) {
+        if other.correlated() > self.correlated() {
+            std::mem::swap(self, &mut other);
+        }
+        self.gains[0] = self.gains[0].max(other.gains[0]);
+        self.guesses.truncate(settings().other_guesses);
+        self.guesses.push(other.guesses.swap_remove(0));
     }
 
     /// Returns the largest gain under the correlated error models.
@@ -85,7 +95,12 @@ const LEFT: f64 = 1e-9;
 impl<'s> Scene<'s> {
     /// Looks at a set at its optimum by least squares, under error models at the outputs; `None` if a simulation fails.
     pub fn new(set: &'s FittedSet<'s>, errors: &'s [Errors]) -> Option<Self> {
-        let (fit, point) = (&set.fit, &set.least_squares.point);
+        Self::at(set, &set.least_squares.point, errors)
+    }
+
+    /// Looks at a set at a point.
+    pub fn at(set: &'s FittedSet<'s>, point: &Point, errors: &'s [Errors]) -> Option<Self> {
+        let fit = &set.fit;
         let slopes = fit.slopes(point)?;
         let trajectory = |piece: usize| Trajectory::new(fit, &set.variant.model, piece, point).ok();
         let trajectories: Vec<Trajectory> =
@@ -127,6 +142,33 @@ impl<'s> Scene<'s> {
         };
         let projections = errors.iter().map(projection).collect();
         Some(Self { set, channels, trajectories, projections, begins })
+    }
+
+    /// Returns for each error model the log-likelihood of what the unknowns leave of the residuals, up to a constant.
+    fn bases(&self) -> Vec<f64> {
+        self.projections.iter().map(|p| -0.5 * dot(&p.residuals, &p.residuals)).collect()
+    }
+
+    /// Screens candidates by index, the best first, at this point and at another one of the same set: each where it explains more.
+    pub fn screen_with(&self, other: &Self, candidates: &[Candidate], wanted: &[usize]) -> Vec<Screened> {
+        let bases = [self, other].map(Self::bases);
+        let of = |scene: &Self, own: &[f64], theirs: &[f64]| {
+            let mut screened = scene.screen(candidates, wanted);
+            for (k, (own, theirs)) in own.iter().zip(theirs).enumerate() {
+                let behind = (theirs - own).max(0.0);
+                screened.iter_mut().for_each(|s| s.gains[k] = (s.gains[k] - behind).max(0.0));
+            }
+            screened
+        };
+        let mut all = of(self, &bases[0], &bases[1]);
+        for there in of(other, &bases[1], &bases[0]) {
+            match all.iter_mut().find(|here| here.index == there.index) {
+                Some(here) => here.join(there),
+                None => all.push(there),
+            }
+        }
+        all.sort_by(|a, b| b.correlated().total_cmp(&a.correlated()));
+        all
     }
 
     /// Screens candidates by index, the best first.

@@ -4,7 +4,7 @@ use mops_core::{EffectClass, math};
 use rayon::prelude::*;
 
 use super::fitted_set::{FittedSet, Key, Start, evidence};
-use super::refit::{Refit, Rough, price};
+use super::refit::{Refit, Rough, are_apart, price};
 use super::screening::{Scene, Screened, pair_gain};
 use super::verdict::is_contradicted;
 use crate::candidate::Candidate;
@@ -223,7 +223,15 @@ impl<'r, 'a> Search<'r, 'a> {
         let is_stacked = |&index: &usize| all[index].only.is_none() || key.iter().all(|&k| all[k].only.is_some());
         let wanted: Vec<usize> =
             (0..all.len()).filter(|index| !key.contains(index)).filter(fits).filter(is_stacked).collect();
-        let screened = scene.screen(all, &wanted);
+        // Correlated errors may leave the basin of least squares: then the motion there is looked at, too.
+        let estimation = parent.estimation(&[]);
+        let apart = likelier_output(&parent)
+            .filter(|likelier| are_apart(&estimation, &parent.least_squares, likelier, settings().clearly));
+        let there = apart.and_then(|likelier| Scene::at(&parent, &likelier.point, &errors));
+        let screened = match &there {
+            Some(there) => scene.screen_with(there, all, &wanted),
+            None => scene.screen(all, &wanted),
+        };
         if key.is_empty() {
             self.screened.clone_from(&screened);
         }
@@ -488,8 +496,9 @@ impl<'r, 'a> Search<'r, 'a> {
 
     /// Returns the fitted sets with one effect less, or else the declared model.
     fn nested(&self, key: &Key) -> Vec<&FittedSet<'a>> {
-        let contained =
-            |smaller: &&FittedSet<'a>| smaller.key.len() + 1 == key.len() && smaller.key.iter().all(|k| key.contains(k));
+        let contained = |smaller: &&FittedSet<'a>| {
+            smaller.key.len() + 1 == key.len() && smaller.key.iter().all(|k| key.contains(k))
+        };
         let nested: Vec<&FittedSet<'a>> = self.sets.iter().filter(contained).collect();
         let declared = self.sets.iter().filter(|set| set.key.is_empty() && nested.is_empty() && !key.is_empty());
         nested.iter().copied().chain(declared).collect()

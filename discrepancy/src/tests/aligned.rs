@@ -37,8 +37,15 @@ fn diagnosed(inflow: fn(&[f64], f64) -> f64, outflow: fn(f64) -> f64) -> Diagnos
     };
     let mut subject = subject(TANK, &[0.4, 0.25, 0.7, 4.0, 4.0], 2, (0..2).map(record).collect());
     subject.measurements[1].role = Role::Selection;
-    let effects =
-        catalogue(&["leak", "sensor-lag", "actuator-lag", "input-delay", "orifice-exponent", "sensor-gain", "overflow"]);
+    let effects = catalogue(&[
+        "leak",
+        "sensor-lag",
+        "actuator-lag",
+        "input-delay",
+        "orifice-exponent",
+        "sensor-gain",
+        "overflow",
+    ]);
     diagnose(&study(&subject), &effects, &Options { max_effects: 2, level: 0.05 }, &()).expect("it simulates")
 }
 
@@ -75,7 +82,8 @@ fn a_delay_and_a_leak_are_effects() {
     let late = diagnosed(|values, sample| at(values, (sample - 1.5).floor()), |_| 0.0);
     assert!(late.alignment.is_empty(), "{:?}", late.alignment);
     assert_eq!(late.found[0].effect, "input-delay");
-    let leaking = diagnosed(|values, sample| at(values, sample.floor()), |h| if h > 4.5 { 0.5 * (h - 4.5).sqrt() } else { 0.0 });
+    let leaking =
+        diagnosed(|values, sample| at(values, sample.floor()), |h| if h > 4.5 { 0.5 * (h - 4.5).sqrt() } else { 0.0 });
     assert!(leaking.alignment.is_empty(), "{:?}", leaking.alignment);
     assert!(leaking.found.iter().any(|found| found.class == "flow"), "{:?}", leaking.found);
 }

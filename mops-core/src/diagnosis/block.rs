@@ -7,8 +7,8 @@ use serde::{Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::{
-    Alignment, Dependence, Diagnosis, Evidence, ExperimentError, ForecastOf, Found, HeldBack, Noticeable, ParameterMove, Ranked,
-    Removed, Rival, Rule, Stability, Step, StrengthValue, Unexplained, Verdict,
+    Alignment, Dependence, Diagnosis, Evidence, ExperimentError, ForecastOf, Found, HeldBack, Noticeable,
+    ParameterMove, Ranked, Removed, Rival, Rule, Stability, Step, StrengthValue, Unexplained, Verdict,
 };
 use crate::experiment::Role;
 
