@@ -232,7 +232,8 @@ impl Sizes {
     }
 
     /// Smallest and largest value that the records can show: enough periods of what repeats, an event of some samples that is not
-    /// most of the record, a time constant that is not much less than a sample, a stop that is left again.
+    /// most of the record, a time constant that is not much less than a sample, a stop that is left again, a force that builds up
+    /// within the motion: beyond, it is a spring.
     fn covered(&self, parameter: &EffectParameter) -> [f64; 2] {
         let periods = |length: f64| std::f64::consts::TAU * settings().periods_seen / length.max(f64::MIN_POSITIVE);
         let within = |share: f64| self.range[0] + share * (self.range[1] - self.range[0]);
@@ -244,7 +245,10 @@ impl Sizes {
             ParameterKind::Frequency => [periods(self.record), f64::INFINITY],
             ParameterKind::Duration => [settings().samples_seen * self.sample, settings().event_share * self.record],
             ParameterKind::BuildUp => {
-                [settings().fastest * self.sample / self.time * self.of(parameter.dimension), f64::INFINITY]
+                let is_displacement = parameter.dimension == Dimension::POSITION;
+                let range = self.range[1] - self.range[0];
+                let most = if is_displacement { settings().built_up * range } else { f64::INFINITY };
+                [settings().fastest * self.sample / self.time * self.of(parameter.dimension), most]
             }
             // Of a store: at a joint a stop yields by its stiffness, however fast.
             ParameterKind::Steepness if self.stiffness.is_none() => {
@@ -258,9 +262,8 @@ impl Sizes {
     /// be another one. A time that is shorter or longer than they show is still a time.
     pub fn shows(&self, parameter: &EffectParameter, value: f64) -> bool {
         let [low, high] = self.covered(parameter);
-        let is_time =
-            matches!(parameter.kind, ParameterKind::BuildUp | ParameterKind::Steepness | ParameterKind::Duration);
-        is_time || value > low && value < high
+        let is_time = matches!(parameter.kind, ParameterKind::Steepness | ParameterKind::Duration);
+        is_time || (value > low || parameter.kind == ParameterKind::BuildUp) && value < high
     }
 
     /// The values of a strength that are tried.

@@ -77,6 +77,9 @@ settings! {
     /// Share of the forecast error above noise that a set must remove where a curve on top of it fires, where it is not first by
     /// evidence, or where only the ends of the calibration records are forecast; there also its probability. Basis: the studies.
     most: f64 = 0.8;
+    /// Share of the mean square error above noise of calibration records that a set must explain for other effects of its classes to
+    /// be tried in it. Basis: the least share that is called most.
+    explained: f64 = 0.5;
     /// Share of the forecast error without it that an effect must remove to be claimed. Basis: an assumption.
     least: f64 = 0.1;
     /// Posterior probability from which class and place are claimed, and the largest one stated of a set that is not first by
@@ -290,6 +293,9 @@ settings! {
     event_share: f64 = 0.25;
     /// Share of the range visited that is free of a stop or an overflow: what always acts is a spring or a loss. Basis: an assumption.
     free_of_it: f64 = 0.25;
+    /// Longest displacement over which a force builds up, as a share of the range visited: over a longer one it is a spring. Basis: an
+    /// assumption.
+    built_up: f64 = 0.5;
     /// Samples at a limit. Basis: the studies.
     touched: usize = 3;
     /// Noises within which samples are at a limit, and from which steps of samples are visible. Basis: the studies.

@@ -216,7 +216,8 @@ impl<'a> Refit<'a> {
         let mut under: Vec<(ErrorModel, Estimate)> = kinds.par_iter().filter_map(|&kind| best(kind)).collect();
         // Correlated errors are more patient with a poor start than least squares is, which then is a start for them.
         let mut least_squares = set.least_squares.clone();
-        for _ in 0..settings().turns {
+        let most = under.iter().map(|(_, estimate)| evidence(estimate)).fold(f64::NEG_INFINITY, f64::max);
+        for _ in 0..if most > least - settings().hopeless { settings().turns } else { 0 } {
             let likeliest = under.iter().max_by(|a, b| evidence(&a.1).total_cmp(&evidence(&b.1)));
             let again = likeliest.and_then(|(_, likeliest)| estimation.least_squares(likeliest.point.clone()));
             let Some(again) = again.filter(|again| again.log_likelihood > least_squares.log_likelihood) else { break };

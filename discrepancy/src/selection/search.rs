@@ -58,6 +58,14 @@ impl<'r, 'a> Search<'r, 'a> {
         set.lack_of_fit().is_none_or(|nats| nats > self.significant) || is_contradicted(set)
     }
 
+    /// Returns true if a set explains most of the mean square error of the declared model above noise: otherwise its effects describe
+    /// what is missing roughly, whatever their names.
+    fn explains_most(&self, set: &FittedSet<'_>) -> bool {
+        let above = |set: &FittedSet<'_>| set.error().map(|error| error * error - 1.0);
+        let both = above(set).zip(self.get(&Key::new()).and_then(above));
+        both.is_some_and(|(own, declared)| own <= (1.0 - settings().explained) * declared)
+    }
+
     /// Notes the most probable set if it has changed.
     fn note(&mut self) {
         let Some(first) = self.sets.first().map(|set| set.key.clone()) else { return };
@@ -96,7 +104,9 @@ impl<'r, 'a> Search<'r, 'a> {
         }
         let mut swapped: Vec<Key> = Vec::new();
         while swapped.len() < settings().beam {
-            let Some(key) = self.sets.first().map(|set| set.key.clone()) else { break };
+            let Some(key) = self.sets.first().filter(|set| self.explains_most(set)).map(|set| set.key.clone()) else {
+                break;
+            };
             if swapped.contains(&key) {
                 break;
             }
@@ -317,9 +327,7 @@ impl<'r, 'a> Search<'r, 'a> {
             let (Some(set), Some(parent)) = (self.get(key), self.get(&smaller).cloned()) else { continue };
             // Where the set is at its optimum, what an effect does is all that is missing without it.
             let start = set.start_at(&set.least_squares.point).without(self.position(set, key[k]));
-            let white = set.least_squares.log_likelihood;
             let Some(rest) = self.refit.at_start(&smaller, &start) else { continue };
-            let white = white - rest.least_squares.log_likelihood;
             let all = &self.refit.candidates;
             let alike = |&index: &usize| {
                 let (this, other) = (&all[key[k]], &all[index]);
@@ -331,12 +339,10 @@ impl<'r, 'a> Search<'r, 'a> {
             let wanted = with(&others, key[k]);
             let Some(scene) = Scene::new(&rest, &[Errors::White]) else { continue };
             let screened = scene.screen(all, &wanted);
-            // The first-order gains of the others are trusted only if that of the effect itself predicts its actual gain.
-            let own = screened.iter().find(|own| own.index == key[k]);
-            let is_predicted = own.is_some_and(|own| settings().allowance * own.gains[0] > white);
+            // Compared to first order, where the effect itself may explain more or less than it does in the end.
+            let own = screened.iter().find(|own| own.index == key[k]).map_or(0.0, |own| own.gains[0]);
             let is_near = |single: &&Screened| {
-                let gain = settings().allowance * single.gains[0];
-                single.index != key[k] && (!is_predicted || gain > white - settings().hopeless)
+                single.index != key[k] && settings().allowance * single.gains[0] > own - settings().hopeless
             };
             // Each is fitted with hyperparameters of its own: those of the set are narrow around its own optimum. Where the set
             // lacks nothing, squares decide. A fit below the set without the effect has failed.

@@ -137,10 +137,12 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
             (own, alike, probability)
         })
         .collect();
-    let is_first = first.is_some_and(|first| {
-        let own = entries_of(search, &set);
-        !set.is_empty() && entries_of(search, &first).iter().all(|entry| own.contains(entry))
-    });
+    let of_first = first.map_or_else(Vec::new, |first| entries_of(search, &first));
+    let own = entries_of(search, &set);
+    let is_first = !own.is_empty() && !of_first.is_empty() && of_first.iter().all(|entry| own.contains(entry));
+    // What has higher evidence says the same, and more that forecasts no better.
+    let is_within = !own.is_empty()
+        && entries.iter().all(|(own, alike, _)| of_first.contains(own) || alike.iter().any(|e| of_first.contains(e)));
     let curves = |key: &Key, kind: Option<ErrorModel>| {
         let set = search.get(key)?;
         let estimate = kind.map_or_else(|| set.likeliest().map(|(_, estimate)| estimate), |kind| set.estimate(kind))?;
@@ -157,8 +159,8 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         .first()
         .is_some_and(|curve| curve.gain >= settings().fires && curve.gain >= settings().small * gained());
     let contradicted = !set.is_empty() && search.get(&set).is_some_and(is_contradicted);
-    // Where a set of higher evidence forecasts no better, or other records contradict, there is more to it, too.
-    let explains = !fires && !contradicted && is_first || share.is_some_and(|share| share >= settings().most);
+    // Where a set of higher evidence says something else, or other records contradict, there is more to it, too.
+    let explains = !fires && !contradicted && (is_first || is_within) || share.is_some_and(|share| share >= settings().most);
     let least = if forecasts.are_of_other_records() { settings().claimed } else { settings().most };
     let most = if is_first { 1.0 } else { settings().claimed };
     // An effect that forecasts hardly better is a proposal.
