@@ -282,10 +282,6 @@ impl<'r, 'a> Search<'r, 'a> {
             self.fit_best(&parent, &pairs, settings().in_full[1]);
             self.sort();
         }
-        for unseen in self.unseen(key, &wanted) {
-            self.fit(&with(key, unseen));
-        }
-        self.sort();
         // What no longer pays goes.
         let best = self.sets.first().map_or(f64::NEG_INFINITY, |first| self.log_posterior(first));
         let near = self.sets.iter().take_while(|set| self.log_posterior(set) > best - settings().negligible);
@@ -295,26 +291,6 @@ impl<'r, 'a> Search<'r, 'a> {
         smaller.dedup();
         self.ensure(&smaller);
         self.correct(&smaller);
-    }
-
-    /// Returns those of some candidates that pay on the declared model under the force error alone: screening, which is under
-    /// output errors, does not see them.
-    fn unseen(&self, key: &Key, among: &[usize]) -> Vec<usize> {
-        let price = price(kinds(&self.refit.candidates));
-        let Some(declared) = self.get(&Vec::new()).filter(|_| !key.is_empty()) else { return Vec::new() };
-        let pays = |single: &FittedSet<'a>, kind: ErrorModel| {
-            let both = single.estimate(kind).zip(declared.estimate(kind));
-            both.is_some_and(|(single, declared)| evidence(single) - evidence(declared) > price)
-        };
-        let is_unseen = |&index: &usize| {
-            let single = self.get(&vec![index]).filter(|_| !self.is_known(&with(key, index)));
-            single.is_some_and(|single| {
-                pays(single, ErrorModel::Force)
-                    && !pays(single, ErrorModel::SmoothOutput)
-                    && !pays(single, ErrorModel::RoughOutput)
-            })
-        };
-        among.iter().copied().filter(is_unseen).collect()
     }
 
     /// Fits the sets in which an effect is exchanged for another of its class at its place.
