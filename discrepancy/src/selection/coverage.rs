@@ -61,19 +61,31 @@ fn is_angle(port: &Port, model: &WithEffects) -> bool {
     unit.is_none_or(|unit| unit.is_angle() || unit.dimension().is_none())
 }
 
-/// Returns true if the declared force at a joint depends on its position, or on that of the companion.
+/// Returns true if the declared force at a joint depends on its position, or on that of the companion. Without a companion it is a
+/// spring to the ground: a shift of all joints alike, which no spring between joints resists, changes the force.
 fn has_spring(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> bool {
     let Some(piece) = pieces.first() else { return false };
     let Some(Spot::Joint(_, position, speed)) = spot(&candidate.port, model, piece) else { return false };
-    let coordinate = match candidate.companion.as_ref().and_then(|port| spot(port, model, piece)) {
-        Some(Spot::Joint(_, other, _)) => other,
-        _ => position,
+    let coordinates = match candidate.companion.as_ref().and_then(|port| spot(port, model, piece)) {
+        Some(Spot::Joint(_, other, _)) => vec![other],
+        _ => positions_like(position, model, piece),
     };
     let moments = || along.iter().flat_map(|trajectory| &trajectory.moments);
     let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0_f64, |most, v| most.max(v.abs()));
     let acceleration = largest(&mut moments().map(|m| m.rates[speed]));
-    let spring = largest(&mut moments().map(|m| m.a[(speed, coordinate)] * m.x[position]));
+    let slope = |m: &Moment| coordinates.iter().map(|&coordinate| m.a[(speed, coordinate)]).sum::<f64>();
+    let spring = largest(&mut moments().map(|m| slope(m) * m.x[position]));
     spring > settings().slight * acceleration
+}
+
+/// Returns the positions of all joints in the unit of one of them.
+fn positions_like(position: usize, model: &WithEffects, piece: &Piece) -> Vec<usize> {
+    let states = model.model().equation_states();
+    let positions = model.model().interface().ports.iter().filter_map(|port| match spot(port, model, piece)? {
+        Spot::Joint(_, position, _) => Some(position),
+        _ => None,
+    });
+    positions.filter(|&other| states[other].unit == states[position].unit).collect()
 }
 
 /// Returns true if the declared model has a spring or a damper between the joints of a candidate: the force on each depends on the
