@@ -44,10 +44,10 @@ const LEAST_SCALE: f64 = 1e-30;
 /// Ratio of actual to predicted decrease up to which a step is rejected.
 const REJECTED: f64 = 1e-4;
 
-/// Largest factor of the damping by which a single ratio shortens a step.
+/// Largest factor of the damping by which a single ratio shortens a step. Half of that of the source passes kinks more often.
 ///
 /// Source: J. J. More, B. S. Garbow, K. E. Hillstrom, User guide for MINPACK-1, report ANL-80-74 (1980), `lmder`.
-const MOST_GROWTH: f64 = 10.0;
+const MOST_GROWTH: f64 = 5.0;
 
 /// Damping beyond which no step can make progress.
 const MOST_DAMPING: f64 = 1e12;
