@@ -403,3 +403,40 @@ fn recorded_inputs_act_before_the_first_sample_used() {
     let k = result["tuners"][0]["value"].as_f64().unwrap();
     assert!((k - 0.7).abs() < 1e-7, "{k}");
 }
+
+#[test]
+fn an_input_with_a_shift_acts_before_its_time_stamps() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = r#"
+        [study]
+        name = "early"
+        task = "calibration"
+        [models.tank.equations]
+        states     = { x = "1" }
+        inputs     = { u = "1" }
+        parameters = { k = "1/s" }
+        der        = { x = "k*u" }
+        start      = { x = 0.5 }
+        [tuners]
+        k = { start = 1.0, min = 0.1, max = 5.0 }
+        [experiments.e]
+        file     = "e.csv"
+        channels = { x = { column = "x", noise = 0.01 } }
+        inputs   = { u = { column = "u", hold = "zero", shift = "-200 ms" } }
+        [criteria]
+        x = { normalised-error = { signal = "x" } }
+    "#;
+    // The input is 3 until 1.5 s, then -1, and is recorded 0.2 s late; k = 0.7.
+    let row = |i: i32| {
+        let t = 0.1 * f64::from(i);
+        let x = 0.5 + 0.7 * (3.0 * t.min(1.5) - (t - 1.5).max(0.0));
+        format!("{t},{},{x}\n", if i < 17 { 3.0 } else { -1.0 })
+    };
+    let table = format!("t,u,x\n{}", (0..=60).map(row).collect::<String>());
+    std::fs::write(folder.path().join("e.csv"), table).unwrap();
+    let path = folder.path().join("study.toml");
+    std::fs::write(&path, study).unwrap();
+    let result = run(path.to_str().unwrap(), folder.path(), &[]);
+    let k = result["tuners"][0]["value"].as_f64().unwrap();
+    assert!((k - 0.7).abs() < 1e-7, "{k}");
+}

@@ -28,6 +28,20 @@ pub struct Added {
 }
 
 impl Added {
+    /// Returns the effect with the values of another one where their parameters have the same name and dimension.
+    #[must_use]
+    pub fn named_like(&self, other: &Self) -> Self {
+        let mut named = self.clone();
+        let theirs = other.candidate.effect.parameters();
+        for (parameter, strength) in self.candidate.effect.parameters().iter().zip(&mut named.strengths) {
+            let same = theirs.iter().position(|p| p.name == parameter.name && p.dimension == parameter.dimension);
+            if let Some(same) = same {
+                *strength = other.strengths[same].clamp(parameter.bounds[0], parameter.bounds[1]);
+            }
+        }
+        named
+    }
+
     /// Takes what a solution says of the effect `index` of a variant: its strengths, and in the experiments of the fit those of
     /// its own there and the start values of its states.
     pub fn take(&mut self, index: usize, variant: &Variant, fit: &Fit<'_>, point: &Point) {

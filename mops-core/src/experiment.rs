@@ -44,6 +44,17 @@ pub enum Hold {
     BandLimited,
 }
 
+impl Hold {
+    /// Returns the name in study files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Zero => "zero",
+            Self::First => "first",
+            Self::BandLimited => "band-limited",
+        }
+    }
+}
+
 /// An input of a model as a function of time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Input {

@@ -151,7 +151,7 @@ fn write_diagnosis(
     for (name, table) in predictions(diagnosis) {
         write(&predicted.join(format!("{name}.csv")), table.as_bytes())?;
     }
-    if diagnosis.found.is_empty() && diagnosis.removed.is_empty() {
+    if !diagnosis.changes_study() {
         return Ok(());
     }
     let text = match home {

@@ -3,9 +3,9 @@
 use std::fmt::Write;
 use std::sync::Arc;
 
-use mops_core::diagnosis::{Diagnosis, Found, StrengthValue};
+use mops_core::diagnosis::{Alignment, Diagnosis, Found, StrengthValue};
 use mops_core::math;
-use mops_core::{AnalysisKind, Effect, EffectParameter, Scope, Study};
+use mops_core::{AnalysisKind, Effect, EffectParameter, Quantity, Scope, Study, Unit};
 
 use super::words;
 use crate::toml_text::{TomlText, key, number, quoted, settled};
@@ -33,6 +33,7 @@ pub(crate) fn repaired(original: &Original<'_>, diagnosis: &Diagnosis, locate: &
     text.set(&["study", "name"], &quoted(&format!("{}-repaired", original.study.name())));
     text.set(&["study", "task"], "\"calibration\"");
     noise_and_criteria(&mut text, diagnosis);
+    alignment(&mut text, diagnosis);
     parameters(&mut text, original.study, diagnosis);
     initial_states(&mut text, original, diagnosis);
     for found in &diagnosis.found {
@@ -56,6 +57,29 @@ fn noise_and_criteria(text: &mut TomlText, diagnosis: &Diagnosis) {
         if !text.has(&["criteria", &p.signal]) {
             let criterion = format!("{{ normalised-error = {{ signal = {} }} }}", quoted(&p.signal));
             text.set(&["criteria", &p.signal], &criterion);
+        }
+    }
+}
+
+/// Sets hold and shift of the inputs that act at other times than the study says.
+fn alignment(text: &mut TomlText, diagnosis: &Diagnosis) {
+    for experiment in text.keys(&["experiments"]) {
+        for Alignment { input, shift, hold } in &diagnosis.alignment {
+            let place = ["experiments", &experiment, "inputs", input];
+            if let Some(column) = text.words(&place) {
+                text.set(&place, &format!("{{ column = {} }}", quoted(&column)));
+            }
+            if text.has(&place) {
+                let own = |key| [&place[..], &[key]].concat();
+                text.set(&own("hold"), &quoted(hold.name()));
+                let second = Unit::known("s");
+                let declared =
+                    text.words(&own("shift")).and_then(|shift| Quantity::parse(&shift).ok()?.to(&second).ok());
+                let shift = shift + declared.unwrap_or(0.0);
+                if shift != 0.0 {
+                    text.set(&own("shift"), &quoted(&format!("{} s", number(shift))));
+                }
+            }
         }
     }
 }
@@ -298,6 +322,21 @@ free     = [\"phi\", \"theta\"]
         let text = made(&diagnosis, &[]);
         let free = "theta = { start = 0.51 }, \"phi-coulomb-friction.1\" = { start = 0.03, min = -0.3, max = 0.3 } }";
         assert!(text.contains(free), "{text}");
+    }
+
+    #[test]
+    fn an_input_that_acts_earlier_has_its_hold_and_shift() {
+        let given = "[experiments.e]\ninputs = { u = \"u\", w = { column = \"w\", shift = \"10 ms\" } }\n";
+        let mut text = TomlText::new(given);
+        let mut diagnosis = Diagnosis::default();
+        let of = |input: &str| Alignment { input: input.to_owned(), shift: -0.02, hold: mops_core::Hold::First };
+        diagnosis.alignment = vec![of("u"), of("w")];
+        alignment(&mut text, &diagnosis);
+        let found: toml::Table = text.into_text().parse().expect("TOML");
+        let inputs = &found["experiments"]["e"]["inputs"];
+        let all = |input: &str| ["column", "hold", "shift"].map(|key| inputs[input][key].as_str().unwrap().to_owned());
+        assert_eq!(all("u"), ["u", "first", "-0.02 s"]);
+        assert_eq!(all("w"), ["w", "first", "-0.01 s"]);
     }
 
     #[test]

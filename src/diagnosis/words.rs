@@ -2,7 +2,7 @@
 
 use mops_core::Role;
 use mops_core::diagnosis::{
-    Dependence, Diagnosis, Found, HeldBack, Removed, Rival, Rule, StrengthValue, Verdict, together,
+    Alignment, Dependence, Diagnosis, Found, HeldBack, Removed, Rival, Rule, StrengthValue, Verdict, together,
 };
 
 use crate::numbers::significant;
@@ -14,18 +14,22 @@ pub(crate) const BARE_MENTION: f64 = 2.0;
 /// Returns the verdict in one to three sentences.
 pub(crate) fn verdict(diagnosis: &Diagnosis) -> String {
     match diagnosis.verdict {
-        Verdict::None => format!(
-            "No missing effect detected. Residual: {} ({} for white residuals).",
-            residual_level(diagnosis),
-            p_value(diagnosis.p_value)
-        ),
+        Verdict::None => {
+            let provided =
+                alignment(diagnosis).map_or_else(String::new, |alignment| format!(", provided that {alignment}"));
+            format!(
+                "No missing effect detected{provided}. Residual: {} ({} for white residuals).",
+                residual_level(diagnosis),
+                p_value(diagnosis.p_value)
+            )
+        }
         Verdict::Effect => {
             let terms: Vec<String> = diagnosis.removed.iter().map(|dropped| format!("`{}`", dropped.term)).collect();
             let lacking = claims(diagnosis).map(|claims| format!("lacks {claims}"));
             let needless = (!terms.is_empty()).then(|| format!("does not need {}", list(&terms)));
             let finding: Vec<String> = lacking.into_iter().chain(needless).collect();
             let finding = finding.join(", and ");
-            let sentences = [explained(diagnosis), proposed(diagnosis), remaining(diagnosis)];
+            let sentences = [aligned(diagnosis), explained(diagnosis), proposed(diagnosis), remaining(diagnosis)];
             let more: String = sentences.into_iter().flatten().map(|sentence| format!(" {sentence}")).collect();
             format!("The model {finding}: {}.{more}", error_change(diagnosis))
         }
@@ -36,7 +40,8 @@ pub(crate) fn verdict(diagnosis: &Diagnosis) -> String {
                 }
                 None => "something that no tested effect explains".to_owned(),
             };
-            let more = proposed(diagnosis).map_or_else(String::new, |sentence| format!(" {sentence}"));
+            let sentences = [aligned(diagnosis), proposed(diagnosis)];
+            let more: String = sentences.into_iter().flatten().map(|sentence| format!(" {sentence}")).collect();
             format!("The model lacks {what}: {}.{more}", error_change(diagnosis))
         }
     }
@@ -66,6 +71,25 @@ fn claims(diagnosis: &Diagnosis) -> Option<String> {
 pub(crate) fn class(class: &str) -> String {
     let article = if class.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
     format!("{article} {class} effect")
+}
+
+/// Returns a sentence on recorded inputs that act at other times than the study says.
+fn aligned(diagnosis: &Diagnosis) -> Option<String> {
+    alignment(diagnosis).map(|alignment| format!("The records agree better with the model if {alignment}."))
+}
+
+/// Returns when recorded inputs act, if at other times than the study says.
+fn alignment(diagnosis: &Diagnosis) -> Option<String> {
+    let of = |own: &Alignment| {
+        let earlier = if own.shift < 0.0 {
+            format!("acts {} s before its time stamps", significant(-own.shift, 4))
+        } else {
+            "is interpolated otherwise between its samples".to_owned()
+        };
+        format!("the input `{}` {earlier} (`hold = \"{}\"`)", own.input, own.hold.name())
+    };
+    let all: Vec<String> = diagnosis.alignment.iter().map(of).collect();
+    (!all.is_empty()).then(|| list(&all))
 }
 
 /// Returns a sentence on the share of the held-out error that the effects explain.
@@ -168,7 +192,7 @@ fn error_change(diagnosis: &Diagnosis) -> String {
 
 /// Returns the residual of the nominal model: `1.02 x noise on calibration data`.
 fn residual_level(diagnosis: &Diagnosis) -> String {
-    let level = by_role(" x noise", |role| together(&diagnosis.before, role).map(times));
+    let level = by_role(" x noise", |role| together(&diagnosis.after, role).map(times));
     level.unwrap_or_else(|| "not known".to_owned())
 }
 

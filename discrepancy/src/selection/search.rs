@@ -302,8 +302,13 @@ impl<'r, 'a> Search<'r, 'a> {
             }
             let (Some(set), Some(parent)) = (self.get(key), self.get(&smaller).cloned()) else { continue };
             // Where the set is at its optimum, what an effect does is all that is missing without it.
-            let start = set.start_at(&set.least_squares.point).without(self.position(set, key[k]));
+            let position = self.position(set, key[k]);
+            let start = set.start_at(&set.least_squares.point);
+            let exchanged = start.added[position].clone();
+            let start = start.without(position);
+            let white = set.least_squares.log_likelihood;
             let Some(rest) = self.refit.at_start(&smaller, &start) else { continue };
+            let white = white - rest.least_squares.log_likelihood;
             let all = &self.refit.candidates;
             let alike = |&index: &usize| {
                 let (this, other) = (&all[key[k]], &all[index]);
@@ -315,10 +320,12 @@ impl<'r, 'a> Search<'r, 'a> {
             let wanted = with(&others, key[k]);
             let Some(scene) = Scene::new(&rest, &[Errors::White]) else { continue };
             let screened = scene.screen(all, &wanted);
-            // Compared to first order, where the effect itself may explain more or less than it does in the end.
-            let own = screened.iter().find(|own| own.index == key[k]).map_or(0.0, |own| own.gains[0]);
+            // The first-order gains of the others are trusted only if that of the effect itself predicts its actual gain.
+            let own = screened.iter().find(|own| own.index == key[k]);
+            let is_predicted = own.is_some_and(|own| settings().allowance * own.gains[0] > white);
             let is_near = |single: &&Screened| {
-                single.index != key[k] && settings().allowance * single.gains[0] > own - settings().hopeless
+                let gain = settings().allowance * single.gains[0];
+                single.index != key[k] && (!is_predicted || gain > white - settings().hopeless)
             };
             // Each is fitted with hyperparameters of its own: those of the set are narrow around its own optimum. Where the set
             // lacks nothing, squares decide. A fit below the set without the effect has failed.
@@ -328,7 +335,9 @@ impl<'r, 'a> Search<'r, 'a> {
             let fitted = |single: &&Screened| {
                 let new = [*single];
                 let likelier = likelier_output(&parent).and_then(|likelier| best_start(&parent, &likelier.point, &new));
-                let rough = self.by_squares(&rest, &new, likelier.as_ref(), least)?;
+                let named = start.with(&single.guesses[0].named_like(&exchanged));
+                let others: Vec<Start> = likelier.into_iter().chain([named]).collect();
+                let rough = self.by_squares(&rest, &new, &others, least)?;
                 let is_hopeless = rough.log_likelihood < least;
                 if is_hopeless { None } else { self.refit.least_squares(&larger(&parent, &new), &[rough.start]) }
             };
@@ -361,7 +370,7 @@ impl<'r, 'a> Search<'r, 'a> {
             let best = trials.iter().map(|trial| trial.rough.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
             let of = |new: &&Vec<&Screened>| {
                 let likelier = best_start(parent, &given.point, new);
-                let by_squares = self.by_squares(parent, new, likelier.as_ref(), f64::NEG_INFINITY)?;
+                let by_squares = self.by_squares(parent, new, likelier.as_slice(), f64::NEG_INFINITY)?;
                 let begin: Vec<Start> = likelier.into_iter().chain([by_squares.start.clone()]).collect();
                 let rough = self.refit.roughly(&begin, &given.errors, best - settings().hopeless)?;
                 Some(Trial { key: larger(parent, new), by_squares, rough })
@@ -389,17 +398,11 @@ impl<'r, 'a> Search<'r, 'a> {
         self.add_all(sets, settings().hopeless);
     }
 
-    /// Fits a set with more effects roughly by least squares: from the optimum of its parent by least squares, and from another
-    /// start. Gives up where the log-likelihood cannot become as large as `least`.
-    fn by_squares(
-        &self,
-        parent: &FittedSet<'a>,
-        new: &[&Screened],
-        other: Option<&Start>,
-        least: f64,
-    ) -> Option<Rough> {
+    /// Fits a set with more effects roughly by least squares: from the optimum of its parent by least squares, and from other
+    /// starts. Gives up where the log-likelihood cannot become as large as `least`.
+    fn by_squares(&self, parent: &FittedSet<'a>, new: &[&Screened], others: &[Start], least: f64) -> Option<Rough> {
         let mut from = starts(parent, &parent.least_squares.point, new);
-        from.extend(other.cloned());
+        from.extend_from_slice(others);
         let rough = self.refit.roughly(&from, &Errors::White, least)?;
         let moved = self.refit.with_moved_states(&rough.start);
         let again = moved.and_then(|moved| self.refit.roughly(&[moved], &Errors::White, least));

@@ -160,7 +160,8 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
         .is_some_and(|curve| curve.gain >= settings().fires && curve.gain >= settings().small * gained());
     let contradicted = !set.is_empty() && search.get(&set).is_some_and(is_contradicted);
     // Where a set of higher evidence says something else, or other records contradict, there is more to it, too.
-    let explains = !fires && !contradicted && (is_first || is_within) || share.is_some_and(|share| share >= settings().most);
+    let explains =
+        !fires && !contradicted && (is_first || is_within) || share.is_some_and(|share| share >= settings().most);
     let least = if forecasts.are_of_other_records() { settings().claimed } else { settings().most };
     let most = if is_first { 1.0 } else { settings().claimed };
     // An effect that forecasts hardly better is a proposal.

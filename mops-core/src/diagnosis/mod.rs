@@ -110,6 +110,11 @@ impl Diagnosis {
     pub fn explains_most(&self) -> bool {
         self.explained_share.is_none_or(|share| share >= 0.5)
     }
+
+    /// Returns true if the repaired study differs from the declared one by more than its initial guess.
+    pub fn changes_study(&self) -> bool {
+        !(self.found.is_empty() && self.removed.is_empty() && self.alignment.is_empty())
+    }
 }
 
 /// Returns a place, with its companion if both are joints or both are processes, as `joint:a with joint:b`: the effect then acts on

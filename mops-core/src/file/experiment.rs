@@ -94,9 +94,8 @@ struct Table<'f> {
     times: Vec<f64>,
     /// Rows used for measurements.
     rows: Range<usize>,
-    /// Rows used for inputs: from the start of the simulation on, which may precede the first measurement. `None` if the
-    /// file starts after the start of the simulation.
-    driven: Option<Range<usize>>,
+    /// Rows that inputs may be taken from.
+    driving: Range<usize>,
 }
 
 impl<'f> Table<'f> {
@@ -149,9 +148,15 @@ impl<'f> Table<'f> {
         }
         let origin = if section.reset_time == Some(false) { 0.0 } else { times[first] };
         let times: Vec<f64> = times.iter().map(|t| t - origin).collect();
-        // The simulation starts at 0 s: inputs there are taken from the last row before.
-        let driven = times[skip..last].partition_point(|&t| t <= 0.0).checked_sub(1).map(|row| skip + row..last);
-        Ok(Self { file, time, times, rows: first..last, driven })
+        Ok(Self { file, time, times, rows: first..last, driving: skip..last })
+    }
+
+    /// Returns the rows used for an input whose time stamps are shifted: from the last one before the start of the simulation at 0 s,
+    /// which may precede the first measurement. `None` if the file starts after that.
+    fn driven(&self, shift: f64) -> Option<Range<usize>> {
+        let Range { start, end } = self.driving;
+        let before = self.times[start..end].partition_point(|&t| t + shift <= 0.0);
+        before.checked_sub(1).map(|row| start + row..end)
     }
 
     fn channel(&self, place: &Node<'_>, signal: &str, table: &ChannelTable) -> Result<ChannelBuilder, Diagnostic> {
@@ -169,16 +174,22 @@ impl<'f> Table<'f> {
     fn input(&self, place: &Node<'_>, table: &InputTable) -> Result<(Input, Option<Unit>), Diagnostic> {
         let (values, unit) =
             self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
-        let Some(rows) = self.driven.clone() else {
-            let first = self.times[self.rows.start];
+        let shift = read_seconds(place, "shift", table.shift.as_ref())?.unwrap_or(0.0);
+        let Some(rows) = self.driven(shift) else {
+            let first = self.times[self.driving.start] + shift;
             let fact = format!("the simulation starts at 0 s, but `{}` is unknown before {first} s", table.column);
             return Err(place
                 .diagnostic(fact)
                 .with_help("omit `reset-time = false` to start at the first sample, or record the input from 0 s on"));
         };
-        let (times, values) = (self.times[rows.clone()].to_vec(), values[rows.clone()].to_vec());
+        let times = self.times[rows.clone()].iter().map(|t| t + shift).collect();
+        let values = values[rows.clone()].to_vec();
         if let Some(gap) = values.iter().position(|v| !v.is_finite()) {
-            let fact = format!("the input column `{}` has a missing sample at {} s", table.column, times[gap]);
+            let fact = format!(
+                "the input column `{}` has a missing sample at {} s",
+                table.column,
+                self.times[rows.start + gap]
+            );
             return Err(self
                 .at(&table.column, rows.start + gap, &fact)
                 .unwrap_or_else(|| place.diagnostic(fact))

@@ -238,7 +238,7 @@ pub(super) struct ExperimentSection {
     /// Measured signals: `theta = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `noise`.
     #[serde(default)]
     pub channels: Entries<ChannelSection>,
-    /// Recorded inputs: `u = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `hold`. Between samples an
+    /// Recorded inputs: `u = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `hold`, `shift`. Between samples an
     /// input is constant (`hold = "zero"`, default) or interpolated linearly (`hold = "first"`).
     #[serde(default)]
     pub inputs: Entries<InputColumn>,
@@ -321,6 +321,9 @@ pub(super) struct InputTable {
     /// `first`: linear interpolation, for smooth inputs. `band-limited`: no content above half the sampling frequency, for
     /// inputs filtered before sampling.
     pub hold: Option<Hold>,
+    /// Time added to the time stamps of the input: negative for an input that acts before them, such as a flow that is logged at the
+    /// end of its interval.
+    pub shift: Option<Quantity>,
 }
 
 /// A state whose initial value is estimated; absent values are derived from the data.
@@ -420,7 +423,8 @@ column_or_table!(InputColumn, InputTable, |column| InputTable {
     unit: None,
     scale: None,
     offset: None,
-    hold: None
+    hold: None,
+    shift: None
 });
 
 /// Free initial states: a list of states, or a table.

@@ -73,7 +73,7 @@ pub(super) fn sections(diagnosis: &Diagnosis, plots: &Plots) -> Markup {
                 (groups(&plots.missing))
             }))
         }
-        @if !diagnosis.found.is_empty() || !diagnosis.removed.is_empty() { (section("Missing effects", missing(diagnosis))) }
+        @if diagnosis.changes_study() { (section(changes(diagnosis), missing(diagnosis))) }
         @if !diagnosis.before.is_empty() { (section(if diagnosis.verdict == Verdict::None { "Errors relative to the noise" } else { "Errors before and after" }, errors::table(diagnosis))) }
         @if !plots.residuals.is_empty() {
             (section("Residuals of the nominal model", html! {
@@ -99,6 +99,11 @@ pub(super) fn sections(diagnosis: &Diagnosis, plots: &Plots) -> Markup {
             (section("Notes", html! { ul class="findings" { @for note in &diagnosis.notes { li { (rich(note)) } } } }))
         }
     }
+}
+
+/// Returns the title of the section on the changes of the study.
+fn changes(diagnosis: &Diagnosis) -> &'static str {
+    if diagnosis.found.is_empty() && diagnosis.removed.is_empty() { "Repaired study" } else { "Missing effects" }
 }
 
 /// Returns the added effects and the dropped terms.
