@@ -1,4 +1,4 @@
-//! Alignment: recorded inputs that act earlier than their time stamps, or that are held otherwise between their samples.
+//! Alignment: recorded inputs that act earlier than their time stamps, or that are interpolated otherwise between their samples.
 //!
 //! An input that acts later is a delay, which is an effect.
 

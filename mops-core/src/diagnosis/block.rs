@@ -23,7 +23,7 @@ pub(crate) struct Block {
     probability: f64,
     /// p-value of the residual's structure without a missing effect.
     p_value: f64,
-    /// Recorded inputs that act at other times than the study says, or are held otherwise; effects are found with these.
+    /// Recorded inputs that act at other times than the study says, or are interpolated otherwise; effects are found with these.
     alignment: Vec<Alignment>,
     /// Effects added to the model, claimed or proposed.
     found: Vec<FoundEffect>,

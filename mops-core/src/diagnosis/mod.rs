@@ -176,7 +176,7 @@ pub enum Rule {
     Probability,
 }
 
-/// Recorded input that acts at other times than its study says, or is held otherwise between its samples.
+/// Recorded input that acts at other times than its study says, or is interpolated otherwise between its samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Alignment {
     /// The input.
