@@ -291,7 +291,8 @@ settings! {
     samples_seen: f64 = 3.0;
     /// Share of a record that an event lasts at most. Basis: the studies.
     event_share: f64 = 0.25;
-    /// Share of the range visited that is free of a stop or an overflow: what always acts is a spring or a loss. Basis: an assumption.
+    /// Share of the range visited that is free of a stop or an overflow, as what always acts is a spring or a loss; share of the way that
+    /// goes back where a hysteresis shows itself. Basis: an assumption.
     free_of_it: f64 = 0.25;
     /// Longest displacement over which a force builds up, as a share of the range visited: over a longer one it is a spring. Basis: an
     /// assumption.

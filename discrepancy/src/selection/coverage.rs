@@ -1,6 +1,6 @@
 //! Which candidates the records can tell at all, decided before any of them is fitted.
 
-use mops_core::{Characteristic, DeclaredTerm, InitialGrid, Port, Variable};
+use mops_core::{Characteristic, DeclaredTerm, Dimension, EffectParameter, InitialGrid, ParameterKind, Port, Variable};
 use mops_models::{Moment, WithEffects};
 use nalgebra::DMatrix;
 
@@ -29,6 +29,10 @@ pub fn is_covered(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], 
     }
     if candidate.effect.characteristic() == Some(Characteristic::Stops) && !shows_stops(candidate, model, pieces, along)
     {
+        return false;
+    }
+    let builds_up = |p: &EffectParameter| p.kind == ParameterKind::BuildUp && p.dimension == Dimension::POSITION;
+    if candidate.effect.parameters().iter().any(builds_up) && !reverses(candidate, model, pieces, along) {
         return false;
     }
     if candidate.effect.is_over_a_turn() && !is_angle(&candidate.port, model) {
@@ -125,15 +129,8 @@ fn has_coupling(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], al
 
 /// Returns true if a motion shows stops: it turns back at both ends, or comes to rest. A falling body turns back at its top only.
 fn shows_stops(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> bool {
-    pieces.iter().zip(along).any(|(piece, along)| {
-        let Some(Spot::Joint(_, _, speed)) = spot(&candidate.port, model, piece) else { return false };
-        let other = match candidate.companion.as_ref().and_then(|port| spot(port, model, piece)) {
-            Some(Spot::Joint(_, _, other)) => Some(other),
-            _ => None,
-        };
-        let speed = |m: &Moment| m.x[speed] - other.map_or(0.0, |other| m.x[other]);
-        let speeds: Vec<f64> = along.moments.iter().map(speed).collect();
-        let still = settings().slight * speeds.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    speeds(candidate, model, pieces, along).iter().any(|speeds| {
+        let still = still(speeds);
         let turns = |sign: f64| {
             let moving = speeds.iter().position(|v| sign * v > still);
             moving.is_some_and(|first| speeds[first..].iter().any(|v| sign * v <= still))
@@ -142,6 +139,34 @@ fn shows_stops(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], alo
         let moved = speeds.iter().position(|v| v.abs() > still).unwrap_or(speeds.len());
         turns(1.0) && turns(-1.0) || speeds[moved..].windows(2 * settings().touched).any(is_at_rest)
     })
+}
+
+/// Returns true if a motion goes both ways for a good part of its range: a hysteresis shows itself at reversals.
+fn reverses(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> bool {
+    speeds(candidate, model, pieces, along).iter().any(|speeds| {
+        let way = |sign: f64| speeds.iter().map(|v| (sign * v).max(0.0)).sum::<f64>();
+        let (forward, back) = (way(1.0), way(-1.0));
+        forward.min(back) > settings().free_of_it * forward.max(back)
+    })
+}
+
+/// Returns the speeds of a joint, or of a joint relative to another one, in every record.
+fn speeds(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> Vec<Vec<f64>> {
+    let of = |(piece, along): (&Piece, &Trajectory)| {
+        let Some(Spot::Joint(_, _, speed)) = spot(&candidate.port, model, piece) else { return None };
+        let other = match candidate.companion.as_ref().and_then(|port| spot(port, model, piece)) {
+            Some(Spot::Joint(_, _, other)) => Some(other),
+            _ => None,
+        };
+        let speed = |m: &Moment| m.x[speed] - other.map_or(0.0, |other| m.x[other]);
+        Some(along.moments.iter().map(speed).collect())
+    };
+    pieces.iter().zip(along).filter_map(of).collect()
+}
+
+/// Returns the speed up to which a joint does not move.
+fn still(speeds: &[f64]) -> f64 {
+    settings().slight * speeds.iter().fold(0.0_f64, |most, v| most.max(v.abs()))
 }
 
 fn touches_limit(values: &[f64], noise: f64) -> bool {
