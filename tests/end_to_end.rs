@@ -364,79 +364,53 @@ fn an_interrupted_run_writes_the_best_point() {
     assert!(result["evaluations"].as_u64().unwrap() >= 1);
 }
 
-/// `x' = k u` from 0.5 at 0 s. Samples of the sensor are used from 2 s on; the recorded input also acts before.
-#[test]
-fn recorded_inputs_act_before_the_first_sample_used() {
+/// Rate `k` of `x' = k u` from 0.5 at 0 s, calibrated with further keys of the experiment. The input is 3 until 1.5 s, then -1, and is
+/// recorded so many steps of 0.1 s late; `k` is 0.7.
+fn rate(keys: &str, input: &str, late: i32) -> f64 {
     let folder = tempfile::tempdir().unwrap();
-    let study = r#"
+    let study = format!(
+        r#"
         [study]
-        name = "late"
+        name = "tank"
         task = "calibration"
         [models.tank.equations]
-        states     = { x = "1" }
-        inputs     = { u = "1" }
-        parameters = { k = "1/s" }
-        der        = { x = "k*u" }
-        start      = { x = 0.5 }
+        states     = {{ x = "1" }}
+        inputs     = {{ u = "1" }}
+        parameters = {{ k = "1/s" }}
+        der        = {{ x = "k*u" }}
+        start      = {{ x = 0.5 }}
         [tuners]
-        k = { start = 1.0, min = 0.1, max = 5.0 }
+        k = {{ start = 1.0, min = 0.1, max = 5.0 }}
         [experiments.e]
-        file       = "e.csv"
-        reset-time = false
-        from       = "2 s"
-        channels   = { x = { column = "x", noise = 0.01 } }
-        inputs     = { u = { column = "u", hold = "zero" } }
+        file     = "e.csv"
+        channels = {{ x = {{ column = "x", noise = 0.01 }} }}
+        inputs   = {{ u = {{ column = "u", {input} }} }}
+        {keys}
         [criteria]
-        x = { normalised-error = { signal = "x" } }
-    "#;
-    // The input is 3 until 1.5 s, then -1; k = 0.7.
+        x = {{ normalised-error = {{ signal = "x" }} }}
+    "#
+    );
     let row = |i: i32| {
         let t = 0.1 * f64::from(i);
         let x = 0.5 + 0.7 * (3.0 * t.min(1.5) - (t - 1.5).max(0.0));
-        format!("{t},{},{x}\n", if i < 15 { 3.0 } else { -1.0 })
+        format!("{t},{},{x}\n", if i < 15 + late { 3.0 } else { -1.0 })
     };
     let table = format!("t,u,x\n{}", (0..=60).map(row).collect::<String>());
     std::fs::write(folder.path().join("e.csv"), table).unwrap();
     let path = folder.path().join("study.toml");
     std::fs::write(&path, study).unwrap();
-    let result = run(path.to_str().unwrap(), folder.path(), &[]);
-    let k = result["tuners"][0]["value"].as_f64().unwrap();
+    run(path.to_str().unwrap(), folder.path(), &[])["tuners"][0]["value"].as_f64().unwrap()
+}
+
+/// Samples of the sensor are used from 2 s on; the recorded input also acts before.
+#[test]
+fn recorded_inputs_act_before_the_first_sample_used() {
+    let k = rate("reset-time = false\nfrom = \"2 s\"", "hold = \"zero\"", 0);
     assert!((k - 0.7).abs() < 1e-7, "{k}");
 }
 
 #[test]
 fn an_input_with_a_shift_acts_before_its_time_stamps() {
-    let folder = tempfile::tempdir().unwrap();
-    let study = r#"
-        [study]
-        name = "early"
-        task = "calibration"
-        [models.tank.equations]
-        states     = { x = "1" }
-        inputs     = { u = "1" }
-        parameters = { k = "1/s" }
-        der        = { x = "k*u" }
-        start      = { x = 0.5 }
-        [tuners]
-        k = { start = 1.0, min = 0.1, max = 5.0 }
-        [experiments.e]
-        file     = "e.csv"
-        channels = { x = { column = "x", noise = 0.01 } }
-        inputs   = { u = { column = "u", hold = "zero", shift = "-200 ms" } }
-        [criteria]
-        x = { normalised-error = { signal = "x" } }
-    "#;
-    // The input is 3 until 1.5 s, then -1, and is recorded 0.2 s late; k = 0.7.
-    let row = |i: i32| {
-        let t = 0.1 * f64::from(i);
-        let x = 0.5 + 0.7 * (3.0 * t.min(1.5) - (t - 1.5).max(0.0));
-        format!("{t},{},{x}\n", if i < 17 { 3.0 } else { -1.0 })
-    };
-    let table = format!("t,u,x\n{}", (0..=60).map(row).collect::<String>());
-    std::fs::write(folder.path().join("e.csv"), table).unwrap();
-    let path = folder.path().join("study.toml");
-    std::fs::write(&path, study).unwrap();
-    let result = run(path.to_str().unwrap(), folder.path(), &[]);
-    let k = result["tuners"][0]["value"].as_f64().unwrap();
+    let k = rate("", "hold = \"zero\", shift = \"-200 ms\"", 2);
     assert!((k - 0.7).abs() < 1e-7, "{k}");
 }

@@ -190,7 +190,7 @@ fn error_change(diagnosis: &Diagnosis) -> String {
     format!("the error {}", change.unwrap_or_else(|| "is not known".to_owned()))
 }
 
-/// Returns the residual of the nominal model: `1.02 x noise on calibration data`.
+/// Returns the residual of the model without missing effects, its inputs aligned: `1.02 x noise on calibration data`.
 fn residual_level(diagnosis: &Diagnosis) -> String {
     let level = by_role(" x noise", |role| together(&diagnosis.after, role).map(times));
     level.unwrap_or_else(|| "not known".to_owned())
