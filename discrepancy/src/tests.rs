@@ -11,6 +11,7 @@ mod holds;
 mod interrupted;
 mod limits;
 mod namesakes;
+mod other_optimum;
 mod pairs;
 mod play;
 mod selection;

@@ -44,7 +44,7 @@ impl<'a> Findings<'_, '_, 'a> {
         let Self { search, verdict, .. } = self;
         let nothing = Key::new();
         let chosen = if verdict.conclusion == Conclusion::None { &nothing } else { &verdict.set };
-        let declared = self.nominal;
+        let declared = self.declared();
         let set = search.get(chosen).expect("a set that passed was fitted");
         let (set, terms) = search.refit.without_terms(set);
         let set = &set;
@@ -96,6 +96,32 @@ impl<'a> Findings<'_, '_, 'a> {
         made.notes = notes.chain(at_bounds).chain(self.notes(set, &made)).collect();
         made.simulations = search.refit.simulations.count();
         made
+    }
+
+    /// Returns the declared model without the effects that the study gives, at the better optimum if the search found one.
+    fn declared(&self) -> &FittedSet<'a> {
+        let found = self.search.get(&Key::new()).filter(|set| set.added.is_empty() && self.alignment.is_empty());
+        let log_likelihood = |set: &FittedSet<'a>| set.least_squares.log_likelihood;
+        let is_better = |set: &&FittedSet<'a>| log_likelihood(set) > log_likelihood(self.nominal) + settings().worse;
+        found.filter(is_better).unwrap_or(self.nominal)
+    }
+
+    /// Returns a note if the fit from the start values of the study ended in another optimum of the declared model.
+    fn other_optimum(&self) -> Option<String> {
+        let (declared, subject) = (self.declared(), self.search.refit.subject);
+        let value = |(&k, value): (&usize, &f64)| {
+            let tuner = &subject.study.tuners()[k];
+            let short = format!("{value:.3e}").parse().unwrap_or(*value);
+            format!("{} = {}", tuner.name, tuner.unit.amount(short))
+        };
+        let values: Vec<String> =
+            subject.globals.iter().zip(&declared.least_squares.point.globals).map(value).collect();
+        (!std::ptr::eq(declared, self.nominal)).then(|| {
+            format!(
+                "the fit of the declared model from the start values of the study ended in a worse optimum: start at {}",
+                values.join(", ")
+            )
+        })
     }
 
     /// Returns true if nothing speaks against the verdict.
@@ -269,6 +295,7 @@ impl<'a> Findings<'_, '_, 'a> {
                 "no selection record: forecasts were tested on the ends of the calibration records only".to_owned(),
             );
         }
+        notes.extend(self.other_optimum());
         if self.verdict.is_contradicted {
             notes.push("selection records contradict the model with the effects found: more is missing".to_owned());
         }

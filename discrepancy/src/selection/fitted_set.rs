@@ -1,6 +1,7 @@
 //! A set of effects, fitted to the calibration records.
 
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 use mops_core::math;
 
@@ -57,6 +58,8 @@ pub struct FittedSet<'a> {
     pub least_squares: Estimate,
     /// Fits under the error models; empty until they are needed.
     pub under: Vec<(ErrorModel, Estimate)>,
+    /// Whether selection records contradict it, once that was asked.
+    pub contradicted: OnceLock<bool>,
 }
 
 impl FittedSet<'_> {

@@ -1,5 +1,7 @@
 //! Fits of sets of effects: the ladder of starts, and the error models.
 
+use std::sync::OnceLock;
+
 use mops_core::{Role, math};
 use rayon::prelude::*;
 
@@ -66,7 +68,15 @@ impl<'a> Refit<'a> {
         let (fit, point, variant) = self.problem(start);
         let estimation = super::fitted_set::estimation(self.subject, &fit, &variant, &added, &[], &point);
         let least_squares = estimation.with(&Errors::White, point, iterations)?;
-        Some(FittedSet { key: key.clone(), added, fit, variant, least_squares, under: Vec::new() })
+        Some(FittedSet {
+            key: key.clone(),
+            added,
+            fit,
+            variant,
+            least_squares,
+            under: Vec::new(),
+            contradicted: OnceLock::new(),
+        })
     }
 
     /// Fits a set roughly under an error model at the outputs whose hyperparameters are given, from the most promising of the starts;
@@ -260,7 +270,8 @@ impl<'a> Refit<'a> {
             if evidence(&under) > evidence(&estimate) {
                 held = all;
                 let key = set.key.clone();
-                set = FittedSet { key, added, fit, variant, least_squares, under: vec![(kind, under)] };
+                let under = vec![(kind, under)];
+                set = FittedSet { key, added, fit, variant, least_squares, under, contradicted: OnceLock::new() };
             }
         }
         (set, held)

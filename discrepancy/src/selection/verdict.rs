@@ -218,6 +218,10 @@ pub fn decide(search: &mut Search<'_, '_>, forecasts: &mut Forecasts) -> Verdict
 /// Returns true if the errors of calibration and selection records, fitted together, are larger than those of the calibration records
 /// alone, and other than the set and its error model expect.
 pub(super) fn is_contradicted(set: &FittedSet<'_>) -> bool {
+    *set.contradicted.get_or_init(|| contradicts(set))
+}
+
+fn contradicts(set: &FittedSet<'_>) -> bool {
     let together = || {
         let (fit, point) = fitted_together(set)?;
         let residuals = fit.all(&point)?;
