@@ -44,7 +44,7 @@ impl<'a> Findings<'_, '_, 'a> {
         let Self { search, verdict, .. } = self;
         let nothing = Key::new();
         let chosen = if verdict.conclusion == Conclusion::None { &nothing } else { &verdict.set };
-        let declared = self.declared();
+        let declared = self.better_declared().unwrap_or(self.nominal);
         let set = search.get(chosen).expect("a set that passed was fitted");
         let (set, terms) = search.refit.without_terms(set);
         let set = &set;
@@ -98,17 +98,16 @@ impl<'a> Findings<'_, '_, 'a> {
         made
     }
 
-    /// Returns the declared model without the effects that the study gives, at the better optimum if the search found one.
-    fn declared(&self) -> &FittedSet<'a> {
-        let found = self.search.get(&Key::new()).filter(|set| set.added.is_empty() && self.alignment.is_empty());
-        let log_likelihood = |set: &FittedSet<'a>| set.least_squares.log_likelihood;
-        let is_better = |set: &&FittedSet<'a>| log_likelihood(set) > log_likelihood(self.nominal) + settings().worse;
-        found.filter(is_better).unwrap_or(self.nominal)
+    /// Returns the declared model at a better optimum than that of its first fit, if the search found one.
+    fn better_declared(&self) -> Option<&FittedSet<'a>> {
+        let found = self.search.get(&Key::new()).filter(|set| set.added.is_empty() && self.alignment.is_empty())?;
+        let first = self.nominal.least_squares.log_likelihood;
+        (found.least_squares.log_likelihood > first + settings().worse).then_some(found)
     }
 
-    /// Returns a note if the fit from the start values of the study ended in another optimum of the declared model.
+    /// Returns a note if the first fit of the declared model ended in a worse optimum than the search found.
     fn other_optimum(&self) -> Option<String> {
-        let (declared, subject) = (self.declared(), self.search.refit.subject);
+        let (declared, subject) = (self.better_declared()?, self.search.refit.subject);
         let value = |(&k, value): (&usize, &f64)| {
             let tuner = &subject.study.tuners()[k];
             let short = format!("{value:.3e}").parse().unwrap_or(*value);
@@ -116,12 +115,8 @@ impl<'a> Findings<'_, '_, 'a> {
         };
         let values: Vec<String> =
             subject.globals.iter().zip(&declared.least_squares.point.globals).map(value).collect();
-        (!std::ptr::eq(declared, self.nominal)).then(|| {
-            format!(
-                "the fit of the declared model from the start values of the study ended in a worse optimum: start at {}",
-                values.join(", ")
-            )
-        })
+        let values = values.join(", ");
+        Some(format!("the first fit of the declared model ended in a worse optimum: start at {values}"))
     }
 
     /// Returns true if nothing speaks against the verdict.
