@@ -226,7 +226,10 @@ impl Sizes {
             }
             _ => [f64::NEG_INFINITY, f64::INFINITY],
         };
-        let [covered_low, covered_high] = self.covered(strength);
+        // Whether an edge is left again is seen in the motion that it bounds, not in the one without it.
+        let is_edge = strength.kind.is_edge();
+        let [covered_low, covered_high] =
+            if is_edge { [f64::NEG_INFINITY, f64::INFINITY] } else { self.covered(strength) };
         let (least, most) = (least.max(covered_low), most.min(covered_high));
         if least.max(low) < most.min(high) { [least.max(low), most.min(high)] } else { strength.bounds }
     }
@@ -294,10 +297,11 @@ impl Sizes {
                 shares.iter().map(|s| least + s * (self.largest() - least)).collect()
             }
             InitialGrid::Plain(values) | InitialGrid::Jumps(values) => values.to_vec(),
-            InitialGrid::Frequencies => {
+            InitialGrid::Frequencies(share) => {
                 let step = std::f64::consts::TAU / (settings().per_period * self.record);
                 let highest = self.highest_frequency();
-                (1..).map(|k| f64::from(k) * step).take_while(|&w| w <= highest).collect()
+                let next = |w: &f64| Some(w + step.max(share * w));
+                std::iter::successors(Some(step), next).take_while(|&w| w <= highest).collect()
             }
             InitialGrid::Steps => {
                 let numbers = 1..=PER_STEP * (settings().most_steps - 1);

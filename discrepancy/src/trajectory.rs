@@ -6,7 +6,8 @@
 
 use mops_core::{Failure, Job, Port};
 use mops_models::{Moment, WithEffects};
-use nalgebra::DMatrix;
+use nalgebra::allocator::Allocator;
+use nalgebra::{Const, DMatrix, DefaultAllocator, Dim, Dyn, OMatrix};
 
 use crate::error_models::{LinearisedMotion, Measured};
 use crate::fit::{Fit, Point};
@@ -246,18 +247,38 @@ impl Trajectory {
 }
 
 fn interval(h: f64, moments: &[Moment]) -> Interval {
-    let (a1, a2) = (&moments[0].a, &moments[1].a);
-    let commutator = a2 * a1 - a1 * a2;
-    let magnus = (a1 + a2) * (0.5 * h) + commutator * (3.0_f64.sqrt() / 12.0 * h * h);
+    match moments[0].a.nrows() {
+        1 => interval_of(Const::<1>, h, moments),
+        2 => interval_of(Const::<2>, h, moments),
+        3 => interval_of(Const::<3>, h, moments),
+        4 => interval_of(Const::<4>, h, moments),
+        5 => interval_of(Const::<5>, h, moments),
+        6 => interval_of(Const::<6>, h, moments),
+        n => interval_of(Dyn(n), h, moments),
+    }
+}
+
+/// The same for a number of states that may be known to the compiler.
+fn interval_of<N: Dim>(n: N, h: f64, moments: &[Moment]) -> Interval
+where
+    DefaultAllocator: Allocator<N, N> + Allocator<N, Dyn>,
+{
+    let square = |m: &DMatrix<f64>| OMatrix::<f64, N, N>::from_column_slice_generic(n, n, m.as_slice());
+    let (a1, a2) = (square(&moments[0].a), square(&moments[1].a));
+    let commutator = &a2 * &a1 - &a1 * &a2;
+    let magnus = (&a1 + &a2) * (0.5 * h) + commutator * (3.0_f64.sqrt() / 12.0 * h * h);
     let transition = exponential(&magnus);
-    let mean = (a1 + a2) * 0.5;
+    let mean = (&a1 + &a2) * 0.5;
     let gains = [0, 1].map(|k| {
         // From a node to the end: the mean of the system over what is left.
         let left = h * (1.0 - NODES[k]);
-        let along = if k == 0 { mean.clone() } else { a2.clone() };
-        exponential(&(along * left)) * &moments[k].b * (0.5 * h)
+        let along = if k == 0 { &mean } else { &a2 };
+        let columns = Dyn(moments[k].b.ncols());
+        let b = OMatrix::<f64, N, Dyn>::from_column_slice_generic(n, columns, moments[k].b.as_slice());
+        let gain = exponential(&(along * left)) * b * (0.5 * h);
+        DMatrix::from_column_slice(gain.nrows(), gain.ncols(), gain.as_slice())
     });
-    Interval { transition, gains }
+    Interval { transition: DMatrix::from_column_slice(n.value(), n.value(), transition.as_slice()), gains }
 }
 
 /// Returns the jump of small deviations of the states where a joint with dry friction comes to rest or turns between two nodes: with
@@ -286,14 +307,18 @@ fn jump(before: &Moment, after: &Moment) -> Option<DMatrix<f64>> {
 }
 
 /// `exp(M)` by its series after halving.
-fn exponential(m: &DMatrix<f64>) -> DMatrix<f64> {
+fn exponential<N: Dim>(m: &OMatrix<f64, N, N>) -> OMatrix<f64, N, N>
+where
+    DefaultAllocator: Allocator<N, N>,
+{
     let mut halvings = 0;
     let mut scaled = m.clone();
     while scaled.amax() > 0.25 && halvings < 40 {
         scaled *= 0.5;
         halvings += 1;
     }
-    let identity = DMatrix::identity(m.nrows(), m.ncols());
+    let (rows, columns) = m.shape_generic();
+    let identity = OMatrix::<f64, N, N>::identity_generic(rows, columns);
     let mut sum = identity.clone();
     for k in (1..=8).rev() {
         sum = &identity + (&scaled * sum) / f64::from(k);

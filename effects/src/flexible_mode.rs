@@ -33,7 +33,8 @@ impl Definition for FlexibleMode {
             "natural frequency of the attached mass with the joint fixed, rad/s",
             Dimension::PER_TIME,
             NOT_NEGATIVE,
-            InitialGrid::Frequencies,
+            // As far apart as the weaker of the damping ratios lets resonances overlap.
+            InitialGrid::Frequencies(0.08),
         ),
         EffectParameter::shape("d", "damping ratio", Dimension::ONE, [0.0, 2.0], InitialGrid::Plain(&[0.02, 0.2])),
     ];

@@ -29,7 +29,7 @@ impl Definition for PeriodicDisturbance {
             "angular frequency, rad/s",
             Dimension::PER_TIME,
             NOT_NEGATIVE,
-            InitialGrid::Frequencies,
+            InitialGrid::Frequencies(0.0),
         ),
         phase().per_experiment(),
     ];

@@ -127,7 +127,7 @@ fn first_trials_are_few_and_allowed() {
                     assert!(allowed(values), "{}", effect.name());
                     count *= values.len() + multiples.len();
                 }
-                InitialGrid::Frequencies | InitialGrid::Steps | InitialGrid::Moments(_) => {}
+                InitialGrid::Frequencies(_) | InitialGrid::Steps | InitialGrid::Moments(_) => {}
             }
         }
         assert!(count <= 44, "{}: {count}", effect.name());

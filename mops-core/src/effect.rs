@@ -181,8 +181,9 @@ pub enum InitialGrid {
     /// Listed values, then multiples of the typical size: periods per turn, and along a rail.
     PlainAndScaled(&'static [f64], &'static [f64]),
     /// Frequencies in rad/s that the record can resolve: at least two thirds of a period in the record, at most 160 periods
-    /// or four samples per period.
-    Frequencies,
+    /// or four samples per period. Each is above the one before by at least this share: a resonance of damping ratio d is 2 d
+    /// times its frequency wide.
+    Frequencies(f64),
     /// Quantisation steps: the largest value divided by the number of steps, from one step on. Neighbouring candidates
     /// differ by one step in about every eighth sample.
     Steps,
@@ -229,6 +230,14 @@ pub enum ParameterKind {
     Instant,
     /// Duration of an event.
     Duration,
+}
+
+impl ParameterKind {
+    /// Returns true for an edge, beyond which a stop or an overflow acts.
+    #[must_use]
+    pub fn is_edge(self) -> bool {
+        matches!(self, Self::LowerEdge | Self::UpperEdge)
+    }
 }
 
 /// Term of the declared model that an effect modifies.
@@ -320,7 +329,7 @@ impl EffectParameter {
     ) -> Self {
         let kind = match grid {
             InitialGrid::Within(_) | InitialGrid::WithinAndGap(_) | InitialGrid::WithinSize(_) => ParameterKind::Level,
-            InitialGrid::Frequencies => ParameterKind::Frequency,
+            InitialGrid::Frequencies(_) => ParameterKind::Frequency,
             _ => ParameterKind::Shape,
         };
         Self { kind, bounds, grid, null_value: None, ..Self::positive(name, about, dimension) }

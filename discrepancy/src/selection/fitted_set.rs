@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 use mops_core::math;
+use rayon::prelude::*;
 
 use crate::candidate::Candidate;
 use crate::estimation::{Channels, ErrorModel, Errors, Estimate, Estimation, log_choices, priors};
 use crate::fit::{Fit, Piece, Point};
 use crate::subject::Subject;
+use crate::trajectory::Trajectory;
 use crate::variant::{Added, Variant};
 
 /// Values to start a fit from: parameters of the study, initial states of each record, and effects with theirs.
@@ -66,6 +68,12 @@ impl FittedSet<'_> {
     /// Returns the estimation problem, with the nominal rates of the baseline.
     pub fn estimation(&self, nominal: &[f64]) -> Estimation<'_> {
         estimation(self.fit.subject, &self.fit, &self.variant, &self.added, nominal, &self.least_squares.point)
+    }
+
+    /// Returns the motion in each record at a point; `None` if a simulation fails.
+    pub fn trajectories(&self, point: &Point) -> Option<Vec<Trajectory>> {
+        let of = |piece: usize| Trajectory::new(&self.fit, &self.variant.model, piece, point).ok();
+        (0..self.fit.pieces.len()).into_par_iter().map(of).collect()
     }
 
     /// Returns the fit under an error model.

@@ -13,7 +13,6 @@ use crate::candidate::Candidate;
 use crate::estimation::{Errors, nominal_rates};
 use crate::meter::Meter;
 use crate::subject::Subject;
-use crate::trajectory::Trajectory;
 use crate::variant::Added;
 
 /// Adds effects that the study gives, `effect@place` each, to the fitted declared model, and fits it again. They are in all sets.
@@ -61,9 +60,7 @@ pub fn prepare<'a>(
     subject.take_pace(&start.tuners);
     let mut refit = Refit { subject, candidates: subject.candidates(effects), nominal: Vec::new(), simulations };
     let declared = refit.least_squares(&Vec::new(), &[start])?;
-    let along =
-        |piece| Trajectory::new(&declared.fit, &declared.variant.model, piece, &declared.least_squares.point).ok();
-    let trajectories: Vec<Trajectory> = (0..declared.fit.pieces.len()).map(along).collect::<Option<_>>()?;
+    let trajectories = declared.trajectories(&declared.least_squares.point)?;
     refit.nominal = nominal_rates(&declared.variant, &trajectories);
     refit
         .candidates

@@ -102,9 +102,7 @@ impl<'s> Scene<'s> {
     pub fn at(set: &'s FittedSet<'s>, point: &Point, errors: &'s [Errors]) -> Option<Self> {
         let fit = &set.fit;
         let slopes = fit.slopes(point)?;
-        let trajectory = |piece: usize| Trajectory::new(fit, &set.variant.model, piece, point).ok();
-        let trajectories: Vec<Trajectory> =
-            (0..fit.pieces.len()).into_par_iter().map(trajectory).collect::<Option<_>>()?;
+        let trajectories = set.trajectories(point)?;
         let mut begins = vec![0];
         for piece in &slopes {
             begins.push(begins[begins.len() - 1] + piece.r.len());

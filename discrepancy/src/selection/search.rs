@@ -1,5 +1,7 @@
 //! Best-first search over sets of effects.
 
+use std::cell::OnceCell;
+
 use mops_core::{EffectClass, math};
 use rayon::prelude::*;
 
@@ -11,6 +13,7 @@ use crate::candidate::Candidate;
 use crate::estimation::{ErrorModel, Errors, Estimate};
 use crate::fit::{Point, Sets};
 use crate::settings::settings;
+use crate::trace_of::sizes_for;
 use crate::variant::Added;
 
 /// Sets that are fitted under the error models at once. Those before them decide for which of them this is hopeless.
@@ -157,9 +160,17 @@ impl<'r, 'a> Search<'r, 'a> {
 
     /// Returns true if an effect of a set is as strong as is physically possible, or at an end of what the records cover.
     pub fn is_at_limit(&self, set: &FittedSet<'a>) -> bool {
+        let motion = OnceCell::new();
+        let sizes = |added: &Added| {
+            let trajectories = motion.get_or_init(|| set.trajectories(&set.least_squares.point)).as_ref()?;
+            sizes_for(&added.candidate, &set.variant.model, &set.fit.pieces, trajectories)
+        };
         let is_shown = |added: &Added| {
             let mut parameters = added.candidate.effect.parameters().iter().zip(&added.strengths);
-            parameters.all(|(parameter, value)| added.sizes.shows(parameter, *value))
+            parameters.all(|(parameter, value)| {
+                let of_motion = if parameter.kind.is_edge() { sizes(added) } else { None };
+                of_motion.unwrap_or(added.sizes).shows(parameter, *value)
+            })
         };
         set.start_at(&set.least_squares.point).added.iter().any(|added| added.is_at_limit() || !is_shown(added))
     }

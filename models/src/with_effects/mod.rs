@@ -77,7 +77,7 @@ impl WithEffects {
                     name: format!("{name}.{}", parameter.name),
                     unit: match parameter.grid {
                         // With the unit 1/s, 5 Hz would be read as 5 rad/s.
-                        InitialGrid::Frequencies => Unit::known("rad/s"),
+                        InitialGrid::Frequencies(_) => Unit::known("rad/s"),
                         _ => unit(parameter.dimension, &placement.port, placement.companion.as_ref(), of),
                     },
                     about: parameter.about.to_owned(),
