@@ -8,7 +8,7 @@ use mops_core::diagnosis::Alignment;
 use mops_core::{Hold, Input};
 use rayon::prelude::*;
 
-use super::fitted_set::{FittedSet, Key, Start};
+use super::fitted_set::{Key, Start};
 use super::forecast::{Forecast, error_of};
 use super::refit::{Refit, Rough, price};
 use super::search::{Search, kinds, likelier_output};
@@ -54,14 +54,15 @@ pub fn align(search: &Search<'_, '_>, kinds_of_forecast: &[Forecast]) -> Option<
     let is_better = {
         let refit = Refit { subject: &aligned, candidates: Vec::new(), nominal: nominal(), simulations };
         let mut set = refit.least_squares(&Key::new(), &[start, starts[1].clone()])?;
-        refit.under_error_models(&mut set, &[], f64::NEG_INFINITY);
-        let posterior = set.log_evidence() - price(kinds(candidates) + alternatives.len());
-        let is_beaten = |other: &FittedSet<'_>| other.key.len() < 2 && search.log_posterior(other) >= posterior;
+        let price = price(kinds(candidates) + alternatives.len());
+        let singles = search.sets.iter().filter(|other| other.key.len() < 2);
+        let rival = singles.map(|single| search.log_posterior(single)).fold(f64::NEG_INFINITY, f64::max);
+        refit.under_error_models(&mut set, &[declared], rival + price);
         let forecasts_better = |kind: &Forecast| {
             let errors = error_of(&set, *kind).zip(error_of(declared, *kind));
             errors.is_some_and(|(own, theirs)| own < theirs)
         };
-        !search.sets.iter().any(is_beaten) && kinds_of_forecast.iter().all(forecasts_better)
+        set.log_evidence() - price > rival && kinds_of_forecast.iter().all(forecasts_better)
     };
     is_better.then(|| (aligned, inputs.clone()))
 }
