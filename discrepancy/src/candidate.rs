@@ -237,6 +237,7 @@ impl Sizes {
     /// Smallest and largest value that the records can show: enough periods of what repeats, an event of some samples that is not
     /// most of the record, a time constant that is not much less than a sample, a stop that is left again, a force that builds up
     /// within the motion: beyond, it is a spring.
+    #[allow(clippy::cast_precision_loss)]
     fn covered(&self, parameter: &EffectParameter) -> [f64; 2] {
         let periods = |length: f64| std::f64::consts::TAU * settings().periods_seen / length.max(f64::MIN_POSITIVE);
         let within = |share: f64| self.range[0] + share * (self.range[1] - self.range[0]);
@@ -246,7 +247,9 @@ impl Sizes {
             ParameterKind::Damping => [f64::NEG_INFINITY, self.time],
             ParameterKind::WaveNumber => [periods(self.range[1] - self.range[0]), f64::INFINITY],
             ParameterKind::Frequency => [periods(self.record), f64::INFINITY],
-            ParameterKind::Duration => [settings().samples_seen * self.sample, settings().event_share * self.record],
+            ParameterKind::Duration => {
+                [settings().samples_seen as f64 * self.sample, settings().event_share * self.record]
+            }
             ParameterKind::BuildUp => {
                 let is_displacement = parameter.dimension == Dimension::POSITION;
                 let range = self.range[1] - self.range[0];

@@ -99,8 +99,6 @@ settings! {
     alike: f64 = 0.98;
     /// Gain in log-likelihood below which an effect under every error model does nothing, nats. Basis: an assumption.
     inert: f64 = 0.3;
-    /// Difference in log-likelihood up to which two sets describe the records equally well, nats. Basis: an assumption.
-    as_good: f64 = 3.0;
     /// Standard errors by which an estimate differs clearly from another one. Basis: a normal error exceeds them in 0.3 %.
     clearly: f64 = 3.0;
     /// Standard errors up to which a declared term may be 0. Basis: a 95 % interval.
@@ -115,8 +113,6 @@ settings! {
     singles: usize = 8;
     /// Further candidates by gain in white noise. Basis: the studies.
     by_squares: usize = 2;
-    /// Candidates among which pairs are formed. Basis: the studies.
-    paired: usize = 60;
     /// Pairs that are fitted. Basis: the studies.
     pairs: usize = 10;
     /// Single effects and pairs of an expansion that are fitted under all error models. Basis: an assumption.
@@ -181,10 +177,8 @@ settings! {
     step_error: f64 = 0.03;
     /// Loosest relative tolerance of a simulation. Basis: an assumption.
     loosest: f64 = 1e-5;
-    /// Largest number of iterations of a fit. Basis: an assumption.
+    /// Largest number of iterations of a fit; of a rough one half of it. Basis: an assumption.
     iterations: usize = 60;
-    /// Largest number of iterations of a rough fit. Basis: an assumption.
-    rough_iterations: usize = 30;
     /// Rounds of parameters and hyperparameters. Basis: an assumption.
     rounds: usize = 8;
     /// Iterations of the parameters in a round, and of a start of the declared model. Basis: an assumption.
@@ -194,10 +188,8 @@ settings! {
     converged: f64 = 0.01;
     /// Predicted decrease of log-likelihood where a rough fit ends, nats. Basis: an assumption.
     roughly: f64 = 0.1;
-    /// Iterations in a row that each decrease the sum of squares by less than the share `stalls` after which a rough fit ends.
-    /// Basis: an assumption.
-    stalled: usize = 5;
-    /// Share of the sum of squares. Basis: an assumption.
+    /// Share of the sum of squares by which each of `look` iterations in a row must decrease it, or a rough fit ends. Basis: an
+    /// assumption.
     stalls: f64 = 0.01;
     /// Gain in log-likelihood, or decrease of a penalty, below which rounds end, nats. Basis: the studies.
     settled: f64 = 0.05;
@@ -213,12 +205,10 @@ settings! {
     shorter: f64 = 0.4;
     /// Trials for each parameter that no derivative moves. Basis: an assumption.
     trials: usize = 24;
-    /// Halvings of their stride. Basis: an assumption.
+    /// Halvings of their stride, from which the end of an interval is searched with twice as many doublings. Basis: an assumption.
     halvings: i32 = 8;
     /// Turns of all such parameters. Basis: an assumption.
     turns: usize = 3;
-    /// Doublings of the stride in the search for the end of an interval. Basis: an assumption.
-    doublings: i32 = 16;
     /// Bisections in the search for the end of an interval. Basis: an assumption.
     bisections: usize = 6;
     /// Steps of a simulation of a candidate for each sample, beyond which it is too stiff. Basis: an assumption.
@@ -256,13 +246,11 @@ settings! {
     declared_prior: f64 = 1.5;
     /// Standard deviation of an initial state, scales. Basis: the studies.
     start_prior: f64 = 3.0;
-    /// Standard deviation of a parameter with a null value, typical sizes at its place. Basis: the studies.
+    /// Standard deviation of a parameter with a null value, typical sizes at its place, and of the logarithm of the steepness of a
+    /// contact or an edge, which data know from below only. Basis: the studies.
     strength_prior: f64 = 2.0;
     /// Standard deviation of the logarithm of a shape. Basis: the studies.
     shape_prior: f64 = 1.0;
-    /// Standard deviation of the logarithm of the steepness of a contact or an edge, which data know from below only. Basis: an
-    /// assumption.
-    steepness_prior: f64 = 2.0;
     /// Standard deviation of a gain. Basis: the studies.
     gain_prior: f64 = 0.3;
     /// Standard deviation of an offset of a sensor, ranges. Basis: the studies.
@@ -287,8 +275,8 @@ settings! {
     /// Periods of what repeats along a position or in time; turns of an angle that is also a coordinate modulo one turn. Basis: the
     /// studies.
     periods_seen: f64 = 1.5;
-    /// Samples that an event lasts. Basis: the studies.
-    samples_seen: f64 = 3.0;
+    /// Samples that an event lasts, or that are at a limit. Basis: the studies.
+    samples_seen: usize = 3;
     /// Share of a record that an event lasts at most. Basis: the studies.
     event_share: f64 = 0.25;
     /// Share of the range visited that is free of a stop or an overflow, as what always acts is a spring or a loss; share of the way that
@@ -297,8 +285,6 @@ settings! {
     /// Longest displacement over which a force builds up, as a share of the range visited: over a longer one it is a spring. Basis: an
     /// assumption.
     built_up: f64 = 0.5;
-    /// Samples at a limit. Basis: the studies.
-    touched: usize = 3;
     /// Noises within which samples are at a limit, and from which steps of samples are visible. Basis: the studies.
     visible: f64 = 2.0;
     /// Share of the largest acceleration that a declared spring must have, and of the largest speed below which a motion is at rest.

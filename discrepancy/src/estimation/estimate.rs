@@ -94,7 +94,7 @@ impl Estimation<'_> {
     /// Fits like [`Estimation::with`], but roughly, and gives up where the log-likelihood cannot become as large as `least`.
     pub fn roughly(&self, errors: &Errors, start: Point, least: f64) -> Option<Estimate> {
         let effort = Effort {
-            iterations: settings().rough_iterations,
+            iterations: settings().iterations / 2,
             negligible: 2.0 * settings().roughly,
             least,
             stalls: |sum| settings().stalls * sum,
@@ -419,7 +419,7 @@ impl Estimation<'_> {
         };
         let mut stalled = 0;
         for iteration in 0..effort.iterations {
-            if iteration > 1 && is_hopeless(&iterate) || stalled >= settings().stalled {
+            if iteration > 1 && is_hopeless(&iterate) || stalled >= settings().look {
                 break;
             }
             let before = iterate.sum();

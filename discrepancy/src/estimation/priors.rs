@@ -51,7 +51,7 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
             value.abs().max(if least.is_finite() { least } else { f64::MIN_POSITIVE })
         };
         match of.kind {
-            ParameterKind::Steepness => at_centre(typical(), settings().steepness_prior),
+            ParameterKind::Steepness => at_centre(typical(), settings().strength_prior),
             ParameterKind::Strength if of.null_value == Some(0.0) => match of.dimension {
                 Dimension::ONE => about_null(1.0, settings().gain_prior),
                 Dimension::TIME => about_null(added.sizes.lag(), 1.0),

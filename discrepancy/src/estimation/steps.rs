@@ -59,7 +59,7 @@ impl Estimation<'_> {
         let place = |by: f64| (value + by).clamp(global.bounds[0], global.bounds[1]);
         let end = |side: f64| {
             let (mut inner, mut outer) = (0.0, side * global.scale * math::powi(0.5, settings().halvings));
-            let farthest = outer.abs() * math::powi(2.0, settings().doublings);
+            let farthest = outer.abs() * math::powi(2.0, 2 * settings().halvings);
             while is_within(outer) {
                 if global.bounds.contains(&place(outer)) || outer.abs() >= farthest {
                     return place(outer);

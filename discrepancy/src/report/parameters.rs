@@ -69,7 +69,7 @@ fn allowed(set: &FittedSet<'_>, index: usize, k: usize) -> Option<[f64; 2]> {
         let (fit, point, variant) =
             problem(subject, &start.added, pieces, &start.tuners, start.locals.clone(), &[], set.fit.simulations);
         let estimation = estimation(subject, &fit, &variant, &start.added, &[], &point);
-        let Some(found) = estimation.with(&estimate.errors, point, settings().rough_iterations) else { continue };
+        let Some(found) = estimation.with(&estimate.errors, point, settings().iterations / 2) else { continue };
         if found.log_likelihood > estimate.log_likelihood - FALL {
             range = [range[0].min(value), range[1].max(value)];
         }

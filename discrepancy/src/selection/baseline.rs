@@ -55,15 +55,15 @@ pub fn baseline(subject: &Subject, simulations: &Meter<'_>) -> Option<Start> {
         {
             let windows = in_windows(count);
             let locals = base::first_locals(&windows);
-            let Some(fitted) = fit(windows.clone(), &tuners, locals, settings().rough_iterations) else { continue };
+            let Some(fitted) = fit(windows.clone(), &tuners, locals, settings().iterations / 2) else { continue };
             starts = begin_of_records(&whole, &windows, &fitted.locals);
             tuners = fitted.tuners;
         }
-        fit(whole.clone(), &tuners, starts, 2 * settings().rough_iterations)
+        fit(whole.clone(), &tuners, starts, settings().iterations)
     };
     let mut ended: Vec<Fitted> = begun.par_iter().filter_map(to_the_end).collect();
     // Windows help a poor start; a good one may need none.
-    ended.extend(fit(whole.clone(), &subject.start(), base::first_locals(&whole), 2 * settings().rough_iterations));
+    ended.extend(fit(whole.clone(), &subject.start(), base::first_locals(&whole), settings().iterations));
     let best = ended.into_iter().min_by(|a, b| a.sum.total_cmp(&b.sum))?;
     Some(Start { tuners: best.tuners, locals: best.locals, added: Vec::new() })
 }

@@ -137,7 +137,7 @@ fn shows_stops(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], alo
         };
         let is_at_rest = |speeds: &[f64]| speeds.iter().all(|v| v.abs() <= still);
         let moved = speeds.iter().position(|v| v.abs() > still).unwrap_or(speeds.len());
-        turns(1.0) && turns(-1.0) || speeds[moved..].windows(2 * settings().touched).any(is_at_rest)
+        turns(1.0) && turns(-1.0) || speeds[moved..].windows(2 * settings().samples_seen).any(is_at_rest)
     })
 }
 
@@ -172,7 +172,7 @@ fn still(speeds: &[f64]) -> f64 {
 fn touches_limit(values: &[f64], noise: f64) -> bool {
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     let count = |limit: f64| values.iter().filter(|v| (*v - limit).abs() < settings().visible * noise).count();
-    count(low) >= settings().touched || count(high) >= settings().touched
+    count(low) >= settings().samples_seen || count(high) >= settings().samples_seen
 }
 
 fn any_series(

@@ -225,7 +225,8 @@ impl<'r, 'a> Search<'r, 'a> {
             other.key.len() == set.key.len()
                 && rest.iter().all(|k| other.key.contains(k))
                 && new.is_some_and(|&k| candidates[k].has_fewer_strengths_than(candidate))
-                && theirs.is_some_and(|theirs| theirs.log_likelihood > estimate.log_likelihood - settings().as_good)
+                && theirs
+                    .is_some_and(|theirs| theirs.log_likelihood > estimate.log_likelihood - 0.5 * settings().strong)
         });
         matching.min_by_key(|set| set.parameters()).map(|simplest| simplest.key.clone())
     }
@@ -595,8 +596,7 @@ fn output_errors(set: &FittedSet<'_>) -> Vec<Errors> {
 
 /// Returns the best pairs by their normal equations.
 fn pairs<'s>(screened: &'s [Screened], candidates: &[Candidate]) -> Vec<(f64, Vec<&'s Screened>)> {
-    let repeats = screened.iter().filter(|screened| candidates[screened.index].only.is_none());
-    let among: Vec<&Screened> = repeats.take(settings().paired).collect();
+    let among: Vec<&Screened> = screened.iter().filter(|screened| candidates[screened.index].only.is_none()).collect();
     #[allow(clippy::cast_precision_loss)]
     let further = |a: usize, b: usize| {
         let count = |k: usize| candidates[among[k].index].effect.parameters().len();
