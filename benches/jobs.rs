@@ -71,8 +71,8 @@ fn timed(problem: &Slow, evaluations: usize, solver: &mut dyn Solver, threads: u
 fn main() {
     let solvers: [Named; 3] = [
         ("genetic", || GeneticOptions::default().build()),
-        ("pattern-search", || PatternSearchOptions::default().build()),
-        ("sqp, gradients by differences", || SqpOptions::default().build()),
+        ("pattern-search", || PatternSearchOptions::default().local()),
+        ("sqp, gradients by differences", || SqpOptions::default().local()),
     ];
     for (tuners, evaluations) in SIZES {
         let shape = Shape { spacing: vec![0.0; tuners], rows: vec![(Usage::Minimise, 1.0); 2], ..Shape::default() };

@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Budget, Cancellation, Effect, Ending, Evaluation, Objective, Oracle, Outcome, Pareto, Place, Problem, Quiet,
-    Record, Run, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task, Watch, conclude,
+    Budget, Cancellation, Effect, End, Ending, Evaluation, Objective, Optimality, Oracle, Outcome, Pareto, Place,
+    Problem, Quiet, Record, Run, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task,
+    Usage, Watch, conclude,
 };
 
 /// Options of [`crate::solve()`].
@@ -142,8 +143,15 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
         }
     }
     let quiet = Quiet(watch);
-    let pareto = pareto(&run, stop, (store, &quiet));
-    let ending = Ending { stop, pareto, seconds: started.elapsed().as_secs_f64() };
+    let point = optimality(&run, (store, &quiet));
+    let pareto = pareto(&run, point, (store, &quiet));
+    let stop = if stop == Stop::Converged && matches!(point, Optimality::Plateau | Optimality::Descent) {
+        Stop::Stalled
+    } else {
+        stop
+    };
+    let end = run.best().map(|best| End::new(point, best.merit, solver.ends(), stop));
+    let ending = Ending { stop, end, pareto, seconds: started.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
     outcome.methods = solver.methods().to_vec();
     outcome.found.slopes = slopes(&run, (store, &quiet));
@@ -166,7 +174,7 @@ pub(crate) fn evaluate_start(study: Study, options: &Options, watch: &dyn Watch)
         let _ = run.evaluate(&[problem.start()]);
     }
     // N.B.: reported as interrupted, so that no initial states are estimated either.
-    let ending = Ending { stop: Stop::Interrupted, pareto: Pareto::NotShown, seconds: 0.0 };
+    let ending = Ending { stop: Stop::Interrupted, end: None, pareto: Pareto::NotShown, seconds: 0.0 };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
     let stop = if watch.wants_stop() { watch.halt().into() } else { Stop::Converged };
     (outcome.solver, outcome.stop) = ("none".to_owned(), stop);
@@ -191,18 +199,32 @@ fn slopes(run: &Run<'_>, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Op
     SlopesReport::at(problem, &mut probe, &run.best()?.point, NEAR)
 }
 
-/// Checks the best point for Pareto optimality.
-fn pareto(run: &Run<'_>, stop: Stop, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Pareto {
-    let problem = run.problem();
-    match run.best().filter(|best| best.merit.is_feasible()) {
-        None => Pareto::NotShown,
-        Some(_) if watch.wants_stop() => Pareto::NotShown,
-        // A minimum of a sum with positive weights is Pareto-optimal.
-        Some(_) if problem.shape().objective == Objective::Sum && stop == Stop::Converged => Pareto::CertifiedLocal,
+/// Classifies the best point to first order.
+fn optimality(run: &Run<'_>, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Optimality {
+    match run.best().filter(|best| best.scaled.is_some() && !watch.wants_stop()) {
+        None => Optimality::NotShown,
         Some(best) => {
-            let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, watch).keeping(store);
-            mops_solvers::certify(&mut probe, &best.point)
+            let mut probe = Run::new(run.problem(), Budget { evaluations: usize::MAX }, watch).keeping(store);
+            mops_solvers::optimality(&mut probe, &best.point)
         }
+    }
+}
+
+/// Checks the best point, with its classification for the objective, for Pareto optimality.
+fn pareto(run: &Run<'_>, point: Optimality, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Pareto {
+    let shape = run.problem().shape();
+    let minimised = shape.rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
+    let Some(best) = run.best().filter(|best| best.merit.is_feasible() && minimised > 0 && !watch.wants_stop()) else {
+        return Pareto::NotShown;
+    };
+    // A local minimum of one criterion, or of a sum with positive weights, is locally Pareto-optimal.
+    if shape.objective == Objective::Sum || minimised == 1 {
+        return if point.is_stationary() { Pareto::CertifiedLocal } else { Pareto::NotShown };
+    }
+    let mut probe = Run::new(run.problem(), Budget { evaluations: usize::MAX }, watch).keeping(store);
+    match mops_solvers::certificate(&mut probe, &best.point).pareto {
+        Pareto::CertifiedLocal if !point.is_stationary() => Pareto::NotShown,
+        pareto => pareto,
     }
 }
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::catalogue::SolverChoice;
+use crate::end::End;
 use crate::evaluation::Evaluation;
 use crate::experiment::{Channel, Role};
 use crate::front;
@@ -20,10 +21,12 @@ use crate::study::{Study, Task};
 use crate::trade_offs::Pareto;
 
 /// End of a run, as far as the run itself does not record it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Ending {
     /// Reason for stopping.
     pub stop: Stop,
+    /// What is known of the best point; `None` if nothing was solved.
+    pub end: Option<End>,
     /// Pareto optimality of the result.
     pub pareto: Pareto,
     /// Wall-clock time, s.
@@ -113,6 +116,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         methods: Vec::new(),
         run: None,
         stop: ending.stop,
+        end: ending.end,
         evaluations: run.archive().len(),
         reused: None,
         simulations,

@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 use crate::criterion::Usage;
 use crate::demand::Demand;
 use crate::diagnosis::Diagnosis;
+use crate::end::End;
 use crate::evaluation::Evaluation;
 use crate::experiment::Role;
 use crate::identification::{ExcitationReport, RegressionReport, SensitivityReport, Whiteness};
@@ -45,6 +46,9 @@ pub struct Outcome {
     pub run: Option<String>,
     /// Why the run stopped.
     pub stop: Stop,
+    /// What is known of the reported point; absent if nothing was solved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end: Option<End>,
     /// Number of evaluated points.
     pub evaluations: usize,
     /// Number of evaluated points taken from another run without simulation; absent if no run was reused.

@@ -181,6 +181,11 @@ pub trait Solver: Send {
         &[]
     }
 
+    /// Returns the merits at which local searches from different starting points have ended; empty if the solver makes none.
+    fn ends(&self) -> &[Merit] {
+        &[]
+    }
+
     /// Returns the points of the Pareto front that each solve a subproblem; empty if the solver only has evaluated points.
     fn front(&self) -> Vec<Vec<f64>> {
         Vec::new()

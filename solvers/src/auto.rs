@@ -1,6 +1,6 @@
 //! Default solver, which chooses a method for the problem.
 
-use mops_core::{Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions, Usage};
+use mops_core::{Halt, Merit, Objective, Oracle, Progress, Shape, Solver, SolverOptions, Usage};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -49,7 +49,7 @@ impl SolverOptions for AutoOptions {
     const KIND: &'static str = "auto";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(Auto { options: self.clone(), stage: None, methods: Vec::new() })
+        Box::new(Auto { options: self.clone(), stage: None, methods: Vec::new(), ends: Vec::new() })
     }
 }
 
@@ -57,6 +57,8 @@ struct Auto {
     options: AutoOptions,
     stage: Option<Stage>,
     methods: Vec<&'static str>,
+    /// Merits at which the runs from different starting points have ended.
+    ends: Vec<Merit>,
 }
 
 enum Stage {
@@ -93,6 +95,7 @@ impl Solver for Auto {
     }
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        self.ends.clear();
         if oracle.shape().objective == Objective::Each {
             let (mut front, method) = front_solver(oracle.shape());
             self.record_methods(&[method]);
@@ -106,7 +109,7 @@ impl Solver for Auto {
         let mut global = match first {
             _ if oracle.shape().residuals > 0 => global.with_local_restarts(),
             Some(first) => global.with_initial_solver(first),
-            None => global.with_continuation(PatternSearchOptions::default().build()),
+            None => global.with_continuation(PatternSearchOptions::default().local()),
         };
         global.begin(oracle, start)?;
         self.stage = Some(Stage::Global(global));
@@ -121,6 +124,7 @@ impl Solver for Auto {
                 if progress == Progress::Continue || oracle.shape().residuals > 0 {
                     return Ok(progress);
                 }
+                self.ends = global.ends().to_vec();
                 let converged = progress == Progress::Converged;
                 let status = Status {
                     converged,
@@ -158,6 +162,13 @@ impl Solver for Auto {
         }
     }
 
+    fn ends(&self) -> &[Merit] {
+        match &self.stage {
+            Some(Stage::Global(global)) => global.ends(),
+            _ => &self.ends,
+        }
+    }
+
     fn front(&self) -> Vec<Vec<f64>> {
         match &self.stage {
             Some(Stage::Front(front)) => front.front(),
@@ -181,7 +192,7 @@ impl Auto {
     /// Starts a pattern search from the best point.
     fn polish(&mut self, oracle: &mut dyn Oracle, status: Status) -> Result<Progress, Halt> {
         let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(Progress::Stalled) };
-        let mut pattern = PatternSearchOptions { size: 0.02, ..Default::default() }.build();
+        let mut pattern = PatternSearchOptions { size: 0.02, ..Default::default() }.local();
         self.record_methods(&[PatternSearchOptions::KIND]);
         pattern.begin(oracle, &best)?;
         self.stage = Some(Stage::Polish(pattern, status));
@@ -206,7 +217,7 @@ impl Auto {
         let previous_objective = oracle.best().map_or(f64::INFINITY, |best| best.merit.objective);
         self.record_methods(&[SqpOptions::KIND]);
         let mut restarts =
-            Multistart::restarts_around_best(SqpOptions::default().build(), RESTART_RADII, NEGLIGIBLE_CHANGE);
+            Multistart::restarts_around_best(SqpOptions::default().local(), RESTART_RADII, NEGLIGIBLE_CHANGE);
         if !restarts.begin_local_restarts(oracle)? {
             return Ok(status.final_progress(progress));
         }
@@ -254,13 +265,13 @@ impl Choice {
 /// Chooses the local solver of a problem.
 fn choose(oracle: &mut dyn Oracle, start: &[f64]) -> Result<Choice, Halt> {
     let shape = oracle.shape().clone();
-    let pattern = || Choice::new(PatternSearchOptions::default().build(), &[PatternSearchOptions::KIND]);
+    let pattern = || Choice::new(PatternSearchOptions::default().local(), &[PatternSearchOptions::KIND]);
     // This solver counts the starting points itself.
     let least_squares = LevenbergMarquardtOptions::default().local();
     if least_squares.accepts(&shape).is_ok() {
         return Ok(Choice::new(least_squares, &[LevenbergMarquardtOptions::KIND]));
     }
-    let sqp = SqpOptions::default().build();
+    let sqp = SqpOptions::default().local();
     if sqp.accepts(&shape).is_err() || start.is_empty() {
         return Ok(pattern());
     }

@@ -44,8 +44,7 @@ impl SolverOptions for LevenbergMarquardtOptions {
     const KIND: &'static str = "levenberg-marquardt";
 
     fn build(&self) -> Box<dyn Solver> {
-        let local = self.local();
-        Box::new(LevenbergMarquardt { starts: Multistart::new(local, self.starts).with_local_restarts() })
+        Box::new(Multistart::new(self.local(), self.starts).with_local_restarts())
     }
 }
 
@@ -53,25 +52,6 @@ impl LevenbergMarquardtOptions {
     /// Builds the method without multistart.
     pub fn local(&self) -> Box<dyn Solver> {
         Box::new(Local { options: self.clone(), state: None })
-    }
-}
-
-/// Solver of the kind `levenberg-marquardt`.
-struct LevenbergMarquardt {
-    starts: Multistart,
-}
-
-impl Solver for LevenbergMarquardt {
-    fn accepts(&self, shape: &Shape) -> Result<(), String> {
-        accepts(shape)
-    }
-
-    fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
-        self.starts.begin(oracle, start)
-    }
-
-    fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        self.starts.step(oracle)
     }
 }
 

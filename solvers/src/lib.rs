@@ -25,7 +25,7 @@ pub mod nelder_mead;
 mod noise_detection;
 pub mod nsga2;
 pub mod nsga3;
-mod pareto;
+mod optimality;
 #[cfg(feature = "argmin")]
 pub mod particle_swarm;
 pub mod pattern_search;
@@ -50,7 +50,7 @@ pub mod prelude {
     };
 }
 
-pub use pareto::{Certificate, certificate, certify};
+pub use optimality::{Certificate, certificate, optimality};
 
 /// Returns every kind of solver, the default first. A new kind is one file and one line here.
 pub fn kinds() -> Vec<SolverKind> {

@@ -1,7 +1,7 @@
 //! Combination of a quasi-Newton method and a pattern search from the same starting point.
 
 use mops_core::math;
-use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions};
+use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver};
 
 use crate::chaining::Chain;
 use crate::local_archive::LocalArchive;
@@ -56,7 +56,7 @@ impl Default for Multimethod {
 
 /// Builds the solver that continues at kinks.
 fn nonsmooth_solver() -> Box<dyn Solver> {
-    SqpOptions::default().build()
+    SqpOptions::default().local()
 }
 
 impl Multimethod {
@@ -82,14 +82,14 @@ impl Solver for Multimethod {
         match &mut self.stage {
             Stage::Coarse => match (self.quasi_newton.step(oracle)?, oracle.best().cloned()) {
                 (Progress::Converged, Some(end)) => {
-                    let mut pattern = PatternSearchOptions { shrink: SHRINK, ..Default::default() }.build();
+                    let mut pattern = PatternSearchOptions { shrink: SHRINK, ..Default::default() }.local();
                     let mut local_best = None;
                     pattern.begin(&mut LocalArchive { oracle, best: &mut local_best }, &self.start)?;
                     self.stage = Stage::Alternative(Box::new(Alternative { pattern, end, local_best }));
                     Ok(Progress::Continue)
                 }
                 (Progress::Stalled, _) => {
-                    let pattern = PatternSearchOptions::default().build();
+                    let pattern = PatternSearchOptions::default().local();
                     self.continue_with(Box::new(Chain::always(nonsmooth_solver(), pattern)), oracle)
                 }
                 (progress, _) => Ok(progress),

@@ -3,7 +3,7 @@
 //! The first run starts from the initial guess of the study, the next ones from the best points of a sample of the box.
 //! If enabled, runs from points around the best one follow until nothing changes.
 
-use mops_core::{Evaluation, Halt, Merit, Oracle, Progress, Solver};
+use mops_core::{Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver};
 
 use crate::local_archive::LocalArchive;
 use crate::start::{best_of, latin_hypercube};
@@ -33,8 +33,8 @@ pub struct Multistart {
     restart_round: RestartRound,
     /// Best point of the present run.
     run_best: Option<Evaluation>,
-    /// Best merits of the completed runs.
-    final_merits: Vec<Merit>,
+    /// Best merits of the completed runs, without those around the best point.
+    ends: Vec<Merit>,
 }
 
 /// Solver that is running.
@@ -75,7 +75,7 @@ impl Multistart {
             min_gain: 1e-3,
             restart_round: RestartRound::NONE,
             run_best: None,
-            final_merits: Vec::new(),
+            ends: Vec::new(),
         }
     }
 
@@ -104,19 +104,6 @@ impl Multistart {
         Self { local_restarts: true, radii, min_gain, queue: Some(Vec::new()), ..Self::new(local, 1) }
     }
 
-    /// Starts the first run.
-    ///
-    /// # Errors
-    /// When the run ends: budget exhausted, or interrupted by the user.
-    pub fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
-        self.queue = None;
-        self.best = None;
-        self.phase = Phase::Initial;
-        self.restart_round = RestartRound::NONE;
-        self.final_merits.clear();
-        self.start_run(oracle, start)
-    }
-
     /// Starts the first round around the best point; returns false if there is no such point.
     ///
     /// # Errors
@@ -127,63 +114,19 @@ impl Multistart {
 
     /// Returns true if two runs have ended within `accuracy` of the best objective, relative to its magnitude.
     pub fn optimum_is_confirmed(&self, accuracy: f64) -> bool {
-        let best = self
-            .final_merits
-            .iter()
-            .fold(Merit::FAILED, |best, end| if end.is_better_than(&best) { *end } else { best });
+        let best =
+            self.ends.iter().fold(Merit::FAILED, |best, end| if end.is_better_than(&best) { *end } else { best });
         let near = |end: &&Merit| {
             end.is_feasible()
                 && end.objective - best.objective <= accuracy * best.objective.abs().max(f64::MIN_POSITIVE)
         };
-        self.final_merits.iter().filter(near).count() > 1
+        self.ends.iter().filter(near).count() > 1
     }
 
     fn start_run(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.run_best = None;
         let initial = self.initial_solver.as_mut().filter(|_| self.phase == Phase::Initial);
         initial.unwrap_or(&mut self.local).begin(&mut LocalArchive { oracle, best: &mut self.run_best }, start)
-    }
-
-    /// Does one iteration of the present run, or starts the next run.
-    ///
-    /// # Errors
-    /// When the run ends: budget exhausted, or interrupted by the user.
-    pub fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        let mut archive = LocalArchive { oracle: &mut *oracle, best: &mut self.run_best };
-        let solver = match self.phase {
-            Phase::Initial => self.initial_solver.as_mut(),
-            Phase::Continuation => self.continuation_solver.as_mut(),
-            Phase::Sampled => None,
-        };
-        let progress = solver.unwrap_or(&mut self.local).step(&mut archive)?;
-        if progress == Progress::Continue {
-            return Ok(progress);
-        }
-        if self.phase == Phase::Initial
-            && let Some(second) = &mut self.continuation_solver
-            && let Some(start) = archive.best().map(|best| best.point.clone())
-        {
-            second.begin(&mut archive, &start)?;
-            self.phase = Phase::Continuation;
-            return Ok(Progress::Continue);
-        }
-        self.phase = Phase::Sampled;
-        self.final_merits.push(self.run_best.as_ref().map_or(Merit::FAILED, |best| best.merit));
-        let found = oracle.best().map_or(Merit::FAILED, |best| best.merit);
-        if self.best.is_none_or(|(known, _)| found.is_better_than(&known)) {
-            self.best = Some((found, progress));
-        }
-        if self.queue.is_none() {
-            self.queue = Some(self.sample(oracle)?);
-        }
-        match self.queue.as_mut().and_then(Vec::pop) {
-            Some(start) => {
-                self.start_run(oracle, &start)?;
-                Ok(Progress::Continue)
-            }
-            None if self.local_restarts && self.start_restart_round(oracle)? => Ok(Progress::Continue),
-            None => Ok(self.best.map_or(Progress::Stalled, |(_, progress)| progress)),
-        }
     }
 
     /// Starts a round around the best point; returns false if the previous rounds brought no gain.
@@ -219,5 +162,64 @@ impl Multistart {
         let mut random = oracle.stream("multistart");
         let sample = latin_hypercube(self.extra_starts * 5 * (n + 1), n, &mut random);
         best_of(oracle, &sample, self.extra_starts)
+    }
+}
+
+impl Solver for Multistart {
+    fn accepts(&self, shape: &Shape) -> Result<(), String> {
+        self.local.accepts(shape)
+    }
+
+    fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
+        self.queue = None;
+        self.best = None;
+        self.phase = Phase::Initial;
+        self.restart_round = RestartRound::NONE;
+        self.ends.clear();
+        self.start_run(oracle, start)
+    }
+
+    fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
+        let mut archive = LocalArchive { oracle: &mut *oracle, best: &mut self.run_best };
+        let solver = match self.phase {
+            Phase::Initial => self.initial_solver.as_mut(),
+            Phase::Continuation => self.continuation_solver.as_mut(),
+            Phase::Sampled => None,
+        };
+        let progress = solver.unwrap_or(&mut self.local).step(&mut archive)?;
+        if progress == Progress::Continue {
+            return Ok(progress);
+        }
+        if self.phase == Phase::Initial
+            && let Some(second) = &mut self.continuation_solver
+            && let Some(start) = archive.best().map(|best| best.point.clone())
+        {
+            second.begin(&mut archive, &start)?;
+            self.phase = Phase::Continuation;
+            return Ok(Progress::Continue);
+        }
+        self.phase = Phase::Sampled;
+        if self.restart_round.count == 0 {
+            self.ends.push(self.run_best.as_ref().map_or(Merit::FAILED, |best| best.merit));
+        }
+        let found = oracle.best().map_or(Merit::FAILED, |best| best.merit);
+        if self.best.is_none_or(|(known, _)| found.is_better_than(&known)) {
+            self.best = Some((found, progress));
+        }
+        if self.queue.is_none() {
+            self.queue = Some(self.sample(oracle)?);
+        }
+        match self.queue.as_mut().and_then(Vec::pop) {
+            Some(start) => {
+                self.start_run(oracle, &start)?;
+                Ok(Progress::Continue)
+            }
+            None if self.local_restarts && self.start_restart_round(oracle)? => Ok(Progress::Continue),
+            None => Ok(self.best.map_or(Progress::Stalled, |(_, progress)| progress)),
+        }
+    }
+
+    fn ends(&self) -> &[Merit] {
+        &self.ends
     }
 }

@@ -2,7 +2,7 @@
 
 use mops_core::math;
 use mops_core::{Budget, Evaluation, Evaluator, Objective, Pareto, Run, Shape, Usage};
-use mops_solvers::certify;
+use mops_solvers::certificate;
 
 /// Two criteria to be minimised over the unit cube, with finite-difference gradients.
 struct Two {
@@ -23,7 +23,7 @@ impl Two {
 
     /// Returns the certificate of a point.
     fn certificate(&self, point: [f64; 3]) -> Pareto {
-        certify(&mut Run::new(self, Budget { evaluations: usize::MAX }, &()), &point)
+        certificate(&mut Run::new(self, Budget { evaluations: usize::MAX }, &()), &point).pareto
     }
 }
 

@@ -84,6 +84,9 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
     let best_name = if solved { "optimum" } else { "start" };
     let summed = outcome.task == Task::Calibration;
     let mut text = String::new();
+    if let Some(doubt) = outcome.end.as_ref().and_then(|end| end.doubt.as_ref()) {
+        text += &format!("\n{doubt}\n");
+    }
     if summed {
         let [now, start] = [outcome.objective, outcome.start.objective].map(number);
         text += &format!("\nobjective (sum of scaled values): {now} (start {start})\n");
@@ -147,6 +150,9 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
     }
     for warning in &outcome.warnings {
         text += &format!("\nwarning: {warning}");
+    }
+    if let Some(end) = outcome.end.as_ref().filter(|end| !end.words.is_empty()) {
+        text += &format!("\n{}", end.words.join(" "));
     }
     let stop = match outcome.stop {
         Stop::Converged => "converged",

@@ -96,7 +96,7 @@ fn study(name: &str, start: f64, usage: Usage) -> (Problem, Evaluation, Outcome,
     run.evaluate(&points).unwrap();
     let solver = mops_solvers::kinds()[0].default_choice();
     let (mut outcome, _) =
-        conclude(&run, &solver, Ending { stop: Stop::Converged, pareto: Pareto::NotShown, seconds: 0.1 });
+        conclude(&run, &solver, Ending { stop: Stop::Converged, end: None, pareto: Pareto::NotShown, seconds: 0.1 });
     (outcome.solver, outcome.methods) = ("by-hand".into(), vec!["sqp", "pattern-search"]);
     outcome.criteria = criterion_reports(problem.study(), &best);
     (outcome.worst_scaled, outcome.objective) = (best.merit.objective, best.merit.objective);

@@ -40,6 +40,16 @@ pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
             if others > 0 { format!(" {} also violated.", counted(others, "other constraint")) } else { String::new() };
         return (Tone::Bad, format!("No feasible point found: {what}.{more}"));
     }
+    let (tone, text) = solved(report);
+    match outcome.end.as_ref().and_then(|end| end.doubt.as_ref()) {
+        Some(doubt) => (if tone == Tone::Good { Tone::Mixed } else { tone }, format!("{doubt} {text}")),
+        None => (tone, text),
+    }
+}
+
+/// Returns the verdict on the result of a task that ended with a feasible point.
+fn solved(report: &Report<'_>) -> (Tone, String) {
+    let outcome = report.outcome;
     match outcome.task {
         Task::Design => design(report),
         Task::Pareto => match outcome.found.trade_offs.iter().flat_map(|found| &found.words).next() {
@@ -180,6 +190,11 @@ pub(super) fn stop(outcome: &Outcome) -> &'static str {
         Stop::Stalled => "Stalled: no further improvement found, convergence not reached",
         Stop::Interrupted => "Interrupted by the user",
     }
+}
+
+/// Returns what is known of the reported point at the end of the search.
+pub(super) fn end(outcome: &Outcome) -> Option<String> {
+    outcome.end.as_ref().map(|end| end.words.join(" ")).filter(|words| !words.is_empty())
 }
 
 /// Returns the solver, with the methods that it has run.

@@ -233,7 +233,8 @@ impl Rounds {
             return Solved { archive: Vec::new(), ..last };
         }
         let pareto = if chosen + 1 == self.done.len() { last.outcome.pareto } else { Pareto::NotShown };
-        let (mut outcome, best) = conclude(&run, &options.solver, Ending { stop, pareto, seconds: 0.0 });
+        let end = last.outcome.end.clone().filter(|_| chosen + 1 == self.done.len());
+        let (mut outcome, best) = conclude(&run, &options.solver, Ending { stop, end, pareto, seconds: 0.0 });
         drop(run);
         (outcome.failures, outcome.methods) = (last.outcome.failures, last.outcome.methods);
         let effort = Effort { samples: 1, starts: 1 };

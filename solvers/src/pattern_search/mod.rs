@@ -15,6 +15,7 @@ use serde::Deserialize;
 
 use crate::cholesky::with_cholesky;
 use crate::linearised_criteria::LinearisedCriteria;
+use crate::multistart::Multistart;
 use crate::noise_detection::{Smoothness, detect_smoothness};
 use crate::sqp::SqpOptions;
 use crate::start::usable_start;
@@ -47,6 +48,9 @@ use trust_region_subproblem::{PenalisedObjective, TrustRegionSubproblem};
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct PatternSearchOptions {
+    /// Number of starting points: the initial guess of the study, and the best points of a sample of the box.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub starts: usize,
     /// Initial size of the pattern, in the unit box.
     #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub size: f64,
@@ -64,7 +68,7 @@ pub struct PatternSearchOptions {
 
 impl Default for PatternSearchOptions {
     fn default() -> Self {
-        Self { size: 0.1, tolerance: 1e-7, shrink: 0.5, batch: 2 }
+        Self { starts: 6, size: 0.1, tolerance: 1e-7, shrink: 0.5, batch: 2 }
     }
 }
 
@@ -72,6 +76,13 @@ impl SolverOptions for PatternSearchOptions {
     const KIND: &'static str = "pattern-search";
 
     fn build(&self) -> Box<dyn Solver> {
+        Box::new(Multistart::new(self.local(), self.starts))
+    }
+}
+
+impl PatternSearchOptions {
+    /// Builds the solver from one starting point.
+    pub fn local(&self) -> Box<dyn Solver> {
         Box::new(PatternSearch { options: self.clone(), state: None, workspace: Workspace::default() })
     }
 }
@@ -494,7 +505,7 @@ impl State {
             return Ok(false);
         }
         let mut gradient_solver =
-            SqpOptions { radius: GRADIENT_RADIUS_FACTOR * self.radius, ..Default::default() }.build();
+            SqpOptions { radius: GRADIENT_RADIUS_FACTOR * self.radius, ..Default::default() }.local();
         gradient_solver.begin(oracle, &self.best.point)?;
         self.gradient_solver = Some(gradient_solver);
         self.gradient_start_value = penalised_value;

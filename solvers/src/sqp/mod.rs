@@ -11,6 +11,7 @@ use serde::Deserialize;
 
 use crate::epigraph::Direction;
 use crate::linearised_criteria::LinearisedCriteria;
+use crate::multistart::Multistart;
 use crate::start::usable_start;
 use state::{FEASIBILITY_TOLERANCE, State};
 
@@ -25,7 +26,8 @@ use state::{FEASIBILITY_TOLERANCE, State};
 /// A criterion may have kinks of its own: an overshoot is the largest of several peaks. If a step fails in spite of its
 /// correction, the criteria are also linearised beyond the kink, and both linear models (cuts) count (bundle method).
 ///
-/// For up to about 50 tuners. Converges fast, to the optimum of the basin of its initial guess.
+/// For up to about 50 tuners. Converges fast, to the optimum of the basin of its starting point; hence it starts from the initial
+/// guess of the study and from the best points of a sample of the box.
 ///
 /// Source: R. Fletcher, Practical Methods of Optimization, 2nd edition (1987), section 14.4 (Sl1QP, second-order
 /// correction), 14.6 (nonsmooth functions); M. J. D. Powell, in Numerical Analysis Dundee 1977, Lecture Notes in
@@ -41,14 +43,17 @@ pub struct SqpOptions {
     /// Initial radius of the trust region, in the unit box.
     #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub radius: f64,
-    /// Maximum number of iterations.
+    /// Number of starting points, including the initial guess of the study.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub starts: usize,
+    /// Maximum number of iterations per starting point.
     #[schemars(range(min = 1))]
     pub max_iterations: usize,
 }
 
 impl Default for SqpOptions {
     fn default() -> Self {
-        Self { tolerance: 1e-12, radius: 1.0, max_iterations: 300 }
+        Self { tolerance: 1e-12, radius: 1.0, starts: 6, max_iterations: 300 }
     }
 }
 
@@ -56,6 +61,13 @@ impl SolverOptions for SqpOptions {
     const KIND: &'static str = "sqp";
 
     fn build(&self) -> Box<dyn Solver> {
+        Box::new(Multistart::new(self.local(), self.starts))
+    }
+}
+
+impl SqpOptions {
+    /// Builds the solver from one starting point.
+    pub fn local(&self) -> Box<dyn Solver> {
         Box::new(Sqp { options: self.clone(), state: None, workspace: Workspace::default() })
     }
 }

@@ -1,11 +1,11 @@
 //! Subproblems, each solved by a local solver from known points.
 
-use mops_core::{Halt, Merit, Objective, Oracle, Progress, Solver, SolverOptions};
+use mops_core::{Halt, Merit, Objective, Oracle, Progress, Solver};
 
 use super::archive::{Archive, Candidate};
 use super::scalarisation::{Role, Scalarisation, ScalarisedProblem};
 use crate::multistart::Multistart;
-use crate::pareto::certify;
+use crate::optimality::certificate;
 use crate::pattern_search::PatternSearchOptions;
 use crate::sqp::SqpOptions;
 
@@ -53,7 +53,7 @@ impl Subproblems {
     ) -> Result<Progress, Halt> {
         let mut problem = ScalarisedProblem::new(oracle, &mut self.archive, scalarisation);
         let mut starts =
-            Multistart::new(SqpOptions { tolerance: TOLERANCE, ..SqpOptions::default() }.build(), self.starts);
+            Multistart::new(SqpOptions { tolerance: TOLERANCE, ..SqpOptions::default() }.local(), self.starts);
         starts.begin(&mut problem, start)?;
         let progress = loop {
             match starts.step(&mut problem)? {
@@ -67,7 +67,7 @@ impl Subproblems {
         if progress == Progress::Converged || best.len() > MAX_POLLED_DIMENSION {
             return Ok(progress);
         }
-        let mut pattern = PatternSearchOptions { size: 0.02, tolerance: 1e-5, ..Default::default() }.build();
+        let mut pattern = PatternSearchOptions { size: 0.02, tolerance: 1e-5, ..Default::default() }.local();
         run(&mut problem, pattern.as_mut(), &best)
     }
 
@@ -120,7 +120,7 @@ impl Subproblems {
         radius: f64,
     ) -> Result<Candidate, Halt> {
         for start in starts {
-            let mut solver = SqpOptions { radius, tolerance: TOLERANCE, ..SqpOptions::default() }.build();
+            let mut solver = SqpOptions { radius, tolerance: TOLERANCE, ..SqpOptions::default() }.local();
             let mut problem = ScalarisedProblem::new(oracle, &mut self.archive, scalarisation);
             run_while_improving(&mut problem, solver.as_mut(), &start.point)?;
         }
@@ -167,7 +167,7 @@ impl Subproblems {
         for candidate in front {
             let nothing = vec![0.0; candidate.criteria.len()];
             let scalarisation = Scalarisation::chebyshev(&nothing, &self.range);
-            certify(&mut ScalarisedProblem::new(oracle, &mut self.archive, &scalarisation), &candidate.point);
+            certificate(&mut ScalarisedProblem::new(oracle, &mut self.archive, &scalarisation), &candidate.point);
         }
     }
 

@@ -55,8 +55,8 @@ pub(super) struct End {
 pub(super) fn local(goal: &Goal, start: &[f64], watch: &dyn Watch) -> End {
     let n = start.len();
     let steps: [(_, usize); 2] = [
-        (SqpOptions { radius: 0.25, ..SqpOptions::default() }.build(), 40 * (n + 1)),
-        (PatternSearchOptions { size: 0.02, tolerance: 1e-6, ..PatternSearchOptions::default() }.build(), 60 * (n + 1)),
+        (SqpOptions { radius: 0.25, ..SqpOptions::default() }.local(), 40 * (n + 1)),
+        (PatternSearchOptions { size: 0.02, tolerance: 1e-6, ..PatternSearchOptions::default() }.local(), 60 * (n + 1)),
     ];
     let mut end = End { evaluation: None, simulations: 0, failed: Vec::new() };
     for (mut solver, evaluations) in steps {

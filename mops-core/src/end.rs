@@ -1,0 +1,195 @@
+//! End of a search: what is known of the point that it reports.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::evaluation::Merit;
+use crate::solver::Stop;
+
+/// First-order classification of a point, for the objective under the constraints and the bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Optimality {
+    /// Stationary: by the derivatives at the point, no direction lowers the objective.
+    Stationary,
+    /// Stationary at a kink of a criterion: by the derivatives sampled around the point, no direction lowers the objective.
+    Kink,
+    /// The objective is constant around the point, so that derivatives show nothing.
+    Plateau,
+    /// A criterion is discontinuous beside the point, so that derivatives show nothing.
+    Jump,
+    /// A small step lowers the objective: the point is not an optimum.
+    Descent,
+    /// Not shown: there are no derivatives, or the decrease that they predict does not happen.
+    NotShown,
+}
+
+impl Optimality {
+    /// Returns true if no direction lowers the objective to first order.
+    #[must_use]
+    pub fn is_stationary(self) -> bool {
+        matches!(self, Self::Stationary | Self::Kink)
+    }
+}
+
+/// What is known of the reported point at the end of a search.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct End {
+    /// First-order classification of the reported point.
+    pub point: Optimality,
+    /// Number of local searches from different starting points that have ended; 0 if the solver makes none.
+    pub searches: usize,
+    /// Number of these searches that ended within a thousandth of the reported objective.
+    pub arrived: usize,
+    /// Number of values, a thousandth apart, at which these searches ended.
+    pub optima: usize,
+    /// Expected share of the starting points that lead to an optimum not yet seen, `w (w + 1)/(n (n - 1))` for `w` optima in `n`
+    /// searches; null if fewer than two searches have ended.
+    ///
+    /// Source: C. G. E. Boender, A. H. G. Rinnooy Kan, Mathematical Programming 37 (1987) 59-80.
+    pub unseen: Option<f64>,
+    /// Reason to doubt that the reported point is the optimum, with the way out; null if there is none.
+    pub doubt: Option<String>,
+    /// What is known, as sentences.
+    pub words: Vec<String>,
+}
+
+/// Difference of two objectives, relative to the larger one plus [`SMALL`], up to which they belong to the same optimum.
+const SAME: f64 = 1e-3;
+
+/// Objective that is regarded as zero. A scaled value of 1 is the demand.
+const SMALL: f64 = 1e-3;
+
+/// Expected share of starting points that lead to an unseen optimum, from which one is likely.
+const LIKELY: f64 = 0.5;
+
+impl End {
+    /// Returns what is known of a point with this merit and classification, after local searches that ended with the given
+    /// merits.
+    #[must_use]
+    pub fn new(point: Optimality, best: Merit, ends: &[Merit], stop: Stop) -> Self {
+        let is_same = |a: f64, b: f64| (a - b).abs() <= SAME * (a.abs().max(b.abs()) + SMALL);
+        let arrived = ends.iter().filter(|end| end.is_feasible() && is_same(end.objective, best.objective)).count();
+        let mut values: Vec<f64> = ends.iter().filter(|end| end.is_feasible()).map(|end| end.objective).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup_by(|later, earlier| is_same(*later, *earlier));
+        // All infeasible ends count as one optimum.
+        let optima = values.len() + usize::from(ends.iter().any(|end| !end.is_feasible()));
+        #[allow(clippy::cast_precision_loss)]
+        let [n, w] = [ends.len() as f64, optima as f64];
+        let unseen = (ends.len() > 1).then(|| (w * (w + 1.0) / (n * (n - 1.0))).min(1.0));
+        let mut end = Self { point, searches: ends.len(), arrived, optima, unseen, doubt: None, words: Vec::new() };
+        end.words = end.words_of_point().into_iter().chain(end.words_of_searches()).collect();
+        end.doubt = end.doubt(best.is_feasible(), stop);
+        end
+    }
+
+    fn words_of_point(&self) -> Option<String> {
+        let words = match self.point {
+            Optimality::Stationary => "The point is stationary: to first order, no direction lowers the objective.",
+            Optimality::Kink => {
+                "The point is stationary at a kink: by the derivatives around it, no direction lowers the objective."
+            }
+            Optimality::Plateau => "The objective is constant around the point.",
+            Optimality::Jump => "A criterion is discontinuous beside the point.",
+            Optimality::Descent => "A step of a thousandth of the box lowers the objective.",
+            Optimality::NotShown => return None,
+        };
+        Some(words.to_owned())
+    }
+
+    fn words_of_searches(&self) -> Option<String> {
+        let Self { searches, arrived, optima, .. } = *self;
+        match (searches, self.unseen) {
+            (0, _) => None,
+            (1, _) => Some("A single local search was made: other basins are unexplored.".to_owned()),
+            (_, Some(unseen)) => {
+                let of_optima = if optima == 1 { "1 optimum".to_owned() } else { format!("{optima} optima") };
+                Some(format!(
+                    "Of {searches} local searches, {arrived} ended here, all in {of_optima}; the expected share of starting \
+                     points that lead to another optimum is {:.0} %.",
+                    100.0 * unseen
+                ))
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns the reason to doubt the point, with the way out.
+    fn doubt(&self, is_feasible: bool, stop: Stop) -> Option<String> {
+        let Self { searches, arrived, optima, .. } = *self;
+        let is_found_again = arrived > 1;
+        match self.point {
+            _ if stop == Stop::Interrupted => None,
+            Optimality::Descent => Some(
+                "Not an optimum, as a step of a thousandth of the box lowers the objective: raise --max-evaluations, or continue \
+                 with another solver (--reuse)."
+                    .to_owned(),
+            ),
+            Optimality::Plateau => Some(
+                "On a plateau: the objective is constant around the point, so that no search sees where it falls; start \
+                 elsewhere, or minimise a criterion that changes."
+                    .to_owned(),
+            ),
+            _ if is_feasible && searches > 1 && (arrived < 2 || self.unseen.is_some_and(|share| share >= LIKELY)) => {
+                let others = if arrived == 1 { "only 1".to_owned() } else { arrived.to_string() };
+                Some(format!(
+                    "Another basin is likely, as {others} of {searches} local searches ended here, and all of them in {optima} \
+                     optima: raise `starts` of the solver, or try another one."
+                ))
+            }
+            Optimality::Jump if !is_found_again => Some(
+                "At a jump: a criterion is discontinuous beside the point, so that derivatives do not show an optimum; compare \
+                 with another solver or seed."
+                    .to_owned(),
+            ),
+            Optimality::NotShown if stop == Stop::Budget => Some(
+                "The budget was spent before an optimum was shown: raise --max-evaluations, or continue with another solver \
+                 (--reuse)."
+                    .to_owned(),
+            ),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn merit(objective: f64) -> Merit {
+        Merit { violation: 0.0, objective }
+    }
+
+    #[test]
+    fn an_optimum_that_most_searches_reach_is_not_doubted() {
+        let ends = [1.0, 1.0001, 1.0, 1.0, 1.2, 1.0].map(merit);
+        let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged);
+        assert_eq!((end.searches, end.arrived, end.optima, &end.doubt), (6, 5, 2, &None));
+        // w (w + 1)/(n (n - 1)) with w = 2, n = 6.
+        assert!((end.unseen.unwrap() - 0.2).abs() < 1e-15);
+    }
+
+    #[test]
+    fn an_optimum_that_a_single_search_of_several_reaches_is_doubted() {
+        let ends = [1.0, 1.1, 1.1, 1.1].map(merit);
+        let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged);
+        assert!(end.doubt.unwrap().starts_with("Another basin is likely"));
+    }
+
+    #[test]
+    fn as_many_optima_as_searches_are_not_all_of_them() {
+        let ends = [1.0, 1.0, 1.3, 1.6, 2.0].map(merit);
+        let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged);
+        assert_eq!((end.arrived, end.optima, end.unseen), (2, 4, Some(1.0)));
+        assert!(end.doubt.is_some());
+    }
+
+    #[test]
+    fn a_descent_and_a_plateau_are_doubted_whatever_the_searches() {
+        for point in [Optimality::Descent, Optimality::Plateau] {
+            let end = End::new(point, merit(3.0), &[merit(3.0); 4], Stop::Converged);
+            assert!(end.doubt.is_some() && !point.is_stationary());
+        }
+    }
+}

@@ -1,0 +1,203 @@
+//! First-order tests of optimality: of a point for the objective, and of its Pareto optimality.
+
+mod cone;
+mod level;
+
+use mops_core::{Linearisation, Optimality, Oracle, Pareto, Shape, Usage};
+
+use cone::DescentCone;
+use level::Level;
+
+/// Improvement per unit of step, relative to the largest derivative of the criterion, below which a direction does not
+/// count as a descent direction. Corresponds to the accuracy of finite-difference gradients.
+const IMPROVEMENT: f64 = 1e-3;
+
+/// Length of a trial step, in the unit box.
+const TRIAL_STEP: f64 = 1e-3;
+
+/// Lengths at which a direction is tried, in trial steps: along a curved constraint or valley only a short step succeeds.
+const LENGTHS: [f64; 2] = [1.0, 0.125];
+
+/// Maximum number of cuts added from trial points.
+const MAX_CUTS: usize = 12;
+
+/// Number of cuts after which gradients are sampled around the point.
+const CUTS_BEFORE_SAMPLING: usize = 2;
+
+/// Distance of the sampled gradients from the point, in the unit box.
+const SAMPLING_RADIUS: f64 = 0.5 * TRIAL_STEP;
+
+/// Height above the point, per unit of [`TRIAL_STEP`] and of the largest derivative, above which a cut lies beyond a
+/// discontinuity. Such a cut says nothing about the point.
+const MAX_CUT_VALUE: f64 = 0.5;
+
+/// Distances from a point at which a plateau is looked for, in the unit box.
+const PLATEAU_REACH: [f64; 2] = [1e-3, 1e-2];
+
+/// Cutting-plane model of what a direction would improve.
+trait Model {
+    /// Returns the step of at most [`TRIAL_STEP`] that improves most, and the predicted improvement; `None` if rounding errors
+    /// prevent its computation.
+    fn direction(&self, point: &[f64]) -> Option<Step>;
+
+    /// Returns true if the scaled values of a trial are an improvement.
+    fn is_improvement(&self, shape: &Shape, trial: &[f64]) -> bool;
+
+    /// Adds the linear models at another point, extrapolated to `point`. Those beyond a discontinuity are ignored; returns true
+    /// if there are any.
+    fn add(&mut self, shape: &Shape, point: &[f64], beyond: &Linearisation) -> bool;
+}
+
+/// Step that a model proposes.
+struct Step {
+    /// Step in the unit box.
+    step: Vec<f64>,
+    /// True if the predicted improvement is negligible.
+    is_negligible: bool,
+}
+
+/// Answer to the question whether a direction improves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Answer {
+    /// None does, by the derivatives at the point.
+    None,
+    /// None does, by the derivatives sampled around the point.
+    NoneAround,
+    /// One does.
+    One,
+    /// A discontinuity hides the answer.
+    Jump,
+    /// Predicted improvements do not happen, or values or derivatives are missing.
+    Unknown,
+}
+
+/// Searches for an improving direction within the bounds and the active constraints.
+///
+/// A criterion may have kinks of its own (an overshoot is the largest of several peaks), and optima often lie on them.
+/// If a trial step does not achieve the predicted decrease, gradients are also evaluated at its end; both linear models
+/// (cuts) then count. Source: C. Lemarechal's cutting planes; K. C. Kiwiel, Methods of Descent for Nondifferentiable
+/// Optimization (1985).
+///
+/// A step along a kink stays on the kink, where finite differences average both sides. After a few steps, gradients are
+/// therefore sampled on either side along every coordinate. Source: A. A. Goldstein, Mathematical Programming 13 (1977) 14-22;
+/// J. V. Burke, A. S. Lewis, M. L. Overton, SIAM Journal on Optimization 15 (2005) 751-779.
+fn answer(oracle: &mut dyn Oracle, point: &[f64], model: &mut impl Model) -> Answer {
+    let shape = oracle.shape().clone();
+    for added in 0..MAX_CUTS {
+        let Some(Step { step, is_negligible }) = model.direction(point) else { return Answer::Unknown };
+        if is_negligible {
+            return if added == 0 { Answer::None } else { Answer::NoneAround };
+        }
+        let trial = |length: f64| -> Vec<f64> {
+            point.iter().zip(&step).map(|(u, d)| (u + length * d).clamp(0.0, 1.0)).collect()
+        };
+        let Ok(trials) = oracle.evaluate(&LENGTHS.map(trial)) else { return Answer::Unknown };
+        if trials.iter().flat_map(|trial| &trial.scaled).any(|values| model.is_improvement(&shape, values)) {
+            return Answer::One;
+        }
+        let Some(farthest) = trials.iter().find(|trial| trial.scaled.is_some()) else { return Answer::Unknown };
+        let Ok(Some(beyond)) = oracle.linearise(&farthest.point, 0.1 * TRIAL_STEP) else { return Answer::Unknown };
+        if model.add(&shape, point, &beyond) {
+            return Answer::Jump;
+        }
+        if added + 1 == CUTS_BEFORE_SAMPLING {
+            for beside in sampling_points(point) {
+                // A failed simulation gives no information.
+                match oracle.linearise(&beside, 0.1 * TRIAL_STEP) {
+                    Ok(Some(beside)) => _ = model.add(&shape, point, &beside),
+                    Ok(None) => {}
+                    Err(_) => return Answer::Unknown,
+                }
+            }
+        }
+    }
+    Answer::Unknown
+}
+
+/// Returns the neighbours of a point on either side along every coordinate, if inside the box.
+fn sampling_points(point: &[f64]) -> impl Iterator<Item = Vec<f64>> {
+    beside(point, SAMPLING_RADIUS)
+}
+
+/// Returns the points at a distance on either side along every coordinate, if inside the box.
+fn beside(point: &[f64], distance: f64) -> impl Iterator<Item = Vec<f64>> {
+    let moved = move |j: usize, step: f64| {
+        let u = point[j] + step;
+        (0.0..=1.0).contains(&u).then(|| point.iter().enumerate().map(|(k, v)| if k == j { u } else { *v }).collect())
+    };
+    (0..point.len()).flat_map(move |j| [distance, -distance].into_iter().filter_map(move |step| moved(j, step)))
+}
+
+/// Returns the bounds of a step in trial steps: none out of the box.
+fn box_of(point: &[f64]) -> [Vec<f64>; 2] {
+    let low = point.iter().map(|&u| if u < 1e-6 { 0.0 } else { -1.0 }).collect();
+    let high = point.iter().map(|&u| if u > 1.0 - 1e-6 { 0.0 } else { 1.0 }).collect();
+    [low, high]
+}
+
+/// Classifies a point to first order for the objective (of an infeasible point: for the largest violation).
+pub fn optimality(oracle: &mut dyn Oracle, point: &[f64]) -> Optimality {
+    let shape = oracle.shape().clone();
+    if point.is_empty() || shape.spacing.iter().any(|&spacing| spacing > 0.0) {
+        return Optimality::NotShown;
+    }
+    let Ok(Some(at)) = oracle.linearise(point, 0.1 * TRIAL_STEP) else { return Optimality::NotShown };
+    let mut level = Level::new(&shape, &at);
+    if level.is_flat() {
+        return beside_flat(oracle, point, &level);
+    }
+    match answer(oracle, point, &mut level) {
+        Answer::None => Optimality::Stationary,
+        Answer::NoneAround => Optimality::Kink,
+        Answer::One => Optimality::Descent,
+        Answer::Jump => Optimality::Jump,
+        Answer::Unknown => Optimality::NotShown,
+    }
+}
+
+/// Classifies a point without slope by the values around it.
+fn beside_flat(oracle: &mut dyn Oracle, point: &[f64], level: &Level) -> Optimality {
+    let shape = oracle.shape().clone();
+    let around: Vec<Vec<f64>> = PLATEAU_REACH.into_iter().flat_map(|distance| beside(point, distance)).collect();
+    let Ok(answers) = oracle.evaluate(&around) else { return Optimality::NotShown };
+    let values: Vec<&Vec<f64>> = answers.iter().filter_map(|answer| answer.scaled.as_ref()).collect();
+    if values.iter().any(|values| level.is_improvement(&shape, values)) {
+        Optimality::Descent
+    } else if values.iter().all(|values| level.is_equal(&shape, values)) {
+        Optimality::Plateau
+    } else {
+        Optimality::Stationary
+    }
+}
+
+/// Result of the test of a point for Pareto optimality.
+#[derive(Debug, Clone)]
+pub struct Certificate {
+    /// Pareto optimality: whether one criterion can be improved without loss in another.
+    pub pareto: Pareto,
+    /// Trade-off weights of the weighted scaled values to be minimised, at a certified point. Along the front, the
+    /// changes of these values multiplied by the weights sum to 0, to first order. The weights follow from the
+    /// multipliers and are positive.
+    pub weights: Option<Vec<f64>>,
+}
+
+/// Searches for a direction that lowers one criterion and raises none, within the bounds and the active constraints.
+///
+/// Returns `certified-local` if there is none for all sampled gradients, and `no` if a small step in such a direction is an
+/// actual improvement. Returns `not-shown` without gradients, or if only the linear models improve.
+pub fn certificate(oracle: &mut dyn Oracle, point: &[f64]) -> Certificate {
+    let unknown = Certificate { pareto: Pareto::NotShown, weights: None };
+    let shape = oracle.shape().clone();
+    if point.is_empty() || !shape.rows.iter().any(|(usage, _)| *usage == Usage::Minimise) {
+        return unknown;
+    }
+    let Ok(Some(at)) = oracle.linearise(point, 0.1 * TRIAL_STEP) else { return unknown };
+    let Some(mut cone) = DescentCone::new(&shape, &at) else { return unknown };
+    match answer(oracle, point, &mut cone) {
+        Answer::None | Answer::NoneAround if cone.is_whole() => {
+            Certificate { pareto: Pareto::CertifiedLocal, weights: cone.trade_offs(point) }
+        }
+        Answer::One => Certificate { pareto: Pareto::No, weights: None },
+        _ => unknown,
+    }
+}
