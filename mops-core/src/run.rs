@@ -388,7 +388,7 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
         let mut seen: HashSet<&[u64], BuildHasherDefault<Bits>> = HashSet::default();
         let is_new = |i: &usize| !self.cache.contains_key(&keys[*i]) && seen.insert(&keys[*i]);
         let mut new: Vec<usize> = (0..keys.len()).filter(is_new).collect();
-        let left = self.budget.evaluations.saturating_sub(self.archive.len());
+        let left = self.remaining();
         let within_budget = new.len() <= left;
         new.truncate(left);
         // Small batches, so that an interrupt takes effect soon. The results are folded in order, so that neither the
@@ -447,6 +447,10 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
 
     fn best(&self) -> Option<&Evaluation> {
         self.best.as_ref()
+    }
+
+    fn remaining(&self) -> usize {
+        self.budget.evaluations.saturating_sub(self.archive.len())
     }
 
     fn stream(&self, label: &str) -> Stream {

@@ -108,6 +108,9 @@ pub trait Oracle {
     /// Returns the best point so far, of this solver or of an earlier one in the same run.
     fn best(&self) -> Option<&Evaluation>;
 
+    /// Returns the number of points that may still be evaluated.
+    fn remaining(&self) -> usize;
+
     /// Returns the random stream with this label, identical for the same seed.
     fn stream(&self, label: &str) -> Stream;
 }

@@ -227,6 +227,11 @@ impl<O: CostFunction<Param = Vec<f64>, Output = f64>> Oracle for ArgminOracle<'_
         self.data.best.as_ref()
     }
 
+    /// argmin counts iterations only.
+    fn remaining(&self) -> usize {
+        usize::MAX
+    }
+
     fn stream(&self, label: &str) -> Stream {
         stream(self.data.seed, label)
     }

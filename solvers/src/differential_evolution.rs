@@ -6,6 +6,7 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::polishing::Polished;
 use crate::population::{Next, Population, RestartRule, StagnationMonitor};
 use crate::ranking::compare;
 
@@ -31,11 +32,13 @@ pub struct DifferentialEvolutionOptions {
     pub patience: usize,
     /// Maximum number of times that the population is resampled.
     pub restarts: usize,
+    /// Whether local searches start from the best points at the end, with a fifth of the budget.
+    pub polish: bool,
 }
 
 impl Default for DifferentialEvolutionOptions {
     fn default() -> Self {
-        Self { population: 0, tolerance: 1e-10, patience: 200, restarts: 20 }
+        Self { population: 0, tolerance: 1e-10, patience: 200, restarts: 20, polish: true }
     }
 }
 
@@ -43,7 +46,8 @@ impl SolverOptions for DifferentialEvolutionOptions {
     const KIND: &'static str = "differential-evolution";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(DifferentialEvolution { options: self.clone(), state: None })
+        let search = Box::new(DifferentialEvolution { options: self.clone(), state: None });
+        if self.polish { Box::new(Polished::new(Self::KIND, search)) } else { search }
     }
 }
 

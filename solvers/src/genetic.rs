@@ -5,6 +5,7 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::polishing::Polished;
 use crate::population::{Next, Population, RestartRule, StagnationMonitor};
 use crate::ranking::compare;
 use crate::variation::Variation;
@@ -42,6 +43,8 @@ pub struct GeneticOptions {
     pub patience: usize,
     /// Maximum number of times that the population is resampled.
     pub restarts: usize,
+    /// Whether local searches start from the best points at the end, with a fifth of the budget.
+    pub polish: bool,
 }
 
 impl Default for GeneticOptions {
@@ -54,6 +57,7 @@ impl Default for GeneticOptions {
             tolerance: 1e-10,
             patience: 40,
             restarts: 20,
+            polish: true,
         }
     }
 }
@@ -62,7 +66,8 @@ impl SolverOptions for GeneticOptions {
     const KIND: &'static str = "genetic";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(Genetic { options: self.clone(), state: None })
+        let search = Box::new(Genetic { options: self.clone(), state: None });
+        if self.polish { Box::new(Polished::new(Self::KIND, search)) } else { search }
     }
 }
 

@@ -30,6 +30,7 @@ mod optimality;
 pub mod particle_swarm;
 pub mod pattern_search;
 mod penalty;
+mod polishing;
 mod population;
 mod quasi_newton;
 mod ranking;

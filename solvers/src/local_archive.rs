@@ -33,6 +33,10 @@ impl Oracle for LocalArchive<'_> {
         self.best.as_ref()
     }
 
+    fn remaining(&self) -> usize {
+        self.oracle.remaining()
+    }
+
     fn stream(&self, label: &str) -> Stream {
         self.oracle.stream(label)
     }

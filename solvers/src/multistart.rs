@@ -104,6 +104,18 @@ impl Multistart {
         Self { local_restarts: true, radii, min_gain, queue: Some(Vec::new()), ..Self::new(local, 1) }
     }
 
+    /// Starts from given points, in their order; returns false if there are none.
+    ///
+    /// # Errors
+    /// When the run ends: budget exhausted, or interrupted by the user.
+    pub fn begin_at(&mut self, oracle: &mut dyn Oracle, mut points: Vec<Vec<f64>>) -> Result<bool, Halt> {
+        points.reverse();
+        let Some(first) = points.pop() else { return Ok(false) };
+        self.begin(oracle, &first)?;
+        self.queue = Some(points);
+        Ok(true)
+    }
+
     /// Starts the first round around the best point; returns false if there is no such point.
     ///
     /// # Errors

@@ -23,6 +23,10 @@ impl Oracle for UncountedOracle<'_> {
         self.0.best()
     }
 
+    fn remaining(&self) -> usize {
+        self.0.remaining()
+    }
+
     fn stream(&self, label: &str) -> Stream {
         self.0.stream(label)
     }

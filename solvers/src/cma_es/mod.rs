@@ -12,6 +12,7 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::polishing::Polished;
 use crate::ranking::ranked;
 use crate::start::usable_start;
 use bipop::{Bipop, Plan};
@@ -49,11 +50,13 @@ pub struct CmaEsOptions {
     /// Number of restarts with a doubled population. Runs with small populations use as many evaluations in total.
     #[schemars(range(max = 30))]
     pub restarts: usize,
+    /// Whether local searches start from the best points at the end, with a fifth of the budget.
+    pub polish: bool,
 }
 
 impl Default for CmaEsOptions {
     fn default() -> Self {
-        Self { population: 0, size: 0.2, tolerance: 1e-10, restarts: 9 }
+        Self { population: 0, size: 0.2, tolerance: 1e-10, restarts: 9, polish: true }
     }
 }
 
@@ -61,7 +64,8 @@ impl SolverOptions for CmaEsOptions {
     const KIND: &'static str = "cma-es";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(CmaEs { options: self.clone(), state: None })
+        let search = Box::new(CmaEs { options: self.clone(), state: None });
+        if self.polish { Box::new(Polished::new(Self::KIND, search)) } else { search }
     }
 }
 

@@ -119,23 +119,21 @@ impl Model for Level {
     fn add(&mut self, shape: &Shape, point: &[f64], beyond: &Linearisation) -> bool {
         let offset: Vec<f64> = point.iter().zip(&beyond.at.point).map(|(a, b)| a - b).collect();
         let LinearisedCriteria { objectives, inequalities, .. } = functions(shape, beyond, self.is_feasible);
-        let extended = |row: LinearModel, at: &LinearModel| {
-            let value = row.value + dot(&row.gradient, &offset);
-            (value.min(at.value), value, row.gradient)
-        };
         let mut jumps = false;
-        for (row, at) in objectives.into_iter().zip(&self.at.objectives) {
-            let (value, extrapolated, gradient) = extended(row, at);
-            if extrapolated > at.value.max(self.value) + MAX_CUT_VALUE * self.steepest * TRIAL_STEP {
-                jumps = true;
-            } else {
-                self.cuts.objectives.push(LinearModel { value, gradient });
+        // `limit` is the value above which a function matters.
+        let mut extend = |rows: Vec<LinearModel>, at: &[LinearModel], limit: f64, into: &mut Vec<LinearModel>| {
+            for (row, at) in rows.into_iter().zip(at) {
+                let value = row.value + dot(&row.gradient, &offset);
+                let steepest = row.gradient.iter().fold(0.0_f64, |largest, slope| largest.max(slope.abs()));
+                if value > at.value.max(limit) + MAX_CUT_VALUE * steepest * TRIAL_STEP {
+                    jumps = true;
+                } else {
+                    into.push(LinearModel { value: value.min(at.value), gradient: row.gradient });
+                }
             }
-        }
-        for (row, at) in inequalities.into_iter().zip(&self.at.inequalities) {
-            let (value, _, gradient) = extended(row, at);
-            self.cuts.inequalities.push(LinearModel { value, gradient });
-        }
+        };
+        extend(objectives, &self.at.objectives, self.value, &mut self.cuts.objectives);
+        extend(inequalities, &self.at.inequalities, 0.0, &mut self.cuts.inequalities);
         jumps
     }
 }
