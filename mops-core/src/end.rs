@@ -32,14 +32,12 @@ impl Optimality {
     }
 }
 
-/// What is known of the reported point at the end of a search.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct End {
-    /// First-order classification of the reported point.
-    pub point: Optimality,
-    /// Number of local searches from different starting points that have ended; 0 if the solver makes none.
+/// Ends of local searches from different starting points.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Basins {
+    /// Number of local searches that have ended; 0 if the solver makes none.
     pub searches: usize,
-    /// Number of these searches that ended within a thousandth of the reported objective.
+    /// Number of these searches that ended within a thousandth of the best objective.
     pub arrived: usize,
     /// Number of values, a thousandth apart, at which these searches ended.
     pub optima: usize,
@@ -48,10 +46,6 @@ pub struct End {
     ///
     /// Source: C. G. E. Boender, A. H. G. Rinnooy Kan, Mathematical Programming 37 (1987) 59-80.
     pub unseen: Option<f64>,
-    /// Reason to doubt that the reported point is the optimum, with the way out; null if there is none.
-    pub doubt: Option<String>,
-    /// What is known, as sentences.
-    pub words: Vec<String>,
 }
 
 /// Difference of two objectives, relative to the larger one plus [`SMALL`], up to which they belong to the same optimum.
@@ -60,14 +54,14 @@ const SAME: f64 = 1e-3;
 /// Objective that is regarded as zero. A scaled value of 1 is the demand.
 const SMALL: f64 = 1e-3;
 
-/// Expected share of starting points that lead to an unseen optimum, from which one is likely.
-const LIKELY: f64 = 0.5;
+/// Expected share of starting points that lead to an unseen optimum, from which another basin is likely. Reached by 1 optimum in
+/// 2 searches, 2 in 4, 3 in 6, 4 in 7.
+const LIKELY: f64 = 0.4;
 
-impl End {
-    /// Returns what is known of a point with this merit and classification, after local searches that ended with the given
-    /// merits.
+impl Basins {
+    /// Returns the summary of searches that have ended with the given merits, where the best known merit is `best`.
     #[must_use]
-    pub fn new(point: Optimality, best: Merit, ends: &[Merit], stop: Stop) -> Self {
+    pub fn of(best: Merit, ends: &[Merit]) -> Self {
         let is_same = |a: f64, b: f64| (a - b).abs() <= SAME * (a.abs().max(b.abs()) + SMALL);
         let arrived = ends.iter().filter(|end| end.is_feasible() && is_same(end.objective, best.objective)).count();
         let mut values: Vec<f64> = ends.iter().filter(|end| end.is_feasible()).map(|end| end.objective).collect();
@@ -78,7 +72,36 @@ impl End {
         #[allow(clippy::cast_precision_loss)]
         let [n, w] = [ends.len() as f64, optima as f64];
         let unseen = (ends.len() > 1).then(|| (w * (w + 1.0) / (n * (n - 1.0))).min(1.0));
-        let mut end = Self { point, searches: ends.len(), arrived, optima, unseen, doubt: None, words: Vec::new() };
+        Self { searches: ends.len(), arrived, optima, unseen }
+    }
+
+    /// Returns true if two searches ended at the best objective and another optimum is unlikely.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        self.arrived > 1 && self.unseen.is_some_and(|share| share < LIKELY)
+    }
+}
+
+/// What is known of the reported point at the end of a search.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct End {
+    /// First-order classification of the reported point.
+    pub point: Optimality,
+    /// Ends of the local searches.
+    #[serde(flatten)]
+    pub basins: Basins,
+    /// Reason to doubt that the reported point is the optimum, with the way out; null if there is none.
+    pub doubt: Option<String>,
+    /// What is known, as sentences.
+    pub words: Vec<String>,
+}
+
+impl End {
+    /// Returns what is known of a point with this merit and classification, after local searches that ended with the given
+    /// merits.
+    #[must_use]
+    pub fn new(point: Optimality, best: Merit, ends: &[Merit], stop: Stop) -> Self {
+        let mut end = Self { point, basins: Basins::of(best, ends), doubt: None, words: Vec::new() };
         end.words = end.words_of_point().into_iter().chain(end.words_of_searches()).collect();
         end.doubt = end.doubt(best.is_feasible(), stop);
         end
@@ -99,8 +122,8 @@ impl End {
     }
 
     fn words_of_searches(&self) -> Option<String> {
-        let Self { searches, arrived, optima, .. } = *self;
-        match (searches, self.unseen) {
+        let Basins { searches, arrived, optima, unseen } = self.basins;
+        match (searches, unseen) {
             (0, _) => None,
             (1, _) => Some("A single local search was made: other basins are unexplored.".to_owned()),
             (_, Some(unseen)) => {
@@ -117,7 +140,7 @@ impl End {
 
     /// Returns the reason to doubt the point, with the way out.
     fn doubt(&self, is_feasible: bool, stop: Stop) -> Option<String> {
-        let Self { searches, arrived, optima, .. } = *self;
+        let Basins { searches, arrived, optima, .. } = self.basins;
         let is_found_again = arrived > 1;
         match self.point {
             _ if stop == Stop::Interrupted => None,
@@ -131,7 +154,7 @@ impl End {
                  elsewhere, or minimise a criterion that changes."
                     .to_owned(),
             ),
-            _ if is_feasible && searches > 1 && (arrived < 2 || self.unseen.is_some_and(|share| share >= LIKELY)) => {
+            _ if is_feasible && searches > 1 && !self.basins.is_settled() => {
                 let others = if arrived == 1 { "only 1".to_owned() } else { arrived.to_string() };
                 Some(format!(
                     "Another basin is likely, as {others} of {searches} local searches ended here, and all of them in {optima} \
@@ -165,9 +188,10 @@ mod tests {
     fn an_optimum_that_most_searches_reach_is_not_doubted() {
         let ends = [1.0, 1.0001, 1.0, 1.0, 1.2, 1.0].map(merit);
         let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged);
-        assert_eq!((end.searches, end.arrived, end.optima, &end.doubt), (6, 5, 2, &None));
+        let Basins { searches, arrived, optima, unseen } = end.basins;
+        assert_eq!((searches, arrived, optima, &end.doubt), (6, 5, 2, &None));
         // w (w + 1)/(n (n - 1)) with w = 2, n = 6.
-        assert!((end.unseen.unwrap() - 0.2).abs() < 1e-15);
+        assert!((unseen.unwrap() - 0.2).abs() < 1e-15);
     }
 
     #[test]
@@ -181,7 +205,7 @@ mod tests {
     fn as_many_optima_as_searches_are_not_all_of_them() {
         let ends = [1.0, 1.0, 1.3, 1.6, 2.0].map(merit);
         let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged);
-        assert_eq!((end.arrived, end.optima, end.unseen), (2, 4, Some(1.0)));
+        assert_eq!((end.basins.arrived, end.basins.optima, end.basins.unseen), (2, 4, Some(1.0)));
         assert!(end.doubt.is_some());
     }
 

@@ -1,6 +1,6 @@
 //! Default solver, which chooses a method for the problem.
 
-use mops_core::{Halt, Merit, Objective, Oracle, Progress, Shape, Solver, SolverOptions, Usage};
+use mops_core::{Halt, Merit, Objective, Optimality, Oracle, Progress, Shape, Solver, SolverOptions, Usage};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -11,6 +11,7 @@ use crate::multistart::Multistart;
 use crate::noise_detection::{Smoothness, detect_smoothness};
 use crate::nsga2::Nsga2Options;
 use crate::nsga3::Nsga3Options;
+use crate::optimality::optimality;
 use crate::pattern_search::PatternSearchOptions;
 use crate::quasi_newton::QuasiNewton;
 use crate::sqp::SqpOptions;
@@ -34,14 +35,14 @@ use crate::weighted_chebyshev::WeightedChebyshevOptions;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {
-    /// Number of starting points, including the initial guess of the study.
+    /// Largest number of starting points, including the initial guess of the study.
     #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
 }
 
 impl Default for AutoOptions {
     fn default() -> Self {
-        Self { starts: 6 }
+        Self { starts: 8 }
     }
 }
 
@@ -77,7 +78,7 @@ enum Stage {
 struct Status {
     /// True if a previous stage has converged.
     converged: bool,
-    /// True if two runs have reached the same optimum.
+    /// True if two runs have reached the best point and another optimum is unlikely.
     confirmed: bool,
     /// Objective at the start of the last multistart around the best point.
     previous_objective: f64,
@@ -85,6 +86,9 @@ struct Status {
 
 /// Relative change of the objective that is regarded as zero.
 const NEGLIGIBLE_CHANGE: f64 = 1e-4;
+
+/// Objective that is regarded as zero. A scaled value of 1 is the demand.
+const SMALL: f64 = 1e-6;
 
 /// Half-widths of the box around the best point, used in turn.
 const RESTART_RADII: &[f64] = &[0.05, 0.02, 0.005];
@@ -126,12 +130,14 @@ impl Solver for Auto {
                 }
                 self.ends = global.ends().to_vec();
                 let converged = progress == Progress::Converged;
-                let status = Status {
-                    converged,
-                    confirmed: global.optimum_is_confirmed(NEGLIGIBLE_CHANGE),
-                    previous_objective: f64::INFINITY,
-                };
-                self.polish(oracle, status)
+                let status = Status { converged, confirmed: global.is_settled(), previous_objective: f64::INFINITY };
+                let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(Progress::Stalled) };
+                match optimality(oracle, &best) {
+                    Optimality::Stationary => Ok(Progress::Converged),
+                    // At a kink, linear models may hide a narrow valley.
+                    Optimality::Kink => self.finish_or_restart(oracle, Status { converged: true, ..status }, progress),
+                    _ => self.polish(oracle, status),
+                }
             }
             Stage::Polish(pattern, status) => {
                 let status = *status;
@@ -230,7 +236,7 @@ impl Auto {
 fn has_improved(oracle: &dyn Oracle, previous_objective: f64) -> bool {
     oracle.best().is_some_and(|best| {
         previous_objective.is_infinite()
-            || previous_objective - best.merit.objective > NEGLIGIBLE_CHANGE * previous_objective.abs()
+            || previous_objective - best.merit.objective > NEGLIGIBLE_CHANGE * previous_objective.abs().max(SMALL)
     })
 }
 

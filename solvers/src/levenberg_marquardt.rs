@@ -26,7 +26,7 @@ pub struct LevenbergMarquardtOptions {
     /// Predicted relative decrease of the sum of squares below which the iteration stops.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
-    /// Number of starting points, including the initial guess of the study.
+    /// Largest number of starting points, including the initial guess of the study.
     #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
     /// Maximum number of iterations per starting point.
@@ -36,7 +36,7 @@ pub struct LevenbergMarquardtOptions {
 
 impl Default for LevenbergMarquardtOptions {
     fn default() -> Self {
-        Self { tolerance: 1e-9, starts: 4, max_iterations: 200 }
+        Self { tolerance: 1e-9, starts: 6, max_iterations: 200 }
     }
 }
 

@@ -1,9 +1,10 @@
 //! Multistart of a local solver.
 //!
-//! The first run starts from the initial guess of the study, the next ones from the best points of a sample of the box.
-//! If enabled, runs from points around the best one follow until nothing changes.
+//! The first run starts from the initial guess of the study, the next ones from the best points of samples of the box, until an
+//! optimum that is not yet known is unlikely. A run that comes close to the end of an earlier one is not continued. If
+//! enabled, runs from points around the best one follow until nothing changes.
 
-use mops_core::{Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver};
+use mops_core::{Basins, Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver};
 
 use crate::local_archive::LocalArchive;
 use crate::start::{best_of, latin_hypercube};
@@ -13,14 +14,20 @@ pub struct Multistart {
     local: Box<dyn Solver>,
     /// Solver for the initial guess of the study, if different from the local solver.
     initial_solver: Option<Box<dyn Solver>>,
-    /// Solver that continues from the end of the first run.
+    /// Solver that continues from the end of the first run unless that has converged.
     continuation_solver: Option<Box<dyn Solver>>,
     /// Solver that is running.
     phase: Phase,
-    /// Number of starting points after the first.
-    extra_starts: usize,
-    /// Remaining starting points, the next one last; `None` before the first run has ended.
-    queue: Option<Vec<Vec<f64>>>,
+    /// Largest number of starting points.
+    starts: usize,
+    /// Number of starting points so far.
+    drawn: usize,
+    /// Evaluations that the oracle allowed at the beginning, and at the beginning of the present run.
+    allowed: [usize; 2],
+    /// Evaluations up to the end of the run that found the best point, and those of that run.
+    arrived: [usize; 2],
+    /// Remaining starting points, the next one last.
+    queue: Vec<Vec<f64>>,
     /// Merit of the best point, and the result of the run that found it.
     best: Option<(Merit, Progress)>,
     /// True if runs around the best point follow.
@@ -33,7 +40,8 @@ pub struct Multistart {
     restart_round: RestartRound,
     /// Best point of the present run.
     run_best: Option<Evaluation>,
-    /// Best merits of the completed runs, without those around the best point.
+    /// Best points of the completed runs, without those around the best point, and their merits.
+    end_points: Vec<Vec<f64>>,
     ends: Vec<Merit>,
 }
 
@@ -44,6 +52,21 @@ enum Phase {
     Continuation,
     Sampled,
 }
+
+/// Number of starting points that are drawn at once.
+const AT_ONCE: usize = 2;
+
+/// Distance along every coordinate, in the unit box, within which a run has arrived at the end of an earlier one.
+const ARRIVED: f64 = 0.01;
+
+/// Largest cost of a run that has found nothing better, relative to that of the run that has found the best point.
+const PATIENCE: usize = 3;
+
+/// Largest cost of all runs while all ends agree, relative to the cost up to the best point.
+const PROOF: usize = 4;
+
+/// Objective that is regarded as zero. A scaled value of 1 is the demand.
+const SMALL: f64 = 1e-6;
 
 /// State of the rounds of restarts around the best point.
 #[derive(Debug, Clone, Copy)]
@@ -60,21 +83,25 @@ impl RestartRound {
 }
 
 impl Multistart {
-    /// Creates a multistart of `local` from `starts` points.
+    /// Creates a multistart of `local` from at most `starts` points.
     pub fn new(local: Box<dyn Solver>, starts: usize) -> Self {
         Self {
             local,
             initial_solver: None,
             continuation_solver: None,
             phase: Phase::Initial,
-            extra_starts: starts.saturating_sub(1),
-            queue: None,
+            starts,
+            drawn: 0,
+            allowed: [0; 2],
+            arrived: [0; 2],
+            queue: Vec::new(),
             best: None,
             local_restarts: false,
             radii: &[0.15, 0.05],
             min_gain: 1e-3,
             restart_round: RestartRound::NONE,
             run_best: None,
+            end_points: Vec::new(),
             ends: Vec::new(),
         }
     }
@@ -85,7 +112,8 @@ impl Multistart {
         Self { initial_solver: Some(first), ..self }
     }
 
-    /// Sets a solver that continues from the best point of the first run, before the other starting points.
+    /// Sets a solver that continues from the best point of the first run, unless that has converged, before the other starting
+    /// points.
     #[must_use]
     pub fn with_continuation(self, second: Box<dyn Solver>) -> Self {
         Self { continuation_solver: Some(second), ..self }
@@ -101,7 +129,7 @@ impl Multistart {
     /// Creates rounds of restarts around the best point only, within the given distances in turn. The rounds end when
     /// none of them improves the objective by `min_gain`, relative to its magnitude.
     pub fn restarts_around_best(local: Box<dyn Solver>, radii: &'static [f64], min_gain: f64) -> Self {
-        Self { local_restarts: true, radii, min_gain, queue: Some(Vec::new()), ..Self::new(local, 1) }
+        Self { local_restarts: true, radii, min_gain, ..Self::new(local, 1) }
     }
 
     /// Starts from given points, in their order; returns false if there are none.
@@ -112,7 +140,7 @@ impl Multistart {
         points.reverse();
         let Some(first) = points.pop() else { return Ok(false) };
         self.begin(oracle, &first)?;
-        self.queue = Some(points);
+        self.queue = points;
         Ok(true)
     }
 
@@ -121,24 +149,75 @@ impl Multistart {
     /// # Errors
     /// When the run ends: budget exhausted, or interrupted by the user.
     pub fn begin_local_restarts(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
+        (self.phase, self.allowed) = (Phase::Sampled, [oracle.remaining(); 2]);
         self.start_restart_round(oracle)
     }
 
-    /// Returns true if two runs have ended within `accuracy` of the best objective, relative to its magnitude.
-    pub fn optimum_is_confirmed(&self, accuracy: f64) -> bool {
-        let best =
-            self.ends.iter().fold(Merit::FAILED, |best, end| if end.is_better_than(&best) { *end } else { best });
-        let near = |end: &&Merit| {
-            end.is_feasible()
-                && end.objective - best.objective <= accuracy * best.objective.abs().max(f64::MIN_POSITIVE)
-        };
-        self.ends.iter().filter(near).count() > 1
+    /// Returns true if two runs have ended at the best point and another optimum is unlikely.
+    pub fn is_settled(&self) -> bool {
+        self.best.is_some_and(|(best, _)| Basins::of(best, &self.ends).is_settled())
     }
 
     fn start_run(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.run_best = None;
+        self.allowed[1] = oracle.remaining();
         let initial = self.initial_solver.as_mut().filter(|_| self.phase == Phase::Initial);
         initial.unwrap_or(&mut self.local).begin(&mut LocalArchive { oracle, best: &mut self.run_best }, start)
+    }
+
+    /// Returns the merit of the earlier end at which the present run has arrived.
+    fn arrival(&self) -> Option<Merit> {
+        let here = self.run_best.as_ref().filter(|_| self.phase == Phase::Sampled && self.restart_round.count == 0)?;
+        let is_near = |point: &Vec<f64>| point.iter().zip(&here.point).all(|(a, b)| (a - b).abs() <= ARRIVED);
+        let known = self.end_points.iter().zip(&self.ends).filter(|(point, _)| is_near(point)).map(|(_, merit)| *merit);
+        known.into_iter().find(|merit| merit.is_feasible() && !here.merit.is_better_than(merit))
+    }
+
+    /// Takes the end of the present run into account.
+    fn record_end(&mut self, oracle: &dyn Oracle, progress: Progress, end: Merit) {
+        if self.restart_round.count == 0 {
+            self.ends.push(end);
+            self.end_points.push(self.run_best.as_ref().map_or_else(Vec::new, |best| best.point.clone()));
+        }
+        let found = oracle.best().map_or(Merit::FAILED, |best| best.merit);
+        if self.best.is_none_or(|(known, _)| found.is_better_than(&known)) {
+            self.best = Some((found, progress));
+            self.arrived = self.allowed.map(|allowed| allowed - oracle.remaining());
+        }
+    }
+
+    /// Returns true if the present run has cost too much for one that has found nothing better.
+    fn is_hopeless(&self, oracle: &dyn Oracle) -> bool {
+        let is_better = |here: &Evaluation| self.best.is_none_or(|(best, _)| here.merit.is_better_than(&best));
+        self.phase == Phase::Sampled
+            && !self.run_best.as_ref().is_some_and(is_better)
+            && self.allowed[1] - oracle.remaining() > PATIENCE * self.arrived[1].max(oracle.shape().dimension() + 1)
+    }
+
+    /// Returns true if the searches have cost enough for what they show: nothing speaks for another optimum.
+    fn is_proven(&self, oracle: &dyn Oracle) -> bool {
+        let agree = self.best.is_some_and(|(best, _)| Basins::of(best, &self.ends).optima < 2);
+        agree && self.allowed[0] - oracle.remaining() > PROOF * self.arrived[0]
+    }
+
+    /// Returns the next starting point in the whole box; `None` if there is none or no need for one.
+    fn next_start(&mut self, oracle: &mut dyn Oracle) -> Result<Option<Vec<f64>>, Halt> {
+        if self.restart_round.count > 0 {
+            return Ok(self.queue.pop());
+        }
+        if self.is_settled() || self.is_proven(oracle) {
+            self.queue.clear();
+            return Ok(None);
+        }
+        let n = oracle.shape().dimension();
+        if self.queue.is_empty() && self.drawn < self.starts && n > 0 {
+            let count = AT_ONCE.min(self.starts - self.drawn);
+            let mut random = oracle.stream(&format!("multistart {}", self.drawn));
+            let sample = latin_hypercube(count * 5 * (n + 1), n, &mut random);
+            self.queue = best_of(oracle, &sample, count)?;
+            self.drawn += count;
+        }
+        Ok(self.queue.pop())
     }
 
     /// Starts a round around the best point; returns false if the previous rounds brought no gain.
@@ -146,7 +225,7 @@ impl Multistart {
         let Some(best) = oracle.best().map(|best| (best.point.clone(), best.merit.objective)) else { return Ok(false) };
         let (centre, objective) = best;
         let RestartRound { count, idle, objective: before } = self.restart_round;
-        let gained = before.is_infinite() || objective < before - self.min_gain * before.abs();
+        let gained = before.is_infinite() || objective < before - self.min_gain * before.abs().max(SMALL);
         let idle = if gained { 0 } else { idle + 1 };
         if idle >= self.radii.len() || centre.is_empty() {
             return Ok(false);
@@ -161,19 +240,9 @@ impl Multistart {
         }
         let mut starts = best_of(oracle, &sample, RestartRound::STARTS)?;
         let Some(start) = starts.pop() else { return Ok(false) };
-        self.queue = Some(starts);
+        self.queue = starts;
         self.start_run(oracle, &start)?;
         Ok(true)
-    }
-
-    fn sample(&self, oracle: &mut dyn Oracle) -> Result<Vec<Vec<f64>>, Halt> {
-        let n = oracle.shape().dimension();
-        if self.extra_starts == 0 || n == 0 {
-            return Ok(Vec::new());
-        }
-        let mut random = oracle.stream("multistart");
-        let sample = latin_hypercube(self.extra_starts * 5 * (n + 1), n, &mut random);
-        best_of(oracle, &sample, self.extra_starts)
     }
 }
 
@@ -183,11 +252,12 @@ impl Solver for Multistart {
     }
 
     fn begin(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
-        self.queue = None;
-        self.best = None;
-        self.phase = Phase::Initial;
-        self.restart_round = RestartRound::NONE;
+        (self.phase, self.restart_round, self.best) = (Phase::Initial, RestartRound::NONE, None);
+        self.queue.clear();
+        self.end_points.clear();
         self.ends.clear();
+        self.drawn = 1;
+        self.allowed = [oracle.remaining(); 2];
         self.start_run(oracle, start)
     }
 
@@ -200,28 +270,26 @@ impl Solver for Multistart {
         };
         let progress = solver.unwrap_or(&mut self.local).step(&mut archive)?;
         if progress == Progress::Continue {
-            return Ok(progress);
-        }
-        if self.phase == Phase::Initial
-            && let Some(second) = &mut self.continuation_solver
-            && let Some(start) = archive.best().map(|best| best.point.clone())
-        {
-            second.begin(&mut archive, &start)?;
-            self.phase = Phase::Continuation;
-            return Ok(Progress::Continue);
+            if let Some(end) = self.arrival() {
+                self.record_end(oracle, Progress::Converged, end);
+            } else if !self.is_hopeless(oracle) {
+                return Ok(progress);
+            }
+        } else {
+            if self.phase == Phase::Initial
+                && progress == Progress::Stalled
+                && let Some(second) = &mut self.continuation_solver
+                && let Some(start) = archive.best().map(|best| best.point.clone())
+            {
+                second.begin(&mut archive, &start)?;
+                self.phase = Phase::Continuation;
+                return Ok(Progress::Continue);
+            }
+            let end = self.run_best.as_ref().map_or(Merit::FAILED, |best| best.merit);
+            self.record_end(oracle, progress, end);
         }
         self.phase = Phase::Sampled;
-        if self.restart_round.count == 0 {
-            self.ends.push(self.run_best.as_ref().map_or(Merit::FAILED, |best| best.merit));
-        }
-        let found = oracle.best().map_or(Merit::FAILED, |best| best.merit);
-        if self.best.is_none_or(|(known, _)| found.is_better_than(&known)) {
-            self.best = Some((found, progress));
-        }
-        if self.queue.is_none() {
-            self.queue = Some(self.sample(oracle)?);
-        }
-        match self.queue.as_mut().and_then(Vec::pop) {
+        match self.next_start(oracle)? {
             Some(start) => {
                 self.start_run(oracle, &start)?;
                 Ok(Progress::Continue)

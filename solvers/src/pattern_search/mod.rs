@@ -48,7 +48,7 @@ use trust_region_subproblem::{PenalisedObjective, TrustRegionSubproblem};
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct PatternSearchOptions {
-    /// Number of starting points: the initial guess of the study, and the best points of a sample of the box.
+    /// Largest number of starting points: the initial guess of the study, and the best points of a sample of the box.
     #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
     /// Initial size of the pattern, in the unit box.
@@ -68,7 +68,7 @@ pub struct PatternSearchOptions {
 
 impl Default for PatternSearchOptions {
     fn default() -> Self {
-        Self { starts: 6, size: 0.1, tolerance: 1e-7, shrink: 0.5, batch: 2 }
+        Self { starts: 8, size: 0.1, tolerance: 1e-7, shrink: 0.5, batch: 2 }
     }
 }
 

@@ -43,7 +43,7 @@ pub struct SqpOptions {
     /// Initial radius of the trust region, in the unit box.
     #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub radius: f64,
-    /// Number of starting points, including the initial guess of the study.
+    /// Largest number of starting points, including the initial guess of the study.
     #[schemars(range(min = 1, max = 10_000))]
     pub starts: usize,
     /// Maximum number of iterations per starting point.
@@ -53,7 +53,7 @@ pub struct SqpOptions {
 
 impl Default for SqpOptions {
     fn default() -> Self {
-        Self { tolerance: 1e-12, radius: 1.0, starts: 6, max_iterations: 300 }
+        Self { tolerance: 1e-12, radius: 1.0, starts: 8, max_iterations: 300 }
     }
 }
 
