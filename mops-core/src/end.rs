@@ -54,8 +54,11 @@ const SAME: f64 = 1e-3;
 /// Objective that is regarded as zero. A scaled value of 1 is the demand.
 const SMALL: f64 = 1e-3;
 
-/// Expected share of starting points that lead to an unseen optimum, from which another basin is likely. Reached by 1 optimum in
-/// 2 searches, 2 in 4, 3 in 6, 4 in 7.
+/// Expected share of starting points that lead to an unseen optimum, below which another basin is unlikely: 1 optimum in 4
+/// searches, 2 in 7.
+const UNLIKELY: f64 = 0.2;
+
+/// Expected share from which another basin is likely: 1 optimum in 2 searches, 2 in 4, 3 in 6, 4 in 7.
 const LIKELY: f64 = 0.4;
 
 impl Basins {
@@ -78,7 +81,13 @@ impl Basins {
     /// Returns true if two searches ended at the best objective and another optimum is unlikely.
     #[must_use]
     pub fn is_settled(&self) -> bool {
-        self.arrived > 1 && self.unseen.is_some_and(|share| share < LIKELY)
+        self.arrived > 1 && self.unseen.is_some_and(|share| share < UNLIKELY)
+    }
+
+    /// Returns true if a single search of several ended at the best objective, or another optimum is likely.
+    #[must_use]
+    pub fn is_doubtful(&self) -> bool {
+        self.searches > 1 && (self.arrived < 2 || self.unseen.is_some_and(|share| share >= LIKELY))
     }
 }
 
@@ -154,7 +163,7 @@ impl End {
                  elsewhere, or minimise a criterion that changes."
                     .to_owned(),
             ),
-            _ if is_feasible && searches > 1 && !self.basins.is_settled() => {
+            _ if is_feasible && self.basins.is_doubtful() => {
                 let others = if arrived == 1 { "only 1".to_owned() } else { arrived.to_string() };
                 Some(format!(
                     "Another basin is likely, as {others} of {searches} local searches ended here, and all of them in {optima} \

@@ -22,10 +22,10 @@ pub struct Multistart {
     starts: usize,
     /// Number of starting points so far.
     drawn: usize,
-    /// Evaluations that the oracle allowed at the beginning, and at the beginning of the present run.
-    allowed: [usize; 2],
-    /// Evaluations up to the end of the run that found the best point, and those of that run.
-    arrived: [usize; 2],
+    /// Evaluations that the oracle allowed at the beginning of the present run.
+    allowed: usize,
+    /// Evaluations of the run that found the best point.
+    arrived: usize,
     /// Remaining starting points, the next one last.
     queue: Vec<Vec<f64>>,
     /// Merit of the best point, and the result of the run that found it.
@@ -62,9 +62,6 @@ const ARRIVED: f64 = 0.01;
 /// Largest cost of a run that has found nothing better, relative to that of the run that has found the best point.
 const PATIENCE: usize = 3;
 
-/// Largest cost of all runs while all ends agree, relative to the cost up to the best point.
-const PROOF: usize = 4;
-
 /// Objective that is regarded as zero. A scaled value of 1 is the demand.
 const SMALL: f64 = 1e-6;
 
@@ -92,8 +89,8 @@ impl Multistart {
             phase: Phase::Initial,
             starts,
             drawn: 0,
-            allowed: [0; 2],
-            arrived: [0; 2],
+            allowed: 0,
+            arrived: 0,
             queue: Vec::new(),
             best: None,
             local_restarts: false,
@@ -149,18 +146,20 @@ impl Multistart {
     /// # Errors
     /// When the run ends: budget exhausted, or interrupted by the user.
     pub fn begin_local_restarts(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
-        (self.phase, self.allowed) = (Phase::Sampled, [oracle.remaining(); 2]);
+        self.phase = Phase::Sampled;
         self.start_restart_round(oracle)
     }
 
-    /// Returns true if two runs have ended at the best point and another optimum is unlikely.
+    /// Returns true if two runs have converged to the best point and another optimum is unlikely.
     pub fn is_settled(&self) -> bool {
-        self.best.is_some_and(|(best, _)| Basins::of(best, &self.ends).is_settled())
+        self.best.is_some_and(|(best, progress)| {
+            progress == Progress::Converged && Basins::of(best, &self.ends).is_settled()
+        })
     }
 
     fn start_run(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.run_best = None;
-        self.allowed[1] = oracle.remaining();
+        self.allowed = oracle.remaining();
         let initial = self.initial_solver.as_mut().filter(|_| self.phase == Phase::Initial);
         initial.unwrap_or(&mut self.local).begin(&mut LocalArchive { oracle, best: &mut self.run_best }, start)
     }
@@ -182,7 +181,7 @@ impl Multistart {
         let found = oracle.best().map_or(Merit::FAILED, |best| best.merit);
         if self.best.is_none_or(|(known, _)| found.is_better_than(&known)) {
             self.best = Some((found, progress));
-            self.arrived = self.allowed.map(|allowed| allowed - oracle.remaining());
+            self.arrived = self.allowed - oracle.remaining();
         }
     }
 
@@ -191,13 +190,7 @@ impl Multistart {
         let is_better = |here: &Evaluation| self.best.is_none_or(|(best, _)| here.merit.is_better_than(&best));
         self.phase == Phase::Sampled
             && !self.run_best.as_ref().is_some_and(is_better)
-            && self.allowed[1] - oracle.remaining() > PATIENCE * self.arrived[1].max(oracle.shape().dimension() + 1)
-    }
-
-    /// Returns true if the searches have cost enough for what they show: nothing speaks for another optimum.
-    fn is_proven(&self, oracle: &dyn Oracle) -> bool {
-        let agree = self.best.is_some_and(|(best, _)| Basins::of(best, &self.ends).optima < 2);
-        agree && self.allowed[0] - oracle.remaining() > PROOF * self.arrived[0]
+            && self.allowed - oracle.remaining() > PATIENCE * self.arrived.max(oracle.shape().dimension() + 1)
     }
 
     /// Returns the next starting point in the whole box; `None` if there is none or no need for one.
@@ -205,7 +198,7 @@ impl Multistart {
         if self.restart_round.count > 0 {
             return Ok(self.queue.pop());
         }
-        if self.is_settled() || self.is_proven(oracle) {
+        if self.is_settled() {
             self.queue.clear();
             return Ok(None);
         }
@@ -257,7 +250,6 @@ impl Solver for Multistart {
         self.end_points.clear();
         self.ends.clear();
         self.drawn = 1;
-        self.allowed = [oracle.remaining(); 2];
         self.start_run(oracle, start)
     }
 

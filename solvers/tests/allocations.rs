@@ -1,7 +1,12 @@
 //! Memory allocations of solvers between evaluations.
 
-use mops_core::{Budget, Evaluation, Halt, Linearisation, Oracle, Progress, Run, Shape, Stream};
+use mops_core::{Budget, Evaluation, Halt, Linearisation, Oracle, Progress, Run, Shape, Solver, SolverOptions, Stream};
 use mops_problems::{Posed, Slope, suites};
+use mops_solvers::cma_es::CmaEsOptions;
+use mops_solvers::differential_evolution::DifferentialEvolutionOptions;
+use mops_solvers::genetic::GeneticOptions;
+use mops_solvers::pattern_search::PatternSearchOptions;
+use mops_solvers::sqp::SqpOptions;
 
 /// Oracle whose own allocations are not counted.
 struct UncountedOracle<'a>(&'a mut dyn Oracle);
@@ -38,6 +43,23 @@ fn uncounted<T>(ask: impl FnOnce() -> T) -> T {
     answer.expect("the closure has run")
 }
 
+/// Returns the method of a kind alone, without several starts and without polishing.
+fn method(kind: &str) -> Box<dyn Solver> {
+    match kind {
+        "sqp" => SqpOptions::default().local(),
+        "pattern-search" => PatternSearchOptions::default().local(),
+        "genetic" => GeneticOptions { polish: false, ..GeneticOptions::default() }.build(),
+        "cma-es" => CmaEsOptions { polish: false, ..CmaEsOptions::default() }.build(),
+        "differential-evolution" => {
+            DifferentialEvolutionOptions { polish: false, ..DifferentialEvolutionOptions::default() }.build()
+        }
+        _ => {
+            let kind = mops_solvers::kinds().into_iter().find(|known| known.name == kind);
+            kind.expect("the kind is registered").default_choice().make()
+        }
+    }
+}
+
 /// Returns the number of allocated blocks per evaluation of the budget, for a solver of some kind on a problem of a
 /// suite. The first few steps do not count.
 fn blocks(kind: &str, suite: &str, name: &str, budget: usize) -> f64 {
@@ -46,8 +68,7 @@ fn blocks(kind: &str, suite: &str, name: &str, budget: usize) -> f64 {
     let problem = problems.iter().find(|problem| problem.name == name).expect("the problem is in the suite");
     let posed = Posed::new(problem, Slope::Differences);
     let mut run = Run::new(&posed, Budget { evaluations: budget }, &());
-    let kind = mops_solvers::kinds().into_iter().find(|known| known.name == kind).expect("the kind is registered");
-    let mut solver = kind.default_choice().make();
+    let mut solver = method(kind);
     solver.begin(&mut run, &posed.start()).expect("the budget is larger");
     // Buffers that are allocated once exist by then.
     for _ in 0..3 {
