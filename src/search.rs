@@ -16,6 +16,9 @@ pub struct Options {
     pub solver: SolverChoice,
     /// Largest number of evaluated points.
     pub max_evaluations: usize,
+    /// Number of evaluated points at which the run ends although its solver counts on `max_evaluations`: where an unfinished run is
+    /// replayed.
+    pub replayed: Option<usize>,
     /// Number of threads; all cores if absent. The result does not depend on it, bit for bit.
     pub jobs: Option<usize>,
     /// Candidate effects of a diagnosis.
@@ -62,6 +65,7 @@ impl Default for Options {
         Self {
             solver,
             max_evaluations: DEFAULT_EVALUATIONS,
+            replayed: None,
             jobs: None,
             effects: mops_effects::effects(),
             keeping: None,
@@ -132,7 +136,9 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let mut solver = options.solver.make();
     accepts(&options.solver, solver.as_ref(), problem.shape())?;
     let (store, begin) = (options.store(&problem), options.begin(&problem));
-    let mut run = Run::new(&problem, Budget { evaluations: options.max_evaluations.max(1) }, watch).keeping(store);
+    let planned = options.max_evaluations.max(1);
+    let evaluations = options.replayed.unwrap_or(planned).max(1);
+    let mut run = Run::new(&problem, Budget { evaluations }, watch).planned(planned).keeping(store);
     let start = begin.map_or_else(|| problem.start(), <[f64]>::to_vec);
     let stop = run.solve(solver.as_mut(), &start);
     if run.archive().is_empty() {

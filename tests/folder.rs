@@ -347,7 +347,8 @@ fn a_folder_removed_during_the_run_is_restored_with_all_points() {
     assert_eq!(output.status.code(), Some(4), "{}", said(&output));
     assert!(said(&output).contains("was removed during the run and has been restored"), "{}", said(&output));
     assert!(points(&out.join("evaluations.sqlite")) as u64 >= result(&out)["evaluations"].as_u64().unwrap());
-    assert!(look("report", &out).status.success());
+    let report = look("report", &out);
+    assert!(report.status.success(), "{}", said(&report));
     // Files of another run that uses the folder by then are not changed.
     let out = root.path().join("taken");
     let child = going(&out);

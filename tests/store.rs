@@ -223,7 +223,8 @@ fn a_larger_budget_extends_a_run() {
     run("pid-design", &short, &["--solver", "genetic", "--max-evaluations", "300"]);
     let said = run("pid-design", &short, &[&SEARCH[..], &["--resume"]].concat());
     run("pid-design", &long, &SEARCH);
-    assert!(counts(&said)[1] >= 300, "{said}");
+    // Of the shorter run, the last fifth was spent on local searches.
+    assert!(counts(&said)[1] >= 240, "{said}");
     assert_eq!(result(&short), result(&long));
 }
 

@@ -96,6 +96,8 @@ pub struct Record {
 pub struct Run<'a, E: Evaluator = Problem> {
     problem: &'a E,
     budget: Budget,
+    /// Budget that the solver counts on, if the run is to end before it.
+    planned: Option<usize>,
     watch: &'a dyn Watch,
     store: Option<&'a dyn Store>,
     /// Number of points answered from the store, without a simulation.
@@ -131,6 +133,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
         Self {
             problem,
             budget,
+            planned: None,
             watch,
             store: None,
             reused: 0,
@@ -144,6 +147,12 @@ impl<'a, E: Evaluator> Run<'a, E> {
             linearisations: 0,
             solved: Vec::new(),
         }
+    }
+
+    /// Sets the budget that the solver counts on; the run ends at its own, smaller budget.
+    #[must_use]
+    pub fn planned(self, evaluations: usize) -> Self {
+        Self { planned: Some(evaluations), ..self }
     }
 
     /// Uses finite differences only, for comparison.
@@ -388,7 +397,7 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
         let mut seen: HashSet<&[u64], BuildHasherDefault<Bits>> = HashSet::default();
         let is_new = |i: &usize| !self.cache.contains_key(&keys[*i]) && seen.insert(&keys[*i]);
         let mut new: Vec<usize> = (0..keys.len()).filter(is_new).collect();
-        let left = self.remaining();
+        let left = self.budget.evaluations.saturating_sub(self.archive.len());
         let within_budget = new.len() <= left;
         new.truncate(left);
         // Small batches, so that an interrupt takes effect soon. The results are folded in order, so that neither the
@@ -450,7 +459,7 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
     }
 
     fn remaining(&self) -> usize {
-        self.budget.evaluations.saturating_sub(self.archive.len())
+        self.planned.unwrap_or(self.budget.evaluations).saturating_sub(self.archive.len())
     }
 
     fn stream(&self, label: &str) -> Stream {

@@ -1,6 +1,8 @@
 //! Default solver, which chooses a method for the problem.
 
-use mops_core::{Halt, Merit, Objective, Optimality, Oracle, Progress, Shape, Solver, SolverOptions, Usage};
+use mops_core::{
+    Basins, Evaluation, Halt, Merit, Objective, Optimality, Oracle, Progress, Shape, Solver, SolverOptions, Usage,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -111,7 +113,7 @@ impl Solver for Auto {
         self.record_methods(methods);
         let global = Multistart::new(local, self.options.starts);
         let mut global = match first {
-            _ if oracle.shape().residuals > 0 => global.with_local_restarts(),
+            _ if oracle.shape().residuals > 0 => global.thorough().with_local_restarts(),
             Some(first) => global.with_initial_solver(first),
             None => global.with_continuation(PatternSearchOptions::default().local()),
         };
@@ -136,6 +138,8 @@ impl Solver for Auto {
                     Optimality::Stationary => Ok(Progress::Converged),
                     // At a kink, linear models may hide a narrow valley.
                     Optimality::Kink => self.finish_or_restart(oracle, Status { converged: true, ..status }, progress),
+                    // Ends that are not optima confirm nothing.
+                    _ if global.continue_thoroughly(oracle)? => Ok(Progress::Continue),
                     _ => self.polish(oracle, status),
                 }
             }
@@ -143,7 +147,12 @@ impl Solver for Auto {
                 let status = *status;
                 match pattern.step(oracle)? {
                     Progress::Continue => Ok(Progress::Continue),
-                    progress => self.finish_or_restart(oracle, status, progress),
+                    progress => {
+                        // A better point than the ends of the runs is not confirmed by them.
+                        let is_settled = |best: &Evaluation| Basins::of(best.merit, &self.ends).is_settled();
+                        let confirmed = status.confirmed && oracle.best().is_some_and(is_settled);
+                        self.finish_or_restart(oracle, Status { confirmed, ..status }, progress)
+                    }
                 }
             }
             Stage::LocalRestarts(restarts, status) => {

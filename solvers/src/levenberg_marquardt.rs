@@ -44,7 +44,7 @@ impl SolverOptions for LevenbergMarquardtOptions {
     const KIND: &'static str = "levenberg-marquardt";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(Multistart::new(self.local(), self.starts).with_local_restarts())
+        Box::new(Multistart::new(self.local(), self.starts).thorough().with_local_restarts())
     }
 }
 

@@ -20,6 +20,8 @@ pub struct Multistart {
     phase: Phase,
     /// Largest number of starting points.
     starts: usize,
+    /// True if all of them are used and every run is brought to its end, whatever the ends show.
+    is_thorough: bool,
     /// Number of starting points so far.
     drawn: usize,
     /// Evaluations that the oracle allowed at the beginning of the present run.
@@ -88,6 +90,7 @@ impl Multistart {
             continuation_solver: None,
             phase: Phase::Initial,
             starts,
+            is_thorough: false,
             drawn: 0,
             allowed: 0,
             arrived: 0,
@@ -101,6 +104,12 @@ impl Multistart {
             end_points: Vec::new(),
             ends: Vec::new(),
         }
+    }
+
+    /// Uses all starting points, and brings every run to its end, whatever the ends show.
+    #[must_use]
+    pub fn thorough(self) -> Self {
+        Self { is_thorough: true, ..self }
     }
 
     /// Sets a different solver for the initial guess of the study.
@@ -157,6 +166,17 @@ impl Multistart {
         })
     }
 
+    /// Continues from the remaining starting points although the ends agree; returns false if there are none.
+    ///
+    /// # Errors
+    /// When the run ends: budget exhausted, or interrupted by the user.
+    pub fn continue_thoroughly(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
+        self.is_thorough = true;
+        let Some(start) = self.next_start(oracle)? else { return Ok(false) };
+        self.start_run(oracle, &start)?;
+        Ok(true)
+    }
+
     fn start_run(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<(), Halt> {
         self.run_best = None;
         self.allowed = oracle.remaining();
@@ -166,7 +186,8 @@ impl Multistart {
 
     /// Returns the merit of the earlier end at which the present run has arrived.
     fn arrival(&self) -> Option<Merit> {
-        let here = self.run_best.as_ref().filter(|_| self.phase == Phase::Sampled && self.restart_round.count == 0)?;
+        let is_global = self.phase == Phase::Sampled && self.restart_round.count == 0 && !self.is_thorough;
+        let here = self.run_best.as_ref().filter(|_| is_global)?;
         let is_near = |point: &Vec<f64>| point.iter().zip(&here.point).all(|(a, b)| (a - b).abs() <= ARRIVED);
         let known = self.end_points.iter().zip(&self.ends).filter(|(point, _)| is_near(point)).map(|(_, merit)| *merit);
         known.into_iter().find(|merit| merit.is_feasible() && !here.merit.is_better_than(merit))
@@ -189,6 +210,7 @@ impl Multistart {
     fn is_hopeless(&self, oracle: &dyn Oracle) -> bool {
         let is_better = |here: &Evaluation| self.best.is_none_or(|(best, _)| here.merit.is_better_than(&best));
         self.phase == Phase::Sampled
+            && !self.is_thorough
             && !self.run_best.as_ref().is_some_and(is_better)
             && self.allowed - oracle.remaining() > PATIENCE * self.arrived.max(oracle.shape().dimension() + 1)
     }
@@ -198,14 +220,19 @@ impl Multistart {
         if self.restart_round.count > 0 {
             return Ok(self.queue.pop());
         }
-        if self.is_settled() {
+        if self.is_settled() && !self.is_thorough {
             self.queue.clear();
             return Ok(None);
         }
         let n = oracle.shape().dimension();
         if self.queue.is_empty() && self.drawn < self.starts && n > 0 {
-            let count = AT_ONCE.min(self.starts - self.drawn);
-            let mut random = oracle.stream(&format!("multistart {}", self.drawn));
+            let left = self.starts - self.drawn;
+            let count = if self.is_thorough { left } else { AT_ONCE.min(left) };
+            let mut random = oracle.stream(&if self.drawn == 1 {
+                "multistart".to_owned()
+            } else {
+                format!("multistart {}", self.drawn)
+            });
             let sample = latin_hypercube(count * 5 * (n + 1), n, &mut random);
             self.queue = best_of(oracle, &sample, count)?;
             self.drawn += count;

@@ -125,7 +125,7 @@ fn ended_early(run: &RunRow) -> bool {
     matches!(run.state, RunState::Running | RunState::Interrupted)
 }
 
-/// Returns the options of the run. The budget of an unfinished run is the number of its evaluations.
+/// Returns the options of the run. An unfinished run is replayed as far as it came.
 fn options(catalogue: &Catalogue, of_file: &mops_core::SolverChoice, run: &RunRow) -> Result<Options, Diagnostic> {
     let solver = if of_file.kind == run.solver {
         of_file.clone()
@@ -136,6 +136,12 @@ fn options(catalogue: &Catalogue, of_file: &mops_core::SolverChoice, run: &RunRo
             || Diagnostic::new(format!("no solver `{}`", run.solver)).with_help(suggestion(&run.solver, names));
         kind.ok_or_else(unknown)?.default_choice()
     };
-    let max_evaluations = if ended_early(run) { run.evaluations.max(1) } else { run.max_evaluations };
-    Ok(Options { solver, max_evaluations, effects: catalogue.effects.clone(), ..Options::default() })
+    let replayed = ended_early(run).then_some(run.evaluations);
+    Ok(Options {
+        solver,
+        max_evaluations: run.max_evaluations,
+        replayed,
+        effects: catalogue.effects.clone(),
+        ..Options::default()
+    })
 }

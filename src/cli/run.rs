@@ -143,6 +143,7 @@ pub(super) fn execute(
     let start = search.solver_options().map_or(Start::Fresh, |solver_options| solver_options.start.start());
     let solver = match chosen {
         None => file.solver.clone(),
+        Some(name) if name == file.solver.kind => file.solver.clone(),
         Some(name) => {
             let names = catalogue.solvers.iter().map(|kind| kind.name);
             let kind = catalogue
@@ -157,6 +158,7 @@ pub(super) fn execute(
     let options = Options {
         solver,
         max_evaluations: limit.or(file.max_evaluations).unwrap_or(DEFAULT_EVALUATIONS),
+        replayed: None,
         jobs: arguments.jobs.map(usize::from),
         effects: catalogue.effects.clone(),
         keeping: None,

@@ -53,7 +53,8 @@ impl Subproblems {
     ) -> Result<Progress, Halt> {
         let mut problem = ScalarisedProblem::new(oracle, &mut self.archive, scalarisation);
         let mut starts =
-            Multistart::new(SqpOptions { tolerance: TOLERANCE, ..SqpOptions::default() }.local(), self.starts);
+            Multistart::new(SqpOptions { tolerance: TOLERANCE, ..SqpOptions::default() }.local(), self.starts)
+                .thorough();
         starts.begin(&mut problem, start)?;
         let progress = loop {
             match starts.step(&mut problem)? {
