@@ -40,7 +40,7 @@ pub struct Polished {
 
 enum Stage {
     Global,
-    Local(Multistart),
+    Local(Box<Multistart>),
     Last(Box<dyn Solver>),
 }
 
@@ -67,7 +67,7 @@ impl Polished {
             return Ok(Progress::Stalled);
         }
         self.methods.push(kind);
-        self.stage = Stage::Local(local);
+        self.stage = Stage::Local(Box::new(local));
         Ok(Progress::Continue)
     }
 

@@ -5,10 +5,13 @@ use mops_core::{Budget, Evaluation, Evaluator, Objective, Optimality, Pareto, Ru
 use mops_solvers::{certificate, optimality};
 use rand::Rng;
 
+/// Scaled values at a point.
+type Values = dyn Fn(&[f64]) -> Vec<f64> + Sync;
+
 /// Criteria over the unit cube, with finite-difference gradients.
 struct Rows {
     shape: Shape,
-    values: Box<dyn Fn(&[f64]) -> Vec<f64> + Sync>,
+    values: Box<Values>,
 }
 
 impl Rows {

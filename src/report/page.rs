@@ -172,8 +172,8 @@ fn header(report: &Report<'_>) -> Markup {
             }
             @if report.outcome.found.diagnosis.as_ref().is_none() { dl class="long" {
                 (fact("Stopped", verdict::stop(outcome)))
-                @if let Some(words) = verdict::end(outcome) { (fact("Optimum", &words)) }
                 @if outcome.task == Task::Design && outcome.feasible { (fact("Pareto", verdict::pareto(outcome.pareto))) }
+                @if let Some(words) = verdict::end(outcome) { (fact("Optimum", &words)) }
             } }
         }
     }

@@ -1,0 +1,96 @@
+//! Ends of searches: the named solvers on shipped studies, and what the output says of a point that is not an optimum.
+
+use std::path::Path;
+
+use assert_cmd::cargo::cargo_bin_cmd;
+use serde_json::Value;
+
+/// Runs a study; returns the result and the text of the terminal.
+fn run(study: &str, folder: &Path, more: &[&str]) -> (Value, String) {
+    let out = folder.join("out");
+    let mut command = cargo_bin_cmd!("mops");
+    command.args(["run", study, "--out", out.to_str().unwrap()]).args(more);
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let result = serde_json::from_slice(&std::fs::read(out.join("result.json")).unwrap()).unwrap();
+    (result, String::from_utf8(output.stdout).unwrap())
+}
+
+/// Values of independent programs (SciPy, an own simulator), or the least of all runs.
+const OPTIMA: &[(&str, f64)] = &[
+    ("pid-design", 0.863_070_4),
+    ("pid-design-constrained", 0.735_926_5),
+    ("pid-design-multi-case", 3.895_509_8),
+    ("furuta-swing", 0.093_45),
+    ("furuta-calibration-2-joint", 3.3759),
+];
+
+#[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+fn each_named_solver_finds_the_optimum_of_the_named_studies() {
+    let folder = tempfile::tempdir().unwrap();
+    for (study, optimum) in OPTIMA {
+        for solver in ["sqp", "pattern-search", "genetic"] {
+            let (result, text) = run(study, folder.path(), &["--solver", solver]);
+            let objective = result["objective"].as_f64().unwrap();
+            assert!(objective < optimum * 1.001, "{solver} on {study}: {objective} {text}");
+            assert!(result["evaluations"].as_u64().unwrap() <= 20_000);
+        }
+    }
+}
+
+#[test]
+fn a_genetic_search_without_local_ones_is_not_certified() {
+    let folder = tempfile::tempdir().unwrap();
+    let alone = ["--solver", "genetic", "--max-evaluations", "2000", "--set", "solver.genetic.polish=false"];
+    let (result, text) = run("furuta-swing", folder.path(), &alone);
+    assert!(result["objective"].as_f64().unwrap() > 0.1, "a genetic search alone is far from the optimum");
+    assert_eq!((&result["end"]["point"], &result["pareto"]), (&"descent".into(), &"not-shown".into()), "{text}");
+    let first = text.lines().filter(|line| !line.is_empty()).nth(1).unwrap();
+    assert!(first.starts_with("Not an optimum"), "{text}");
+}
+
+/// A linear criterion that is cut off at 3 from above, as a settling time at the end of a short simulation.
+const SATURATED: &str = r#"
+[study]
+name = "saturated"
+
+[models.plant.equations]
+states     = { x = "1" }
+parameters = { a = "1", b = "1" }
+der        = { x = "-x*1 [1/s]" }
+outputs    = { y = { value = "min(3, 5 - a - b)", unit = "1" } }
+horizon    = "1 s"
+
+[tuners]
+a = { start = 0.3, min = 0, max = 2 }
+b = { start = 0.4, min = 0, max = 2 }
+
+[criteria]
+peak = { peak = { signal = "y" }, demand = 1 }
+"#;
+
+#[test]
+fn a_plateau_is_neither_converged_nor_certified() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study.toml");
+    std::fs::write(&study, SATURATED).unwrap();
+    let alone = ["--solver", "sqp", "--set", "solver.sqp.starts=1"];
+    let (result, text) = run(study.to_str().unwrap(), folder.path(), &alone);
+    assert_eq!(result["end"]["point"], "plateau", "{text}");
+    assert_eq!((&result["stop"], &result["pareto"]), (&"stalled".into(), &"not-shown".into()));
+    assert!(text.contains("On a plateau"), "{text}");
+    // With starting points in the whole box, the search sees where the criterion falls.
+    let (result, text) = run(study.to_str().unwrap(), folder.path(), &["--solver", "sqp"]);
+    assert_eq!((&result["end"]["point"], &result["stop"]), (&"stationary".into(), &"converged".into()), "{text}");
+    assert!((result["objective"].as_f64().unwrap() - 1.0).abs() < 1e-6, "{text}");
+}
+
+#[test]
+fn a_discontinuity_and_ends_that_differ_are_the_first_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let (result, text) = run("pole-placement-retuning", folder.path(), &["--solver", "sqp"]);
+    assert_eq!(result["end"]["point"], "jump", "{text}");
+    assert!(result["end"]["doubt"].as_str().unwrap().starts_with("Another basin is likely"), "{text}");
+    assert!(result["end"]["unseen"].as_f64().unwrap() >= 0.4);
+}
