@@ -62,7 +62,8 @@ impl Polished {
         } else {
             return self.search_last(oracle);
         };
-        let mut local = Multistart::new(local, 1);
+        let local = Multistart::new(local, 1);
+        let mut local = if kind == LevenbergMarquardtOptions::KIND { local.with_local_restarts() } else { local };
         if !local.begin_at(oracle, points)? {
             return Ok(Progress::Stalled);
         }
