@@ -149,22 +149,25 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
         }
     }
     let quiet = Quiet(watch);
-    let point = optimality(&run, (store, &quiet));
-    let pareto = pareto(&run, point, (store, &quiet));
+    let mut probe = Run::new(&problem, Budget { evaluations: usize::MAX }, &quiet).keeping(store);
+    let point = optimality(&run, &mut probe, watch);
+    let pareto = pareto(&run, point, &mut probe, watch);
     let stop = if stop == Stop::Converged && matches!(point, Optimality::Plateau | Optimality::Descent) {
         Stop::Stalled
     } else {
         stop
     };
-    let end = run.best().map(|best| End::new(point, best.merit, solver.ends(), stop));
+    // A replay ends where the run was interrupted, not at a budget.
+    let cause = if options.replayed.is_some() { Stop::Interrupted } else { stop };
+    let end = run.best().map(|best| End::new(point, best.merit, solver.ends(), cause));
     let ending = Ending { stop, end, pareto, seconds: started.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
     outcome.methods = solver.methods().to_vec();
-    outcome.found.slopes = slopes(&run, (store, &quiet));
+    outcome.found.slopes = slopes(&run, &mut probe, watch);
     outcome.seconds = started.elapsed().as_secs_f64();
     outcome.reused = begin.map(|_| run.reused());
     let archive = run.archive().to_vec();
-    drop(run);
+    drop((run, probe));
     Ok(Solved { outcome, problem, best, archive, front: Vec::new() })
 }
 
@@ -196,28 +199,22 @@ const NEAR: f64 = 1e-4;
 
 /// Returns the derivatives of the criteria of a design with respect to its tuners at the best point; `None` after a stop
 /// request.
-fn slopes(run: &Run<'_>, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Option<SlopesReport> {
+fn slopes(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> Option<SlopesReport> {
     let problem = run.problem();
     if problem.study().task() != Task::Design || watch.wants_stop() {
         return None;
     }
-    let mut probe = Run::new(problem, Budget { evaluations: usize::MAX }, watch).keeping(store);
-    SlopesReport::at(problem, &mut probe, &run.best()?.point, NEAR)
+    SlopesReport::at(problem, probe, &run.best()?.point, NEAR)
 }
 
 /// Classifies the best point to first order.
-fn optimality(run: &Run<'_>, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Optimality {
-    match run.best().filter(|best| best.scaled.is_some() && !watch.wants_stop()) {
-        None => Optimality::NotShown,
-        Some(best) => {
-            let mut probe = Run::new(run.problem(), Budget { evaluations: usize::MAX }, watch).keeping(store);
-            mops_solvers::optimality(&mut probe, &best.point)
-        }
-    }
+fn optimality(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> Optimality {
+    let best = run.best().filter(|best| best.scaled.is_some() && !watch.wants_stop());
+    best.map_or(Optimality::NotShown, |best| mops_solvers::optimality(probe, &best.point))
 }
 
 /// Checks the best point, with its classification for the objective, for Pareto optimality.
-fn pareto(run: &Run<'_>, point: Optimality, (store, watch): (Option<&dyn Store>, &dyn Watch)) -> Pareto {
+fn pareto(run: &Run<'_>, point: Optimality, probe: &mut Run<'_>, watch: &dyn Watch) -> Pareto {
     let shape = run.problem().shape();
     let minimised = shape.rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
     let Some(best) = run.best().filter(|best| best.merit.is_feasible() && minimised > 0 && !watch.wants_stop()) else {
@@ -227,8 +224,7 @@ fn pareto(run: &Run<'_>, point: Optimality, (store, watch): (Option<&dyn Store>,
     if shape.objective == Objective::Sum || minimised == 1 {
         return if point.is_stationary() { Pareto::CertifiedLocal } else { Pareto::NotShown };
     }
-    let mut probe = Run::new(run.problem(), Budget { evaluations: usize::MAX }, watch).keeping(store);
-    match mops_solvers::certificate(&mut probe, &best.point).pareto {
+    match mops_solvers::certificate(probe, &best.point).pareto {
         Pareto::CertifiedLocal if !point.is_stationary() => Pareto::NotShown,
         pareto => pareto,
     }

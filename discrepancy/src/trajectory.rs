@@ -258,7 +258,7 @@ fn interval(h: f64, moments: &[Moment]) -> Interval {
     }
 }
 
-/// The same for a number of states that may be known to the compiler.
+/// Returns the interval for `n` states; where the type fixes their number, its matrices need no allocation.
 fn interval_of<N: Dim>(n: N, h: f64, moments: &[Moment]) -> Interval
 where
     DefaultAllocator: Allocator<N, N> + Allocator<N, Dyn>,

@@ -48,11 +48,12 @@ pub struct Basins {
     pub unseen: Option<f64>,
 }
 
-/// Difference of two objectives, relative to the larger one plus [`SMALL`], up to which they belong to the same optimum.
+/// Difference of two objectives, relative to the larger one plus [`SMALL_OBJECTIVE`], up to which they belong to the same optimum.
 const SAME: f64 = 1e-3;
 
-/// Objective that is regarded as zero. A scaled value of 1 is the demand.
-const SMALL: f64 = 1e-3;
+/// Objective whose relative changes do not matter: changes count relative to the objective plus this. A scaled value of 1 is the
+/// demand.
+pub const SMALL_OBJECTIVE: f64 = 1e-3;
 
 /// Expected share of starting points that lead to an unseen optimum, below which another basin is unlikely: 1 optimum in 4
 /// searches, 2 in 7.
@@ -65,7 +66,7 @@ impl Basins {
     /// Returns the summary of searches that have ended with the given merits, where the best known merit is `best`.
     #[must_use]
     pub fn of(best: Merit, ends: &[Merit]) -> Self {
-        let is_same = |a: f64, b: f64| (a - b).abs() <= SAME * (a.abs().max(b.abs()) + SMALL);
+        let is_same = |a: f64, b: f64| (a - b).abs() <= SAME * (a.abs().max(b.abs()) + SMALL_OBJECTIVE);
         let arrived = ends.iter().filter(|end| end.is_feasible() && is_same(end.objective, best.objective)).count();
         let mut values: Vec<f64> = ends.iter().filter(|end| end.is_feasible()).map(|end| end.objective).collect();
         values.sort_by(f64::total_cmp);

@@ -73,7 +73,7 @@ pub use effect::{
     BoundEffect, Characteristic, DeclaredTerm, Dimension, DryFriction, Effect, EffectClass, EffectParameter,
     InitialGrid, ParameterKind, Placement, PortKind, PortState, Scope,
 };
-pub use end::{Basins, End, Optimality};
+pub use end::{Basins, End, Optimality, SMALL_OBJECTIVE};
 pub use evaluation::{Evaluation, FEASIBLE, Merit, Objective, Reading};
 pub use evaluator::Evaluator;
 pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};

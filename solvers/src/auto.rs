@@ -9,12 +9,13 @@ use serde::Deserialize;
 use crate::chaining::Chain;
 use crate::levenberg_marquardt::LevenbergMarquardtOptions;
 use crate::multimethod::Multimethod;
-use crate::multistart::Multistart;
+use crate::multistart::{Multistart, SMALL};
 use crate::noise_detection::{Smoothness, detect_smoothness};
 use crate::nsga2::Nsga2Options;
 use crate::nsga3::Nsga3Options;
 use crate::optimality::optimality;
 use crate::pattern_search::PatternSearchOptions;
+use crate::polishing::pattern_at_best;
 use crate::quasi_newton::QuasiNewton;
 use crate::sqp::SqpOptions;
 use crate::weighted_chebyshev::WeightedChebyshevOptions;
@@ -31,9 +32,9 @@ use crate::weighted_chebyshev::WeightedChebyshevOptions;
 ///   or lists; otherwise `nsga2` for two criteria and `nsga3` for more.
 ///
 /// Every method for one objective runs from several points (multistart): the initial guess of the study and the best
-/// points of a sample of the box. Unless the objective is a sum of squares, a pattern search then continues from the
-/// best point. Unless the criterion is smooth, a pattern search also continues from the end of the first run. An
-/// optimum may lie at a discontinuity (of a settling time, for example), where gradients are of no use.
+/// points of samples of the box, until another optimum is unlikely. Where the best point is then not shown to be stationary
+/// and the objective is no sum of squares, a pattern search continues from it, and from the end of the first run if that
+/// has not converged: an optimum may lie at a discontinuity (of a settling time, for example), where gradients are of no use.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {
@@ -88,9 +89,6 @@ struct Status {
 
 /// Relative change of the objective that is regarded as zero.
 const NEGLIGIBLE_CHANGE: f64 = 1e-4;
-
-/// Objective that is regarded as zero. A scaled value of 1 is the demand.
-const SMALL: f64 = 1e-6;
 
 /// Half-widths of the box around the best point, used in turn.
 const RESTART_RADII: &[f64] = &[0.05, 0.02, 0.005];
@@ -206,10 +204,8 @@ impl Auto {
 
     /// Starts a pattern search from the best point.
     fn polish(&mut self, oracle: &mut dyn Oracle, status: Status) -> Result<Progress, Halt> {
-        let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(Progress::Stalled) };
-        let mut pattern = PatternSearchOptions { size: 0.02, ..Default::default() }.local();
+        let Some(pattern) = pattern_at_best(oracle)? else { return Ok(Progress::Stalled) };
         self.record_methods(&[PatternSearchOptions::KIND]);
-        pattern.begin(oracle, &best)?;
         self.stage = Some(Stage::Polish(pattern, status));
         Ok(Progress::Continue)
     }

@@ -13,6 +13,13 @@ pub struct LinearModel {
     pub gradient: Vec<f64>,
 }
 
+impl LinearModel {
+    /// Returns the largest derivative.
+    pub fn steepest(&self) -> f64 {
+        self.gradient.iter().fold(0.0_f64, |largest, slope| largest.max(slope.abs()))
+    }
+}
+
 // N.B.: a derived `clone_from` allocates new memory.
 impl Clone for LinearModel {
     fn clone(&self) -> Self {

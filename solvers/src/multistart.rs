@@ -65,7 +65,7 @@ const ARRIVED: f64 = 0.01;
 const PATIENCE: usize = 3;
 
 /// Objective that is regarded as zero. A scaled value of 1 is the demand.
-const SMALL: f64 = 1e-6;
+pub const SMALL: f64 = 1e-6;
 
 /// State of the rounds of restarts around the best point.
 #[derive(Debug, Clone, Copy)]

@@ -44,6 +44,17 @@ enum Stage {
     Last(Box<dyn Solver>),
 }
 
+/// Starts a pattern search of small size at the best point; `None` if there is no such point.
+///
+/// # Errors
+/// When the run ends: budget exhausted, or interrupted by the user.
+pub fn pattern_at_best(oracle: &mut dyn Oracle) -> Result<Option<Box<dyn Solver>>, Halt> {
+    let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(None) };
+    let mut pattern = PatternSearchOptions { size: LAST_SIZE, ..PatternSearchOptions::default() }.local();
+    pattern.begin(oracle, &best)?;
+    Ok(Some(pattern))
+}
+
 impl Polished {
     /// Polishes the result of `search`, a solver of the given kind.
     pub fn new(kind: &'static str, search: Box<dyn Solver>) -> Self {
@@ -73,9 +84,7 @@ impl Polished {
     }
 
     fn search_last(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
-        let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(Progress::Stalled) };
-        let mut pattern = PatternSearchOptions { size: LAST_SIZE, ..PatternSearchOptions::default() }.local();
-        pattern.begin(oracle, &best)?;
+        let Some(pattern) = pattern_at_best(oracle)? else { return Ok(Progress::Stalled) };
         self.methods.push(PatternSearchOptions::KIND);
         self.stage = Stage::Last(pattern);
         Ok(Progress::Continue)

@@ -199,6 +199,7 @@ fn a_jump_beside_the_point_shows_nothing() {
 #[test]
 fn no_plateau_of_saturated_criteria_is_stationary() {
     let mut random = stream(7, "plateaus");
+    let mut shown = 0;
     for case in 0..200 {
         let centre: [f64; 3] = std::array::from_fn(|_| random.random());
         let (limit, steep) = (random.random_range(0.01..0.1), random.random_range(1.0..50.0));
@@ -212,9 +213,11 @@ fn no_plateau_of_saturated_criteria_is_stationary() {
         let within: [f64; 3] = std::array::from_fn(|j| centre[j] + 0.3 * limit.sqrt() * (point[j] - centre[j]));
         if away > edge {
             assert_eq!(saturated.optimality(&point), Optimality::Plateau, "{case}: {point:?} of {centre:?}");
+            shown += 1;
         }
         if within.iter().all(|u| (0.02..0.98).contains(u)) && 1.0 + steep * limit > 1.6 && steep * limit < 1.9 {
             assert_eq!(saturated.optimality(&within), Optimality::Plateau, "{case}: {within:?} of {centre:?}");
         }
     }
+    assert!(shown > 100, "{shown}");
 }

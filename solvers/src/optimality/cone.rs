@@ -1,11 +1,9 @@
 //! Directions along which no criterion increases.
 
 use mops_core::{FEASIBLE, Linearisation, Objective, Shape};
-use nalgebra::DMatrix;
 
-use super::{IMPROVEMENT, MAX_CUT_VALUE, Model, Step, TRIAL_STEP, box_of};
+use super::{IMPROVEMENT, MAX_CUT_VALUE, Model, Step, TRIAL_STEP, steepest_step};
 use crate::active_set::dot;
-use crate::epigraph::{Direction, Subproblem};
 use crate::linearised_criteria::{LinearModel, LinearisedCriteria};
 
 /// Relative derivative below which finite differences show only noise.
@@ -30,9 +28,8 @@ impl DescentCone {
     /// Creates the cone; `None` if no criterion has a slope.
     pub fn new(shape: &Shape, at: &Linearisation) -> Option<Self> {
         let criteria = each(shape, at);
-        let steepest = |row: &LinearModel| row.gradient.iter().fold(0.0_f64, |a, s| a.max(s.abs()));
         let has_slope = |(k, row): (usize, &LinearModel)| {
-            let (value, steepest) = (row.value, steepest(row));
+            let (value, steepest) = (row.value, row.steepest());
             (steepest >= MIN_GRADIENT * value.abs().max(f64::MIN_POSITIVE)).then_some((k, value, steepest))
         };
         let scales: Vec<(usize, f64, f64)> = criteria.objectives.iter().enumerate().filter_map(has_slope).collect();
@@ -60,7 +57,6 @@ impl DescentCone {
     /// Computes the step with the steepest descent in the cone, with the trade-off weights of the criteria.
     fn solve(&self, point: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
         // Lengths in units of the step: values and gradients are then of the same order.
-        let n = point.len();
         let in_step_units =
             |row: &LinearModel| LinearModel { value: row.value / TRIAL_STEP, gradient: row.gradient.clone() };
         let mut inequalities: Vec<LinearModel> = self.objectives.iter().map(in_step_units).collect();
@@ -68,13 +64,9 @@ impl DescentCone {
         inequalities.extend(self.inequalities.iter().map(in_step_units));
         let sum =
             |gradient: Vec<f64>, row: &LinearModel| gradient.iter().zip(&row.gradient).map(|(a, b)| a + b).collect();
-        let total = LinearModel { value: 0.0, gradient: self.objectives.iter().fold(vec![0.0; n], sum) };
+        let total = LinearModel { value: 0.0, gradient: self.objectives.iter().fold(vec![0.0; point.len()], sum) };
         let cone = LinearisedCriteria { objectives: vec![total], inequalities, equalities: self.equalities.clone() };
-        let [low, high] = box_of(point);
-        // A penalty above every multiplier keeps the direction inside the cone.
-        let mut direction = Direction::default();
-        let hessian = DMatrix::identity(n, n) * 1e-6;
-        Subproblem::default().solve(&cone, &hessian, [&low, &high], 1e4, &mut direction)?;
+        let direction = steepest_step(&cone, point)?;
         // The weights are those of the sum plus the multipliers that keep each criterion from increasing.
         let constraint_multipliers = &direction.multipliers.inequalities;
         let m = self.objectives.len();

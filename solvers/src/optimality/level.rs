@@ -1,18 +1,13 @@
 //! Level of the objective around a point.
 
-use mops_core::{Linearisation, Shape};
-use nalgebra::DMatrix;
+use mops_core::{Linearisation, SMALL_OBJECTIVE, Shape};
 
-use super::{MAX_CUT_VALUE, Model, Step, TRIAL_STEP, box_of};
+use super::{MAX_CUT_VALUE, Model, Step, TRIAL_STEP, steepest_step};
 use crate::active_set::dot;
-use crate::epigraph::{Direction, Subproblem};
 use crate::linearised_criteria::{LinearModel, LinearisedCriteria};
 
-/// Decrease of the objective within a trial step that is regarded as zero, relative to the objective plus [`SMALL`].
+/// Decrease of the objective within a trial step that is regarded as zero, relative to the objective plus [`SMALL_OBJECTIVE`].
 const NEGLIGIBLE: f64 = 1e-5;
-
-/// Objective that is regarded as zero. A scaled value of 1 is the demand.
-const SMALL: f64 = 1e-3;
 
 /// Change of the objective within a trial step that is a rounding error, relative as above.
 const ROUNDING: f64 = 1e-11;
@@ -36,9 +31,8 @@ impl Level {
         let is_feasible = linearisation.at.merit.is_feasible();
         let at = functions(shape, linearisation, is_feasible);
         let value = at.objective();
-        let attains = |row: &&LinearModel| row.value >= value - NEGLIGIBLE * (value.abs() + SMALL);
-        let slopes = at.objectives.iter().filter(attains).flat_map(|row| &row.gradient);
-        let steepest = slopes.fold(0.0_f64, |largest, slope| largest.max(slope.abs()));
+        let attains = |row: &&LinearModel| row.value >= value - NEGLIGIBLE * (value.abs() + SMALL_OBJECTIVE);
+        let steepest = at.objectives.iter().filter(attains).map(LinearModel::steepest).fold(0.0, f64::max);
         Self { is_feasible, value, steepest, at, cuts: LinearisedCriteria::default() }
     }
 
@@ -53,7 +47,7 @@ impl Level {
     }
 
     fn size(&self) -> f64 {
-        self.value.abs() + SMALL
+        self.value.abs() + SMALL_OBJECTIVE
     }
 
     /// Returns the objective of scaled values; infinite if they become infeasible.
@@ -71,40 +65,28 @@ impl Model for Level {
     fn direction(&self, point: &[f64]) -> Option<Step> {
         let n = point.len();
         let unit = self.steepest.max(f64::MIN_POSITIVE);
-        // In units of the trial step and of the largest derivative, relative to the objective.
-        let scaled = |row: &LinearModel, base: f64| LinearModel {
-            value: (row.value - base) / (unit * TRIAL_STEP),
+        #[allow(clippy::cast_precision_loss)]
+        let lowest = self.value - unit * n as f64 * TRIAL_STEP;
+        // In units of the trial step and of a derivative.
+        let scaled = |row: &LinearModel, value: f64, unit: f64| LinearModel {
+            value: value / (unit * TRIAL_STEP),
             gradient: row.gradient.iter().map(|slope| slope / unit).collect(),
         };
-        // Whether the function can exceed what the objective may fall to, within the step.
-        let reaches = |row: &LinearModel| {
-            let reach: f64 = row.gradient.iter().map(|slope| slope.abs()).sum();
-            #[allow(clippy::cast_precision_loss)]
-            let fall = unit * n as f64;
-            row.value + reach * TRIAL_STEP >= self.value - fall * TRIAL_STEP
+        let reaches = |row: &LinearModel, limit: f64| {
+            row.value + row.gradient.iter().map(|slope| slope.abs()).sum::<f64>() * TRIAL_STEP >= limit
         };
         let all = |group: fn(&LinearisedCriteria) -> &Vec<LinearModel>| group(&self.at).iter().chain(group(&self.cuts));
-        let within = |row: &LinearModel| {
-            let reach: f64 = row.gradient.iter().map(|slope| slope.abs()).sum();
-            // A constraint holds at the point.
-            (row.value + reach * TRIAL_STEP >= 0.0).then(|| {
-                let held = LinearModel { value: row.value.min(0.0), gradient: row.gradient.clone() };
-                let size = row.gradient.iter().fold(f64::MIN_POSITIVE, |largest, slope| largest.max(slope.abs()));
-                LinearModel {
-                    value: held.value / (size * TRIAL_STEP),
-                    gradient: held.gradient.iter().map(|slope| slope / size).collect(),
-                }
-            })
-        };
+        let objectives = all(|c| &c.objectives).filter(|row| reaches(row, lowest));
+        let inequalities = all(|c| &c.inequalities).filter(|row| reaches(row, 0.0));
         let criteria = LinearisedCriteria {
-            objectives: all(|c| &c.objectives).filter(|row| reaches(row)).map(|row| scaled(row, self.value)).collect(),
-            inequalities: all(|c| &c.inequalities).filter_map(within).collect(),
-            equalities: self.at.equalities.iter().map(|row| scaled(row, row.value)).collect(),
+            objectives: objectives.map(|row| scaled(row, row.value - self.value, unit)).collect(),
+            // Constraints hold at the point.
+            inequalities: inequalities
+                .map(|row| scaled(row, row.value.min(0.0), row.steepest().max(f64::MIN_POSITIVE)))
+                .collect(),
+            equalities: self.at.equalities.iter().map(|row| scaled(row, 0.0, unit)).collect(),
         };
-        let [low, high] = box_of(point);
-        let mut direction = Direction::default();
-        let hessian = DMatrix::identity(n, n) * 1e-6;
-        Subproblem::default().solve(&criteria, &hessian, [&low, &high], 1e4, &mut direction)?;
+        let direction = steepest_step(&criteria, point)?;
         let predicted = -direction.level * unit * TRIAL_STEP;
         Some(Step {
             step: direction.step.iter().map(|d| TRIAL_STEP * d).collect(),
@@ -124,7 +106,7 @@ impl Model for Level {
         let mut extend = |rows: Vec<LinearModel>, at: &[LinearModel], limit: f64, into: &mut Vec<LinearModel>| {
             for (row, at) in rows.into_iter().zip(at) {
                 let value = row.value + dot(&row.gradient, &offset);
-                let steepest = row.gradient.iter().fold(0.0_f64, |largest, slope| largest.max(slope.abs()));
+                let steepest = row.steepest();
                 if value > at.value.max(limit) + MAX_CUT_VALUE * steepest * TRIAL_STEP {
                     jumps = true;
                 } else {

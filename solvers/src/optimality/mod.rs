@@ -4,7 +4,10 @@ mod cone;
 mod level;
 
 use mops_core::{Linearisation, Optimality, Oracle, Pareto, Shape, Usage};
+use nalgebra::DMatrix;
 
+use crate::epigraph::{Direction, Subproblem};
+use crate::linearised_criteria::LinearisedCriteria;
 use cone::DescentCone;
 use level::Level;
 
@@ -128,11 +131,16 @@ fn beside(point: &[f64], distance: f64) -> impl Iterator<Item = Vec<f64>> {
     (0..point.len()).flat_map(move |j| [distance, -distance].into_iter().filter_map(move |step| moved(j, step)))
 }
 
-/// Returns the bounds of a step in trial steps: none out of the box.
-fn box_of(point: &[f64]) -> [Vec<f64>; 2] {
-    let low = point.iter().map(|&u| if u < 1e-6 { 0.0 } else { -1.0 }).collect();
-    let high = point.iter().map(|&u| if u > 1.0 - 1e-6 { 0.0 } else { 1.0 }).collect();
-    [low, high]
+/// Returns the step within the box, in trial steps, that lowers criteria in units of the trial step most; `None` if rounding
+/// errors prevent its computation.
+fn steepest_step(criteria: &LinearisedCriteria, point: &[f64]) -> Option<Direction> {
+    let low: Vec<f64> = point.iter().map(|&u| if u < 1e-6 { 0.0 } else { -1.0 }).collect();
+    let high: Vec<f64> = point.iter().map(|&u| if u > 1.0 - 1e-6 { 0.0 } else { 1.0 }).collect();
+    let hessian = DMatrix::identity(point.len(), point.len()) * 1e-6;
+    let mut direction = Direction::default();
+    // A penalty above every multiplier keeps the step within the constraints.
+    Subproblem::default().solve(criteria, &hessian, [&low, &high], 1e4, &mut direction)?;
+    Some(direction)
 }
 
 /// Classifies a point to first order for the objective (of an infeasible point: for the largest violation).
