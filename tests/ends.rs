@@ -94,3 +94,22 @@ fn a_discontinuity_and_ends_that_differ_are_the_first_line() {
     assert!(result["end"]["doubt"].as_str().unwrap().starts_with("Another basin is likely"), "{text}");
     assert!(result["end"]["unseen"].as_f64().unwrap() >= 0.4);
 }
+
+#[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+fn along_a_curved_ridge_of_constraints_every_seed_ends_at_the_optimum() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study.toml");
+    // The constraints of its README, which make the settling time smooth.
+    let smooth = r#"
+peak = { peak          = { signal = "phi" }, usage = "inequality", demand = "30.3 deg" }
+dip  = { step-envelope = { signal = "phi", lower = [["1.2 s", "29.7 deg"]] }, usage = "inequality", good = "-0.3 deg", bad = "0 deg" }
+"#;
+    let shipped = std::fs::read_to_string("studies/pole-placement-retuning/study.toml").unwrap();
+    std::fs::write(&study, shipped + smooth).unwrap();
+    for seed in ["1", "2", "3", "4", "5"] {
+        let (result, text) = run(study.to_str().unwrap(), folder.path(), &["--seed", seed]);
+        // 1.11584 by an independent program (SciPy).
+        assert!(result["objective"].as_f64().unwrap() < 1.11584 * 1.001, "{seed}: {text}");
+    }
+}

@@ -32,8 +32,8 @@ use crate::weighted_chebyshev::WeightedChebyshevOptions;
 ///   or lists; otherwise `nsga2` for two criteria and `nsga3` for more.
 ///
 /// Every method for one objective runs from several points (multistart): the initial guess of the study and the best
-/// points of samples of the box, until another optimum is unlikely. Where the best point is then not shown to be stationary
-/// and the objective is no sum of squares, a pattern search continues from it, and from the end of the first run if that
+/// points of samples of the box, until another optimum is unlikely. Where the best point is then not shown to be stationary,
+/// or the runs have ended at several optima, and the objective is no sum of squares, a pattern search continues from it, and from the end of the first run if that
 /// has not converged: an optimum may lie at a discontinuity (of a settling time, for example), where gradients are of no use.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
@@ -129,13 +129,15 @@ impl Solver for Auto {
                     return Ok(progress);
                 }
                 self.ends = global.ends().to_vec();
-                let converged = progress == Progress::Converged;
-                let status = Status { converged, confirmed: global.is_settled(), previous_objective: f64::INFINITY };
-                let Some(best) = oracle.best().map(|best| best.point.clone()) else { return Ok(Progress::Stalled) };
-                match optimality(oracle, &best) {
-                    Optimality::Stationary => Ok(Progress::Converged),
+                let Some(best) = oracle.best().cloned() else { return Ok(Progress::Stalled) };
+                let (converged, confirmed) = (progress == Progress::Converged, global.is_settled());
+                // Otherwise the best point may stand in a narrow curved valley, where derivatives show no descent.
+                let is_trusted = converged && (confirmed || Basins::of(best.merit, &self.ends).optima < 2);
+                let status = Status { converged, confirmed, previous_objective: f64::INFINITY };
+                match optimality(oracle, &best.point) {
+                    Optimality::Stationary if is_trusted => Ok(Progress::Converged),
                     // At a kink, linear models may hide a narrow valley.
-                    Optimality::Kink => self.finish_or_restart(oracle, Status { converged: true, ..status }, progress),
+                    Optimality::Kink if is_trusted => self.finish_or_restart(oracle, status, progress),
                     // Ends that are not optima confirm nothing.
                     _ if global.continue_thoroughly(oracle)? => Ok(Progress::Continue),
                     _ => self.polish(oracle, status),
