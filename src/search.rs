@@ -6,7 +6,7 @@ use std::time::Instant;
 use mops_core::{
     Budget, Cancellation, Effect, End, Ending, Evaluation, Objective, Optimality, Oracle, Outcome, Pareto, Place,
     Problem, Quiet, Record, Run, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task,
-    Usage, Watch, conclude,
+    Watch, conclude,
 };
 
 /// Options of [`crate::solve()`].
@@ -216,7 +216,7 @@ fn optimality(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> Optimali
 /// Checks the best point, with its classification for the objective, for Pareto optimality.
 fn pareto(run: &Run<'_>, point: Optimality, probe: &mut Run<'_>, watch: &dyn Watch) -> Pareto {
     let shape = run.problem().shape();
-    let minimised = shape.rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
+    let minimised = shape.objective_count();
     let Some(best) = run.best().filter(|best| best.merit.is_feasible() && minimised > 0 && !watch.wants_stop()) else {
         return Pareto::NotShown;
     };

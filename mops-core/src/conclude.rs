@@ -159,10 +159,10 @@ const LONGEST_FRONT: usize = 200;
 /// Returns the points of the Pareto front in order of the first criterion, thinned evenly if there are many. For a single
 /// design, returns the design itself.
 fn front_points(run: &Run<'_>, best: &Evaluation) -> Vec<Design> {
-    let study = run.problem().study();
+    let problem = run.problem();
     let front = run.front();
     let Some(m) = front.first().map(|&i| run.archive()[i].objectives.len()) else {
-        return vec![outcome::design(study, best)];
+        return vec![outcome::design(problem, best)];
     };
     let row = |i: usize| run.archive()[i].objectives.as_slice();
     let objectives: Vec<f64> = front.iter().flat_map(|&i| row(i).iter().copied()).collect();
@@ -172,7 +172,7 @@ fn front_points(run: &Run<'_>, best: &Evaluation) -> Vec<Design> {
     let reported = run.archive().iter().position(|record| record.tuners == best.tuners);
     kept.extend(reported.filter(|i| front.contains(i) && !kept.contains(i)));
     kept.sort_by(|&a, &b| front::compare(row(a), row(b)));
-    kept.into_iter().map(|i| outcome::design(study, run.evaluation(i))).collect()
+    kept.into_iter().map(|i| outcome::design(problem, run.evaluation(i))).collect()
 }
 
 /// Returns a number with six significant digits, to hide rounding errors.

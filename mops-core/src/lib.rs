@@ -32,6 +32,7 @@ mod least_squares;
 pub mod linear;
 mod linearised;
 mod model;
+mod objectives;
 mod outcome;
 mod panics;
 mod placement;
@@ -88,6 +89,7 @@ pub use model::{
     WithTangents, Work,
 };
 pub use mops_math as math;
+pub use objectives::FrontObjective;
 pub use outcome::{
     CalibrationReport, ChannelReport, CriterionReport, Design, ExcitationFindings, ExperimentReport, FailureReport,
     Findings, Outcome, ParameterReport, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,

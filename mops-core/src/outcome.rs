@@ -12,9 +12,11 @@ use crate::criterion::Usage;
 use crate::demand::Demand;
 use crate::diagnosis::Diagnosis;
 use crate::end::End;
-use crate::evaluation::Evaluation;
+use crate::evaluation::{Evaluation, Objective};
 use crate::experiment::Role;
 use crate::identification::{ExcitationReport, RegressionReport, SensitivityReport, Whiteness};
+use crate::objectives::FrontObjective;
+use crate::problem::Problem;
 use crate::robustness::{GlobalSensitivityReport, MonteCarloReport, RobustReport, WorstCaseReport};
 use crate::slopes::SlopesReport;
 use crate::solver::Stop;
@@ -199,6 +201,12 @@ pub struct Design {
     /// Values of all criteria, by `case/criterion`.
     #[schemars(with = "BTreeMap<String, f64>")]
     pub criteria: Map<String, Value>,
+    /// Values of the objectives of a Pareto front: of every minimised criterion in its worst case, which has the largest weighted
+    /// scaled value, by name; under `per-case`, by `case/criterion` where a criterion is minimised in several cases. Absent for a
+    /// single design.
+    #[schemars(with = "BTreeMap<String, f64>")]
+    #[serde(skip_serializing_if = "Map::is_empty")]
+    pub objectives: Map<String, Value>,
 }
 
 /// Criterion values in a result, for one case.
@@ -392,10 +400,14 @@ pub(crate) fn worst_scaled(study: &Study, at: &Evaluation) -> f64 {
 }
 
 /// Returns the tuners and criteria at a point of a Pareto front.
-pub(crate) fn design(study: &Study, at: &Evaluation) -> Design {
+pub(crate) fn design(problem: &Problem, at: &Evaluation) -> Design {
+    let study = problem.study();
+    let objectives = if problem.shape().objective == Objective::Each { problem.objectives() } else { Vec::new() };
+    let worst = |objective: &FrontObjective| json!(objective.worst(study, at).map(|(_, reading)| reading.value));
     let value = |reading: &Option<crate::evaluation::Reading>| json!(reading.map(|r| r.value));
     Design {
         tuners: study.tuners.iter().zip(&at.tuners).map(|(t, &v)| (t.name.clone(), json!(v))).collect(),
+        objectives: objectives.iter().map(|objective| (objective.label.clone(), worst(objective))).collect(),
         criteria: study.rows.iter().zip(&at.readings).map(|(row, reading)| (study.key(row), value(reading))).collect(),
     }
 }

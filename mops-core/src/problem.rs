@@ -12,6 +12,7 @@ use crate::experiment::Role;
 use crate::failure::Failure;
 use crate::known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes as KnownSlopes, RowValue};
 use crate::model::{Analysis, Job};
+use crate::objectives::FrontObjective;
 use crate::panics::caught;
 use crate::random::stream;
 use crate::scalar::Dual;
@@ -122,6 +123,11 @@ impl Problem {
     /// Returns the dimensions and kinds of the problem.
     pub fn shape(&self) -> &Shape {
         &self.shape
+    }
+
+    /// Returns the objectives of the Pareto front, in the order of [`Shape::objectives`].
+    pub fn objectives(&self) -> Vec<FrontObjective> {
+        FrontObjective::of_study(&self.study, &self.shape.rows)
     }
 
     /// Returns the active tuners, as indices into the tuners of the study.
@@ -466,11 +472,23 @@ fn own_usage(row: &Row, study: &Study) -> Usage {
 }
 
 /// Returns the dimensions and kinds of the problem, without residuals.
+/// Returns the index of the objective of every minimised row, in the order of the rows.
+fn groups(objectives: &[FrontObjective]) -> Vec<usize> {
+    let rows = objectives.iter().enumerate().flat_map(|(k, objective)| objective.rows.iter().map(move |&row| (row, k)));
+    let mut rows: Vec<(usize, usize)> = rows.collect();
+    rows.sort_unstable();
+    rows.into_iter().map(|(_, objective)| objective).collect()
+}
+
 fn shape(study: &Study, active: &[usize], usage: impl Fn(&Row, &Study) -> Usage) -> Shape {
-    let rows = study.rows.iter().map(|row| (usage(row, study), row.weight)).collect();
+    let rows: Vec<(Usage, f64)> = study.rows.iter().map(|row| (usage(row, study), row.weight)).collect();
     let spacing = active.iter().map(|&i| study.tuners[i].spacing()).collect();
     let points = if study.task == Task::Pareto { study.tasks.pareto.points } else { 0 };
-    Shape { spacing, rows, objective: study.objective, points, residuals: 0 }
+    let groups = match study.objective {
+        Objective::Each => groups(&FrontObjective::of_study(study, &rows)),
+        Objective::Max | Objective::Sum => Vec::new(),
+    };
+    Shape { spacing, rows, objective: study.objective, groups, points, residuals: 0 }
 }
 
 /// Returns the values of a job without residuals, for a cache that does not need them.

@@ -21,7 +21,11 @@ pub struct Shape {
     pub rows: Vec<(Usage, f64)>,
     /// Combination of the minimised rows into one objective.
     pub objective: Objective,
-    /// Approximate number of points requested for the Pareto front; 0 if not specified.
+    /// Index of the objective to which each minimised row belongs, in the order of these rows, if the objectives count each by
+    /// itself. The value of an objective is the largest weighted scaled value of its rows. Empty if every row is an objective of
+    /// its own.
+    pub groups: Vec<usize>,
+    /// Number of points requested for the Pareto front; 0 if not specified.
     pub points: usize,
     /// Length of the residual vector whose sum of squares is the objective; 0 if the objective is not a sum of squares.
     pub residuals: usize,
@@ -33,9 +37,39 @@ impl Shape {
         self.spacing.len()
     }
 
-    /// Returns the weighted scaled values of the rows to be minimised.
+    /// Returns the objectives: the weighted scaled values of the rows to be minimised, or the largest one of each group.
     pub fn objectives(&self, scaled: &[f64]) -> Vec<f64> {
-        self.pick(Usage::Minimise, scaled, |s, weight| weight * s)
+        let mut objectives = Vec::with_capacity(self.objective_count());
+        self.append_objectives(scaled, &mut objectives);
+        objectives
+    }
+
+    /// Appends the objectives, as [`Shape::objectives`], to a vector.
+    pub fn append_objectives(&self, scaled: &[f64], to: &mut Vec<f64>) {
+        let values = self.rows.iter().zip(scaled).filter(|((usage, _), _)| *usage == Usage::Minimise);
+        let values = values.map(|((_, weight), s)| weight * s);
+        if self.groups.is_empty() {
+            to.extend(values);
+            return;
+        }
+        let first = to.len();
+        to.resize(first + self.objective_count(), f64::NEG_INFINITY);
+        for (&group, value) in self.groups.iter().zip(values) {
+            to[first + group] = to[first + group].max(value);
+        }
+    }
+
+    /// Returns the number of objectives.
+    pub fn objective_count(&self) -> usize {
+        match self.groups.iter().max() {
+            Some(last) => last + 1,
+            None => self.rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count(),
+        }
+    }
+
+    /// Returns the index of the objective to which each minimised row belongs, in the order of these rows.
+    pub fn objective_of_rows(&self) -> Vec<usize> {
+        if self.groups.is_empty() { (0..self.objective_count()).collect() } else { self.groups.clone() }
     }
 
     /// Returns the inequality constraints, satisfied if at most 0.

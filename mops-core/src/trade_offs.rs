@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::criterion::Usage;
 use crate::evaluation::Evaluation;
 use crate::front;
+use crate::objectives::FrontObjective;
 use crate::problem::Problem;
 
 /// Pareto optimality of a result: certified, not shown or refuted.
@@ -44,7 +44,7 @@ pub struct TradeOffs {
 /// A criterion of a front.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct FrontCriterion {
-    /// Key in the points of the front, `case/criterion`.
+    /// Key in `objectives` of the points of the front.
     pub key: String,
     /// Unit of its values.
     pub unit: String,
@@ -92,11 +92,13 @@ impl TradeOffs {
     pub fn of(problem: &Problem, points: &[Certified]) -> Option<Self> {
         let study = problem.study();
         let shape = problem.shape();
-        let rows: Vec<usize> = (0..study.rows.len()).filter(|&i| shape.rows[i].0 == Usage::Minimise).collect();
-        let m = rows.len();
-        let value = |at: &Evaluation, row: usize| Some(at.readings[row]?.value);
+        let objectives = problem.objectives();
+        let m = objectives.len();
+        let value = |at: &Evaluation, objective: &FrontObjective| Some(objective.worst(study, at)?.1.value);
         let values: Vec<f64> =
-            points.iter().flat_map(|p| rows.iter().map(|&row| value(&p.at, row))).collect::<Option<_>>()?;
+            points.iter().flat_map(|p| objectives.iter().map(|o| value(&p.at, o))).collect::<Option<_>>()?;
+        // The demand, the weight and the unit of a criterion are the same in all cases.
+        let rows: Vec<usize> = objectives.iter().map(|objective| objective.rows[0]).collect();
         let scaled: Vec<f64> = points
             .iter()
             .map(|p| p.at.scaled.as_ref().map(|s| shape.objectives(s)))
@@ -123,7 +125,7 @@ impl TradeOffs {
         };
         let criteria: Vec<FrontCriterion> = (0..m)
             .map(|k| FrontCriterion {
-                key: study.key(&study.rows[rows[k]]),
+                key: objectives[k].label.clone(),
                 unit: study.rows[rows[k]].unit.to_string(),
                 best: extreme(k, true),
                 worst: extreme(k, false),

@@ -1,7 +1,7 @@
 //! Default solver, which chooses a method for the problem.
 
 use mops_core::{
-    Basins, Evaluation, Halt, Merit, Objective, Optimality, Oracle, Progress, Shape, Solver, SolverOptions, Usage,
+    Basins, Evaluation, Halt, Merit, Objective, Optimality, Oracle, Progress, Shape, Solver, SolverOptions,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -250,7 +250,7 @@ fn has_improved(oracle: &dyn Oracle, previous_objective: f64) -> bool {
 /// Chooses the solver for a front: `weighted-chebyshev` for few criteria, otherwise `nsga2` (crowding) for two criteria
 /// and `nsga3` (reference directions) for more.
 fn front_solver(shape: &Shape) -> (Box<dyn Solver>, &'static str) {
-    let objectives = shape.rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
+    let objectives = shape.objective_count();
     let chebyshev = WeightedChebyshevOptions::default().build();
     if objectives <= 3 && shape.dimension() <= 50 && chebyshev.accepts(shape).is_ok() {
         return (chebyshev, WeightedChebyshevOptions::KIND);

@@ -49,7 +49,7 @@ fn front(outcome: &Outcome, found: &TradeOffs) -> String {
     let rows = outcome.front.iter().zip(&found.points).enumerate().map(|(i, (point, known))| {
         let value = |of: &Map<String, Value>, name: &str| of[name].as_f64().map_or_else(String::new, number);
         let mut row = vec![(i + 1).to_string()];
-        row.extend(found.criteria.iter().map(|c| value(&point.criteria, &c.key)));
+        row.extend(found.criteria.iter().map(|c| value(&point.objectives, &c.key)));
         row.extend(active.iter().map(|name| value(&point.tuners, name)));
         row.push(number(known.worst_scaled));
         row.push(match known.pareto {

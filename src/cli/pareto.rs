@@ -11,9 +11,9 @@ use crate::terminal::CommandError;
 /// Options of `mops pareto`.
 #[derive(Args)]
 #[command(after_help = "\
-Each criterion with usage minimise is an objective of its own. The result is the Pareto front: about 30 evenly spread
-non-dominated designs, each the solution of an optimisation problem (default solver for up to three criteria:
-weighted-chebyshev).
+Each criterion with usage minimise is an objective, with the value of its worst case, which has the largest weighted scaled
+value (with --per-case: an objective in every case). The result is the Pareto front: 30 evenly spread non-dominated designs,
+each the solution of an optimisation problem (default solver: weighted-chebyshev).
 
 result.json lists the points as `front`, sorted by the first criterion, and `trade_offs`: the knee, the point nearest to the
 demands, the exchange rates between criteria, and whether each point is certified as Pareto-optimal. report.html plots them;
@@ -29,12 +29,15 @@ pub(super) struct Arguments {
     common: CommonOptions,
     #[command(flatten)]
     solver_options: SolverOptions,
-    /// Approximate number of points [default: [pareto] of the study, or 30].
+    /// Number of points [default: [pareto] of the study, or 30].
     #[arg(long, value_parser = clap::value_parser!(u16).range(3..=200))]
     points: Option<u16>,
+    /// Count every criterion as an objective in every case, instead of in its worst case.
+    #[arg(long)]
+    per_case: bool,
 }
 
 pub(super) fn pareto(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    let Arguments { common, solver_options, points } = arguments;
-    execute(catalogue, common, &Search::Pareto { solver_options, points: *points })
+    let Arguments { common, solver_options, points, per_case } = arguments;
+    execute(catalogue, common, &Search::Pareto { solver_options, points: *points, per_case: *per_case })
 }

@@ -93,8 +93,8 @@ pub(super) enum Search<'a> {
     Task(&'a SolverOptions),
     /// A diagnosis.
     Diagnosis,
-    /// The Pareto front, with the given number of points.
-    Pareto { solver_options: &'a SolverOptions, points: Option<u16> },
+    /// The Pareto front, with the given number of points, of the criteria in their worst case or in every case.
+    Pareto { solver_options: &'a SolverOptions, points: Option<u16>, per_case: bool },
 }
 
 impl Search<'_> {
@@ -103,9 +103,10 @@ impl Search<'_> {
         match self {
             Self::Task(_) => Vec::new(),
             Self::Diagnosis => vec![DIAGNOSIS.to_owned()],
-            Self::Pareto { points, .. } => {
+            Self::Pareto { points, per_case, .. } => {
                 let points = points.map(|points| format!("pareto.points={points}"));
-                std::iter::once(PARETO.to_owned()).chain(points).collect()
+                let per_case = per_case.then(|| "pareto.per-case=true".to_owned());
+                std::iter::once(PARETO.to_owned()).chain(points).chain(per_case).collect()
             }
         }
     }

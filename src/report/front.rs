@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 use mops_core::math;
-use mops_core::{Analysis, Pareto, TradeOffs, Tuner};
+use mops_core::{Analysis, FrontCriterion, FrontObjective, Pareto, TradeOffs, Tuner};
 
 use super::Report;
 use super::figures::{Figure, Group};
@@ -65,23 +65,14 @@ pub(super) fn group(report: &Report<'_>) -> Option<Group> {
 
 fn criteria(report: &Report<'_>, found: &TradeOffs) -> Vec<Quantity> {
     let study = report.problem.study();
-    let quantity = |k: usize| {
-        let criterion = &found.criteria[k];
-        let row = study.rows().iter().position(|row| study.key(row) == criterion.key).expect("a row of the study");
-        let demand = study.rows()[row].demand.limit();
-        Quantity {
-            name: if study.cases().len() > 1 {
-                criterion.key.replace('/', ", ")
-            } else {
-                study.rows()[row].name.clone()
-            },
-            unit: criterion.unit.clone(),
-            values: report.front.iter().map(|at| at.readings[row].map_or(f64::NAN, |r| r.value)).collect(),
-            log: false,
-            demand,
-        }
+    let quantity = |(criterion, objective): (&FrontCriterion, FrontObjective)| Quantity {
+        name: criterion.key.replace('/', ", "),
+        unit: criterion.unit.clone(),
+        values: report.front.iter().map(|at| objective.worst(study, at).map_or(f64::NAN, |(_, r)| r.value)).collect(),
+        log: false,
+        demand: study.rows()[objective.rows[0]].demand.limit(),
     };
-    (0..found.criteria.len()).map(quantity).collect()
+    found.criteria.iter().zip(report.problem.objectives()).map(quantity).collect()
 }
 
 fn tuners(report: &Report<'_>) -> Vec<Quantity> {

@@ -72,10 +72,14 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<Strin
         let active = of_study.tuners().iter().zip(&at.tuners).filter(|(tuner, _)| tuner.active);
         active.map(tuner).collect::<Vec<_>>().join(", ")
     };
+    let objectives = problem.objectives();
+    let value = |i: usize, k: usize| {
+        objectives[k].worst(problem.study(), &front[i].at).map_or(f64::NAN, |(_, reading)| reading.value)
+    };
     let values = |i: usize| {
         let criteria = found.criteria.iter().enumerate();
         let values = criteria
-            .map(|(k, c)| format!("{} {}", name(found, k), amount(value(found, front, problem, i, k), &c.unit)));
+            .map(|(k, c)| format!("{} {}", name(found, k), amount(value(i, k), &c.unit)));
         values.collect::<Vec<_>>().join(", ")
     };
     let nearest = found.nearest;
@@ -130,18 +134,8 @@ fn price(found: &TradeOffs, i: usize) -> String {
     )
 }
 
-/// Formats the name of a criterion, with its case if the name is not unique.
 fn name(found: &TradeOffs, k: usize) -> String {
-    let short = |key: &str| key.split_once('/').map_or(key.to_owned(), |(_, name)| name.to_owned());
-    let own = short(&found.criteria[k].key);
-    let unique = found.criteria.iter().filter(|c| short(&c.key) == own).count() == 1;
-    if unique { format!("`{own}`") } else { format!("`{}`", found.criteria[k].key) }
-}
-
-fn value(found: &TradeOffs, front: &[Certified], problem: &Problem, i: usize, k: usize) -> f64 {
-    let study = problem.study();
-    let row = study.rows().iter().position(|row| study.key(row) == found.criteria[k].key);
-    row.and_then(|row| front[i].at.readings[row]).map_or(f64::NAN, |reading| reading.value)
+    format!("`{}`", found.criteria[k].key)
 }
 
 fn amount(value: f64, unit: &str) -> String {

@@ -128,8 +128,12 @@ pub(super) struct DiagnosisSection {
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct ParetoSection {
-    /// Approximate number of points of the Pareto front; default 30.
+    /// Number of points of the Pareto front; default 30.
     pub points: Option<usize>,
+    /// True: every criterion is an objective in every case. False (default): a criterion is one objective, with the value of its
+    /// worst case, which has the largest weighted scaled value.
+    #[serde(default)]
+    pub per_case: bool,
 }
 
 /// Names of the tables of tasks in a study file.
@@ -202,8 +206,8 @@ pub(super) fn read(root: &Node<'_>, catalogue: &Catalogue, tasks: &mut TasksBuil
         tasks.diagnosis = DiagnosisTask { max_effects, level, effects, without, with };
     }
     if let Some(node) = root.child("pareto") {
-        let ParetoSection { points } = node.read()?;
-        tasks.pareto = ParetoTask { points: points.unwrap_or(ParetoTask::default().points) };
+        let ParetoSection { points, per_case } = node.read()?;
+        tasks.pareto = ParetoTask { points: points.unwrap_or(ParetoTask::default().points), per_case };
     }
     robustness::read(root, tasks)
 }

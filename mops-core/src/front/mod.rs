@@ -45,8 +45,10 @@ pub fn thinned(objectives: &[f64], m: usize, count: usize) -> Vec<usize> {
     let mut distance = vec![f64::INFINITY; points];
     let mut best = (0..m).filter_map(least);
     while taken.len() < count {
-        let farthest = (0..points).reduce(|a, b| if distance[b] > distance[a] { b } else { a });
-        let Some(next) = best.next().or(farthest).filter(|&i| distance[i] > 0.0) else { break };
+        // A point may be the best in several objectives.
+        let farthest = || (0..points).reduce(|a, b| if distance[b] > distance[a] { b } else { a });
+        let next = best.find(|&i| distance[i] > 0.0).or_else(farthest);
+        let Some(next) = next.filter(|&i| distance[i] > 0.0) else { break };
         taken.push(next);
         for (i, distance) in distance.iter_mut().enumerate() {
             let square = |k: usize| math::powi((objectives[i * m + k] - objectives[next * m + k]) / ranges[k], 2);

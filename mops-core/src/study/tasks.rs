@@ -214,13 +214,15 @@ pub struct Axis {
 /// Settings of `pareto`.
 #[derive(Debug, Clone, Copy)]
 pub struct ParetoTask {
-    /// Approximate number of points of the Pareto front.
+    /// Number of points of the Pareto front.
     pub points: usize,
+    /// True if a criterion counts as an objective in every case, false if it counts in its worst case.
+    pub per_case: bool,
 }
 
 impl Default for ParetoTask {
     fn default() -> Self {
-        Self { points: 30 }
+        Self { points: 30, per_case: false }
     }
 }
 
@@ -286,6 +288,14 @@ fn pareto(task: ParetoTask, study: &Study) -> Result<ParetoTask, StudyError> {
     }
     let counts = |row: &&Row| row.usage == Usage::Minimise && study.case_of(row).role() == Role::Calibration;
     let minimised: Vec<&Row> = study.rows.iter().filter(counts).collect();
+    let is_single = |first: &&&Row| minimised.iter().all(|row| row.name == first.name);
+    let single = minimised.first().filter(is_single);
+    if let Some(row) = single.filter(|_| !task.per_case && minimised.len() > 1) {
+        let fact = format!("a Pareto front needs at least two criteria to minimise, found only `{}`", row.name);
+        return Err(StudyError::new("task", fact)
+            .with_help("omit `usage` of another criterion, or set per-case = true in [pareto] for the front over the cases")
+            .within("study"));
+    }
     if minimised.len() < 2 {
         let known = minimised.first().map_or_else(|| "none".to_owned(), |row| format!("only `{}`", row.name));
         return Err(StudyError::new(

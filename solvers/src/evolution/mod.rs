@@ -6,7 +6,7 @@ mod mating;
 
 use std::cmp::Ordering;
 
-use mops_core::{Evaluation, FEASIBLE, Halt, Objective, Oracle, Progress, Shape, Solver, Stream, Usage};
+use mops_core::{Evaluation, FEASIBLE, Halt, Objective, Oracle, Progress, Shape, Solver, Stream};
 
 use crate::start::latin_hypercube;
 use crate::variation::Variation;
@@ -46,9 +46,7 @@ impl Pool {
             let violation = answer.merit.violation;
             self.violations.push(if violation <= FEASIBLE { 0.0 } else { violation });
             match &answer.scaled {
-                Some(scaled) => self.objectives.extend(
-                    shape.rows.iter().zip(scaled).filter(|((u, _), _)| *u == Usage::Minimise).map(|((_, w), s)| w * s),
-                ),
+                Some(scaled) => shape.append_objectives(scaled, &mut self.objectives),
                 None => self.objectives.extend(std::iter::repeat_n(f64::INFINITY, self.m)),
             }
         }
@@ -95,8 +93,7 @@ impl<S: Survival> Evolution<S> {
 
 impl<S: Survival> Solver for Evolution<S> {
     fn accepts(&self, shape: &Shape) -> Result<(), String> {
-        let objectives = shape.rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
-        if shape.objective == Objective::Each && objectives > 0 {
+        if shape.objective == Objective::Each && shape.objective_count() > 0 {
             return Ok(());
         }
         Err("`nsga2` and `nsga3` search for a Pareto front: set objective = \"each\" in [study] and minimise a criterion, or use `cma-es`"
@@ -108,7 +105,7 @@ impl<S: Survival> Solver for Evolution<S> {
         if start.is_empty() {
             return Ok(());
         }
-        let m = oracle.shape().rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
+        let m = oracle.shape().objective_count();
         let size = self.survival.begin(m);
         let mut random = oracle.stream("evolution");
         let mut members = Pool { m, points: latin_hypercube(size, start.len(), &mut random), ..Pool::default() };

@@ -86,7 +86,7 @@ impl Model for Level {
                 .collect(),
             equalities: self.at.equalities.iter().map(|row| scaled(row, 0.0, unit)).collect(),
         };
-        let direction = steepest_step(&criteria, point)?;
+        let direction = steepest_step(&criteria, point, 0)?;
         let predicted = -direction.level * unit * TRIAL_STEP;
         Some(Step {
             step: direction.step.iter().map(|d| TRIAL_STEP * d).collect(),

@@ -131,12 +131,16 @@ fn beside(point: &[f64], distance: f64) -> impl Iterator<Item = Vec<f64>> {
     (0..point.len()).flat_map(move |j| [distance, -distance].into_iter().filter_map(move |step| moved(j, step)))
 }
 
-/// Returns the step within the box, in trial steps, that lowers criteria in units of the trial step most; `None` if rounding
-/// errors prevent its computation.
-fn steepest_step(criteria: &LinearisedCriteria, point: &[f64]) -> Option<Direction> {
-    let low: Vec<f64> = point.iter().map(|&u| if u < 1e-6 { 0.0 } else { -1.0 }).collect();
-    let high: Vec<f64> = point.iter().map(|&u| if u > 1.0 - 1e-6 { 0.0 } else { 1.0 }).collect();
-    let hessian = DMatrix::identity(point.len(), point.len()) * 1e-6;
+/// Returns the step within the box, in trial steps, that lowers criteria in units of the trial step most, followed by the changes
+/// of `changing` objectives, none of which is positive; `None` if rounding errors prevent the computation.
+#[allow(clippy::cast_precision_loss)]
+fn steepest_step(criteria: &LinearisedCriteria, point: &[f64], changing: usize) -> Option<Direction> {
+    let mut low: Vec<f64> = point.iter().map(|&u| if u < 1e-6 { 0.0 } else { -1.0 }).collect();
+    let mut high: Vec<f64> = point.iter().map(|&u| if u > 1.0 - 1e-6 { 0.0 } else { 1.0 }).collect();
+    // With derivatives of at most 1, no objective changes by more.
+    low.extend(std::iter::repeat_n(-(point.len() as f64), changing));
+    high.extend(std::iter::repeat_n(0.0, changing));
+    let hessian = DMatrix::identity(low.len(), low.len()) * 1e-6;
     let mut direction = Direction::default();
     // A penalty above every multiplier keeps the step within the constraints.
     Subproblem::default().solve(criteria, &hessian, [&low, &high], 1e4, &mut direction)?;

@@ -11,14 +11,14 @@ use super::scalarisation::Scalarisation;
 pub struct Candidate {
     /// Point of the unit box.
     pub point: Vec<f64>,
-    /// Weighted scaled values of the criteria to be minimised.
-    pub criteria: Vec<f64>,
+    /// Weighted scaled values of the objectives.
+    pub objectives: Vec<f64>,
 }
 
 impl Candidate {
     /// Returns true if no criterion is worse and one is better by more than `margin`, in units of `range`.
     pub fn dominates(&self, other: &Self, range: &[f64], margin: f64) -> bool {
-        let gains = || self.criteria.iter().zip(&other.criteria).zip(range).map(|((a, b), range)| (b - a) / range);
+        let gains = || self.objectives.iter().zip(&other.objectives).zip(range).map(|((a, b), range)| (b - a) / range);
         gains().all(|gain| gain >= 0.0) && gains().any(|gain| gain > margin)
     }
 
@@ -41,7 +41,7 @@ impl Archive {
         for answer in answers {
             let Some(scaled) = answer.scaled.as_ref().filter(|_| answer.merit.violation <= FEASIBLE) else { continue };
             if self.seen.insert(answer.point.iter().map(|u| u.to_bits()).collect()) {
-                self.candidates.push(Candidate { point: answer.point.clone(), criteria: shape.objectives(scaled) });
+                self.candidates.push(Candidate { point: answer.point.clone(), objectives: shape.objectives(scaled) });
             }
         }
     }
@@ -54,7 +54,7 @@ impl Archive {
     /// Returns the `count` best points for a subproblem, the best first, at a mutual distance of at least `distance`.
     pub fn best(&self, scalarisation: &Scalarisation, count: usize, distance: f64) -> Vec<Candidate> {
         let key = |candidate: &Candidate| {
-            let merit = scalarisation.merit(&candidate.criteria);
+            let merit = scalarisation.merit(&candidate.objectives);
             (merit.violation.max(FEASIBLE), merit.objective)
         };
         let mut order: Vec<((f64, f64), &Candidate)> =

@@ -6,7 +6,7 @@ mod reference_directions;
 mod scalarisation;
 mod subproblem;
 
-use mops_core::{Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions, Usage};
+use mops_core::{Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -18,8 +18,9 @@ use subproblem::Subproblems;
 /// Weighted Chebyshev method for evenly spread points of the Pareto front (non-dominated designs). Each point solves a
 /// weighted min-max problem. Needs `objective = "each"`.
 ///
-/// First every criterion is minimised alone (multistart), and then the others as far as possible without loss. The
-/// results are the ends of the front and define the range of every criterion.
+/// An objective is a criterion in its worst case, or in every case. First every objective is minimised alone (multistart), and
+/// then the others as far as possible without loss; for three and more objectives, also all but one at a time. The results are
+/// the ends of the front and define the range of every objective.
 ///
 /// Two criteria: the two neighbours `p`, `q` with the largest distance define a rectangle. The next point is the
 /// deepest one in it,
@@ -31,11 +32,11 @@ use subproblem::Subproblems;
 /// is a gap in the front and is closed.
 ///
 /// Three and more criteria: `min max_i (f_i - ideal_i) / (range_i w_i)` for weights `w` spread evenly over the simplex,
-/// each from the nearest known point.
+/// each from the nearest known point. While points are missing, weights in the largest gaps of the front follow.
 ///
 /// One more point minimises the largest scaled value, as in a single design; it meets the demands best.
 ///
-/// If a criterion has slack, it is lowered further while the others stay. All evaluated points are compared with the
+/// If an objective has slack, it is lowered further while the others stay. All evaluated points are compared with the
 /// front, and an optimality test is made at each of its points; a dominating point is a new starting point. Subproblems
 /// that fail are omitted.
 ///
@@ -49,8 +50,7 @@ use subproblem::Subproblems;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct WeightedChebyshevOptions {
-    /// Number of points; 0 for the number requested by the study, or 30. For three and more criteria, the largest
-    /// number of evenly spread weights that does not exceed it.
+    /// Number of points; 0 for the number requested by the study, or 30.
     #[schemars(range(max = 10_000))]
     pub points: usize,
     /// Number of starting points for the minimum of each criterion, including the initial guess of the study.
@@ -89,8 +89,10 @@ struct State {
 }
 
 enum Stage {
-    /// Minimisation of one criterion alone, by index.
-    SingleCriterion(usize),
+    /// Minimisation of one objective alone, by index.
+    Anchors(usize),
+    /// Minimisation of all objectives but one, by index, for three and more objectives.
+    Opposites(usize),
     /// Rectangles between neighbouring points, for two criteria.
     Rectangles(Rectangles),
     /// Reference directions, for three and more criteria.
@@ -125,7 +127,7 @@ impl Solver for WeightedChebyshev {
             start: start.to_vec(),
             subproblems: Subproblems::new(self.options.starts),
             front: Vec::new(),
-            stage: Stage::SingleCriterion(0),
+            stage: Stage::Anchors(0),
             optimality_checked: false,
         });
         Ok(())
@@ -141,29 +143,41 @@ impl Solver for WeightedChebyshev {
             (0, requested) => requested,
             (points, _) => points,
         };
-        let criteria = oracle.shape().rows.iter().filter(|(usage, _)| *usage == Usage::Minimise).count();
+        let objectives = oracle.shape().objective_count();
         match &mut state.stage {
-            Stage::SingleCriterion(k) => {
+            Stage::Anchors(k) => {
                 let k = *k;
-                if k < criteria {
-                    if let Some(candidate) = state.subproblems.minimise_single(oracle, &state.start, k, criteria)? {
+                if k < objectives {
+                    if let Some(candidate) = state.subproblems.anchor(oracle, &state.start, k, objectives)? {
                         state.front.push(candidate);
                     }
-                    state.stage = Stage::SingleCriterion(k + 1);
+                    state.stage = Stage::Anchors(k + 1);
                     return Ok(Progress::Continue);
                 }
-                if criteria == 0 {
+                if objectives == 0 {
                     return state.subproblems.find_feasible(oracle, &state.start);
                 }
                 if state.front.is_empty() {
                     return Ok(Progress::Stalled);
                 }
-                state.subproblems.set_ranges(&state.front);
-                state.stage = match criteria {
+                state.keep_non_dominated();
+                state.stage = match objectives {
                     1 => Stage::ReplaceDominated(0),
                     2 => Stage::Rectangles(Rectangles::default()),
-                    _ => Stage::ReferenceDirections(ReferenceDirections::new(criteria, points)),
+                    _ => Stage::Opposites(0),
                 };
+                Ok(Progress::Continue)
+            }
+            Stage::Opposites(k) => {
+                let k = *k;
+                if k < objectives {
+                    let candidate = state.subproblems.opposite(oracle, k)?;
+                    insert(&mut state.front, candidate);
+                    state.stage = Stage::Opposites(k + 1);
+                    return Ok(Progress::Continue);
+                }
+                state.keep_non_dominated();
+                state.stage = Stage::ReferenceDirections(ReferenceDirections::new(objectives, points));
                 Ok(Progress::Continue)
             }
             Stage::Rectangles(rectangles) => {
@@ -174,13 +188,13 @@ impl Solver for WeightedChebyshev {
                 Ok(Progress::Continue)
             }
             Stage::ReferenceDirections(reference_directions) => {
-                if !reference_directions.solve_next(oracle, &mut state.subproblems, &mut state.front)? {
+                if !reference_directions.solve_next(oracle, &mut state.subproblems, &mut state.front, points)? {
                     state.stage = Stage::MeetDemands;
                 }
                 Ok(Progress::Continue)
             }
             Stage::MeetDemands => {
-                let candidate = state.subproblems.solve_for_demands(oracle, criteria)?;
+                let candidate = state.subproblems.solve_for_demands(oracle, objectives)?;
                 insert(&mut state.front, candidate);
                 state.stage = Stage::ReplaceDominated(0);
                 Ok(Progress::Continue)
@@ -204,10 +218,20 @@ impl Solver for WeightedChebyshev {
     fn front(&self) -> Vec<Vec<f64>> {
         let Some(state) = &self.state else { return Vec::new() };
         // Without the ends of the front, all evaluated points are a better result.
-        if matches!(state.stage, Stage::SingleCriterion(_)) {
+        if matches!(state.stage, Stage::Anchors(_)) {
             return Vec::new();
         }
         state.front.iter().map(|candidate| candidate.point.clone()).collect()
+    }
+}
+
+impl State {
+    /// Removes dominated points of the front, and sets the ranges of the objectives to those of the others.
+    fn keep_non_dominated(&mut self) {
+        for candidate in std::mem::take(&mut self.front) {
+            insert(&mut self.front, candidate);
+        }
+        self.subproblems.set_ranges(&self.front);
     }
 }
 
@@ -216,9 +240,9 @@ const MAX_ROUNDS: usize = 5;
 
 /// Inserts a point into the front and removes points that it dominates; returns false if the point is dominated itself.
 fn insert(front: &mut Vec<Candidate>, candidate: Candidate) -> bool {
-    let range = vec![1.0; candidate.criteria.len()];
+    let range = vec![1.0; candidate.objectives.len()];
     let is_dominated =
-        |other: &Candidate| other.criteria == candidate.criteria || other.dominates(&candidate, &range, 0.0);
+        |other: &Candidate| other.objectives == candidate.objectives || other.dominates(&candidate, &range, 0.0);
     if front.iter().any(is_dominated) {
         return false;
     }

@@ -1,4 +1,4 @@
-//! Search for two criteria: rectangles between neighbouring points of the front, the largest first.
+//! Search for two objectives: rectangles between neighbouring points of the front, the largest first.
 
 use mops_core::math;
 use mops_core::{FEASIBLE, Halt, Oracle};
@@ -41,13 +41,13 @@ impl Rectangles {
         for candidate in all {
             insert(front, candidate);
         }
-        front.sort_by(|a, b| a.criteria[0].total_cmp(&b.criteria[0]));
+        front.sort_by(|a, b| a.objectives[0].total_cmp(&b.objectives[0]));
         if front.len() >= points || self.solved >= 3 * points {
             return Ok(false);
         }
         let range = subproblems.range.clone();
         let length = |p: &Candidate, q: &Candidate| {
-            (0..2).map(|k| math::powi((p.criteria[k] - q.criteria[k]) / range[k], 2)).sum::<f64>().sqrt()
+            (0..2).map(|k| math::powi((p.objectives[k] - q.objectives[k]) / range[k], 2)).sum::<f64>().sqrt()
         };
         let is_open = |i: &usize| {
             self.failures(&front[*i], &front[*i + 1]) < MAX_FAILURES && is_wide(&front[*i], &front[*i + 1], &range)
@@ -61,28 +61,28 @@ impl Rectangles {
         self.solved += 1;
         let found = search_rectangle(oracle, subproblems, &p, &q, front.len())?;
         let Some(found) = found else {
-            self.failures.push((p.criteria, q.criteria, MAX_FAILURES));
+            self.failures.push((p.objectives, q.objectives, MAX_FAILURES));
             return Ok(true);
         };
         for (a, b) in [(&p, &found), (&found, &q)] {
             let new_failures = if length(a, b) > MIN_DIVISION * length(&p, &q) { failures + 1 } else { 0 };
-            self.failures.push((a.criteria.clone(), b.criteria.clone(), new_failures));
+            self.failures.push((a.objectives.clone(), b.objectives.clone(), new_failures));
         }
         if !insert(front, found) {
-            self.failures.push((p.criteria, q.criteria, MAX_FAILURES));
+            self.failures.push((p.objectives, q.objectives, MAX_FAILURES));
         }
         Ok(true)
     }
 
     fn failures(&self, p: &Candidate, q: &Candidate) -> usize {
-        let same = |(a, b, _): &&(Vec<f64>, Vec<f64>, usize)| *a == p.criteria && *b == q.criteria;
+        let same = |(a, b, _): &&(Vec<f64>, Vec<f64>, usize)| *a == p.objectives && *b == q.objectives;
         self.failures.iter().rev().find(same).map_or(0, |(_, _, failures)| *failures)
     }
 }
 
 /// Returns true if both sides of a rectangle are longer than the resolution.
 fn is_wide(p: &Candidate, q: &Candidate, range: &[f64]) -> bool {
-    (0..2).all(|k| (p.criteria[k] - q.criteria[k]).abs() > 1e-5 * range[k])
+    (0..2).all(|k| (p.objectives[k] - q.objectives[k]).abs() > 1e-5 * range[k])
 }
 
 /// Returns the deepest point of the rectangle; `None` if it is empty.
@@ -93,8 +93,8 @@ fn search_rectangle(
     q: &Candidate,
     solved: usize,
 ) -> Result<Option<Candidate>, Halt> {
-    let low = [p.criteria[0], q.criteria[1]];
-    let scalarisation = Scalarisation::chebyshev(&low, &[q.criteria[0] - p.criteria[0], p.criteria[1] - q.criteria[1]]);
+    let low = [p.objectives[0], q.objectives[1]];
+    let scalarisation = Scalarisation::chebyshev(&low, &[q.objectives[0] - p.objectives[0], p.objectives[1] - q.objectives[1]]);
     let distance = p.distance(q);
     let radius = distance.clamp(1e-3, 0.3);
     let between: Vec<f64> = p.point.iter().zip(&q.point).map(|(a, b)| 0.5 * (a + b)).collect();
@@ -104,16 +104,16 @@ fn search_rectangle(
     let count = if solved < 6 { 4 } else { 1 };
     let starts = subproblems.archive.best(&scalarisation, count, (0.3 * distance).max(1e-3));
     let mut found = subproblems.solve(oracle, &scalarisation, &starts, radius)?;
-    if scalarisation.merit(&found.criteria).objective > 1.0 - EXPECTED_DEPTH {
+    if scalarisation.merit(&found.objectives).objective > 1.0 - EXPECTED_DEPTH {
         found = subproblems.solve(oracle, &scalarisation, &[p.clone(), q.clone()], radius)?;
     }
     // At an end of the front both gradients may vanish: start elsewhere.
-    if scalarisation.merit(&found.criteria).objective > 1.0 - MIN_DEPTH
+    if scalarisation.merit(&found.objectives).objective > 1.0 - MIN_DEPTH
         && let Some(start) = balanced_point(oracle, subproblems, &scalarisation, p, q)?
     {
         found = subproblems.solve(oracle, &scalarisation, &[start], radius)?;
     }
-    if scalarisation.merit(&found.criteria).objective > 1.0 - MIN_DEPTH {
+    if scalarisation.merit(&found.objectives).objective > 1.0 - MIN_DEPTH {
         return Ok(None);
     }
     subproblems.remove_slack(oracle, &scalarisation, found).map(Some)
@@ -139,10 +139,10 @@ fn balanced_point(
         let answers = oracle.evaluate(&[point])?;
         subproblems.archive.record(oracle.shape(), &answers);
         let Some(scaled) = &answers[0].scaled else { return Ok(None) };
-        let criteria = oracle.shape().objectives(scaled);
-        let scalarised_values = scalarisation.scalarised_values(&criteria);
+        let objectives = oracle.shape().objectives(scaled);
+        let scalarised_values = scalarisation.scalarised_values(&objectives);
         let feasible = answers[0].merit.violation <= FEASIBLE;
-        last = feasible.then(|| Candidate { point: answers[0].point.clone(), criteria });
+        last = feasible.then(|| Candidate { point: answers[0].point.clone(), objectives });
         if scalarised_values[0] < scalarised_values[1] { low = at } else { high = at }
     }
     Ok(last)

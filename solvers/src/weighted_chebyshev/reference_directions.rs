@@ -1,4 +1,5 @@
-//! Search for three and more criteria: evenly spread reference directions from the ideal point.
+//! Search for three and more objectives: evenly spread reference directions from the ideal point, then those in the gaps of
+//! the front.
 
 use mops_core::math;
 use mops_core::{Halt, Oracle};
@@ -15,39 +16,74 @@ pub struct ReferenceDirections {
     pending: Vec<Vec<f64>>,
     /// Solved directions with the points found.
     solved: Vec<(Vec<f64>, Candidate)>,
+    /// Directions for gaps of the front.
+    fine: Vec<Vec<f64>>,
 }
 
 /// Offset of every weight, which turns directions on the boundary of the simplex inwards.
-const MIN_WEIGHT: f64 = 0.01;
+pub const MIN_WEIGHT: f64 = 0.01;
+
+/// Number of directions for gaps, per requested point.
+const FINE: usize = 8;
+
+/// Largest number of solved directions, per requested point.
+const MAX_SOLVED: usize = 3;
 
 impl ReferenceDirections {
-    pub fn new(criteria: usize, points: usize) -> Self {
+    pub fn new(objectives: usize, points: usize) -> Self {
         let shift_inwards = |weight: f64| MIN_WEIGHT + weight;
-        let reference_directions = simplex_lattice(criteria, max_divisions(criteria, points));
-        let shifted =
-            reference_directions.into_iter().map(|direction| direction.into_iter().map(shift_inwards).collect());
-        Self { pending: shifted.collect(), solved: Vec::new() }
+        let lattice = |points: usize| -> Vec<Vec<f64>> {
+            let directions = simplex_lattice(objectives, max_divisions(objectives, points));
+            directions.into_iter().map(|direction| direction.into_iter().map(shift_inwards).collect()).collect()
+        };
+        Self { pending: lattice(points), solved: Vec::new(), fine: lattice(FINE * points) }
     }
 
-    /// Solves the direction that is nearest to one solved before; returns false if none is left.
+    /// Returns the direction in the largest gap: the farthest one from the points of the front and from the solved directions.
+    fn in_gap(&self, subproblems: &Subproblems, front: &[Candidate]) -> Option<Vec<f64>> {
+        let image = |candidate: &Candidate| {
+            let of = candidate.objectives.iter().zip(&subproblems.ideal).zip(&subproblems.range);
+            direction_of(of.map(|((f, ideal), range)| ((f - ideal) / range).max(0.0)).collect())
+        };
+        let solved = self.solved.iter().map(|(direction, _)| direction_of(direction.clone()));
+        let known: Vec<Vec<f64>> = front.iter().map(image).chain(solved).collect();
+        let gap = |direction: &Vec<f64>| {
+            let direction = direction_of(direction.clone());
+            known.iter().map(|other| square(&direction, other)).fold(f64::INFINITY, f64::min)
+        };
+        let largest = self.fine.iter().map(|direction| (gap(direction), direction)).max_by(|a, b| a.0.total_cmp(&b.0));
+        largest.filter(|(gap, _)| *gap > 0.0).map(|(_, direction)| direction.clone())
+    }
+
+    /// Solves the direction that is nearest to one solved before, or one in a gap of the front; returns false if no gap is
+    /// left, or if the front has enough points.
     pub fn solve_next(
         &mut self,
         oracle: &mut dyn Oracle,
         subproblems: &mut Subproblems,
         front: &mut Vec<Candidate>,
+        points: usize,
     ) -> Result<bool, Halt> {
-        let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| math::powi(a - b, 2)).sum::<f64>();
         let nearest = |direction: &[f64]| {
-            let of = |(other, candidate): &(Vec<f64>, Candidate)| (distance(direction, other), candidate.clone());
+            let of = |(other, candidate): &(Vec<f64>, Candidate)| (square(direction, other), candidate.clone());
             self.solved.iter().map(of).min_by(|a, b| a.0.total_cmp(&b.0))
         };
         // The first direction is the one nearest to the centre.
-        let middle = |direction: &[f64]| distance(direction, &vec![1.0 / direction.len() as f64; direction.len()]);
+        let middle = |direction: &[f64]| square(direction, &vec![1.0 / direction.len() as f64; direction.len()]);
         let key = |direction: &[f64]| nearest(direction).map_or_else(|| middle(direction), |(distance, _)| distance);
         let next = (0..self.pending.len()).min_by(|&a, &b| key(&self.pending[a]).total_cmp(&key(&self.pending[b])));
-        let Some(next) = next else { return Ok(false) };
-        let neighbour = nearest(&self.pending[next]).map(|(_, candidate)| candidate);
-        let direction = self.pending.swap_remove(next);
+        let direction = match next {
+            Some(next) => self.pending[next].clone(),
+            None if front.len() >= points || self.solved.len() >= MAX_SOLVED * points => return Ok(false),
+            None => match self.in_gap(subproblems, front) {
+                Some(direction) => direction,
+                None => return Ok(false),
+            },
+        };
+        let neighbour = nearest(&direction).map(|(_, candidate)| candidate);
+        if let Some(next) = next {
+            self.pending.swap_remove(next);
+        }
         let range: Vec<f64> = direction.iter().zip(&subproblems.range).map(|(w, range)| w * range).collect();
         let scalarisation = Scalarisation::chebyshev(&subproblems.ideal, &range);
         let mut starts = subproblems.archive.best(&scalarisation, if neighbour.is_none() { 4 } else { 1 }, 0.1);
@@ -59,4 +95,16 @@ impl ReferenceDirections {
         insert(front, found);
         Ok(true)
     }
+}
+
+/// Returns the squared distance of two directions.
+fn square(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| math::powi(a - b, 2)).sum()
+}
+
+/// Returns the direction with the sum 1.
+fn direction_of(mut weights: Vec<f64>) -> Vec<f64> {
+    let sum: f64 = weights.iter().sum();
+    weights.iter_mut().for_each(|weight| *weight /= sum.max(f64::MIN_POSITIVE));
+    weights
 }

@@ -4,19 +4,19 @@ use mops_core::{Evaluation, Halt, Linearisation, Merit, Objective, Oracle, Shape
 
 use super::archive::Archive;
 
-/// Role of a criterion `f` (weighted scaled value) in a subproblem.
+/// Role of an objective `f` (weighted scaled value) in a subproblem.
 #[derive(Debug, Clone, Copy)]
 pub enum Role {
     /// `(f - reference) / scale` is minimised.
     Minimised { reference: f64, scale: f64 },
     /// `(f - limit) / scale` is at most 0.
     Limited { limit: f64, scale: f64 },
-    /// The criterion has no influence.
+    /// The objective has no influence.
     Ignored,
 }
 
 impl Role {
-    /// Returns factor and offset that map the criterion to its scaled value in the subproblem.
+    /// Returns factor and offset that map the objective to its scaled value in the subproblem.
     fn coefficients(self) -> (f64, f64) {
         match self {
             Self::Minimised { reference, scale } => (1.0 / scale, -reference / scale),
@@ -34,66 +34,66 @@ impl Role {
     }
 }
 
-/// Scalarisation of a subproblem: a role for every criterion, in their order. Constraints remain unchanged.
+/// Scalarisation of a subproblem: a role for every objective, in their order. The largest of the minimised ones counts.
+/// Constraints remain unchanged.
 #[derive(Debug, Clone)]
 pub struct Scalarisation {
-    /// Roles of the criteria.
+    /// Roles of the objectives.
     pub roles: Vec<Role>,
-    /// Combination of the minimised criteria into one number.
-    pub objective: Objective,
 }
 
 impl Scalarisation {
-    /// Creates the weighted Chebyshev distance: the largest criterion, relative to `low` and in units of `range`.
+    /// Creates the weighted Chebyshev distance: the largest objective, relative to `low` and in units of `range`.
     pub fn chebyshev(low: &[f64], range: &[f64]) -> Self {
         let role = |(&reference, &scale): (&f64, &f64)| Role::Minimised { reference, scale };
-        Self { roles: low.iter().zip(range).map(role).collect(), objective: Objective::Max }
+        Self { roles: low.iter().zip(range).map(role).collect() }
     }
 
-    /// Returns the scaled value of every criterion in the subproblem.
-    pub fn scalarised_values(&self, criteria: &[f64]) -> Vec<f64> {
+    /// Returns the scaled value of every objective in the subproblem.
+    pub fn scalarised_values(&self, objectives: &[f64]) -> Vec<f64> {
         let scalarised_value = |(role, f): (&Role, &f64)| {
             let (factor, offset) = role.coefficients();
             factor * f + offset
         };
-        self.roles.iter().zip(criteria).map(scalarised_value).collect()
+        self.roles.iter().zip(objectives).map(scalarised_value).collect()
     }
 
-    /// Returns the merit of the criteria; its violation is that of the limited criteria alone.
-    pub fn merit(&self, criteria: &[f64]) -> Merit {
-        let (mut violation, mut worst, mut sum) = (0.0_f64, f64::NEG_INFINITY, 0.0);
-        for (role, f) in self.roles.iter().zip(criteria) {
-            let (factor, offset) = role.coefficients();
-            let value = factor * f + offset;
+    /// Returns the merit of the objectives; its violation is that of the limited ones alone.
+    pub fn merit(&self, objectives: &[f64]) -> Merit {
+        let mut merit = Merit { violation: 0.0, objective: f64::NEG_INFINITY };
+        for (role, value) in self.roles.iter().zip(self.scalarised_values(objectives)) {
             match role {
-                Role::Minimised { .. } => (worst, sum) = (worst.max(value), sum + value),
-                Role::Limited { .. } => violation = violation.max(value - 1.0),
+                Role::Minimised { .. } => merit.objective = merit.objective.max(value),
+                Role::Limited { .. } => merit.violation = merit.violation.max(value - 1.0),
                 Role::Ignored => {}
             }
         }
-        Merit { violation, objective: if self.objective == Objective::Sum { sum } else { worst } }
+        merit
     }
 
-    fn shape(&self, of: &Shape) -> Shape {
-        let mut roles = self.roles.iter();
+    /// Returns the shape of the subproblem, with factor and offset of every row.
+    fn rows(&self, of: &Shape) -> (Shape, Vec<(f64, f64)>) {
+        let objective_of = of.objective_of_rows();
+        let mut minimised = objective_of.iter();
+        let mut groups = Vec::new();
         let mut row = |(usage, weight): &(Usage, f64)| match usage {
-            Usage::Minimise => (roles.next().expect("a role for every criterion").usage(), 1.0),
-            other => (*other, *weight),
-        };
-        Shape { rows: of.rows.iter().map(&mut row).collect(), objective: self.objective, residuals: 0, ..of.clone() }
-    }
-
-    /// Returns factor and offset of every criterion and constraint.
-    fn coefficients(&self, of: &Shape) -> Vec<(f64, f64)> {
-        let mut roles = self.roles.iter();
-        let mut coefficients = |(usage, weight): &(Usage, f64)| match usage {
             Usage::Minimise => {
-                let (factor, offset) = roles.next().expect("a role for every criterion").coefficients();
-                (factor * weight, offset)
+                let &k = minimised.next().expect("an objective for every minimised row");
+                let (factor, offset) = self.roles[k].coefficients();
+                if let Role::Minimised { .. } = self.roles[k] {
+                    groups.push(k);
+                }
+                ((self.roles[k].usage(), 1.0), (factor * weight, offset))
             }
-            _ => (1.0, 0.0),
+            other => ((*other, *weight), (1.0, 0.0)),
         };
-        of.rows.iter().map(&mut coefficients).collect()
+        let (rows, coefficients) = of.rows.iter().map(&mut row).unzip();
+        // Without the objectives that are not minimised, the others are counted anew.
+        let mut minimised = groups.clone();
+        minimised.sort_unstable();
+        minimised.dedup();
+        let groups = groups.iter().map(|group| minimised.partition_point(|other| other < group)).collect();
+        (Shape { rows, objective: Objective::Max, groups, residuals: 0, ..of.clone() }, coefficients)
     }
 }
 
@@ -111,7 +111,7 @@ pub struct ScalarisedProblem<'a> {
 
 impl<'a> ScalarisedProblem<'a> {
     pub fn new(oracle: &'a mut dyn Oracle, archive: &'a mut Archive, scalarisation: &Scalarisation) -> Self {
-        let (shape, coefficients) = (scalarisation.shape(oracle.shape()), scalarisation.coefficients(oracle.shape()));
+        let (shape, coefficients) = scalarisation.rows(oracle.shape());
         Self { oracle, archive, shape, coefficients, best: None }
     }
 

@@ -1,8 +1,9 @@
 //! Subproblems, each solved by a local solver from known points.
 
-use mops_core::{Halt, Merit, Objective, Oracle, Progress, Solver};
+use mops_core::{Halt, Merit, Oracle, Progress, Solver, front};
 
 use super::archive::{Archive, Candidate};
+use super::reference_directions::MIN_WEIGHT;
 use super::scalarisation::{Role, Scalarisation, ScalarisedProblem};
 use crate::multistart::Multistart;
 use crate::optimality::certificate;
@@ -13,17 +14,17 @@ use crate::sqp::SqpOptions;
 pub struct Subproblems {
     pub archive: Archive,
     starts: usize,
-    /// Smallest value of every criterion on the front, and the range of the front above it.
+    /// Smallest value of every objective on the front, and the range of the front above it.
     pub ideal: Vec<f64>,
     pub range: Vec<f64>,
     /// Number of subproblems without a solution.
     pub failed: usize,
 }
 
-/// Permitted relative loss of a criterion while the others are minimised.
+/// Permitted relative loss of an objective while the others are minimised.
 const ALLOWED_LOSS: f64 = 1e-7;
 
-/// Slack of a criterion, relative to its range in the subproblem, above which another search follows.
+/// Slack of an objective, relative to its range in the subproblem, above which another search follows.
 const SLACK: f64 = 1e-4;
 
 /// Tolerance of `sqp`, in units of the subproblem.
@@ -39,7 +40,7 @@ impl Subproblems {
 
     /// Searches for a feasible point of a study that has constraints only.
     pub fn find_feasible(&mut self, oracle: &mut dyn Oracle, start: &[f64]) -> Result<Progress, Halt> {
-        let scalarisation = Scalarisation { roles: Vec::new(), objective: Objective::Max };
+        let scalarisation = Scalarisation { roles: Vec::new() };
         self.multistart(oracle, &scalarisation, start)
     }
 
@@ -72,39 +73,52 @@ impl Subproblems {
         run(&mut problem, pattern.as_mut(), &best)
     }
 
-    /// Minimises one criterion, then the others without loss in it.
-    pub fn minimise_single(
+    /// Minimises one objective, then the others as far as possible without loss in it.
+    pub fn anchor(
         &mut self,
         oracle: &mut dyn Oracle,
         start: &[f64],
-        criterion: usize,
+        objective: usize,
         of: usize,
     ) -> Result<Option<Candidate>, Halt> {
-        let role =
-            |k: usize| if k == criterion { Role::Minimised { reference: 0.0, scale: 1.0 } } else { Role::Ignored };
-        let scalarisation = Scalarisation { roles: (0..of).map(role).collect(), objective: Objective::Max };
+        let alone =
+            |k: usize| if k == objective { Role::Minimised { reference: 0.0, scale: 1.0 } } else { Role::Ignored };
+        let scalarisation = Scalarisation { roles: (0..of).map(alone).collect() };
         self.multistart(oracle, &scalarisation, start)?;
         let Some(optimum) = self.best_archived(&scalarisation) else {
             self.failed += 1;
             return Ok(None);
         };
-        let f = optimum.criteria[criterion];
+        let f = optimum.objectives[objective];
         let limit = f + ALLOWED_LOSS * f.abs().max(1.0);
-        let role = |k: usize| match k == criterion {
+        let others = |k: usize| match k == objective {
             true => Role::Limited { limit, scale: 1.0 },
-            false => Role::Minimised { reference: 0.0, scale: optimum.criteria[k].abs().max(1e-3) },
+            false => Role::Minimised { reference: 0.0, scale: optimum.objectives[k].abs().max(1e-3) },
         };
-        let scalarisation = Scalarisation { roles: (0..of).map(role).collect(), objective: Objective::Sum };
-        Ok(Some(self.solve(oracle, &scalarisation, &[optimum], 0.1)?))
+        let scalarisation = Scalarisation { roles: (0..of).map(others).collect() };
+        let found = self.solve(oracle, &scalarisation, &[optimum], 0.1)?;
+        self.remove_slack(oracle, &scalarisation, found).map(Some)
     }
 
-    /// Sets ideal point and ranges of the criteria from the ends of the front.
+    /// Minimises all objectives but one, in units of their ranges, then the one as far as possible without loss in the others.
+    pub fn opposite(&mut self, oracle: &mut dyn Oracle, objective: usize) -> Result<Candidate, Halt> {
+        let role = |(k, (&reference, &scale)): (usize, (&f64, &f64))| match k == objective {
+            true => Role::Minimised { reference, scale: scale / MIN_WEIGHT },
+            false => Role::Minimised { reference, scale },
+        };
+        let roles = self.ideal.iter().zip(&self.range).enumerate().map(role).collect();
+        let scalarisation = Scalarisation { roles };
+        let starts = self.archive.best(&scalarisation, 2, 0.1);
+        let found = self.solve(oracle, &scalarisation, &starts, 0.1)?;
+        self.remove_slack(oracle, &scalarisation, found)
+    }
+
+    /// Sets ideal point and ranges of the objectives from the ends of the front.
     pub fn set_ranges(&mut self, front: &[Candidate]) {
-        let criteria = front[0].criteria.len();
-        let column = |k: usize| front.iter().map(move |candidate| candidate.criteria[k]);
-        self.ideal = (0..criteria).map(|k| column(k).fold(f64::INFINITY, f64::min)).collect();
-        let extent = |k: usize| column(k).fold(f64::NEG_INFINITY, f64::max) - self.ideal[k];
-        self.range = (0..criteria).map(|k| if extent(k) > 0.0 { extent(k) } else { 1.0 }).collect();
+        let objectives: Vec<f64> = front.iter().flat_map(|candidate| candidate.objectives.iter().copied()).collect();
+        let ranges = front::ranges(&objectives, front[0].objectives.len());
+        self.ideal = ranges.iter().map(|[low, _]| *low).collect();
+        self.range = ranges.iter().map(|[low, high]| if high > low { high - low } else { 1.0 }).collect();
     }
 
     /// Returns the best known point of a subproblem.
@@ -129,44 +143,45 @@ impl Subproblems {
     }
 
     /// Returns the point with the smallest maximum of the weighted scaled values.
-    pub fn solve_for_demands(&mut self, oracle: &mut dyn Oracle, criteria: usize) -> Result<Candidate, Halt> {
-        let scalarisation = Scalarisation::chebyshev(&vec![0.0; criteria], &vec![1.0; criteria]);
+    pub fn solve_for_demands(&mut self, oracle: &mut dyn Oracle, objectives: usize) -> Result<Candidate, Halt> {
+        let scalarisation = Scalarisation::chebyshev(&vec![0.0; objectives], &vec![1.0; objectives]);
         let starts = self.archive.best(&scalarisation, 2, 0.02);
         let found = self.solve(oracle, &scalarisation, &starts, 0.05)?;
         self.remove_slack(oracle, &scalarisation, found)
     }
 
-    /// Minimises the criteria that have slack in a min-max problem, while the others stay.
+    /// Minimises the objectives that have slack in a min-max problem, while the others stay. As this is a min-max problem itself,
+    /// its slack is removed in turn.
     pub fn remove_slack(
         &mut self,
         oracle: &mut dyn Oracle,
         scalarisation: &Scalarisation,
         candidate: Candidate,
     ) -> Result<Candidate, Halt> {
-        let worst = scalarisation.merit(&candidate.criteria).objective;
-        let value = |role: &Role, f: f64| match role {
-            Role::Minimised { reference, scale } => (f - reference) / scale,
-            _ => f64::NEG_INFINITY,
-        };
-        let values: Vec<f64> =
-            scalarisation.roles.iter().zip(&candidate.criteria).map(|(role, &f)| value(role, f)).collect();
-        if values.iter().all(|value| *value >= worst - SLACK) {
-            return Ok(candidate);
+        let (mut scalarisation, mut candidate) = (scalarisation.clone(), candidate);
+        loop {
+            let worst = scalarisation.merit(&candidate.objectives).objective;
+            let values = scalarisation.scalarised_values(&candidate.objectives);
+            let role = |((role, value), &f): ((&Role, f64), &f64)| match role {
+                Role::Minimised { scale, .. } if value < worst - SLACK => {
+                    Role::Minimised { reference: f, scale: *scale }
+                }
+                Role::Minimised { scale, .. } => Role::Limited { limit: f, scale: *scale },
+                other => *other,
+            };
+            let roles: Vec<Role> = scalarisation.roles.iter().zip(values).zip(&candidate.objectives).map(role).collect();
+            if !roles.iter().any(|role| matches!(role, Role::Minimised { .. })) {
+                return Ok(candidate);
+            }
+            scalarisation = Scalarisation { roles };
+            candidate = self.solve(oracle, &scalarisation, &[candidate], 0.05)?;
         }
-        let role = |((role, value), &f): ((&Role, &f64), &f64)| match role {
-            Role::Minimised { scale, .. } if *value < worst - SLACK => Role::Minimised { reference: f, scale: *scale },
-            Role::Minimised { scale, .. } => Role::Limited { limit: f, scale: *scale },
-            other => *other,
-        };
-        let roles = scalarisation.roles.iter().zip(&values).zip(&candidate.criteria).map(role).collect();
-        let scalarisation = Scalarisation { roles, objective: Objective::Sum };
-        self.solve(oracle, &scalarisation, &[candidate], 0.05)
     }
 
     /// Tests every point of the front for optimality; trial points that dominate it enter the archive.
     pub fn check_optimality(&mut self, oracle: &mut dyn Oracle, front: &[Candidate]) {
         for candidate in front {
-            let nothing = vec![0.0; candidate.criteria.len()];
+            let nothing = vec![0.0; candidate.objectives.len()];
             let scalarisation = Scalarisation::chebyshev(&nothing, &self.range);
             certificate(&mut ScalarisedProblem::new(oracle, &mut self.archive, &scalarisation), &candidate.point);
         }
@@ -180,14 +195,14 @@ impl Subproblems {
             let here = front[i].clone();
             let dominates = |other: &&Candidate| other.dominates(&here, &self.range, 1e-9);
             let gain = |other: &Candidate| {
-                here.criteria.iter().zip(&other.criteria).zip(&self.range).map(|((a, b), r)| (a - b) / r).sum::<f64>()
+                here.objectives.iter().zip(&other.objectives).zip(&self.range).map(|((a, b), r)| (a - b) / r).sum::<f64>()
             };
             let better =
                 self.archive.candidates().iter().filter(dominates).max_by(|a, b| gain(a).total_cmp(&gain(b))).cloned();
             let Some(better) = better else { continue };
             changed = true;
-            // Improve all criteria together, starting from the dominating point.
-            let scalarisation = Scalarisation::chebyshev(&better.criteria, &self.range);
+            // Improve all objectives together, starting from the dominating point.
+            let scalarisation = Scalarisation::chebyshev(&better.objectives, &self.range);
             let found =
                 if gain(&better) > 1e-5 { self.solve(oracle, &scalarisation, &[better], 0.05)? } else { better };
             front[i] = found;

@@ -52,7 +52,7 @@ impl<'a> Posed<'a> {
             Sense::Squares => Objective::Sum,
             Sense::Each => Objective::Each,
         };
-        let shape = Shape { spacing: vec![0.0; problem.dimension()], rows, objective, points: 0, residuals };
+        let shape = Shape { spacing: vec![0.0; problem.dimension()], rows, objective, residuals, ..Shape::default() };
         let bounds = finite(&problem.start, &problem.bounds, problem.reach);
         Self { problem, shape, bounds, slope, noise: 0.0, seed: 1 }
     }
