@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Budget, Cancellation, Effect, End, Ending, Evaluation, Objective, Optimality, Oracle, Outcome, Pareto, Place,
+    Budget, Cancellation, Effect, End, Ending, Evaluation, Objective, Optimality, Oracle, Outcome, Pareto, Patience, Place,
     Problem, Quiet, Record, Run, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task,
     Watch, conclude,
 };
@@ -19,6 +19,8 @@ pub struct Options {
     /// Number of evaluated points at which the run ends although its solver counts on `max_evaluations`: where an unfinished run is
     /// replayed.
     pub replayed: Option<usize>,
+    /// Patience with a search that hardly improves any more; without limit if absent.
+    pub patience: Option<Patience>,
     /// Number of threads; all cores if absent. The result does not depend on it, bit for bit.
     pub jobs: Option<usize>,
     /// Candidate effects of a diagnosis.
@@ -66,6 +68,7 @@ impl Default for Options {
             solver,
             max_evaluations: DEFAULT_EVALUATIONS,
             replayed: None,
+            patience: None,
             jobs: None,
             effects: mops_effects::effects(),
             keeping: None,
@@ -138,7 +141,7 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let (store, begin) = (options.store(&problem), options.begin(&problem));
     let planned = options.max_evaluations.max(1);
     let evaluations = options.replayed.unwrap_or(planned).max(1);
-    let mut run = Run::new(&problem, Budget { evaluations }, watch).planned(planned).keeping(store);
+    let mut run = Run::new(&problem, Budget { evaluations }, watch).planned(planned).patient(options.patience).keeping(store);
     let start = begin.map_or_else(|| problem.start(), <[f64]>::to_vec);
     let stop = run.solve(solver.as_mut(), &start);
     if run.archive().is_empty() {

@@ -23,6 +23,17 @@ pub struct Budget {
     pub evaluations: usize,
 }
 
+/// Limit of a run whose best point hardly improves any more.
+#[derive(Debug, Clone, Copy)]
+pub struct Patience {
+    /// Smallest number of evaluations after the last gain.
+    pub least: usize,
+    /// Smallest number of evaluations after the last gain, relative to those before it.
+    pub ratio: usize,
+    /// Decrease of the objective, or of the violation of an infeasible point, that counts as a gain, in scaled values.
+    pub gain: f64,
+}
+
 /// Observer of a run, which may also stop it. Only the observer reads the clock, so that time changes no number.
 pub trait Watch: Sync {
     /// Returns true if the run must stop now.
@@ -98,6 +109,7 @@ pub struct Run<'a, E: Evaluator = Problem> {
     budget: Budget,
     /// Budget that the solver counts on, if the run is to end before it.
     planned: Option<usize>,
+    patience: Option<Patience>,
     watch: &'a dyn Watch,
     store: Option<&'a dyn Store>,
     /// Number of points answered from the store, without a simulation.
@@ -134,6 +146,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
             problem,
             budget,
             planned: None,
+            patience: None,
             watch,
             store: None,
             reused: 0,
@@ -153,6 +166,12 @@ impl<'a, E: Evaluator> Run<'a, E> {
     #[must_use]
     pub fn planned(self, evaluations: usize) -> Self {
         Self { planned: Some(evaluations), ..self }
+    }
+
+    /// Ends the run, as stalled, when its best point has not improved for long.
+    #[must_use]
+    pub fn patient(self, patience: Option<Patience>) -> Self {
+        Self { patience, ..self }
     }
 
     /// Uses finite differences only, for comparison.
@@ -188,8 +207,10 @@ impl<'a, E: Evaluator> Run<'a, E> {
         self.tell();
         let mut iterate = || -> Result<Stop, Halt> {
             solver.begin(self, start)?;
+            let mut last_gain = (0, Merit::FAILED);
             loop {
                 match solver.step(self)? {
+                    Progress::Continue if self.is_exhausted(&mut last_gain) => return Ok(Stop::Stalled),
                     Progress::Continue => {}
                     Progress::Converged => return Ok(Stop::Converged),
                     Progress::Stalled => return Ok(Stop::Stalled),
@@ -199,6 +220,24 @@ impl<'a, E: Evaluator> Run<'a, E> {
         let stop = iterate().unwrap_or_else(Stop::from);
         self.solved = solver.front().iter().map(|point| self.problem.tuners_at(point)).collect();
         stop
+    }
+
+    /// Returns true if the best point has not improved for longer than the patience of the run. `last_gain` holds the number of
+    /// evaluations and the merit at the last gain.
+    fn is_exhausted(&self, last_gain: &mut (usize, Merit)) -> bool {
+        let (Some(patience), Some(best)) = (self.patience, &self.best) else { return false };
+        let (at, before) = *last_gain;
+        let is_gain = match (before.is_feasible(), best.merit.is_feasible()) {
+            (true, _) => before.objective - best.merit.objective > patience.gain,
+            (false, true) => true,
+            // N.B.: a failed point has an infinite violation.
+            (false, false) => before.violation - best.merit.violation > patience.gain,
+        };
+        if is_gain {
+            *last_gain = (self.archive.len(), best.merit);
+            return false;
+        }
+        self.archive.len() - at > patience.least.max(patience.ratio * at)
     }
 
     /// Records an evaluation of the start made elsewhere, so that a run cancelled before its first evaluation has a point to

@@ -159,6 +159,7 @@ pub(super) fn execute(
     let options = Options {
         solver,
         max_evaluations: limit.or(file.max_evaluations).unwrap_or(DEFAULT_EVALUATIONS),
+        patience: None,
         replayed: None,
         jobs: arguments.jobs.map(usize::from),
         effects: catalogue.effects.clone(),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use mops_core::{
-    AddedReport, Budget, Ending, Evaluation, FEASIBLE, Halt, Oracle, Pareto, Problem, Record, RobustReport, RobustTask,
+    AddedReport, Budget, Ending, Evaluation, FEASIBLE, Halt, Oracle, Pareto, Patience, Problem, Record, RobustReport, RobustTask,
     RoundReport, Run, RunState, Scenario, Stop, Store, Study, Usage, Watch, conclude, uncertain_reports,
 };
 
@@ -14,6 +14,10 @@ use crate::numbers::significant;
 use crate::search::{EvaluationStore, Options, SolveError, Solved, search};
 
 /// Outer approximation: solves for the present cases, searches the box for worse cases, adds them, and repeats.
+///
+/// A design against cases that are still to be added is not worth a long search: a round has a share of the budget, and it ends
+/// when its design hardly improves any more. Once no worse case is found, the search of the last design is repeated with more
+/// patience.
 ///
 /// The optimum over the present cases is a lower bound for every design, provided that the solver finds the optimum. The worst
 /// case found in the box is the value of the present design.
@@ -26,12 +30,21 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let mut left = options.max_evaluations;
     let (mut stop, mut archive, mut simulations, mut reused) = (Stop::Stalled, Vec::new(), 0, 0);
     let mut last: Option<Solved>;
+    let mut is_thorough = false;
     loop {
         let before = options.max_evaluations - left;
+        let is_last = rounds.done.len() + 1 == rounds.task.rounds;
+        let share = if is_thorough || is_last { left } else { left.div_ceil(ROUND_SHARE) };
+        let factor = if is_thorough { THOROUGH } else { 1 };
+        let patience = Patience {
+            least: factor * LEAST_PATIENCE * (Problem::outline(&rounds.study).dimension() + 1),
+            ratio: factor,
+            gain: rounds.task.tolerance,
+        };
         let designing = Designing { watch, round: rounds.done.len() + 1, cases: rounds.scenarios.len(), before };
         let study = rounds.to_solve();
         let keeping = rounds.keeping(&study, options);
-        let solved = search(study, &Options { max_evaluations: left, keeping, ..options.clone() }, &designing)?;
+        let solved = search(study, &Options { max_evaluations: share, patience: Some(patience), keeping, ..options.clone() }, &designing)?;
         reused += solved.outcome.reused.unwrap_or(0);
         left = left.saturating_sub(solved.outcome.evaluations);
         simulations += solved.outcome.simulations;
@@ -43,10 +56,12 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
             stop = watch.halt().into();
             break;
         }
-        if !more {
-            stop = last.as_ref().map_or(stop, |solved| solved.outcome.stop);
+        let found = last.as_ref().map_or(stop, |solved| solved.outcome.stop);
+        if !more && (is_thorough || found == Stop::Converged || left == 0) {
+            stop = found;
             break;
         }
+        is_thorough = !more;
         if rounds.done.len() == rounds.task.rounds {
             break;
         }
@@ -65,6 +80,20 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     solved.archive = archive;
     Ok(solved)
 }
+
+/// Doubt about a design whose worst cases are unknown.
+const NOT_SEARCHED: &str = "The uncertain parameters were not searched for worst cases: the values hold for the given cases only; \
+                            continue the run (--resume).";
+
+/// Share of the remaining budget that a round may spend: one part of so many.
+const ROUND_SHARE: usize = 3;
+
+/// Smallest number of evaluations without gain after which the design of a round is given up, in numbers of points that a gradient
+/// by differences needs.
+const LEAST_PATIENCE: usize = 30;
+
+/// Patience with the last design, relative to that with the design of a round.
+const THOROUGH: usize = 5;
 
 /// Observer of the design search of one round; reports it as a stage, and counts its points in the whole run.
 struct Designing<'a> {
@@ -223,7 +252,14 @@ impl Rounds {
 
     /// Returns the outcome of the chosen design over all cases, including those found last.
     fn conclude(self, last: Solved, options: &Options, stop: Stop) -> Solved {
-        let Some(chosen) = self.chosen() else { return Solved { archive: Vec::new(), ..last } };
+        let chosen = self.chosen().filter(|&chosen| !self.worst[chosen].is_empty());
+        let Some(chosen) = chosen else {
+            let mut outcome = last.outcome;
+            if let Some(end) = &mut outcome.end {
+                end.doubt = Some(NOT_SEARCHED.to_owned());
+            }
+            return Solved { outcome, archive: Vec::new(), ..last };
+        };
         let settled = self.done.last().is_some_and(|round| round.added.is_empty());
         let design = &self.done[chosen].tuners;
         let problem = Problem::new(Arc::new(self.study.with_scenarios(&self.scenarios))).concluding();
