@@ -151,10 +151,24 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
             run.take_start(answer);
         }
     }
+    // Of a front, the point nearest to the demands is reported.
+    let nearest = run.front().into_iter().min_by(|&a, &b| {
+        let worst = |i: usize| run.archive()[i].merit.objective;
+        worst(a).total_cmp(&worst(b))
+    });
+    if let Some(nearest) = nearest {
+        run.settle(run.evaluation(nearest).clone());
+    }
     let quiet = Quiet(watch);
     let mut probe = Run::new(&problem, Budget { evaluations: usize::MAX }, &quiet).keeping(store);
-    let point = optimality(&run, &mut probe, watch);
-    let pareto = pareto(&run, point, &mut probe, watch);
+    let mut point = optimality(&run, &mut probe, watch);
+    let mut shown = pareto(&run, point, &mut probe, watch);
+    let has_slack = shown == Pareto::No && problem.shape().objective == Objective::Max;
+    if has_slack && stop != Stop::Interrupted && remove_slack(&mut run) {
+        point = optimality(&run, &mut probe, watch);
+        shown = pareto(&run, point, &mut probe, watch);
+    }
+    let pareto = shown;
     let stop = if stop == Stop::Converged && matches!(point, Optimality::Plateau | Optimality::Descent) {
         Stop::Stalled
     } else {
@@ -172,6 +186,19 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let archive = run.archive().to_vec();
     drop((run, probe));
     Ok(Solved { outcome, problem, best, archive, front: Vec::new() })
+}
+
+/// Lowers the criteria of the best point that do not decide its objective, while the others stay. Returns true if there is such a
+/// point.
+fn remove_slack(run: &mut Run<'_>) -> bool {
+    let Some(best) = run.best().cloned() else { return false };
+    // At the end of the budget, the points evaluated so far count.
+    let Ok(Some(found)) = mops_solvers::remove_slack(run, &best.point) else { return false };
+    let is_as_good = found.merit.is_feasible() && found.merit.objective <= best.merit.objective;
+    if is_as_good {
+        run.settle(found);
+    }
+    is_as_good
 }
 
 /// Evaluates the start values only and returns the outcome.

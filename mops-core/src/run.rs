@@ -247,6 +247,11 @@ impl<'a, E: Evaluator> Run<'a, E> {
         self.keep(key, answer);
     }
 
+    /// Reports an evaluated point instead of the best one: one that is as good, and better in what the objective leaves open.
+    pub fn settle(&mut self, evaluation: Evaluation) {
+        self.best = Some(evaluation);
+    }
+
     /// Returns all points, in the order of their evaluation.
     pub fn archive(&self) -> &[Record] {
         &self.archive

@@ -52,6 +52,7 @@ pub mod prelude {
 }
 
 pub use optimality::{Certificate, certificate, optimality};
+pub use weighted_chebyshev::remove_slack;
 
 /// Returns every kind of solver, the default first. A new kind is one file and one line here.
 pub fn kinds() -> Vec<SolverKind> {

@@ -3,7 +3,9 @@
 use std::time::Instant;
 
 use mops_core::math;
-use mops_core::{Budget, Certified, Design, FrontPoint, Pareto, Problem, Quiet, Run, Study, TradeOffs, Watch};
+use mops_core::{
+    Budget, Certified, Design, FrontPoint, Outcome, Pareto, Problem, Quiet, Run, Stop, Study, TradeOffs, Watch,
+};
 use mops_solvers::certificate;
 
 use crate::numbers::significant;
@@ -11,11 +13,14 @@ use crate::search::{Options, SolveError, Solved, search};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let started = Instant::now();
-    let mut solved = search(study, options, watch)?;
+    // The rest of the budget is for the certificates.
+    let searched = options.max_evaluations - options.max_evaluations / CERTIFICATES;
+    let mut solved = search(study, &Options { max_evaluations: searched, ..options.clone() }, watch)?;
     let problem = &solved.problem;
     // The points of the certificates are not part of the observed search.
     let quiet = Quiet(watch);
-    let mut run = Run::new(problem, Budget { evaluations: usize::MAX }, &quiet);
+    let left = options.max_evaluations.saturating_sub(solved.outcome.evaluations);
+    let mut run = Run::new(problem, Budget { evaluations: left }, &quiet);
     let concluding = problem.concluding();
     let certified = |point: &Design| {
         let at = concluding.evaluate_at(&tuners(problem, point));
@@ -37,13 +42,33 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         return Ok(solved);
     }
     if let Some(mut found) = TradeOffs::of(problem, &front) {
+        // Of equally near points, the reported one.
+        let worst = found.points[found.nearest].worst_scaled;
+        let is_reported = |&i: &usize| front[i].at.tuners == solved.best.tuners && found.points[i].worst_scaled <= worst;
+        found.nearest = (0..front.len()).find(is_reported).unwrap_or(found.nearest);
         found.words = words(problem, &front, &found);
         solved.outcome.pareto = found.points[found.nearest].pareto;
+        solved.outcome.warnings.extend(missing_points(problem, &solved.outcome, front.len()));
         solved.outcome.found.trade_offs = Some(found);
     }
     solved.front = front.into_iter().map(|point| point.at).collect();
     solved.outcome.seconds = started.elapsed().as_secs_f64();
     Ok(solved)
+}
+
+/// Share of the budget kept for the certificates of the points: one part of so many.
+const CERTIFICATES: usize = 5;
+
+/// Returns why the front has fewer points than the study asks for; `None` if it has as many.
+fn missing_points(problem: &Problem, outcome: &Outcome, found: usize) -> Option<String> {
+    let asked = problem.study().tasks().pareto.points;
+    let why = match outcome.stop {
+        _ if found >= asked => return None,
+        Stop::Budget => "the budget was spent before; raise --max-evaluations",
+        Stop::Interrupted => "the search was interrupted; continue it (--resume)",
+        Stop::Converged | Stop::Stalled => "every further search ended at one of these points, or in a gap of the front",
+    };
+    Some(format!("{asked} points were asked for, the front has {found}: {why}"))
 }
 
 /// Returns the values of all tuners of a point in the result.
@@ -139,6 +164,9 @@ fn name(found: &TradeOffs, k: usize) -> String {
 }
 
 fn amount(value: f64, unit: &str) -> String {
+    if !value.is_finite() {
+        return "not reached".to_owned();
+    }
     let number = significant(value, 4);
     if unit == "1" { number } else { format!("{number} {unit}") }
 }

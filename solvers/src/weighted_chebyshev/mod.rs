@@ -6,13 +6,14 @@ mod reference_directions;
 mod scalarisation;
 mod subproblem;
 
-use mops_core::{Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions};
+use mops_core::{Evaluation, Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use archive::Candidate;
 use rectangles::Rectangles;
 use reference_directions::ReferenceDirections;
+use scalarisation::Scalarisation;
 use subproblem::Subproblems;
 
 /// Weighted Chebyshev method for evenly spread points of the Pareto front (non-dominated designs). Each point solves a
@@ -233,6 +234,22 @@ impl State {
         }
         self.subproblems.set_ranges(&self.front);
     }
+}
+
+/// Lowers the objectives of a point that are smaller than the largest one, while the others stay; `None` if the point is
+/// infeasible.
+///
+/// # Errors
+/// Returns [`Halt`] if the run is over.
+pub fn remove_slack(oracle: &mut dyn Oracle, point: &[f64]) -> Result<Option<Evaluation>, Halt> {
+    let answers = oracle.evaluate(&[point.to_vec()])?;
+    let mut subproblems = Subproblems::new(1);
+    subproblems.archive.record(oracle.shape(), &answers);
+    let Some(candidate) = subproblems.archive.candidates().first().cloned() else { return Ok(None) };
+    let m = oracle.shape().objective_count();
+    let scalarisation = Scalarisation::chebyshev(&vec![0.0; m], &vec![1.0; m]);
+    let found = subproblems.remove_slack(oracle, &scalarisation, candidate)?;
+    Ok(oracle.evaluate(&[found.point])?.pop())
 }
 
 /// Maximum number of rounds that replace dominated points.
