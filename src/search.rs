@@ -176,7 +176,10 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     };
     // A replay ends where the run was interrupted, not at a budget.
     let cause = if options.replayed.is_some() { Stop::Interrupted } else { stop };
-    let end = run.best().map(|best| End::new(point, best.merit, solver.ends(), cause));
+    let end = run.best().map(|best| {
+        let is_noise = best.merit.is_feasible() && problem.shape().is_noise(best.merit.objective);
+        End::new(point, best.merit, solver.ends(), cause, is_noise)
+    });
     let ending = Ending { stop, end, pareto, seconds: started.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
     outcome.methods = solver.methods().to_vec();

@@ -106,14 +106,18 @@ pub struct End {
     pub words: Vec<String>,
 }
 
+/// What the level of the residuals shows of other basins.
+const NOISE: &str = "The residuals are noise of the stated level: no other point fits significantly better.";
+
 impl End {
     /// Returns what is known of a point with this merit and classification, after local searches that ended with the given
-    /// merits.
+    /// merits. `is_noise`: the residuals are noise, see [`crate::Shape::is_noise`].
     #[must_use]
-    pub fn new(point: Optimality, best: Merit, ends: &[Merit], stop: Stop) -> Self {
+    pub fn new(point: Optimality, best: Merit, ends: &[Merit], stop: Stop, is_noise: bool) -> Self {
         let mut end = Self { point, basins: Basins::of(best, ends), doubt: None, words: Vec::new() };
-        end.words = end.words_of_point().into_iter().chain(end.words_of_searches()).collect();
-        end.doubt = end.doubt(best.is_feasible(), stop);
+        let of_searches = if is_noise { Some(NOISE.to_owned()) } else { end.words_of_searches() };
+        end.words = end.words_of_point().into_iter().chain(of_searches).collect();
+        end.doubt = end.doubt(best.is_feasible() && !is_noise, stop);
         end
     }
 
@@ -149,7 +153,7 @@ impl End {
     }
 
     /// Returns the reason to doubt the point, with the way out.
-    fn doubt(&self, is_feasible: bool, stop: Stop) -> Option<String> {
+    fn doubt(&self, may_be_elsewhere: bool, stop: Stop) -> Option<String> {
         let Basins { searches, arrived, optima, .. } = self.basins;
         let is_found_again = arrived > 1;
         match self.point {
@@ -164,7 +168,7 @@ impl End {
                  elsewhere, or minimise a criterion that changes."
                     .to_owned(),
             ),
-            _ if is_feasible && self.basins.is_doubtful() => {
+            _ if may_be_elsewhere && self.basins.is_doubtful() => {
                 let others = if arrived == 1 { "only 1".to_owned() } else { arrived.to_string() };
                 Some(format!(
                     "Another basin is likely, as {others} of {searches} local searches ended here, and all of them in {optima} \
@@ -197,7 +201,7 @@ mod tests {
     #[test]
     fn an_optimum_that_most_searches_reach_is_not_doubted() {
         let ends = [1.0, 1.0001, 1.0, 1.0, 1.2, 1.0].map(merit);
-        let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged);
+        let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged, false);
         let Basins { searches, arrived, optima, unseen } = end.basins;
         assert_eq!((searches, arrived, optima, &end.doubt), (6, 5, 2, &None));
         // w (w + 1)/(n (n - 1)) with w = 2, n = 6.
@@ -207,14 +211,14 @@ mod tests {
     #[test]
     fn an_optimum_that_a_single_search_of_several_reaches_is_doubted() {
         let ends = [1.0, 1.1, 1.1, 1.1].map(merit);
-        let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged);
+        let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged, false);
         assert!(end.doubt.unwrap().starts_with("Another basin is likely"));
     }
 
     #[test]
     fn as_many_optima_as_searches_are_not_all_of_them() {
         let ends = [1.0, 1.0, 1.3, 1.6, 2.0].map(merit);
-        let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged);
+        let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged, false);
         assert_eq!((end.basins.arrived, end.basins.optima, end.basins.unseen), (2, 4, Some(1.0)));
         assert!(end.doubt.is_some());
     }
@@ -222,7 +226,7 @@ mod tests {
     #[test]
     fn a_descent_and_a_plateau_are_doubted_whatever_the_searches() {
         for point in [Optimality::Descent, Optimality::Plateau] {
-            let end = End::new(point, merit(3.0), &[merit(3.0); 4], Stop::Converged);
+            let end = End::new(point, merit(3.0), &[merit(3.0); 4], Stop::Converged, false);
             assert!(end.doubt.is_some() && !point.is_stationary());
         }
     }

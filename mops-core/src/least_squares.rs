@@ -187,8 +187,53 @@ impl LeastSquares {
     }
 }
 
+/// Number of rows that are factorised at once, and smallest number per column.
+const CHUNK: usize = 256;
+const ROWS_PER_COLUMN: usize = 4;
+
 /// Returns the triangular factor `R` of a matrix `J = QR`, and `Q'r`. The condition of `J` is not squared, as by normal equations.
+///
+/// A tall matrix is factorised by chunks of rows, without the columns that vanish in a chunk, and then the factors of all chunks
+/// together: the time for coordinates that act in few rows each is linear in the number of rows.
+///
+/// Source: J. Demmel, L. Grigori, M. Hoemmen, J. Langou, SIAM Journal on Scientific Computing 34 (2012) A206-A239 (tall and skinny
+/// QR).
 fn factorised(residuals: &DVector<f64>, jacobian: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let (rows, n) = jacobian.shape();
+    if rows < 2 * CHUNK || n == 0 {
+        return factorised_at_once(residuals, jacobian);
+    }
+    // Rows of the factors of all chunks: columns, their values, right-hand side.
+    let mut factors: Vec<(Vec<usize>, DMatrix<f64>, DVector<f64>)> = Vec::new();
+    let mut begin = 0;
+    while begin < rows {
+        let is_zero = |j: usize, count: usize| jacobian.column(j).rows(begin, count).iter().all(|slope| *slope == 0.0);
+        let least = CHUNK.min(rows - begin);
+        let columns = (0..n).filter(|&j| !is_zero(j, least)).count();
+        let count = least.max(ROWS_PER_COLUMN * columns).min(rows - begin);
+        let columns: Vec<usize> = (0..n).filter(|&j| !is_zero(j, count)).collect();
+        let part = jacobian.rows(begin, count).select_columns(&columns);
+        let (factor, target) = factorised_at_once(&residuals.rows(begin, count).into_owned(), &part);
+        factors.push((columns, factor, target));
+        begin += count;
+    }
+    let total = factors.iter().map(|(_, factor, _)| factor.nrows()).sum();
+    let (mut stacked, mut target) = (DMatrix::zeros(total, n), DVector::zeros(total));
+    let mut row = 0;
+    for (columns, factor, part) in &factors {
+        for (i, &j) in columns.iter().enumerate() {
+            stacked.view_mut((row, j), (factor.nrows(), 1)).copy_from(&factor.column(i));
+        }
+        target.rows_mut(row, part.len()).copy_from(part);
+        row += factor.nrows();
+    }
+    factorised_at_once(&target, &stacked)
+}
+
+fn factorised_at_once(residuals: &DVector<f64>, jacobian: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    if jacobian.ncols() == 0 {
+        return (DMatrix::zeros(0, 0), DVector::zeros(0));
+    }
     let qr = jacobian.clone().qr();
     let mut target = residuals.clone();
     qr.q_tr_mul(&mut target);

@@ -10,6 +10,7 @@ use crate::demand::Demand;
 use crate::evaluation::{Evaluation, Merit, Objective, Reading};
 use crate::experiment::Role;
 use crate::failure::Failure;
+use crate::math;
 use crate::known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes as KnownSlopes, RowValue};
 use crate::model::{Analysis, Job};
 use crate::objectives::FrontObjective;
@@ -86,6 +87,7 @@ impl Problem {
         let counting = jobs.iter().copied().filter(counts).collect();
         let mut problem = Self { study, active, base, shape, jobs, counting };
         problem.shape.residuals = problem.count_residuals();
+        problem.shape.noise = problem.noise_of_residuals().unwrap_or(0.0);
         problem
     }
 
@@ -100,6 +102,26 @@ impl Problem {
         let mut points = std::iter::once(self.start()).chain(elsewhere);
         let succeeds = points.find_map(|point| Some(self.evaluate(&point)).filter(|e| e.scaled.is_some()));
         succeeds.map_or(0, |evaluation| evaluation.residuals.len())
+    }
+
+    /// Returns the sum of squares up to which the residuals are noise, see [`Shape::noise`]; `None` if a noise level is unknown.
+    ///
+    /// Each term `a_i e_i^2` with standard normal `e_i` has the mean `a_i` and the variance `2 a_i^2`.
+    fn noise_of_residuals(&self) -> Option<f64> {
+        if self.shape.residuals == 0 {
+            return None;
+        }
+        let (mut mean, mut variance) = (0.0, 0.0);
+        for row in (0..self.study.rows.len()).filter(|&row| self.is_minimised(row)) {
+            let samples = self.study.rows[row].criterion.samples(self.study.case_of(&self.study.rows[row]))?;
+            let unit = self.residual_factor(row)? * samples.noise?;
+            for weight in samples.weights {
+                let term = math::powi(unit * weight, 2);
+                mean += term;
+                variance += 2.0 * term * term;
+            }
+        }
+        Some(mean + 3.0 * variance.sqrt())
     }
 
     /// Returns a copy for concluding a run: only a second, insistent cancellation request ends its simulations.
@@ -488,7 +510,8 @@ fn shape(study: &Study, active: &[usize], usage: impl Fn(&Row, &Study) -> Usage)
         Objective::Each => groups(&FrontObjective::of_study(study, &rows)),
         Objective::Max | Objective::Sum => Vec::new(),
     };
-    Shape { spacing, rows, objective: study.objective, groups, points, residuals: 0 }
+    let local = (0..active.len()).filter(|&j| study.tuners[active[j]].case.is_some()).collect();
+    Shape { spacing, rows, objective: study.objective, groups, points, residuals: 0, noise: 0.0, local }
 }
 
 /// Returns the values of a job without residuals, for a cache that does not need them.

@@ -29,9 +29,22 @@ pub struct Shape {
     pub points: usize,
     /// Length of the residual vector whose sum of squares is the objective; 0 if the objective is not a sum of squares.
     pub residuals: usize,
+    /// Sum of squares up to which the residuals are noise: expectation plus three standard deviations of the sum for independent
+    /// normal noise of the known levels; 0 if a level is unknown.
+    pub noise: f64,
+    /// Coordinates that act in the residuals of a single experiment, such as its initial state, by index.
+    pub local: Vec<usize>,
 }
 
+/// Share of the noise below which the residuals are too small for noise of the stated levels.
+const FAR_BELOW_NOISE: f64 = 0.1;
+
 impl Shape {
+    /// Returns true if a sum of squares is what the noise of the measurements leaves: no other point fits significantly better.
+    pub fn is_noise(&self, sum: f64) -> bool {
+        (FAR_BELOW_NOISE * self.noise..=self.noise).contains(&sum) && self.noise > 0.0
+    }
+
     /// Returns the number of tuners.
     pub fn dimension(&self) -> usize {
         self.spacing.len()

@@ -1,7 +1,7 @@
 //! Multistart of a local solver.
 //!
 //! The first run starts from the initial guess of the study, the next ones from the best points of samples of the box, until an
-//! optimum that is not yet known is unlikely. A run that comes close to the end of an earlier one is not continued. If
+//! optimum that is not yet known is unlikely, or until the residuals of a calibration are noise. A run that comes close to the end of an earlier one is not continued. If
 //! enabled, runs from points around the best one follow until nothing changes.
 
 use mops_core::{Basins, Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver};
@@ -28,6 +28,8 @@ pub struct Multistart {
     allowed: usize,
     /// Evaluations of the run that found the best point.
     arrived: usize,
+    /// Initial guess of the study.
+    initial: Vec<f64>,
     /// Remaining starting points, the next one last.
     queue: Vec<Vec<f64>>,
     /// Merit of the best point, and the result of the run that found it.
@@ -94,6 +96,7 @@ impl Multistart {
             drawn: 0,
             allowed: 0,
             arrived: 0,
+            initial: Vec::new(),
             queue: Vec::new(),
             best: None,
             local_restarts: false,
@@ -224,7 +227,9 @@ impl Multistart {
             self.queue.clear();
             return Ok(None);
         }
-        let n = oracle.shape().dimension();
+        // Coordinates of single experiments follow from the others: they keep their initial guess.
+        let local = oracle.shape().local.clone();
+        let n = oracle.shape().dimension() - local.len();
         if self.queue.is_empty() && self.drawn < self.starts && n > 0 {
             let left = self.starts - self.drawn;
             let count = if self.is_thorough { left } else { AT_ONCE.min(left) };
@@ -233,7 +238,8 @@ impl Multistart {
             } else {
                 format!("multistart {}", self.drawn)
             });
-            let sample = latin_hypercube(count * 5 * (n + 1), n, &mut random);
+            let mut sample = latin_hypercube(count * 5 * (n + 1), self.initial.len(), &mut random);
+            sample.iter_mut().for_each(|point| local.iter().for_each(|&j| point[j] = self.initial[j]));
             self.queue = best_of(oracle, &sample, count)?;
             self.drawn += count;
         }
@@ -251,12 +257,14 @@ impl Multistart {
             return Ok(false);
         }
         self.restart_round = RestartRound { count: count + 1, idle, objective };
-        let n = centre.len();
+        let local = oracle.shape().local.clone();
+        let n = centre.len() - local.len();
         let radius = self.radii[count % self.radii.len()];
         let mut random = oracle.stream(&format!("restart {count}"));
-        let mut sample = latin_hypercube(2 * (n + 1), n, &mut random);
+        let mut sample = latin_hypercube(2 * (n + 1), centre.len(), &mut random);
         for point in &mut sample {
             point.iter_mut().zip(&centre).for_each(|(u, c)| *u = (c + radius * (2.0 * *u - 1.0)).clamp(0.0, 1.0));
+            local.iter().for_each(|&j| point[j] = centre[j]);
         }
         let mut starts = best_of(oracle, &sample, RestartRound::STARTS)?;
         let Some(start) = starts.pop() else { return Ok(false) };
@@ -277,6 +285,7 @@ impl Solver for Multistart {
         self.end_points.clear();
         self.ends.clear();
         self.drawn = 1;
+        self.initial = start.to_vec();
         self.start_run(oracle, start)
     }
 
@@ -308,6 +317,11 @@ impl Solver for Multistart {
             self.record_end(oracle, progress, end);
         }
         self.phase = Phase::Sampled;
+        if self.best.is_some_and(|(best, progress)| {
+            progress == Progress::Converged && best.is_feasible() && oracle.shape().is_noise(best.objective)
+        }) {
+            return Ok(Progress::Converged);
+        }
         match self.next_start(oracle)? {
             Some(start) => {
                 self.start_run(oracle, &start)?;
