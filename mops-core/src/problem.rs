@@ -42,10 +42,12 @@ pub struct Slopes {
     pub rows: Vec<Vec<f64>>,
     /// Derivative of residual `i` along coordinate `j`: `residuals[j][i]`.
     pub residuals: Vec<Vec<f64>>,
+    /// Residuals at the point.
+    pub at: Vec<f64>,
 }
 
-/// A row, by index, with its derivative along every coordinate.
-type RowSlopes = (usize, Vec<Value>);
+/// A row, by index, with its value and its derivative along every coordinate.
+type RowSlopes = (usize, Value, Vec<Value>);
 
 impl Problem {
     /// Creates the problem of the study itself: tuners of the study and of its calibration cases. The other cases are
@@ -243,10 +245,9 @@ impl Problem {
                 None => (job, self.run_job(job, &tuners), true),
             })
             .collect();
-        let keeps_residuals = self.shape.residuals > 0;
         let is_new = |(_, values, new): &&(usize, JobValues, bool)| *new && *values != Err(Failure::Cancelled);
         let learned: Vec<(usize, JobValues)> = (values.iter().filter(is_new))
-            .map(|(job, values, _)| (*job, if keeps_residuals { values.clone() } else { without_residuals(values) }))
+            .map(|(job, values, _)| (*job, without_residuals(values)))
             .collect();
         let learned = (!learned.is_empty()).then_some(Known { jobs: learned });
         CachedPoint { evaluation: self.judge(point, tuners, values.into_iter().map(|(job, v, _)| (job, v))), learned }
@@ -262,13 +263,8 @@ impl Problem {
     /// Returns true if the cached values of a job contain everything that this problem needs.
     fn suffices(&self, job: usize, values: &JobValues) -> bool {
         let Ok(values) = values else { return true };
-        let rows = self.study.rows.iter().zip(&self.shape.rows).enumerate().filter(|(_, (row, _))| row.job == job);
-        let needs_residuals = |usage: Usage| self.shape.residuals > 0 && usage == Usage::Minimise;
-        rows.into_iter().all(|(index, (_, (usage, _)))| match values.iter().find(|(row, _)| *row == index) {
-            Some((_, Ok(value))) => !needs_residuals(*usage) || !value.residuals.is_empty(),
-            Some((_, Err(_))) => true,
-            None => false,
-        })
+        let mut rows = self.study.rows.iter().enumerate().filter(|(_, row)| row.job == job);
+        rows.all(|(index, _)| values.iter().any(|(row, _)| *row == index))
     }
 
     /// Rates the values of jobs by the demands of the study.
@@ -328,21 +324,36 @@ impl Problem {
     /// Returns the derivatives at an evaluated point, from the tangents of the models. `None` if a model, a criterion or a
     /// tuner has no exact derivatives. `reach` is the distance within which the derivatives are to describe the problem.
     pub fn slopes(&self, at: &Evaluation, reach: f64) -> Option<Slopes> {
-        self.scaled_slopes(at, self.row_slopes(at, reach)?)
+        let of_rows = self.row_slopes(at, reach)?;
+        let mut residuals = vec![Vec::new(); self.study.rows.len()];
+        let of_rows = of_rows.into_iter().map(|(row, value, slopes)| {
+            residuals[row] = value.residuals;
+            (row, slopes)
+        });
+        let of_rows = of_rows.collect();
+        self.scaled_slopes(at, of_rows, residuals)
     }
 
-    /// Returns the derivatives at an evaluated point as [`Problem::slopes`], with cached derivatives of the rows.
+    /// Returns the derivatives at an evaluated point as [`Problem::slopes`], with cached derivatives of the rows. Those of residuals
+    /// are not cached.
     pub fn slopes_keeping(
         &self,
         at: &Evaluation,
         reach: f64,
         known: Option<Option<KnownSlopes>>,
     ) -> CachedGradients<Slopes> {
+        if self.shape.residuals > 0 {
+            return CachedGradients { slopes: self.slopes(at, reach), learned: None };
+        }
         let known = known.filter(|known| known.as_ref().is_none_or(|rows| self.suffice(rows)));
-        let (rows, new) = known.map_or_else(|| (self.row_slopes(at, reach), true), |known| (known, false));
+        let simulated = || {
+            let rows = self.row_slopes(at, reach)?;
+            Some(rows.into_iter().map(|(row, _, slopes)| (row, slopes)).collect::<KnownSlopes>())
+        };
+        let (rows, new) = known.map_or_else(|| (simulated(), true), |known| (known, false));
         // Derivatives that were cut off are not cached.
         let learned = (new && (rows.is_some() || !self.is_cancelled())).then(|| rows.clone());
-        CachedGradients { slopes: rows.and_then(|rows| self.scaled_slopes(at, rows)), learned }
+        CachedGradients { slopes: rows.and_then(|rows| self.scaled_slopes(at, rows, Vec::new())), learned }
     }
 
     /// Returns true if cached derivatives contain everything that this problem needs.
@@ -352,16 +363,13 @@ impl Problem {
             match known.iter().find(|(row, _)| *row == index) {
                 _ if *usage == Usage::Monitor => true,
                 None => false,
-                Some((_, along)) => {
-                    let needs_residuals = self.shape.residuals > 0 && *usage == Usage::Minimise;
-                    along.len() == n && !(needs_residuals && along.iter().any(|slope| slope.residuals.is_empty()))
-                }
+                Some((_, along)) => along.len() == n,
             }
         })
     }
 
     /// Returns the derivatives of the rows that count along every coordinate, in the units of their criteria.
-    fn row_slopes(&self, at: &Evaluation, reach: f64) -> Option<KnownSlopes> {
+    fn row_slopes(&self, at: &Evaluation, reach: f64) -> Option<Vec<RowSlopes>> {
         if self.shape.spacing.iter().any(|&spacing| spacing > 0.0) || at.scaled.is_none() {
             return None;
         }
@@ -371,15 +379,15 @@ impl Problem {
             .par_iter()
             .map(|&job| caught(|| self.job_slopes(job, &at.tuners, &moves, reach)).ok()?)
             .collect();
-        let mut rows: KnownSlopes = of_jobs.into_iter().collect::<Option<Vec<_>>>()?.into_iter().flatten().collect();
+        let mut rows: Vec<RowSlopes> = of_jobs.into_iter().collect::<Option<Vec<_>>>()?.into_iter().flatten().collect();
         if self.shape.residuals == 0 {
-            rows.iter_mut().flat_map(|(_, along)| along).for_each(|slope| slope.residuals.clear());
+            rows.iter_mut().flat_map(|(_, _, along)| along).for_each(|slope| slope.residuals.clear());
         }
         Some(rows)
     }
 
-    /// Returns the derivatives of the scaled values and of the weighted residuals.
-    fn scaled_slopes(&self, at: &Evaluation, of_rows: KnownSlopes) -> Option<Slopes> {
+    /// Returns the derivatives of the scaled values and of the weighted residuals, with the residuals of the rows as `values`.
+    fn scaled_slopes(&self, at: &Evaluation, of_rows: KnownSlopes, values: Vec<Vec<f64>>) -> Option<Slopes> {
         let (count, n) = (self.study.rows.len(), self.active.len());
         let mut rows = vec![vec![0.0; n]; count];
         let mut residuals = vec![vec![Vec::new(); count]; n];
@@ -391,7 +399,7 @@ impl Problem {
         }
         let residuals: Vec<Vec<f64>> = residuals.into_iter().map(|of_rows| self.residuals(of_rows)).collect();
         let finite = rows.iter().chain(&residuals).flatten().all(|slope| slope.is_finite());
-        finite.then_some(Slopes { rows, residuals })
+        finite.then(|| Slopes { rows, residuals, at: self.residuals(values) })
     }
 
     /// Returns the derivative of all tuners along each coordinate of the unit box, ties included.
@@ -434,7 +442,7 @@ impl Problem {
                 let tangent = Tangent { analysis: &analysis, value: &value, along, reach };
                 slopes[j] = row.criterion.slope(case, &tangent).ok()?;
             }
-            Some((index, slopes))
+            Some((index, value, slopes))
         })
         .collect()
     }

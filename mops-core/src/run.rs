@@ -110,6 +110,9 @@ pub struct Run<'a, E: Evaluator = Problem> {
     /// Budget that the solver counts on, if the run is to end before it.
     planned: Option<usize>,
     patience: Option<Patience>,
+    /// True while residuals are asked for, also of points evaluated before. They are not kept: a calibration may have more
+    /// samples times evaluations than memory.
+    needs_residuals: bool,
     watch: &'a dyn Watch,
     store: Option<&'a dyn Store>,
     /// Number of points answered from the store, without a simulation.
@@ -147,6 +150,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
             budget,
             planned: None,
             patience: None,
+            needs_residuals: false,
             watch,
             store: None,
             reused: 0,
@@ -316,8 +320,9 @@ impl<'a, E: Evaluator> Run<'a, E> {
 
     /// Records an evaluated point, and passes new results to the store.
     fn keep(&mut self, key: Vec<u64>, answer: CachedPoint) {
-        let CachedPoint { evaluation, learned } = answer;
+        let CachedPoint { mut evaluation, learned } = answer;
         self.record(&evaluation);
+        evaluation.residuals = Vec::new();
         if let Some(store) = self.store {
             self.reused += usize::from(learned.is_none());
             store.answered(&evaluation.tuners, learned);
@@ -331,6 +336,14 @@ impl<'a, E: Evaluator> Run<'a, E> {
         if let Some(best) = self.best.as_ref().filter(|_| std::mem::take(&mut self.improved)) {
             self.watch.improved(best);
         }
+    }
+
+    /// Returns values and derivatives at a point by finite differences.
+    fn difference(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
+        self.needs_residuals = self.shape().residuals > 0;
+        let found = Differences::of_noise(self.problem.noise()).linearise(self, point, reach);
+        self.needs_residuals = false;
+        found
     }
 
     /// Returns exact derivatives, from the store if available.
@@ -446,6 +459,7 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
         new.truncate(left);
         // Small batches, so that an interrupt takes effect soon. The results are folded in order, so that neither the
         // batches nor the number of threads change a bit.
+        let mut residuals: HashMap<usize, Vec<f64>> = HashMap::new();
         for batch in new.chunks(4 * rayon::current_num_threads().max(1)) {
             if self.watch.wants_stop() {
                 return Err(self.watch.halt());
@@ -458,6 +472,9 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
             };
             let cut_off = answers.iter().position(|answer| answer.evaluation.is_cancelled());
             for (&i, answer) in batch.iter().zip(answers).take(cut_off.unwrap_or(batch.len())) {
+                if !answer.evaluation.residuals.is_empty() {
+                    residuals.insert(i, answer.evaluation.residuals.clone());
+                }
                 self.keep(keys[i].clone(), answer);
             }
             self.tell();
@@ -468,16 +485,20 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
         if !within_budget {
             return Err(Halt::Budget);
         }
-        Ok(points
-            .iter()
-            .zip(&keys)
-            .map(|(point, key)| Evaluation { point: point.clone(), ..self.cache[key].clone() })
-            .collect())
+        let whole = |(i, (point, key)): (usize, (&Vec<f64>, &Vec<u64>))| {
+            let known = self.cache[key].clone();
+            let residuals = match residuals.remove(&i) {
+                None if self.needs_residuals && known.scaled.is_some() => self.problem.evaluate(point).residuals,
+                fresh => fresh.unwrap_or_default(),
+            };
+            Evaluation { point: point.clone(), residuals, ..known }
+        };
+        Ok(points.iter().zip(&keys).enumerate().map(whole).collect())
     }
 
     /// Returns exact derivatives if models and criteria provide them, else finite differences.
     fn linearise(&mut self, point: &[f64], reach: f64) -> Result<Option<Linearisation>, Halt> {
-        let differences = Differences::of_noise(self.problem.noise());
+        let step = Differences::of_noise(self.problem.noise()).step(reach);
         let at = self.evaluate(&[point.to_vec()])?.pop().expect("one point, one answer");
         if at.scaled.is_none() {
             return Ok(None);
@@ -490,12 +511,12 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
             if self.linearisations >= self.budget.evaluations {
                 return Err(Halt::Budget);
             }
-            if let Some(slopes) = self.slopes(&at, differences.step(reach)) {
+            if let Some(Slopes { rows, residuals, at: values }) = self.slopes(&at, step) {
                 self.linearisations += 1;
-                return Ok(Some(Linearisation { at, rows: slopes.rows, residuals: slopes.residuals }));
+                return Ok(Some(Linearisation { at: Evaluation { residuals: values, ..at }, rows, residuals }));
             }
         }
-        differences.linearise(self, point, reach)
+        self.difference(point, reach)
     }
 
     fn best(&self) -> Option<&Evaluation> {

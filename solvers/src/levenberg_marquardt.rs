@@ -93,8 +93,9 @@ impl Solver for Local {
         self.state = None;
         let Some(start) = usable_start(oracle, start)? else { return Ok(()) };
         let Some(at) = oracle.linearise(&start, 1.0)? else { return Ok(()) };
-        let (jacobian, residuals) = matrices(&at);
-        let iterate = LeastSquares::new(vec![[0.0, 1.0]; start.len()], at.at.point, residuals, jacobian);
+        let point = at.at.point.clone();
+        let (jacobian, residuals) = matrices(at);
+        let iterate = LeastSquares::new(vec![[0.0, 1.0]; start.len()], point, residuals, jacobian);
         self.state = Some(State { iterate, iterations: 0, stalled_steps: 0 });
         Ok(())
     }
@@ -120,18 +121,17 @@ impl Solver for Local {
             return Ok(if state.iterate.reject(ratio) { Progress::Continue } else { state.termination() });
         }
         let Some(at) = oracle.linearise(&step.to, 1.0)? else { return Ok(Progress::Stalled) };
-        let (jacobian, residuals) = matrices(&at);
-        state.iterate.accept(at.at.point, residuals, jacobian, ratio);
+        let (jacobian, residuals) = matrices(at);
+        state.iterate.accept(step.to, residuals, jacobian, ratio);
         state.stalled_steps = if actual <= 100.0 * self.options.tolerance * sum { state.stalled_steps + 1 } else { 0 };
         Ok(if state.stalled_steps >= 3 { state.termination() } else { Progress::Continue })
     }
 }
 
-fn matrices(at: &Linearisation) -> (DMatrix<f64>, DVector<f64>) {
-    let columns: Vec<DVector<f64>> = at.residuals.iter().map(|c| DVector::from_column_slice(c)).collect();
-    let residuals = DVector::from_column_slice(&at.at.residuals);
-    let jacobian =
-        if columns.is_empty() { DMatrix::zeros(residuals.len(), 0) } else { DMatrix::from_columns(&columns) };
+fn matrices(at: Linearisation) -> (DMatrix<f64>, DVector<f64>) {
+    let residuals = DVector::from_vec(at.at.residuals);
+    let (rows, columns) = (residuals.len(), at.residuals.len());
+    let jacobian = DMatrix::from_iterator(rows, columns, at.residuals.into_iter().flatten());
     (jacobian, residuals)
 }
 

@@ -48,28 +48,17 @@ pub(super) fn lists(bytes: &[u8]) -> Option<Vec<(usize, Vec<f64>)>> {
     Some(lists)
 }
 
-/// Converts derivatives of rows to bytes: for each coordinate a list that starts with the derivative of the value.
+/// Converts derivatives of rows to bytes: for each row a list with one derivative per coordinate.
 pub(super) fn of_slopes(slopes: &RowSlopes) -> Vec<u8> {
-    let lists: Vec<(usize, Vec<f64>)> = (slopes.iter())
-        .flat_map(|(row, along)| {
-            along.iter().map(move |slope| (*row, [&[slope.number], &slope.residuals[..]].concat()))
-        })
-        .collect();
+    let numbers = |along: &Vec<Value>| along.iter().map(|slope| slope.number).collect::<Vec<f64>>();
+    let lists: Vec<(usize, Vec<f64>)> = slopes.iter().map(|(row, along)| (*row, numbers(along))).collect();
     of_lists(lists.iter().map(|(row, numbers)| (*row, numbers.as_slice())))
 }
 
 /// Converts bytes to derivatives; returns `None` if they are truncated.
 pub(super) fn slopes(bytes: &[u8]) -> Option<RowSlopes> {
-    let mut slopes = RowSlopes::new();
-    for (row, numbers) in lists(bytes)? {
-        let (number, residuals) = numbers.split_first()?;
-        let slope = Value { number: *number, residuals: residuals.to_vec(), ..Value::default() };
-        match slopes.last_mut().filter(|(last, _)| *last == row) {
-            Some((_, along)) => along.push(slope),
-            None => slopes.push((row, vec![slope])),
-        }
-    }
-    Some(slopes)
+    let of_row = |(row, numbers): (usize, Vec<f64>)| (row, numbers.into_iter().map(Value::from).collect());
+    Some(lists(bytes)?.into_iter().map(of_row).collect())
 }
 
 fn word(rest: &mut &[u8]) -> Option<usize> {

@@ -1,22 +1,19 @@
 //! Conversion between a stored point and the columns of its table.
 
-use std::collections::HashMap;
-
 use mops_core::{Failure, JobValues, Known, Missed, Study, Value};
 use rusqlite::Row;
 use serde_json::json;
 
 use super::bytes;
 
-/// Columns of a point: criteria, notes, failures, residuals.
-pub(super) type Columns = (Vec<u8>, Option<String>, Option<String>, Option<Vec<u8>>);
+/// Columns of a point: criteria, notes, failures.
+pub(super) type Columns = (Vec<u8>, Option<String>, Option<String>);
 
 /// Converts the values of a point to columns.
 pub(super) fn columns(known: &Known, rows: usize) -> Columns {
     let mut criteria = vec![f64::NAN; rows];
     let mut notes = serde_json::Map::new();
     let mut failures = Vec::new();
-    let mut residuals: Vec<(usize, &[f64])> = Vec::new();
     for (job, values) in &known.jobs {
         match values {
             Err(failure) => {
@@ -45,9 +42,6 @@ pub(super) fn columns(known: &Known, rows: usize) -> Columns {
                                 (Some(note), None) => drop(notes.insert(row.to_string(), json!(note))),
                                 (note, Some(horizon)) => drop(notes.insert(row.to_string(), json!([note, horizon]))),
                             }
-                            if !value.residuals.is_empty() {
-                                residuals.push((*row, &value.residuals));
-                            }
                         }
                     }
                 }
@@ -59,7 +53,6 @@ pub(super) fn columns(known: &Known, rows: usize) -> Columns {
         bytes::of_numbers(&criteria),
         (!notes.is_empty()).then(|| text(notes.into())),
         (!failures.is_empty()).then(|| text(failures.into())),
-        (!residuals.is_empty()).then(|| bytes::of_lists(residuals.into_iter())),
     )
 }
 
@@ -76,8 +69,6 @@ pub(super) fn known(
         Ok(text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default())
     };
     let (notes, failures) = (json(2)?, json(3)?);
-    let lists = row.get_ref(4)?.as_blob_or_null()?.and_then(bytes::lists).unwrap_or_default();
-    let mut residuals: HashMap<usize, Vec<f64>> = lists.into_iter().collect();
     let failures = failures.as_array().cloned().unwrap_or_default();
     let of = |key: &str, index: usize| failures.iter().find(|failure| failure[key].as_u64() == Some(index as u64));
 
@@ -98,7 +89,7 @@ pub(super) fn known(
                 .is_array()
                 .then(|| Missed { horizon: written[1].as_str().and_then(|horizon| horizon.parse().ok()) });
             let note = written.as_str().or(written[0].as_str()).map(&mut *intern);
-            Some(Ok(Value { number, residuals: residuals.remove(&index).unwrap_or_default(), note, missed }))
+            Some(Ok(Value { number, note, missed, ..Value::default() }))
         };
         let rows = (0..study.rows().len()).filter(|&index| study.rows()[index].job == job);
         let values: Vec<_> = rows.filter_map(|index| Some((index, value(index)?))).collect();

@@ -16,7 +16,7 @@ use super::runs::{RunRow, RunState, insert_run, now, run_row};
 const APPLICATION: i32 = i32::from_be_bytes(*b"mops");
 
 /// Version of the tables.
-const FORMAT: i32 = 2;
+const FORMAT: i32 = 3;
 
 const TABLES: &str = "
 CREATE TABLE runs (
@@ -45,8 +45,7 @@ CREATE TABLE points (
     tuners BLOB NOT NULL UNIQUE,       -- values of all tuners (and uncertain parameters), float64 little-endian
     criteria BLOB NOT NULL,            -- values of all rows, float64 little-endian; NaN for a missing value
     notes TEXT,                        -- JSON: row -> note on its value, or [note, horizon] for a target never reached
-    failures TEXT,                     -- JSON: jobs that failed, rows without a value
-    residuals BLOB                     -- lists: row, length, float64; NULL if not needed or the size limit is reached
+    failures TEXT                      -- JSON: jobs that failed, rows without a value
 );
 CREATE TABLE slopes (
     tuners BLOB NOT NULL,              -- point of the derivatives
@@ -176,13 +175,13 @@ impl Database {
         let transaction = self.connection.transaction()?;
         {
             let mut insert = transaction.prepare(
-                "INSERT INTO points (run, tuners, criteria, notes, failures, residuals) VALUES (?, ?, ?, ?, ?, ?) \
+                "INSERT INTO points (run, tuners, criteria, notes, failures) VALUES (?, ?, ?, ?, ?) \
                  ON CONFLICT (tuners) DO UPDATE SET criteria = excluded.criteria, notes = excluded.notes, \
-                 failures = excluded.failures, residuals = coalesce(excluded.residuals, residuals)",
+                 failures = excluded.failures",
             )?;
             for PointRow { tuners, known } in points {
-                let (criteria, notes, failures, residuals) = columns(known, rows);
-                insert.execute(params![run, bytes::of_key(tuners), criteria, notes, failures, residuals])?;
+                let (criteria, notes, failures) = columns(known, rows);
+                insert.execute(params![run, bytes::of_key(tuners), criteria, notes, failures])?;
             }
             let mut insert =
                 transaction.prepare("INSERT OR REPLACE INTO slopes (tuners, reach, slopes) VALUES (?, ?, ?)")?;
@@ -204,7 +203,7 @@ impl Database {
         intern: &mut dyn FnMut(&str) -> &'static str,
     ) -> rusqlite::Result<Points> {
         let mut statement =
-            self.connection.prepare("SELECT tuners, criteria, notes, failures, residuals FROM points ORDER BY id")?;
+            self.connection.prepare("SELECT tuners, criteria, notes, failures FROM points ORDER BY id")?;
         let mut rows = statement.query([])?;
         let mut points = Points::new();
         while let Some(row) = rows.next()? {
@@ -245,10 +244,9 @@ impl Database {
         Ok(slopes)
     }
 
-    /// Returns the size of residuals and derivatives, in bytes.
+    /// Returns the size of the derivatives, in bytes.
     pub(super) fn room_taken(&self) -> rusqlite::Result<usize> {
-        let sql = "SELECT (SELECT coalesce(sum(length(residuals)), 0) FROM points) + \
-                   (SELECT coalesce(sum(length(slopes)), 0) FROM slopes)";
+        let sql = "SELECT coalesce(sum(length(slopes)), 0) FROM slopes";
         self.connection.query_row(sql, [], |row| size(row, 0))
     }
 }

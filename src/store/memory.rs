@@ -4,13 +4,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::sync::{PoisonError, RwLock};
 
-use mops_core::{Cancellation, Evaluation, Known, RowSlopes, RunState, Store, Value};
+use mops_core::{Cancellation, Evaluation, Known, RowSlopes, RunState, Store};
 
 use super::bytes;
 use super::database::{PointRow, Points, Slopes};
 
-/// Largest size in bytes of residuals and derivatives in a database. Beyond it, only criteria are stored, and residuals that a
-/// solver needs are simulated again.
+/// Largest size in bytes of the derivatives in a database. Beyond it, only criteria are stored.
 pub(super) const ROOM: usize = 256 << 20;
 
 /// Message to the writer, in chronological order.
@@ -39,7 +38,7 @@ pub(super) struct Memory {
     /// True if the stored points are in another database, from which used points are copied.
     pub foreign: bool,
     pub sender: SyncSender<Message>,
-    /// Remaining size in bytes for residuals and derivatives.
+    /// Remaining size in bytes for derivatives.
     pub room: AtomicUsize,
     /// Number of points answered without a simulation.
     pub reused: AtomicUsize,
@@ -86,13 +85,6 @@ impl Store for Memory {
         };
         self.simulated.fetch_add(1, Ordering::Relaxed);
         known.into_iter().for_each(|known| new.complete(known));
-        if !self.reserve(values(&new).map(|value| value.residuals.len()).sum()) {
-            new.jobs.iter_mut().filter_map(|(_, values)| values.as_mut().ok()).flatten().for_each(|(_, value)| {
-                if let Ok(value) = value {
-                    value.residuals.clear();
-                }
-            });
-        }
         points.insert(key.clone(), new.clone());
         // Sent under the lock of the points, so that the last message holds the latest values of the point.
         self.send(Message::Point(PointRow { tuners: key, known: new }));
@@ -104,13 +96,9 @@ impl Store for Memory {
     }
 
     fn learned_slopes(&self, tuners: &[f64], reach: f64, slopes: Option<RowSlopes>) {
-        let numbers = slopes.iter().flatten().flat_map(|(_, along)| along).map(|slope| 3 + slope.residuals.len()).sum();
+        let numbers = slopes.iter().flatten().flat_map(|(_, along)| along).map(|_| 3).sum();
         if self.reserve(numbers) {
             self.send(Message::Slopes(bytes::key(tuners), reach, slopes));
         }
     }
-}
-
-fn values(known: &Known) -> impl Iterator<Item = &Value> {
-    known.jobs.iter().filter_map(|(_, values)| values.as_ref().ok()).flatten().filter_map(|(_, v)| v.as_ref().ok())
 }
