@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Budget, Cancellation, Effect, End, Ending, Evaluation, Objective, Optimality, Oracle, Outcome, Pareto, Patience, Place,
-    Problem, Quiet, Record, Run, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task,
-    Watch, conclude,
+    Budget, Cancellation, Effect, End, Ending, Evaluation, Objective, Optimality, Oracle, Outcome, Pareto, Patience,
+    Place, Problem, Quiet, Record, Run, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError,
+    Task, Watch, conclude,
 };
 
 /// Options of [`crate::solve()`].
@@ -141,7 +141,8 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let (store, begin) = (options.store(&problem), options.begin(&problem));
     let planned = options.max_evaluations.max(1);
     let evaluations = options.replayed.unwrap_or(planned).max(1);
-    let mut run = Run::new(&problem, Budget { evaluations }, watch).planned(planned).patient(options.patience).keeping(store);
+    let mut run =
+        Run::new(&problem, Budget { evaluations }, watch).planned(planned).patient(options.patience).keeping(store);
     let start = begin.map_or_else(|| problem.start(), <[f64]>::to_vec);
     let stop = run.solve(solver.as_mut(), &start);
     if run.archive().is_empty() {

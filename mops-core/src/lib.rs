@@ -106,7 +106,7 @@ pub use robustness::{
     GlobalSensitivityReport, MonteCarloReport, QuantileReport, RobustReport, RoundReport, ShareReport, Slice, Subject,
     UncertainReport, WorstCaseReport, WorstReport, uncertain_reports,
 };
-pub use run::{Budget, Patience, FailureCount, Quiet, Record, Run, State as RunState, Watch};
+pub use run::{Budget, FailureCount, Patience, Quiet, Record, Run, State as RunState, Watch};
 pub use samples::Samples;
 pub use scalar::{DIRECTIONS, Dual, Dual7, Scalar};
 pub use slopes::{CriterionSlopes, SlopesReport};

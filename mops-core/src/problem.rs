@@ -10,8 +10,8 @@ use crate::demand::Demand;
 use crate::evaluation::{Evaluation, Merit, Objective, Reading};
 use crate::experiment::Role;
 use crate::failure::Failure;
-use crate::math;
 use crate::known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes as KnownSlopes, RowValue};
+use crate::math;
 use crate::model::{Analysis, Job};
 use crate::objectives::FrontObjective;
 use crate::panics::caught;
@@ -19,7 +19,7 @@ use crate::random::stream;
 use crate::scalar::Dual;
 use crate::solver::Shape;
 use crate::study::{Row, Study, Task};
-use crate::tuner::Tuner;
+use crate::tuner::{Scale, Tuner};
 
 /// The optimisation problem of a study: active tuners as coordinates of the unit box, criteria as rows of scaled values.
 #[derive(Clone)]
@@ -246,9 +246,8 @@ impl Problem {
             })
             .collect();
         let is_new = |(_, values, new): &&(usize, JobValues, bool)| *new && *values != Err(Failure::Cancelled);
-        let learned: Vec<(usize, JobValues)> = (values.iter().filter(is_new))
-            .map(|(job, values, _)| (*job, without_residuals(values)))
-            .collect();
+        let learned: Vec<(usize, JobValues)> =
+            (values.iter().filter(is_new)).map(|(job, values, _)| (*job, without_residuals(values))).collect();
         let learned = (!learned.is_empty()).then_some(Known { jobs: learned });
         CachedPoint { evaluation: self.judge(point, tuners, values.into_iter().map(|(job, v, _)| (job, v))), learned }
     }
@@ -518,8 +517,13 @@ fn shape(study: &Study, active: &[usize], usage: impl Fn(&Row, &Study) -> Usage)
         Objective::Each => groups(&FrontObjective::of_study(study, &rows)),
         Objective::Max | Objective::Sum => Vec::new(),
     };
+    let log_ratio = |tuner: &Tuner| match tuner.scale {
+        Scale::Log => math::ln(tuner.bounds[1] / tuner.bounds[0]),
+        Scale::Linear => 0.0,
+    };
+    let log_ratios = active.iter().map(|&i| log_ratio(&study.tuners[i])).collect();
     let local = (0..active.len()).filter(|&j| study.tuners[active[j]].case.is_some()).collect();
-    Shape { spacing, rows, objective: study.objective, groups, points, residuals: 0, noise: 0.0, local }
+    Shape { spacing, rows, objective: study.objective, groups, points, residuals: 0, noise: 0.0, local, log_ratios }
 }
 
 /// Returns the values of a job without residuals, for a cache that does not need them.

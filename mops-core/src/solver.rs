@@ -17,6 +17,8 @@ use crate::random::Stream;
 pub struct Shape {
     /// Distance between neighbouring values of every tuner; 0 for continuous tuners. The length is the dimension.
     pub spacing: Vec<f64>,
+    /// Logarithm of the ratio of the bounds of every tuner on a logarithmic scale, 0 on a linear one; empty if all are linear.
+    pub log_ratios: Vec<f64>,
     /// Usage and weight of every row.
     pub rows: Vec<(Usage, f64)>,
     /// Combination of the minimised rows into one objective.

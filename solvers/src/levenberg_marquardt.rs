@@ -1,6 +1,7 @@
 //! Levenberg-Marquardt method for sums of squares, with bounds and multistart.
 
-use mops_core::{Halt, LeastSquares, Linearisation, Oracle, Progress, Shape, Solver, SolverOptions};
+use mops_core::math;
+use mops_core::{Evaluation, Halt, LeastSquares, Linearisation, Oracle, Progress, Shape, Solver, SolverOptions};
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -14,6 +15,9 @@ use crate::start::usable_start;
 /// ```
 /// Bounds are handled by an active set: tuners that the step would move beyond a bound are fixed there, and the step is
 /// recomputed.
+///
+/// A logarithmic scale may bend a straight valley: where steps in the scaled tuners bring little, steps in the tuners themselves
+/// are tried as well.
 ///
 /// The method runs from the initial guess of the study, then from the best points of a sample of the box. It then
 /// restarts around the best point, until two rounds in succession improve it by less than a thousandth.
@@ -78,7 +82,13 @@ struct Local {
 }
 
 struct State {
-    iterate: LeastSquares,
+    /// The iterate in both coordinates.
+    iterates: [LeastSquares; 2],
+    coordinates: [Coordinates; 2],
+    /// Index of the coordinates of the last accepted step.
+    preferred: usize,
+    /// Number of successive accepted steps with a small decrease.
+    slow_steps: usize,
     iterations: usize,
     /// Number of successive steps with negligible decrease.
     stalled_steps: usize,
@@ -94,37 +104,106 @@ impl Solver for Local {
         let Some(start) = usable_start(oracle, start)? else { return Ok(()) };
         let Some(at) = oracle.linearise(&start, 1.0)? else { return Ok(()) };
         let point = at.at.point.clone();
-        let (jacobian, residuals) = matrices(at);
-        let iterate = LeastSquares::new(vec![[0.0, 1.0]; start.len()], point, residuals, jacobian);
-        self.state = Some(State { iterate, iterations: 0, stalled_steps: 0 });
+        let matrices = matrices(at);
+        let log_ratios = &oracle.shape().log_ratios;
+        let coordinates = [Coordinates { log_ratios: Vec::new() }, Coordinates { log_ratios: log_ratios.clone() }];
+        let iterates = [0, 1].map(|k| {
+            let (jacobian, residuals) = coordinates[k].transformed(&point, &matrices);
+            LeastSquares::new(vec![[0.0, 1.0]; point.len()], coordinates[k].place_of(&point), residuals, jacobian)
+        });
+        let (slow_steps, iterations, stalled_steps) = (0, 0, 0);
+        self.state = Some(State { iterates, coordinates, preferred: 0, slow_steps, iterations, stalled_steps });
         Ok(())
     }
 
     fn step(&mut self, oracle: &mut dyn Oracle) -> Result<Progress, Halt> {
         let Some(state) = &mut self.state else { return Ok(Progress::Stalled) };
         state.iterations += 1;
-        if state.iterate.point().is_empty() {
+        if state.iterates[0].point().is_empty() {
             return Ok(Progress::Converged);
         }
         if state.iterations > self.options.max_iterations {
             return Ok(Progress::Stalled);
         }
-        let sum = state.iterate.sum();
-        let Some(step) = state.iterate.step() else { return Ok(Progress::Stalled) };
-        if step.predicted <= self.options.tolerance * sum {
+        let sum = state.iterates[0].sum();
+        let tried: Vec<usize> = if state.tries_both() { vec![0, 1] } else { vec![state.preferred] };
+        let steps = tried.iter().map(|&k| state.iterates[k].step());
+        let Some(steps) = steps.collect::<Option<Vec<_>>>() else { return Ok(Progress::Stalled) };
+        if steps.iter().all(|step| step.predicted <= self.options.tolerance * sum) {
             return Ok(state.termination());
         }
-        let answer = oracle.evaluate(std::slice::from_ref(&step.to))?.pop().expect("one point, one answer");
-        let actual = if answer.scaled.is_some() { sum - answer.merit.objective } else { f64::NEG_INFINITY };
-        let ratio = actual / step.predicted;
-        if !LeastSquares::accepts(ratio) {
-            return Ok(if state.iterate.reject(ratio) { Progress::Continue } else { state.termination() });
-        }
-        let Some(at) = oracle.linearise(&step.to, 1.0)? else { return Ok(Progress::Stalled) };
-        let (jacobian, residuals) = matrices(at);
-        state.iterate.accept(step.to, residuals, jacobian, ratio);
+        let points: Vec<Vec<f64>> =
+            tried.iter().zip(&steps).map(|(&k, step)| state.coordinates[k].point_at(&step.to)).collect();
+        let answers = oracle.evaluate(&points)?;
+        let decrease = |answer: &Evaluation| match answer.scaled {
+            Some(_) => sum - answer.merit.objective,
+            None => f64::NEG_INFINITY,
+        };
+        let ratios: Vec<f64> = answers.iter().zip(&steps).map(|(a, step)| decrease(a) / step.predicted).collect();
+        let accepted = (0..tried.len()).filter(|&i| LeastSquares::accepts(ratios[i]));
+        let Some(best) = accepted.max_by(|&i, &j| decrease(&answers[i]).total_cmp(&decrease(&answers[j]))) else {
+            let can_continue = tried.iter().zip(&ratios).map(|(&k, &ratio)| state.iterates[k].reject(ratio));
+            let can_continue = can_continue.fold(false, |any, can| any | can);
+            return Ok(if can_continue { Progress::Continue } else { state.termination() });
+        };
+        let Some(at) = oracle.linearise(&points[best], 1.0)? else { return Ok(Progress::Stalled) };
+        let actual = decrease(&answers[best]);
+        state.move_to(&points[best], &matrices(at), &tried, &ratios);
+        state.preferred = tried[best];
+        state.slow_steps = if actual <= SLOW * sum { state.slow_steps + 1 } else { 0 };
         state.stalled_steps = if actual <= 100.0 * self.options.tolerance * sum { state.stalled_steps + 1 } else { 0 };
         Ok(if state.stalled_steps >= 3 { state.termination() } else { Progress::Continue })
+    }
+}
+
+/// Relative decrease of the sum of squares that counts as small, and number of such steps after which both coordinates are tried.
+const SLOW: f64 = 0.1;
+const MANY_SLOW: usize = 3;
+
+/// Coordinates of the steps, in [0, 1]: the tuners themselves, relative to their ranges, where a scale is logarithmic and listed
+/// here; else the scaled tuners.
+struct Coordinates {
+    /// Logarithm of the ratio of the bounds of every tuner, 0 for a linear scale; empty for steps in the scaled tuners.
+    log_ratios: Vec<f64>,
+}
+
+impl Coordinates {
+    /// Returns the tuners on a logarithmic scale, by index, with the logarithms of the ratios of their bounds.
+    fn bent(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.log_ratios.iter().copied().enumerate().filter(|(_, ratio)| *ratio != 0.0)
+    }
+
+    /// Returns the place of a point of the unit box.
+    fn place_of(&self, point: &[f64]) -> Vec<f64> {
+        let mut place = point.to_vec();
+        for (j, ratio) in self.bent() {
+            place[j] = ((math::exp(ratio * point[j]) - 1.0) / (math::exp(ratio) - 1.0)).clamp(0.0, 1.0);
+        }
+        place
+    }
+
+    /// Returns the point of the unit box at a place.
+    fn point_at(&self, place: &[f64]) -> Vec<f64> {
+        let mut point = place.to_vec();
+        for (j, ratio) in self.bent() {
+            let value = 1.0 + place[j] * (math::exp(ratio) - 1.0);
+            point[j] = (math::ln(value) / ratio).clamp(0.0, 1.0);
+        }
+        point
+    }
+
+    /// Returns the derivatives with respect to the place of a point, with the residuals.
+    fn transformed(
+        &self,
+        point: &[f64],
+        (jacobian, residuals): &(DMatrix<f64>, DVector<f64>),
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let mut jacobian = jacobian.clone();
+        for (j, ratio) in self.bent() {
+            let slope = (math::exp(ratio) - 1.0) / (ratio * math::exp(ratio * point[j]));
+            jacobian.column_mut(j).scale_mut(slope);
+        }
+        (jacobian, residuals.clone())
     }
 }
 
@@ -136,11 +215,33 @@ fn matrices(at: Linearisation) -> (DMatrix<f64>, DVector<f64>) {
 }
 
 impl State {
+    /// Returns true if steps in both coordinates are to be tried.
+    fn tries_both(&self) -> bool {
+        self.slow_steps >= MANY_SLOW && self.coordinates[1].bent().next().is_some()
+    }
+
+    /// Moves both iterates to a point; `ratios` are those of the coordinates that were `tried`.
+    fn move_to(&mut self, point: &[f64], matrices: &(DMatrix<f64>, DVector<f64>), tried: &[usize], ratios: &[f64]) {
+        /// Ratio that leaves the damping as it is.
+        const NEUTRAL: f64 = 0.5;
+        for k in [0, 1] {
+            let ratio = tried.iter().position(|&other| other == k).map_or(NEUTRAL, |i| ratios[i]);
+            let ratio = if LeastSquares::accepts(ratio) {
+                ratio
+            } else {
+                self.iterates[k].reject(ratio);
+                NEUTRAL
+            };
+            let (jacobian, residuals) = self.coordinates[k].transformed(point, matrices);
+            self.iterates[k].accept(self.coordinates[k].place_of(point), residuals, jacobian, ratio);
+        }
+    }
+
     /// Applies More's test: at an optimum the residuals are orthogonal to every column of the Jacobian of a free
     /// coordinate.
     fn termination(&self) -> Progress {
         /// Largest cosine regarded as orthogonal: the accuracy of finite-difference gradients.
         const ORTHOGONAL: f64 = 1e-3;
-        if self.iterate.largest_cosine() <= ORTHOGONAL { Progress::Converged } else { Progress::Stalled }
+        if self.iterates[0].largest_cosine() <= ORTHOGONAL { Progress::Converged } else { Progress::Stalled }
     }
 }

@@ -44,7 +44,8 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     if let Some(mut found) = TradeOffs::of(problem, &front) {
         // Of equally near points, the reported one.
         let worst = found.points[found.nearest].worst_scaled;
-        let is_reported = |&i: &usize| front[i].at.tuners == solved.best.tuners && found.points[i].worst_scaled <= worst;
+        let is_reported =
+            |&i: &usize| front[i].at.tuners == solved.best.tuners && found.points[i].worst_scaled <= worst;
         found.nearest = (0..front.len()).find(is_reported).unwrap_or(found.nearest);
         found.words = words(problem, &front, &found);
         solved.outcome.pareto = found.points[found.nearest].pareto;
@@ -66,7 +67,9 @@ fn missing_points(problem: &Problem, outcome: &Outcome, found: usize) -> Option<
         _ if found >= asked => return None,
         Stop::Budget => "the budget was spent before; raise --max-evaluations",
         Stop::Interrupted => "the search was interrupted; continue it (--resume)",
-        Stop::Converged | Stop::Stalled => "every further search ended at one of these points, or in a gap of the front",
+        Stop::Converged | Stop::Stalled => {
+            "every further search ended at one of these points, or in a gap of the front"
+        }
     };
     Some(format!("{asked} points were asked for, the front has {found}: {why}"))
 }
@@ -103,8 +106,7 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<Strin
     };
     let values = |i: usize| {
         let criteria = found.criteria.iter().enumerate();
-        let values = criteria
-            .map(|(k, c)| format!("{} {}", name(found, k), amount(value(i, k), &c.unit)));
+        let values = criteria.map(|(k, c)| format!("{} {}", name(found, k), amount(value(i, k), &c.unit)));
         values.collect::<Vec<_>>().join(", ")
     };
     let nearest = found.nearest;

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use mops_core::{
-    AddedReport, Budget, Ending, Evaluation, FEASIBLE, Halt, Oracle, Pareto, Patience, Problem, Record, RobustReport, RobustTask,
-    RoundReport, Run, RunState, Scenario, Stop, Store, Study, Usage, Watch, conclude, uncertain_reports,
+    AddedReport, Budget, Ending, Evaluation, FEASIBLE, Halt, Oracle, Pareto, Patience, Problem, Record, RobustReport,
+    RobustTask, RoundReport, Run, RunState, Scenario, Stop, Store, Study, Usage, Watch, conclude, uncertain_reports,
 };
 
 use super::batches::Stage;
@@ -44,7 +44,11 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         let designing = Designing { watch, round: rounds.done.len() + 1, cases: rounds.scenarios.len(), before };
         let study = rounds.to_solve();
         let keeping = rounds.keeping(&study, options);
-        let solved = search(study, &Options { max_evaluations: share, patience: Some(patience), keeping, ..options.clone() }, &designing)?;
+        let solved = search(
+            study,
+            &Options { max_evaluations: share, patience: Some(patience), keeping, ..options.clone() },
+            &designing,
+        )?;
         reused += solved.outcome.reused.unwrap_or(0);
         left = left.saturating_sub(solved.outcome.evaluations);
         simulations += solved.outcome.simulations;

@@ -293,7 +293,9 @@ fn pareto(task: ParetoTask, study: &Study) -> Result<ParetoTask, StudyError> {
     if let Some(row) = single.filter(|_| !task.per_case && minimised.len() > 1) {
         let fact = format!("a Pareto front needs at least two criteria to minimise, found only `{}`", row.name);
         return Err(StudyError::new("task", fact)
-            .with_help("omit `usage` of another criterion, or set per-case = true in [pareto] for the front over the cases")
+            .with_help(
+                "omit `usage` of another criterion, or set per-case = true in [pareto] for the front over the cases",
+            )
             .within("study"));
     }
     if minimised.len() < 2 {

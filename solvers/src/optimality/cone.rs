@@ -50,7 +50,8 @@ impl DescentCone {
             inequalities: criteria.inequalities.iter().filter(|row| row.value > -1e-4).map(at_zero).collect(),
             equalities: criteria.equalities.iter().map(at_zero).collect(),
         };
-        cone.cuts = criteria.objectives.iter().enumerate().filter_map(|(row, model)| cone.relative(row, model)).collect();
+        cone.cuts =
+            criteria.objectives.iter().enumerate().filter_map(|(row, model)| cone.relative(row, model)).collect();
         Some(cone)
     }
 

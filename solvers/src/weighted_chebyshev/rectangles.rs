@@ -94,7 +94,8 @@ fn search_rectangle(
     solved: usize,
 ) -> Result<Option<Candidate>, Halt> {
     let low = [p.objectives[0], q.objectives[1]];
-    let scalarisation = Scalarisation::chebyshev(&low, &[q.objectives[0] - p.objectives[0], p.objectives[1] - q.objectives[1]]);
+    let scalarisation =
+        Scalarisation::chebyshev(&low, &[q.objectives[0] - p.objectives[0], p.objectives[1] - q.objectives[1]]);
     let distance = p.distance(q);
     let radius = distance.clamp(1e-3, 0.3);
     let between: Vec<f64> = p.point.iter().zip(&q.point).map(|(a, b)| 0.5 * (a + b)).collect();

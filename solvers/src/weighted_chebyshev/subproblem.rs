@@ -171,7 +171,8 @@ impl Subproblems {
                 Role::Minimised { scale, .. } => Role::Limited { limit: f, scale: *scale },
                 other => *other,
             };
-            let roles: Vec<Role> = scalarisation.roles.iter().zip(values).zip(&candidate.objectives).map(role).collect();
+            let roles: Vec<Role> =
+                scalarisation.roles.iter().zip(values).zip(&candidate.objectives).map(role).collect();
             if !roles.iter().any(|role| matches!(role, Role::Minimised { .. })) {
                 return Ok(candidate);
             }
@@ -197,7 +198,12 @@ impl Subproblems {
             let here = front[i].clone();
             let dominates = |other: &&Candidate| other.dominates(&here, &self.range, 1e-9);
             let gain = |other: &Candidate| {
-                here.objectives.iter().zip(&other.objectives).zip(&self.range).map(|((a, b), r)| (a - b) / r).sum::<f64>()
+                here.objectives
+                    .iter()
+                    .zip(&other.objectives)
+                    .zip(&self.range)
+                    .map(|((a, b), r)| (a - b) / r)
+                    .sum::<f64>()
             };
             let better =
                 self.archive.candidates().iter().filter(dominates).max_by(|a, b| gain(a).total_cmp(&gain(b))).cloned();
