@@ -82,8 +82,8 @@ struct Local {
 }
 
 struct State {
-    /// The iterate in both coordinates.
-    iterates: [LeastSquares; 2],
+    /// The iterate in the scaled tuners and, once these have brought little, in the tuners themselves.
+    iterates: Vec<LeastSquares>,
     coordinates: [Coordinates; 2],
     /// Index of the coordinates of the last accepted step.
     preferred: usize,
@@ -104,13 +104,9 @@ impl Solver for Local {
         let Some(start) = usable_start(oracle, start)? else { return Ok(()) };
         let Some(at) = oracle.linearise(&start, 1.0)? else { return Ok(()) };
         let point = at.at.point.clone();
-        let matrices = matrices(at);
-        let log_ratios = &oracle.shape().log_ratios;
-        let coordinates = [Coordinates { log_ratios: Vec::new() }, Coordinates { log_ratios: log_ratios.clone() }];
-        let iterates = [0, 1].map(|k| {
-            let (jacobian, residuals) = coordinates[k].transformed(&point, &matrices);
-            LeastSquares::new(vec![[0.0, 1.0]; point.len()], coordinates[k].place_of(&point), residuals, jacobian)
-        });
+        let log_ratios = oracle.shape().log_ratios.clone();
+        let coordinates = [Coordinates { log_ratios: Vec::new() }, Coordinates { log_ratios }];
+        let iterates = vec![coordinates[0].begin(&point, matrices(at))];
         let (slow_steps, iterations, stalled_steps) = (0, 0, 0);
         self.state = Some(State { iterates, coordinates, preferred: 0, slow_steps, iterations, stalled_steps });
         Ok(())
@@ -126,7 +122,8 @@ impl Solver for Local {
             return Ok(Progress::Stalled);
         }
         let sum = state.iterates[0].sum();
-        let tried: Vec<usize> = if state.tries_both() { vec![0, 1] } else { vec![state.preferred] };
+        let tried: Vec<usize> =
+            if state.slow_steps >= MANY_SLOW { (0..state.iterates.len()).collect() } else { vec![state.preferred] };
         let steps = tried.iter().map(|&k| state.iterates[k].step());
         let Some(steps) = steps.collect::<Option<Vec<_>>>() else { return Ok(Progress::Stalled) };
         if steps.iter().all(|step| step.predicted <= self.options.tolerance * sum) {
@@ -148,9 +145,9 @@ impl Solver for Local {
         };
         let Some(at) = oracle.linearise(&points[best], 1.0)? else { return Ok(Progress::Stalled) };
         let actual = decrease(&answers[best]);
-        state.move_to(&points[best], &matrices(at), &tried, &ratios);
         state.preferred = tried[best];
         state.slow_steps = if actual <= SLOW * sum { state.slow_steps + 1 } else { 0 };
+        state.move_to(&points[best], matrices(at), &tried, &ratios);
         state.stalled_steps = if actual <= 100.0 * self.options.tolerance * sum { state.stalled_steps + 1 } else { 0 };
         Ok(if state.stalled_steps >= 3 { state.termination() } else { Progress::Continue })
     }
@@ -192,18 +189,18 @@ impl Coordinates {
         point
     }
 
-    /// Returns the derivatives with respect to the place of a point, with the residuals.
-    fn transformed(
-        &self,
-        point: &[f64],
-        (jacobian, residuals): &(DMatrix<f64>, DVector<f64>),
-    ) -> (DMatrix<f64>, DVector<f64>) {
-        let mut jacobian = jacobian.clone();
+    /// Changes derivatives with respect to a point of the unit box to those with respect to its place.
+    fn transform(&self, point: &[f64], jacobian: &mut DMatrix<f64>) {
         for (j, ratio) in self.bent() {
             let slope = (math::exp(ratio) - 1.0) / (ratio * math::exp(ratio * point[j]));
             jacobian.column_mut(j).scale_mut(slope);
         }
-        (jacobian, residuals.clone())
+    }
+
+    /// Begins an iteration at a point of the unit box.
+    fn begin(&self, point: &[f64], (mut jacobian, residuals): (DMatrix<f64>, DVector<f64>)) -> LeastSquares {
+        self.transform(point, &mut jacobian);
+        LeastSquares::new(vec![[0.0, 1.0]; point.len()], self.place_of(point), residuals, jacobian)
     }
 }
 
@@ -215,16 +212,17 @@ fn matrices(at: Linearisation) -> (DMatrix<f64>, DVector<f64>) {
 }
 
 impl State {
-    /// Returns true if steps in both coordinates are to be tried.
-    fn tries_both(&self) -> bool {
-        self.slow_steps >= MANY_SLOW && self.coordinates[1].bent().next().is_some()
-    }
-
-    /// Moves both iterates to a point; `ratios` are those of the coordinates that were `tried`.
-    fn move_to(&mut self, point: &[f64], matrices: &(DMatrix<f64>, DVector<f64>), tried: &[usize], ratios: &[f64]) {
+    /// Moves the iterates to a point; `ratios` are those of the coordinates that were `tried`. Creates the second one if it is
+    /// needed from now on.
+    fn move_to(&mut self, point: &[f64], mut matrices: (DMatrix<f64>, DVector<f64>), tried: &[usize], ratios: &[f64]) {
         /// Ratio that leaves the damping as it is.
         const NEUTRAL: f64 = 0.5;
-        for k in [0, 1] {
+        let is_needed = self.slow_steps >= MANY_SLOW && self.coordinates[1].bent().next().is_some();
+        if self.iterates.len() == 1 && is_needed {
+            let damping = self.iterates[0].damping();
+            self.iterates.push(self.coordinates[1].begin(point, matrices.clone()).damped(damping));
+        }
+        for k in 0..self.iterates.len() {
             let ratio = tried.iter().position(|&other| other == k).map_or(NEUTRAL, |i| ratios[i]);
             let ratio = if LeastSquares::accepts(ratio) {
                 ratio
@@ -232,7 +230,9 @@ impl State {
                 self.iterates[k].reject(ratio);
                 NEUTRAL
             };
-            let (jacobian, residuals) = self.coordinates[k].transformed(point, matrices);
+            let is_last = k + 1 == self.iterates.len();
+            let (mut jacobian, residuals) = if is_last { std::mem::take(&mut matrices) } else { matrices.clone() };
+            self.coordinates[k].transform(point, &mut jacobian);
             self.iterates[k].accept(self.coordinates[k].place_of(point), residuals, jacobian, ratio);
         }
     }

@@ -143,20 +143,21 @@ impl Evaluator for Posed<'_> {
             return None;
         }
         let width = |j: usize| self.bounds[j][1] - self.bounds[j][0];
+        let at_point = self.outputs(&at.tuners)[..self.shape.residuals].to_vec();
         let outputs = self.problem.functions.slopes(&at.tuners);
         let n = at.point.len();
         let mut rows = vec![Vec::with_capacity(n); self.shape.rows.len()];
         let mut residuals = Vec::with_capacity(n);
         for j in 0..n {
             let column: Vec<f64> = outputs.iter().map(|slope| slope[j] * width(j)).collect();
-            let squares = |slopes: &[f64]| at.residuals.iter().zip(slopes).map(|(r, s)| 2.0 * r * s).sum();
+            let squares = |slopes: &[f64]| at_point.iter().zip(slopes).map(|(r, s)| 2.0 * r * s).sum();
             for (row, slope) in rows.iter_mut().zip(self.rows(&column, squares, 0.0)) {
                 row.push(slope);
             }
             residuals.push(column[..self.shape.residuals].to_vec());
         }
         let finite = rows.iter().flatten().all(|slope| slope.is_finite());
-        finite.then_some(Slopes { rows, residuals })
+        finite.then_some(Slopes { rows, residuals, at: at_point })
     }
 
     /// Returns the noise level: that of rounding, or the added noise.
