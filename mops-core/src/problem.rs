@@ -67,6 +67,7 @@ impl Problem {
         let mut problem = Self::with(study, active, tuners.to_vec(), |row, study| {
             if study.jobs[row.job].case == case { row.usage } else { Usage::Monitor }
         });
+        problem.shape.local.clear();
         let here = |job: &usize| problem.study.jobs[*job].case == case;
         problem.jobs.retain(here);
         problem.counting.retain(here);
@@ -522,7 +523,9 @@ fn shape(study: &Study, active: &[usize], usage: impl Fn(&Row, &Study) -> Usage)
         Scale::Linear => 0.0,
     };
     let log_ratios = active.iter().map(|&i| log_ratio(&study.tuners[i])).collect();
-    let local = (0..active.len()).filter(|&j| study.tuners[active[j]].case.is_some()).collect();
+    // Initial guesses from the data are good ones.
+    let is_local = |tuner: &Tuner| tuner.case.is_some() && tuner.guessed.contains(&true);
+    let local = (0..active.len()).filter(|&j| is_local(&study.tuners[active[j]])).collect();
     Shape { spacing, rows, objective: study.objective, groups, points, residuals: 0, noise: 0.0, local, log_ratios }
 }
 

@@ -34,7 +34,7 @@ pub struct Shape {
     /// Sum of squares up to which the residuals are noise: expectation plus three standard deviations of the sum for independent
     /// normal noise of the known levels; 0 if a level is unknown.
     pub noise: f64,
-    /// Coordinates that act in the residuals of a single experiment, such as its initial state, by index.
+    /// Coordinates that act in a single experiment and whose initial guess follows from its data, such as initial states, by index.
     pub local: Vec<usize>,
 }
 

@@ -1,5 +1,6 @@
 //! The command line of `mops`: commands, and the module of each.
 
+mod bench;
 mod check;
 mod compare;
 mod data;
@@ -75,6 +76,8 @@ enum Command {
     Pick(pick::Arguments),
     /// Find the physical effect missing from a calibrated model, add it, and report the errors before and after.
     Diagnose(diagnose::Arguments),
+    /// Compare solvers on a study, over several seeds: successes, evaluations, time, profile.
+    Bench(bench::Arguments),
     /// List the runs below a folder: study, date, worst scaled value, evaluations.
     History(history::Arguments),
     /// Compare runs side by side: tuners, criteria, differences in percent, and a page with their responses.
@@ -135,6 +138,7 @@ fn perform(catalogue: &Catalogue, command: Command, mut program: clap::Command) 
         Command::Pareto(arguments) => pareto::pareto(catalogue, &arguments),
         Command::Pick(arguments) => pick::pick(catalogue, &arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(catalogue, &arguments),
+        Command::Bench(arguments) => bench::bench(catalogue, &arguments),
         Command::History(arguments) => history::history(catalogue, &arguments),
         Command::Compare(arguments) => compare::compare(catalogue, &arguments),
         Command::Report(arguments) => report::report(catalogue, &arguments),

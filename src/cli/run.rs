@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, Halt, Stop, Study, StudyError, Task, Watch, suggestion};
+use mops_core::{Catalogue, Diagnostic, Halt, SolverChoice, Stop, Study, StudyError, Task, Watch, suggestion};
 
 use super::run_files::{DISK_TIMEOUT, RunFiles};
 use super::study::{StudyArguments, home, open_as, without_settings};
@@ -123,6 +123,17 @@ pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
     execute(catalogue, &arguments.common, &Search::Task(&arguments.solver_options))
 }
 
+/// Returns the solver of the study if it has this name, or the one of the catalogue with its default options.
+pub(super) fn solver_named(catalogue: &Catalogue, file: &StudyFile, name: &str) -> Result<SolverChoice, Diagnostic> {
+    if name == file.solver.kind {
+        return Ok(file.solver.clone());
+    }
+    let names = catalogue.solvers.iter().map(|kind| kind.name);
+    let kind = catalogue.solvers.iter().find(|kind| kind.name == name);
+    let kind = kind.ok_or_else(|| Diagnostic::new(format!("no solver `{name}`")).with_help(suggestion(name, names)))?;
+    Ok(kind.default_choice())
+}
+
 /// Runs the study and writes the result.
 pub(super) fn execute(
     catalogue: &Catalogue,
@@ -144,16 +155,7 @@ pub(super) fn execute(
     let start = search.solver_options().map_or(Start::Fresh, |solver_options| solver_options.start.start());
     let solver = match chosen {
         None => file.solver.clone(),
-        Some(name) if name == file.solver.kind => file.solver.clone(),
-        Some(name) => {
-            let names = catalogue.solvers.iter().map(|kind| kind.name);
-            let kind = catalogue
-                .solvers
-                .iter()
-                .find(|kind| kind.name == name)
-                .ok_or_else(|| Diagnostic::new(format!("no solver `{name}`")).with_help(suggestion(name, names)))?;
-            kind.default_choice()
-        }
+        Some(name) => solver_named(catalogue, &file, name)?,
     };
     let limit = limit.map(|n| usize::try_from(n).unwrap_or(usize::MAX));
     let options = Options {
@@ -312,7 +314,7 @@ fn watch(study: &Study, options: &Options) -> Result<Page, CommandError> {
 
 /// Returns the error for a study that the solver or task refuses. The position in the file is given if there is one; a solver
 /// from the command line has none.
-fn refused(why: &StudyError, file: &StudyFile, solver: &str) -> Diagnostic {
+pub(super) fn refused(why: &StudyError, file: &StudyFile, solver: &str) -> Diagnostic {
     let of_command_line = solver != file.solver.kind && why.path.first().is_some_and(|key| key == "solver");
     if why.path.is_empty() || of_command_line {
         Diagnostic { help: why.help.clone(), ..Diagnostic::new(why.message.clone()) }

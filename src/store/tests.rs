@@ -112,7 +112,7 @@ fn points_are_read_as_written_bit_by_bit() {
     let value = |(i, row): (usize, usize)| -> RowValue {
         let note = (i == 0).then_some("not settled at the end");
         let missed = (i < 2).then_some(Missed { horizon: (i == 0).then_some(0.1 + 0.2) });
-        (row, Ok(Value { number: odd[i % 4], residuals: if i == 1 { odd.to_vec() } else { Vec::new() }, note, missed }))
+        (row, Ok(Value { number: odd[i % 4], note, missed, ..Value::default() }))
     };
     let failures = [
         Failure::Diverged(1.0 / 3.0),
@@ -148,11 +148,7 @@ fn points_are_read_as_written_bit_by_bit() {
 #[test]
 fn derivatives_and_missing_derivatives_are_read_as_written() {
     let study = file("pid-design", &[]).study;
-    let slope = |number: f64, residuals: &[f64]| Value { number, residuals: residuals.to_vec(), ..Value::default() };
-    let rows: RowSlopes = vec![
-        (0, vec![slope(0.1 + 0.2, &[1.0, -0.0]), slope(-3.0, &[0.5, 1e-300])]),
-        (1, vec![slope(1.0, &[]), slope(2.0, &[])]),
-    ];
+    let rows: RowSlopes = vec![(0, vec![(0.1 + 0.2).into(), (-0.0).into()]), (1, vec![1.0.into(), 1e-300.into()])];
     let key = bytes::key(&[1.0, 2.0]);
     let slopes = [(key.clone(), 1e-3, Some(rows.clone())), (key.clone(), 1e-4, None)];
     let found = written(&study, &[], &slopes).slopes().unwrap();

@@ -40,6 +40,8 @@ pub struct BlindDirection {
     pub words: String,
     /// True for a straight line in the tuners; false for one in their logarithms, as for products and ratios.
     pub straight: bool,
+    /// Clause for a straight line that has the same direction, if the clause is that of a product or a ratio of two tuners.
+    pub sum: Option<String>,
 }
 
 /// Returns a basis of directions that are not determined, reduced by elimination so that each involves few tuners.
@@ -72,7 +74,11 @@ pub(super) fn directions(
             // Text outside the names, which are between backticks.
             let said: String = words.split('`').step_by(2).collect();
             let multiplied = ["ratio", "product", "^", "factor"].iter().any(|sign| said.contains(sign));
-            BlindDirection { limit, straight: !multiplied, words, changes }
+            let sum = match changes.as_slice() {
+                [a, b] if multiplied => Some(sum(*a, *b, coordinates)),
+                _ => None,
+            };
+            BlindDirection { limit, straight: !multiplied, words, changes, sum }
         })
         .collect()
 }
@@ -128,11 +134,7 @@ fn words(changes: &[(usize, f64)], coordinates: &[Coordinate]) -> String {
                     let joint = if ratio > 0.0 { "/" } else { " " };
                     format!("only {high}^{p}{joint}{low} can be estimated")
                 }
-                _ => {
-                    let slope = -(x * coordinates[*a].scale()) / (y * coordinates[*b].scale());
-                    let sign = if slope < 0.0 { "-" } else { "+" };
-                    format!("only {a_name} {sign} {} {b_name} can be estimated", coefficient(slope.abs()))
-                }
+                _ => sum((*a, *x), (*b, *y), coordinates),
             }
         }
         many if relative && many.iter().all(|(_, share)| (share - many[0].1).abs() < EQUAL) => {
@@ -158,6 +160,14 @@ fn words(changes: &[(usize, f64)], coordinates: &[Coordinate]) -> String {
             format!("no effect if {}{less}", listed(&main))
         }
     }
+}
+
+/// Returns the clause for a direction along which a weighted sum of two tuners is constant.
+fn sum((a, x): (usize, f64), (b, y): (usize, f64), coordinates: &[Coordinate]) -> String {
+    let slope = -(x * coordinates[a].scale()) / (y * coordinates[b].scale());
+    let sign = if slope < 0.0 { "-" } else { "+" };
+    let [a, b] = [a, b].map(|k| &coordinates[k].name);
+    format!("only `{a}` {sign} {} `{b}` can be estimated", coefficient(slope.abs()))
 }
 
 #[cfg(test)]

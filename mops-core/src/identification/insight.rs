@@ -28,10 +28,17 @@ pub(crate) fn report(problem: &Problem, at: &[f64], local: &Local) -> Sensitivit
     let directions: Vec<DirectionReport> = found
         .blind
         .iter()
-        .map(|blind| DirectionReport {
-            words: format!("{}{}", blind.words, suffix(blind.limit)),
-            changes: blind.changes.iter().map(|&(k, c)| (found.coordinates[k].name.clone(), c)).collect(),
-            remaining: remaining(problem, at, blind, &found.coordinates),
+        .map(|blind| {
+            let along = |straight: bool| remaining(problem, at, (blind, straight), &found.coordinates);
+            let remaining = along(blind.straight);
+            // A sum and a product of two tuners may have the same direction at a point: a step decides.
+            let sum = blind.sum.as_ref().map(|words| (words, along(true))).filter(|(_, change)| *change < remaining);
+            let (words, remaining) = sum.unwrap_or((&blind.words, remaining));
+            DirectionReport {
+                words: format!("{words}{}", suffix(blind.limit)),
+                changes: blind.changes.iter().map(|&(k, c)| (found.coordinates[k].name.clone(), c)).collect(),
+                remaining,
+            }
         })
         .collect();
     let tuners: Vec<TunerSensitivity> = (0..found.coordinates.len()).map(|k| tuner(local, k)).collect();
@@ -97,8 +104,13 @@ fn tuner(local: &Local, k: usize) -> TunerSensitivity {
 }
 
 /// Returns the remaining change of the residuals for a 10 % step along a blind direction, relative to steps of its
-/// single tuners.
-fn remaining(problem: &Problem, at: &[f64], blind: &BlindDirection, coordinates: &[Coordinate]) -> f64 {
+/// single tuners. The step is straight in the tuners, or in their logarithms.
+fn remaining(
+    problem: &Problem,
+    at: &[f64],
+    (blind, straight): (&BlindDirection, bool),
+    coordinates: &[Coordinate],
+) -> f64 {
     let study = problem.study();
     let vector = |evaluation: Evaluation| -> Option<Vec<f64>> {
         let scaled = evaluation.scaled?;
@@ -109,7 +121,7 @@ fn remaining(problem: &Problem, at: &[f64], blind: &BlindDirection, coordinates:
         let mut tuners = at.to_vec();
         for &(k, share) in changes {
             let (i, step) = (problem.active()[k], 0.1 * share);
-            let straight = blind.straight || tuners[i] == 0.0;
+            let straight = straight || tuners[i] == 0.0;
             tuners[i] = if straight { tuners[i] + step * coordinates[k].scale() } else { tuners[i] * math::exp(step) };
         }
         study.apply_ties(&mut tuners);

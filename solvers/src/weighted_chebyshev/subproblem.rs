@@ -147,8 +147,6 @@ impl Subproblems {
         let scalarisation = Scalarisation::chebyshev(&vec![0.0; objectives], &vec![1.0; objectives]);
         let starts = self.archive.best(&scalarisation, 2, 0.02);
         let found = self.solve(oracle, &scalarisation, &starts, 0.05)?;
-        self.multistart(oracle, &scalarisation, &found.point)?;
-        let found = self.best_archived(&scalarisation).unwrap_or(found);
         self.remove_slack(oracle, &scalarisation, found)
     }
 

@@ -1,0 +1,329 @@
+//! `mops bench`: compares solvers on a study, over several seeds.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use mops_core::{Cancellation, Catalogue, Diagnostic, SMALL_OBJECTIVE, Stop, Task};
+use serde::Serialize;
+
+use super::run::{refused, solver_named};
+use super::study::{StudyArguments, open};
+use crate::files;
+use crate::numbers::{file_name, number, significant};
+use crate::report::{Color, Curve, Plot, page};
+use crate::search::{DEFAULT_EVALUATIONS, Options, Solved, suits};
+use crate::solve::solve;
+use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, print, print_json, table};
+
+/// Arguments of `mops bench`.
+#[derive(Args)]
+#[command(after_help = "\
+Every solver runs from the start values of the study, once per seed, with the same budget. A run succeeds if it comes within
+the tolerance of the best known value: the smallest objective of all runs, or --known.
+
+Written to the output folder: runs.csv (one line per run), profile.svg and profile.png (share of successful runs over the
+number of evaluations), bench.html (both).
+
+Examples:
+  mops bench pid-design --solver auto,sqp,pattern-search
+  mops bench my-study --solver cma-es,genetic --seeds 10 --max-evaluations 5000")]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    study: StudyArguments,
+    /// Solvers, separated by commas.
+    #[arg(long, value_name = "SOLVERS", value_delimiter = ',', required = true)]
+    solver: Vec<String>,
+    /// Number of seeds: 1, 2, and so on.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    seeds: u16,
+    /// Budget of every run: largest number of evaluated points [default: that of the study, or 20000].
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    max_evaluations: Option<u64>,
+    /// Best known value of the objective [default: the smallest objective of all runs].
+    #[arg(long, value_name = "OBJECTIVE", allow_negative_numbers = true)]
+    known: Option<f64>,
+    /// Relative distance from the best known value within which a run succeeds.
+    #[arg(long, value_name = "TOLERANCE", default_value_t = 1e-3)]
+    within: f64,
+    /// Number of threads [default: all cores].
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    #[command(flatten)]
+    limit: Limit,
+    /// Output folder [default: results/<study>-bench].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print a JSON object instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// One run of a solver.
+#[derive(Debug, Clone, Serialize)]
+struct BenchRun {
+    solver: &'static str,
+    seed: u64,
+    /// Objective of the reported point; null if it violates a constraint or no simulation succeeded.
+    objective: Option<f64>,
+    /// True if the objective is within the tolerance of the best known value.
+    success: bool,
+    /// Number of evaluations after which it was so for the first time.
+    arrived: Option<usize>,
+    evaluations: usize,
+    simulations: usize,
+    seconds: f64,
+    stop: Stop,
+    /// Objectives that improved on all before, with the number of evaluations.
+    #[serde(skip)]
+    history: Vec<(usize, f64)>,
+}
+
+/// Result of the comparison.
+#[derive(Serialize)]
+struct Bench {
+    study: String,
+    /// Best known value of the objective.
+    known: f64,
+    /// Relative distance from it within which a run succeeds.
+    within: f64,
+    max_evaluations: usize,
+    runs: Vec<BenchRun>,
+}
+
+pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
+    let file = open(catalogue, &arguments.study)?;
+    if !matches!(file.study.task(), Task::Design | Task::Calibration) {
+        return Err(Diagnostic::new("solvers are compared on a design or a calibration, but the task is another one")
+            .with_help("set --set study.task=\"design\", or use `mops run` with each solver")
+            .into());
+    }
+    let most = arguments.max_evaluations.map(|n| usize::try_from(n).unwrap_or(usize::MAX));
+    let max_evaluations = most.or(file.max_evaluations).unwrap_or(DEFAULT_EVALUATIONS);
+    let cancellation = cancel_on_signal(arguments.limit, "interrupted: finishing the present run");
+    let mut runs = Vec::new();
+    let solvers =
+        arguments.solver.iter().map(|name| solver_named(catalogue, &file, name)).collect::<Result<Vec<_>, _>>()?;
+    for solver in &solvers {
+        suits(&file.study, solver).map_err(|why| refused(&why.0, &file, solver.kind))?;
+    }
+    for solver in &solvers {
+        for seed in 1..=u64::from(arguments.seeds) {
+            if cancellation.requested().is_some() {
+                break;
+            }
+            let mut study = file.study.clone();
+            study.set_seed(seed);
+            let options = Options {
+                solver: solver.clone(),
+                max_evaluations,
+                jobs: arguments.jobs.map(usize::from),
+                effects: catalogue.effects.clone(),
+                cancellation: Cancellation::clone(&cancellation),
+                ..Options::default()
+            };
+            let progress = Progress::new(!arguments.json, max_evaluations, &cancellation);
+            let solved = solve(study, &options, &progress);
+            progress.finish();
+            let solved = solved.map_err(|why| refused(&why.0, &file, solver.kind))?;
+            // An interrupted run says nothing of its solver.
+            if cancellation.requested().is_none() {
+                runs.push(of_run(solver.kind, seed, &solved));
+            }
+        }
+    }
+    let found = runs.iter().filter_map(|run| run.objective).reduce(f64::min);
+    let Some(known) = arguments.known.or(found) else {
+        return Err(Diagnostic::new("no run found a point that satisfies the constraints")
+            .with_help("raise --max-evaluations, or try other solvers")
+            .into());
+    };
+    let limit = known + arguments.within * known.abs().max(SMALL_OBJECTIVE);
+    for run in &mut runs {
+        run.success = run.objective.is_some_and(|objective| objective <= limit);
+        let first = run.history.iter().find(|(_, objective)| *objective <= limit);
+        run.arrived = first.map(|(evaluations, _)| *evaluations).filter(|_| run.success);
+    }
+    let bench = Bench { study: file.study.name().to_owned(), known, within: arguments.within, max_evaluations, runs };
+    let folder = arguments.out.clone();
+    let folder = folder.unwrap_or_else(|| Path::new("results").join(format!("{}-bench", file_name(&bench.study))));
+    bench.write(&folder)?;
+    if arguments.json {
+        print_json(&bench)?;
+    } else {
+        print(&format!("{}\nruns, profile and page are in {}\n", bench.text(), folder.display()))?;
+    }
+    Ok(if cancellation.requested().is_some() { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+fn of_run(solver: &'static str, seed: u64, solved: &Solved) -> BenchRun {
+    let outcome = &solved.outcome;
+    let mut history: Vec<(usize, f64)> = Vec::new();
+    for (evaluations, record) in (1..).zip(&solved.archive) {
+        let objective = record.merit.objective;
+        if record.merit.is_feasible() && history.last().is_none_or(|(_, best)| objective < *best) {
+            history.push((evaluations, objective));
+        }
+    }
+    BenchRun {
+        solver,
+        seed,
+        objective: Some(outcome.objective).filter(|value| outcome.feasible && value.is_finite()),
+        success: false,
+        arrived: None,
+        evaluations: outcome.evaluations,
+        simulations: outcome.simulations,
+        seconds: outcome.seconds,
+        stop: outcome.stop,
+        history,
+    }
+}
+
+impl Bench {
+    /// Returns the solvers in the order of the command line, each with its runs.
+    fn solvers(&self) -> Vec<(&'static str, Vec<&BenchRun>)> {
+        let mut solvers: Vec<(&'static str, Vec<&BenchRun>)> = Vec::new();
+        for run in &self.runs {
+            match solvers.iter_mut().find(|(solver, _)| *solver == run.solver) {
+                Some((_, runs)) => runs.push(run),
+                None => solvers.push((run.solver, vec![run])),
+            }
+        }
+        solvers
+    }
+
+    /// Returns one line per solver: successes, objectives, medians of the evaluations and of the time.
+    #[allow(clippy::cast_precision_loss)]
+    fn rows(&self) -> Vec<Vec<String>> {
+        let row = |(solver, runs): (&'static str, Vec<&BenchRun>)| {
+            let objectives: Vec<f64> = runs.iter().map(|run| run.objective.unwrap_or(f64::INFINITY)).collect();
+            let shown = |value: Option<f64>| match value {
+                Some(value) if value.is_finite() => significant(value, 6),
+                _ => String::new(),
+            };
+            let arrived: Vec<f64> = runs.iter().filter_map(|run| run.arrived).map(|n| n as f64).collect();
+            vec![
+                solver.to_owned(),
+                format!("{} of {}", runs.iter().filter(|run| run.success).count(), runs.len()),
+                shown(quantile(&objectives, 0.0)),
+                shown(quantile(&objectives, 0.5)),
+                shown(quantile(&objectives, 1.0)),
+                shown(quantile(&arrived, 0.5)),
+                shown(quantile(&runs.iter().map(|run| run.evaluations as f64).collect::<Vec<_>>(), 0.5)),
+                quantile(&runs.iter().map(|run| run.seconds).collect::<Vec<_>>(), 0.5).map_or_else(String::new, number),
+            ]
+        };
+        self.solvers().into_iter().map(row).collect()
+    }
+
+    fn introduction(&self) -> String {
+        format!(
+            "{}: best known objective {}; a run succeeds within {} of it; budget {} evaluations",
+            self.study,
+            significant(self.known, 6),
+            significant(100.0 * self.within, 3) + " %",
+            self.max_evaluations
+        )
+    }
+
+    fn text(&self) -> String {
+        let numeric: Vec<usize> = (1..HEADER.len()).collect();
+        format!("{}\n\n{}", self.introduction(), table(&HEADER, &numeric, self.rows()))
+    }
+
+    /// Returns the data profile: the share of successful runs over the number of evaluations.
+    ///
+    /// Source: J. J. More, S. M. Wild, SIAM Journal on Optimization 20 (2009) 172-191.
+    #[allow(clippy::cast_precision_loss)]
+    fn profile(&self) -> Plot {
+        let curve = |(i, (solver, runs)): (usize, (&'static str, Vec<&BenchRun>))| {
+            let mut arrived: Vec<usize> = runs.iter().filter_map(|run| run.arrived).collect();
+            arrived.sort_unstable();
+            let share = |count: usize| 100.0 * count as f64 / runs.len() as f64;
+            let mut points = vec![(1.0, 0.0)];
+            for (count, &evaluations) in arrived.iter().enumerate() {
+                points.extend([(evaluations as f64, share(count)), (evaluations as f64, share(count + 1))]);
+            }
+            points.push((self.max_evaluations as f64, share(arrived.len())));
+            Curve { name: solver.to_owned(), points, color: Color::Series(i), ..Curve::default() }
+        };
+        Plot {
+            title: format!("{}: successful runs", self.study),
+            x_label: "evaluations (1)".into(),
+            y_label: "runs (%)".into(),
+            log_x: true,
+            curves: self.solvers().into_iter().enumerate().map(curve).collect(),
+            ..Plot::default()
+        }
+    }
+
+    fn write(&self, folder: &Path) -> Result<(), CommandError> {
+        std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
+        let header = "solver,seed,objective,success,arrived,evaluations,simulations,seconds,stop\n".to_owned();
+        let lines = self.runs.iter().map(|run| {
+            let stop = serde_json::to_value(run.stop).ok();
+            format!(
+                "{},{},{},{},{},{},{},{},{}\n",
+                run.solver,
+                run.seed,
+                run.objective.map_or_else(String::new, |value| value.to_string()),
+                run.success,
+                run.arrived.map_or_else(String::new, |count| count.to_string()),
+                run.evaluations,
+                run.simulations,
+                run.seconds,
+                stop.as_ref().and_then(|stop| stop.as_str()).unwrap_or_default()
+            )
+        });
+        let write = |name: &str, content: String| {
+            let path = folder.join(name);
+            files::write(&path, content).map_err(CommandError::cannot_write(&path))
+        };
+        write("runs.csv", header + &lines.collect::<String>())?;
+        let profile = self.profile();
+        write("profile.svg", profile.svg())?;
+        let png = folder.join("profile.png");
+        profile.write_png(&png).map_err(CommandError::cannot_write(&png))?;
+        let cells = |cells: &[String], tag: &str| -> String {
+            cells.iter().map(|cell| format!("<{tag}>{cell}</{tag}>")).collect::<String>()
+        };
+        let rows: String = self.rows().iter().map(|row| format!("<tr>{}</tr>", cells(row, "td"))).collect();
+        let body = format!(
+            "<h1>{}</h1><p>{}</p><div class=\"scroll\"><table><thead><tr>{}</tr></thead><tbody>{rows}</tbody></table></div>\
+             <figure>{}</figure>",
+            escaped(&self.study),
+            escaped(&self.introduction()),
+            cells(&HEADER.map(str::to_owned), "th"),
+            profile.svg()
+        );
+        write("bench.html", page(&format!("{}: solvers", self.study), &body))
+    }
+}
+
+/// Columns of the table.
+const HEADER: [&str; 8] =
+    ["solver", "success", "best", "median", "worst", "evaluations to success", "evaluations", "time, s"];
+
+/// Returns a quantile of values, the nearest one; `None` without values.
+#[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn quantile(values: &[f64], share: f64) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get((share * sorted.len().saturating_sub(1) as f64).round() as usize).copied()
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_the_nearest_values() {
+        let values = [3.0, 1.0, f64::INFINITY];
+        assert_eq!([0.0, 0.5, 1.0].map(|share| quantile(&values, share)), [Some(1.0), Some(3.0), Some(f64::INFINITY)]);
+        assert_eq!(quantile(&[], 0.5), None);
+    }
+}
