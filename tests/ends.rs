@@ -113,3 +113,96 @@ dip  = { step-envelope = { signal = "phi", lower = [["1.2 s", "29.7 deg"]] }, us
         assert!(result["objective"].as_f64().unwrap() < 1.11584 * 1.001, "{seed}: {text}");
     }
 }
+
+/// Standard normal numbers by the sum of twelve uniform ones, from a linear congruential generator.
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    let mut uniform = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+}
+
+/// Writes a study of several records of a first-order lag with free initial states; returns its path.
+fn lags(folder: &Path, records: u32, stated_noise: f64) -> String {
+    let mut experiments = String::new();
+    for record in 0..records {
+        let mut noise = noise(u64::from(record) + 1);
+        let rows = (0..200).map(|k| f64::from(k) * 0.05).map(|t| {
+            let y = 2.0 * (1.0 - (-t / 3.0).exp()) + 0.05 * noise();
+            format!("{t},{y}\n")
+        });
+        let text = "t [s],y\n".to_owned() + &rows.collect::<String>();
+        std::fs::write(folder.join(format!("r{record}.csv")), text).unwrap();
+        experiments += &format!(
+            "[experiments.r{record}]\nfile = \"r{record}.csv\"\nfree = [\"x\"]\n\
+             channels = {{ x = {{ column = \"y\", noise = {stated_noise}, unit = \"1\" }} }}\n"
+        );
+    }
+    let study = folder.join(format!("lags-{records}.toml"));
+    let text = format!(
+        "[study]\nname = \"lags\"\ntask = \"calibration\"\n\
+         [models.m.equations]\nstates = {{ x = \"1\" }}\nparameters = {{ K = \"1\", T = \"s\" }}\nder = {{ x = \"(K - x)/T\" }}\n\
+         {experiments}[tuners]\nK = {{ start = 1.0, min = 0.1, max = 10.0, scale = \"log\" }}\n\
+         T = {{ start = 1.0, min = 0.1, max = 100.0, scale = \"log\" }}\n\
+         [criteria]\ny = {{ normalised-error = {{ signal = \"x\" }} }}\n"
+    );
+    std::fs::write(&study, text).unwrap();
+    study.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_calibration_ends_where_the_residuals_are_noise_whatever_the_number_of_records() {
+    let folder = tempfile::tempdir().unwrap();
+    let [one, many] = [1, 12].map(|records| run(&lags(folder.path(), records, 0.05), folder.path(), &[]));
+    for (result, text) in [&one, &many] {
+        assert!(text.contains("noise of the stated level"), "{text}");
+        assert_eq!(result["end"]["searches"], 1);
+        for (tuner, truth) in [(0, 2.0), (1, 3.0)] {
+            let value = result["tuners"][tuner]["value"].as_f64().unwrap();
+            assert!((value / truth - 1.0).abs() < 0.05, "{value} {truth}");
+        }
+    }
+    let evaluations = |result: &Value| result["evaluations"].as_u64().unwrap();
+    assert!(evaluations(&many.0) <= evaluations(&one.0) + 5, "{} {}", evaluations(&many.0), evaluations(&one.0));
+    // Residuals are neither kept nor stored.
+    let database = std::fs::metadata(folder.path().join("out/evaluations.sqlite")).unwrap().len();
+    assert!(database < 200_000, "{database}");
+}
+
+#[test]
+fn residuals_above_or_far_below_the_stated_noise_do_not_end_a_calibration() {
+    let folder = tempfile::tempdir().unwrap();
+    for stated in [0.02, 0.5] {
+        let (result, text) = run(&lags(folder.path(), 1, stated), folder.path(), &[]);
+        assert!(!text.contains("noise of the stated level"), "{stated}: {text}");
+        assert!(result["end"]["searches"].as_u64().unwrap() > 1);
+    }
+}
+
+#[test]
+fn solvers_are_compared_on_a_study_by_their_success() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("bench");
+    let mut command = cargo_bin_cmd!("mops");
+    command.args(["bench", "pid-design", "--solver", "sqp,nelder-mead", "--seeds", "2", "--max-evaluations", "600"]);
+    let output = command.args(["--json", "--out", out.to_str().unwrap()]).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let bench: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let runs = bench["runs"].as_array().unwrap();
+    assert_eq!(runs.len(), 4);
+    let known = bench["known"].as_f64().unwrap();
+    assert!((known / 0.863_070_4 - 1.0).abs() < 1e-3, "{known}");
+    for run in runs {
+        let objective = run["objective"].as_f64().unwrap();
+        assert_eq!(run["success"], objective <= known * 1.001, "{run}");
+        assert_eq!(run["arrived"].is_null(), run["success"] == false, "{run}");
+        assert!(run["evaluations"].as_u64().unwrap() <= 600);
+    }
+    let lines = std::fs::read_to_string(out.join("runs.csv")).unwrap().lines().count();
+    assert_eq!(lines, 5);
+    for file in ["profile.svg", "profile.png", "bench.html"] {
+        assert!(out.join(file).exists(), "{file}");
+    }
+}

@@ -158,3 +158,95 @@ fn a_picked_point_is_optimal_for_its_demands() {
         assert!((worst - 1.0).abs() < 1e-3 + PRINTED / known[1], "{known:?}: {worst}");
     }
 }
+
+/// A model whose outputs are functions of its parameters, over two cases: `f` is worst in the case `right` below `p` = 0.5, else
+/// in `left`, and `g` does not depend on the case.
+const CASES: &str = r#"
+[study]
+name = "cases"
+[models.m.equations]
+states = { x = "1" }
+parameters = { p = "1", centre = "1" }
+der = { x = "-x" }
+outputs = { f = { value = "(p - centre)^2 + 1", unit = "1" }, g = { value = "(p - 3)^2 + 1", unit = "1" } }
+horizon = "1 s"
+[tuners]
+p = { start = 0.2, min = -4.0, max = 4.0 }
+[cases]
+left = { centre = 0.0 }
+right = { centre = 1.0 }
+[criteria]
+f = { final-value = { signal = "f" }, demand = 1.0 }
+g = { final-value = { signal = "g" }, demand = 1.0 }
+"#;
+
+#[test]
+fn the_worst_case_of_a_criterion_is_its_objective() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study.toml");
+    std::fs::write(&study, CASES).unwrap();
+    let arguments = [study.to_str().unwrap(), "--points", "10"];
+    let result = pareto(folder.path(), &arguments);
+    let front = result["front"].as_array().unwrap();
+    assert!(front.len() >= 10, "{}", front.len());
+    for point in front {
+        let p = point["tuners"]["p"].as_f64().unwrap();
+        assert!((0.5 - 1e-6..=3.0 + 1e-6).contains(&p), "{p}");
+        let objectives = point["objectives"].as_object().unwrap();
+        assert_eq!(objectives.keys().collect::<Vec<_>>(), ["f", "g"]);
+        assert!((objectives["f"].as_f64().unwrap() - (p * p + 1.0)).abs() < 1e-9);
+        assert_eq!(point["criteria"].as_object().unwrap().len(), 4);
+    }
+    let found = &result["trade_offs"];
+    let certified = |point: &&Value| point["pareto"] == "certified-local";
+    assert!(found["points"].as_array().unwrap().iter().filter(certified).count() >= front.len() - 1);
+    assert_eq!(found["criteria"].as_array().unwrap().iter().map(|c| &c["key"]).collect::<Vec<_>>(), ["f", "g"]);
+
+    // Per case, `right/f` may be better at the cost of `left/f`: the front begins at p = 0.
+    let result = pareto(folder.path(), &[&arguments[..], &["--per-case"]].concat());
+    let front = result["front"].as_array().unwrap();
+    assert_eq!(front[0]["objectives"].as_object().unwrap().len(), 4);
+    let least = front.iter().map(|point| point["tuners"]["p"].as_f64().unwrap()).fold(f64::INFINITY, f64::min);
+    assert!(least.abs() < 1e-3, "{least}");
+}
+
+#[test]
+fn a_front_keeps_its_budget_and_says_why_points_are_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let result = pareto(folder.path(), &["pid-pareto", "--points", "40", "--max-evaluations", "400"]);
+    assert!(result["evaluations"].as_u64().unwrap() <= 400, "{}", result["evaluations"]);
+    let front = result["front"].as_array().unwrap().len();
+    let warnings = result["warnings"].to_string();
+    let said = warnings.contains(&format!("40 points were asked for, the front has {front}: the budget was spent"));
+    assert!(said == (front < 40), "{front} {warnings}");
+}
+
+/// `d` alone decides the maximum, 2, whatever `a` is; `c = 1 + a` costs nothing.
+#[test]
+fn a_criterion_that_does_not_decide_the_maximum_is_lowered_at_no_cost() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study.toml");
+    let text = r#"
+[study]
+name = "slack"
+[models.m.equations]
+states = { x = "1" }
+parameters = { a = "1" }
+der = { x = "-x" }
+outputs = { c = { value = "1 + a", unit = "1" }, d = { value = "2 + 0*a", unit = "1" } }
+horizon = "1 s"
+[tuners]
+a = { start = 0.5, min = 0.0, max = 1.0 }
+[criteria]
+c = { final-value = { signal = "c" }, demand = 1.0 }
+d = { final-value = { signal = "d" }, demand = 1.0 }
+"#;
+    std::fs::write(&study, text).unwrap();
+    let output = cargo_bin_cmd!("mops")
+        .args(["run", study.to_str().unwrap(), "--json", "--out", folder.path().to_str().unwrap()])
+        .output()
+        .unwrap();
+    let result = result::read(&output.stdout).unwrap();
+    assert!((result["criteria"][0]["value"].as_f64().unwrap() - 1.0).abs() < 1e-6, "{}", result["criteria"]);
+    assert!((result["worst_scaled"].as_f64().unwrap() - 2.0).abs() < 1e-12);
+}

@@ -107,7 +107,8 @@ pub struct End {
 }
 
 /// What the level of the residuals shows of other basins.
-const NOISE: &str = "The residuals are noise of the stated level: no other point fits significantly better.";
+const NOISE: &str = "The residuals are noise of the stated level: no other point fits significantly better. Whether others fit \
+                     as well was not searched.";
 
 impl End {
     /// Returns what is known of a point with this merit and classification, after local searches that ended with the given

@@ -243,6 +243,7 @@ fn factorised_at_once(residuals: &DVector<f64>, jacobian: &DMatrix<f64>) -> (DMa
 }
 
 #[cfg(test)]
+#[allow(clippy::cast_precision_loss)]
 mod tests {
     use super::*;
 
@@ -275,6 +276,23 @@ mod tests {
         let found = minimum([[-5.0, 5.0]; 2]);
         assert!((found.point()[0] - 1.0).abs() < 1e-9 && (found.point()[1] - 1.0).abs() < 1e-9, "{:?}", found.point());
         assert!(found.full_step().expect("regular").predicted < 1e-15);
+    }
+
+    /// Of 700 rows, the last four columns act in a quarter each.
+    #[test]
+    fn factors_of_chunks_are_those_of_the_whole_matrix() {
+        let slope = |i: usize, j: usize| match j {
+            0 | 1 => math::sin((1 + j) as f64 * i as f64),
+            _ if i / 175 == j - 2 => math::cos(i as f64),
+            _ => 0.0,
+        };
+        let jacobian = DMatrix::from_fn(700, 6, slope);
+        let residuals = DVector::from_fn(700, |i, _| math::sin(0.1 * i as f64));
+        let [(chunks, q), (whole, p)] = [factorised(&residuals, &jacobian), factorised_at_once(&residuals, &jacobian)];
+        // Both are unique up to signs: R'R = J'J and R'Q'r = J'r.
+        assert!((chunks.tr_mul(&chunks) - whole.tr_mul(&whole)).abs().max() < 1e-11);
+        assert!((chunks.tr_mul(&q) - whole.tr_mul(&p)).abs().max() < 1e-11);
+        assert!((chunks.tr_mul(&chunks) - jacobian.tr_mul(&jacobian)).abs().max() < 1e-11);
     }
 
     #[test]

@@ -41,10 +41,15 @@ pub struct Shape {
 /// Share of the noise below which the residuals are too small for noise of the stated levels.
 const FAR_BELOW_NOISE: f64 = 0.1;
 
+/// Number of residuals per tuner below which several optima may lie within the noise, as with two exponentials and 41 samples.
+const RESIDUALS_PER_TUNER: usize = 30;
+
 impl Shape {
-    /// Returns true if a sum of squares is what the noise of the measurements leaves: no other point fits significantly better.
+    /// Returns true if a sum of squares of many residuals is what the noise of the measurements leaves: no other point fits
+    /// significantly better.
     pub fn is_noise(&self, sum: f64) -> bool {
-        (FAR_BELOW_NOISE * self.noise..=self.noise).contains(&sum) && self.noise > 0.0
+        let are_many = self.residuals >= RESIDUALS_PER_TUNER * self.dimension();
+        are_many && self.noise > 0.0 && (FAR_BELOW_NOISE * self.noise..=self.noise).contains(&sum)
     }
 
     /// Returns the number of tuners.

@@ -105,6 +105,26 @@ fn weighted_chebyshev_spreads_points_over_a_sphere() {
     assert!(far(farthest) < 0.35, "{farthest:?}: {}", far(farthest));
 }
 
+/// At the ends of this front, a criterion is zero on whole faces of the box.
+#[test]
+fn weighted_chebyshev_finds_a_sphere_from_any_start() {
+    let suite = mops_problems::suites().into_iter().find(|s| s.name == "dtlz").unwrap();
+    let problem = (suite.problems)().into_iter().find(|problem| problem.name == "DTLZ2").unwrap();
+    let posed = Posed::new(&problem, Slope::Exact);
+    let n = posed.start().len();
+    for k in 0..8_u32 {
+        // Fractions of multiples of the golden ratio.
+        let start: Vec<f64> =
+            (0..u32::try_from(n).unwrap()).map(|j| (0.618 * f64::from(1 + k + 5 * j)).fract()).collect();
+        let mut run = Run::new(&posed, Budget { evaluations: 8000 }, &());
+        run.solve(&mut *weighted_chebyshev(), &start);
+        let rows: Vec<Vec<f64>> = run.front().into_iter().map(|i| run.archive()[i].objectives.clone()).collect();
+        assert!(rows.len() >= 30, "{k}: {}", rows.len());
+        let off = |row: &Vec<f64>| (row.iter().map(|f| f * f).sum::<f64>() - 1.0).abs() > 1e-3;
+        assert_eq!(rows.iter().find(|row| off(row)), None, "{k}");
+    }
+}
+
 fn weighted_chebyshev() -> Box<dyn mops_core::Solver> {
     let kind = mops_solvers::kinds().into_iter().find(|kind| kind.name == "weighted-chebyshev").unwrap();
     kind.default_choice().make()

@@ -98,6 +98,12 @@ mod tests {
     }
 
     #[test]
+    fn a_point_that_is_the_best_in_two_objectives_does_not_end_the_thinning() {
+        let points: Vec<f64> = (0..=100).flat_map(|i| [f64::from(i), f64::from(i), 100.0 - f64::from(i)]).collect();
+        assert_eq!(thinned(&points, 3, 5), [0, 25, 50, 75, 100]);
+    }
+
+    #[test]
     fn the_distance_of_a_front_to_itself_is_zero() {
         let front = [0.0, 1.0, 1.0, 0.0];
         assert_eq!(inverted_generational_distance(&front, 2, &[vec![0.0, 1.0], vec![1.0, 0.0]]), 0.0);
