@@ -207,7 +207,8 @@ fn the_worst_case_of_a_criterion_is_its_objective() {
     let front = result["front"].as_array().unwrap();
     assert_eq!(front[0]["objectives"].as_object().unwrap().len(), 4);
     let least = front.iter().map(|point| point["tuners"]["p"].as_f64().unwrap()).fold(f64::INFINITY, f64::min);
-    assert!(least.abs() < 1e-3, "{least}");
+    // The other objectives are lowered within the constraint tolerance, twice: p^2 < 2.1e-6.
+    assert!(least.abs() < 1.5e-3, "{least}");
 }
 
 #[test]

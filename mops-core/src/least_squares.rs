@@ -187,7 +187,10 @@ impl LeastSquares {
     }
 }
 
-/// Number of rows that are factorised at once, and smallest number per column.
+/// Number of rows from which a matrix is factorised by chunks: below, nothing is gained.
+const TALL: usize = 4096;
+
+/// Number of rows of a chunk, and smallest number per column.
 const CHUNK: usize = 256;
 const ROWS_PER_COLUMN: usize = 4;
 
@@ -200,9 +203,15 @@ const ROWS_PER_COLUMN: usize = 4;
 /// QR).
 fn factorised(residuals: &DVector<f64>, jacobian: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
     let (rows, n) = jacobian.shape();
-    if rows < 2 * CHUNK || n == 0 {
-        return factorised_at_once(residuals, jacobian);
+    if rows < TALL || n == 0 {
+        factorised_at_once(residuals, jacobian)
+    } else {
+        factorised_by_chunks(residuals, jacobian)
     }
+}
+
+fn factorised_by_chunks(residuals: &DVector<f64>, jacobian: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let (rows, n) = jacobian.shape();
     // Rows of the factors of all chunks: columns, their values, right-hand side.
     let mut factors: Vec<(Vec<usize>, DMatrix<f64>, DVector<f64>)> = Vec::new();
     let mut begin = 0;
@@ -288,7 +297,8 @@ mod tests {
         };
         let jacobian = DMatrix::from_fn(700, 6, slope);
         let residuals = DVector::from_fn(700, |i, _| math::sin(0.1 * i as f64));
-        let [(chunks, q), (whole, p)] = [factorised(&residuals, &jacobian), factorised_at_once(&residuals, &jacobian)];
+        let [(chunks, q), (whole, p)] =
+            [factorised_by_chunks(&residuals, &jacobian), factorised_at_once(&residuals, &jacobian)];
         // Both are unique up to signs: R'R = J'J and R'Q'r = J'r.
         assert!((chunks.tr_mul(&chunks) - whole.tr_mul(&whole)).abs().max() < 1e-11);
         assert!((chunks.tr_mul(&q) - whole.tr_mul(&p)).abs().max() < 1e-11);
