@@ -130,7 +130,7 @@ fn lags(folder: &Path, records: u32, stated_noise: f64) -> String {
     for record in 0..records {
         let mut noise = noise(u64::from(record) + 1);
         let rows = (0..200).map(|k| f64::from(k) * 0.05).map(|t| {
-            let y = 2.0 * (1.0 - (-t / 3.0).exp()) + 0.05 * noise();
+            let y = 2.0 * (1.0 - mops_core::math::exp(-t / 3.0)) + 0.05 * noise();
             format!("{t},{y}\n")
         });
         let text = "t [s],y\n".to_owned() + &rows.collect::<String>();
