@@ -162,14 +162,11 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     }
     let quiet = Quiet(watch);
     let mut probe = Run::new(&problem, Budget { evaluations: usize::MAX }, &quiet).keeping(store);
-    let mut point = optimality(&run, &mut probe, watch);
-    let mut shown = pareto(&run, point, &mut probe, watch);
-    let has_slack = shown == Pareto::No && problem.shape().objective == Objective::Max;
+    let (mut point, mut pareto) = shown(&run, &mut probe, watch);
+    let has_slack = pareto == Pareto::No && problem.shape().objective == Objective::Max;
     if has_slack && stop != Stop::Interrupted && remove_slack(&mut run) {
-        point = optimality(&run, &mut probe, watch);
-        shown = pareto(&run, point, &mut probe, watch);
+        (point, pareto) = shown(&run, &mut probe, watch);
     }
-    let pareto = shown;
     let stop = if stop == Stop::Converged && matches!(point, Optimality::Plateau | Optimality::Descent) {
         Stop::Stalled
     } else {
@@ -196,7 +193,7 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
 /// point.
 fn remove_slack(run: &mut Run<'_>) -> bool {
     let Some(best) = run.best().cloned() else { return false };
-    // At the end of the budget, the points evaluated so far count.
+    // Without a result at the end of the budget, the point stays.
     let Ok(Some(found)) = mops_solvers::remove_slack(run, &best.point) else { return false };
     let is_as_good = found.merit.is_feasible() && found.merit.objective <= best.merit.objective;
     if is_as_good {
@@ -239,6 +236,12 @@ fn slopes(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> Option<Slope
         return None;
     }
     SlopesReport::at(problem, probe, &run.best()?.point, NEAR)
+}
+
+/// Returns what is shown of the best point: its classification for the objective, and its Pareto optimality.
+fn shown(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> (Optimality, Pareto) {
+    let point = optimality(run, probe, watch);
+    (point, pareto(run, point, probe, watch))
 }
 
 /// Classifies the best point to first order.

@@ -251,7 +251,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
         self.keep(key, answer);
     }
 
-    /// Reports an evaluated point instead of the best one: one that is as good, and better in what the objective leaves open.
+    /// Sets the reported point to an evaluated one with the same objective, such as one that dominates the best point.
     pub fn settle(&mut self, evaluation: Evaluation) {
         self.best = Some(evaluation);
     }

@@ -45,8 +45,8 @@ const FAR_BELOW_NOISE: f64 = 0.1;
 const RESIDUALS_PER_TUNER: usize = 30;
 
 impl Shape {
-    /// Returns true if a sum of squares of many residuals is what the noise of the measurements leaves: no other point fits
-    /// significantly better.
+    /// Returns true if the sum of squares is at the level of the measurement noise, so that no other point fits significantly
+    /// better. Requires many residuals per tuner.
     pub fn is_noise(&self, sum: f64) -> bool {
         let are_many = self.residuals >= RESIDUALS_PER_TUNER * self.dimension();
         are_many && self.noise > 0.0 && (FAR_BELOW_NOISE * self.noise..=self.noise).contains(&sum)

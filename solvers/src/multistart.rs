@@ -1,8 +1,8 @@
 //! Multistart of a local solver.
 //!
 //! The first run starts from the initial guess of the study, the next ones from the best points of samples of the box, until an
-//! optimum that is not yet known is unlikely, or until the residuals of a calibration are noise. A run that comes close to the end of an earlier one is not continued. If
-//! enabled, runs from points around the best one follow until nothing changes.
+//! optimum that is not yet known is unlikely, or until the residuals of a calibration are noise. A run that comes close to the end
+//! of an earlier one is not continued. If enabled, runs from points around the best one follow until nothing changes.
 
 use mops_core::{Basins, Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver};
 

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Cancellation, Catalogue, Diagnostic, SMALL_OBJECTIVE, Stop, Task};
+use maud::{PreEscaped, html};
+use mops_core::{Catalogue, Diagnostic, Halt, SMALL_OBJECTIVE, Stop, Task};
 use serde::Serialize;
 
 use super::run::{refused, solver_named};
@@ -95,12 +96,12 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     let file = open(catalogue, &arguments.study)?;
     if !matches!(file.study.task(), Task::Design | Task::Calibration) {
         return Err(Diagnostic::new("solvers are compared on a design or a calibration, but the task is another one")
-            .with_help("set --set study.task=\"design\", or use `mops run` with each solver")
+            .with_help("add --set study.task=\"design\", or use `mops run` with each solver")
             .into());
     }
     let most = arguments.max_evaluations.map(|n| usize::try_from(n).unwrap_or(usize::MAX));
     let max_evaluations = most.or(file.max_evaluations).unwrap_or(DEFAULT_EVALUATIONS);
-    let cancellation = cancel_on_signal(arguments.limit, "interrupted: finishing the present run");
+    let cancellation = cancel_on_signal(arguments.limit, "interrupted: writing the finished runs");
     let mut runs = Vec::new();
     let solvers =
         arguments.solver.iter().map(|name| solver_named(catalogue, &file, name)).collect::<Result<Vec<_>, _>>()?;
@@ -119,7 +120,7 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
                 max_evaluations,
                 jobs: arguments.jobs.map(usize::from),
                 effects: catalogue.effects.clone(),
-                cancellation: Cancellation::clone(&cancellation),
+                cancellation: cancellation.clone(),
                 ..Options::default()
             };
             let progress = Progress::new(!arguments.json, max_evaluations, &cancellation);
@@ -153,7 +154,8 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     } else {
         print(&format!("{}\nruns, profile and page are in {}\n", bench.text(), folder.display()))?;
     }
-    Ok(if cancellation.requested().is_some() { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    let interrupted = cancellation.requested() == Some(Halt::Interrupted);
+    Ok(if interrupted { ExitCode::from(4) } else { ExitCode::SUCCESS })
 }
 
 fn of_run(solver: &'static str, seed: u64, solved: &Solved) -> BenchRun {
@@ -259,44 +261,29 @@ impl Bench {
 
     fn write(&self, folder: &Path) -> Result<(), CommandError> {
         std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
-        let header = "solver,seed,objective,success,arrived,evaluations,simulations,seconds,stop\n".to_owned();
-        let lines = self.runs.iter().map(|run| {
-            let stop = serde_json::to_value(run.stop).ok();
-            format!(
-                "{},{},{},{},{},{},{},{},{}\n",
-                run.solver,
-                run.seed,
-                run.objective.map_or_else(String::new, |value| value.to_string()),
-                run.success,
-                run.arrived.map_or_else(String::new, |count| count.to_string()),
-                run.evaluations,
-                run.simulations,
-                run.seconds,
-                stop.as_ref().and_then(|stop| stop.as_str()).unwrap_or_default()
-            )
-        });
+        let csv = folder.join("runs.csv");
+        files::write_csv(&csv, |writer| self.runs.iter().try_for_each(|run| writer.serialize(run)))
+            .map_err(CommandError::cannot_write(&csv))?;
         let write = |name: &str, content: String| {
             let path = folder.join(name);
             files::write(&path, content).map_err(CommandError::cannot_write(&path))
         };
-        write("runs.csv", header + &lines.collect::<String>())?;
         let profile = self.profile();
         write("profile.svg", profile.svg())?;
         let png = folder.join("profile.png");
         profile.write_png(&png).map_err(CommandError::cannot_write(&png))?;
-        let cells = |cells: &[String], tag: &str| -> String {
-            cells.iter().map(|cell| format!("<{tag}>{cell}</{tag}>")).collect::<String>()
+        let body = html! {
+            h1 { (self.study) }
+            p { (self.introduction()) }
+            div class="wide" {
+                table {
+                    thead { tr { @for title in HEADER { th scope="col" { (title) } } } }
+                    tbody { @for row in self.rows() { tr { @for cell in row { td { (cell) } } } } }
+                }
+            }
+            figure { (PreEscaped(profile.svg())) }
         };
-        let rows: String = self.rows().iter().map(|row| format!("<tr>{}</tr>", cells(row, "td"))).collect();
-        let body = format!(
-            "<h1>{}</h1><p>{}</p><div class=\"scroll\"><table><thead><tr>{}</tr></thead><tbody>{rows}</tbody></table></div>\
-             <figure>{}</figure>",
-            escaped(&self.study),
-            escaped(&self.introduction()),
-            cells(&HEADER.map(str::to_owned), "th"),
-            profile.svg()
-        );
-        write("bench.html", page(&format!("{}: solvers", self.study), &body))
+        write("bench.html", page(&format!("{}: solvers", self.study), &body.into_string()))
     }
 }
 
@@ -310,10 +297,6 @@ fn quantile(values: &[f64], share: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.get((share * sorted.len().saturating_sub(1) as f64).round() as usize).copied()
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;")
 }
 
 #[cfg(test)]

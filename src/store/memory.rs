@@ -96,7 +96,7 @@ impl Store for Memory {
     }
 
     fn learned_slopes(&self, tuners: &[f64], reach: f64, slopes: Option<RowSlopes>) {
-        let numbers = slopes.iter().flatten().flat_map(|(_, along)| along).map(|_| 3).sum();
+        let numbers = slopes.iter().flatten().map(|(_, along)| 2 + along.len()).sum();
         if self.reserve(numbers) {
             self.send(Message::Slopes(bytes::key(tuners), reach, slopes));
         }
