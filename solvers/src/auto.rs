@@ -16,6 +16,7 @@ use crate::nsga3::Nsga3Options;
 use crate::optimality::optimality;
 use crate::pattern_search::PatternSearchOptions;
 use crate::polishing::pattern_at_best;
+use crate::proof::{NOT_SHOWN, Proof, STATIONARY};
 use crate::quasi_newton::QuasiNewton;
 use crate::sqp::SqpOptions;
 use crate::weighted_chebyshev::WeightedChebyshevOptions;
@@ -32,7 +33,8 @@ use crate::weighted_chebyshev::WeightedChebyshevOptions;
 ///   or lists; otherwise `nsga2` for two criteria and `nsga3` for more.
 ///
 /// Every method for one objective runs from several points (multistart): the initial guess of the study and the best
-/// points of samples of the box, until another optimum is unlikely. Where the best point is then not shown to be stationary,
+/// points of samples of the box, until another optimum is unlikely. What is spent after the last gain is limited in proportion to
+/// what has been spent before it: to three times as much where the point is shown to be stationary, to sixty times elsewhere. Where the best point is then not shown to be stationary,
 /// or the runs have ended at several optima, and the objective is no sum of squares, a pattern search continues from it, and from the end of the first run if that
 /// has not converged: an optimum may lie at a discontinuity (of a settling time, for example), where gradients are of no use.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -53,7 +55,13 @@ impl SolverOptions for AutoOptions {
     const KIND: &'static str = "auto";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(Auto { options: self.clone(), stage: None, methods: Vec::new(), ends: Vec::new() })
+        Box::new(Auto {
+            options: self.clone(),
+            stage: None,
+            methods: Vec::new(),
+            ends: Vec::new(),
+            proof: Proof::default(),
+        })
     }
 }
 
@@ -63,6 +71,8 @@ struct Auto {
     methods: Vec<&'static str>,
     /// Merits at which the runs from different starting points have ended.
     ends: Vec<Merit>,
+    /// Cost of the last gain, once the runs from different starting points have ended.
+    proof: Proof,
 }
 
 enum Stage {
@@ -83,6 +93,8 @@ struct Status {
     converged: bool,
     /// True if two runs have reached the best point and another optimum is unlikely.
     confirmed: bool,
+    /// Limit of the proof, as a factor on the cost of the last gain.
+    proof: usize,
     /// Objective at the start of the last multistart around the best point.
     previous_objective: f64,
 }
@@ -129,25 +141,32 @@ impl Solver for Auto {
                     return Ok(progress);
                 }
                 self.ends = global.ends().to_vec();
+                self.proof = global.proof();
                 let Some(best) = oracle.best().cloned() else { return Ok(Progress::Stalled) };
                 let (converged, confirmed) = (progress == Progress::Converged, global.is_settled());
                 // Otherwise the best point may stand in a narrow curved valley, where derivatives show no descent.
                 let is_trusted = converged && (confirmed || Basins::of(best.merit, &self.ends).optima < 2);
-                let status = Status { converged, confirmed, previous_objective: f64::INFINITY };
-                match optimality(oracle, &best.point) {
+                let optimality = optimality(oracle, &best.point);
+                let proof = if optimality.is_stationary() { STATIONARY } else { NOT_SHOWN };
+                let status = Status { converged, confirmed, proof, previous_objective: f64::INFINITY };
+                match optimality {
                     Optimality::Stationary if is_trusted => Ok(Progress::Converged),
                     // At a kink, linear models may hide a narrow valley.
                     Optimality::Kink if is_trusted => self.finish_or_restart(oracle, status, progress),
                     // Ends that are not optima confirm nothing.
-                    _ if global.continue_thoroughly(oracle)? => Ok(Progress::Continue),
+                    _ if self.proof.is_spent(oracle, NOT_SHOWN) => Ok(progress),
+                    _ if global.continue_in_doubt(oracle)? => Ok(Progress::Continue),
                     _ => self.polish(oracle, status),
                 }
             }
             Stage::Polish(pattern, status) => {
                 let status = *status;
-                match pattern.step(oracle)? {
-                    Progress::Continue => Ok(Progress::Continue),
+                let progress = pattern.step(oracle)?;
+                self.proof.observe(oracle);
+                match progress {
+                    Progress::Continue if !self.proof.is_spent(oracle, status.proof) => Ok(Progress::Continue),
                     progress => {
+                        let progress = if progress == Progress::Continue { Progress::Stalled } else { progress };
                         // A better point than the ends of the runs is not confirmed by them.
                         let is_settled = |best: &Evaluation| Basins::of(best.merit, &self.ends).is_settled();
                         let confirmed = status.confirmed && oracle.best().is_some_and(is_settled);
@@ -157,7 +176,12 @@ impl Solver for Auto {
             }
             Stage::LocalRestarts(restarts, status) => {
                 let status = *status;
-                match restarts.step(oracle)? {
+                let progress = restarts.step(oracle)?;
+                self.proof.observe(oracle);
+                match progress {
+                    Progress::Continue if self.proof.is_spent(oracle, status.proof) => {
+                        Ok(status.final_progress(Progress::Stalled))
+                    }
                     Progress::Continue => Ok(Progress::Continue),
                     _ if has_improved(oracle, status.previous_objective) => self.polish(oracle, status),
                     progress => Ok(status.final_progress(progress)),

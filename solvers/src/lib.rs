@@ -32,6 +32,7 @@ pub mod pattern_search;
 mod penalty;
 mod polishing;
 mod population;
+mod proof;
 mod quasi_newton;
 mod ranking;
 mod simplex_lattice;

@@ -1,12 +1,14 @@
 //! Multistart of a local solver.
 //!
 //! The first run starts from the initial guess of the study, the next ones from the best points of samples of the box, until an
-//! optimum that is not yet known is unlikely, or until the residuals of a calibration are noise. A run that comes close to the end
-//! of an earlier one is not continued. If enabled, runs from points around the best one follow until nothing changes.
+//! optimum that is not yet known is unlikely, until the confirmation has cost its share (see [`crate::proof`]), or until the
+//! residuals of a calibration are noise. A run that comes close to the end of an earlier one is not continued. If enabled, runs from points around the best one follow until nothing changes.
 
-use mops_core::{Basins, Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver};
+use mops_core::{Basins, Evaluation, Halt, Merit, Oracle, Progress, SMALL_OBJECTIVE, Shape, Solver};
 
 use crate::local_archive::LocalArchive;
+use crate::optimality::optimality;
+use crate::proof::{NOT_SHOWN, Proof, STATIONARY, is_gain};
 use crate::start::{best_of, latin_hypercube};
 
 /// Local solver with a list of starting points.
@@ -22,12 +24,19 @@ pub struct Multistart {
     starts: usize,
     /// True if all of them are used and every run is brought to its end, whatever the ends show.
     is_thorough: bool,
-    /// Number of starting points so far.
+    /// True if agreement of the ends confirms nothing.
+    is_doubted: bool,
+    /// Number of starting points so far, and number of runs.
     drawn: usize,
+    runs: usize,
     /// Evaluations that the oracle allowed at the beginning of the present run.
     allowed: usize,
-    /// Evaluations of the run that found the best point.
-    arrived: usize,
+    /// Evaluations of the run that found the best point, up to the last gain and in all.
+    to_gain: usize,
+    cost: usize,
+    /// True if the best point is shown to be stationary.
+    is_stationary: bool,
+    proof: Proof,
     /// Initial guess of the study.
     initial: Vec<f64>,
     /// Remaining starting points, the next one last.
@@ -63,8 +72,16 @@ const AT_ONCE: usize = 2;
 /// Distance along every coordinate, in the unit box, within which a run has arrived at the end of an earlier one.
 const ARRIVED: f64 = 0.01;
 
-/// Largest cost of a run that has found nothing better, relative to that of the run that has found the best point.
-const PATIENCE: usize = 3;
+/// Relative difference of two objectives up to which a run that is near an earlier end has not improved it.
+const NO_BETTER: f64 = 1e-6;
+
+/// Largest cost of a run that has found nothing better, relative to that of the run that has found the best point. Where this is
+/// shown to be stationary, the latter is counted up to its last gain.
+const PATIENCE: f64 = 3.0;
+const PATIENCE_STATIONARY: f64 = 1.5;
+
+/// Number of runs before their cost is limited by that of the last gain.
+const MIN_RUNS: usize = 3;
 
 /// Objective that is regarded as zero. A scaled value of 1 is the demand.
 pub const SMALL: f64 = 1e-6;
@@ -93,9 +110,14 @@ impl Multistart {
             phase: Phase::Initial,
             starts,
             is_thorough: false,
+            is_doubted: false,
             drawn: 0,
+            runs: 0,
             allowed: 0,
-            arrived: 0,
+            to_gain: 0,
+            cost: 0,
+            is_stationary: false,
+            proof: Proof::default(),
             initial: Vec::new(),
             queue: Vec::new(),
             best: None,
@@ -169,12 +191,17 @@ impl Multistart {
         })
     }
 
+    /// Returns what has been spent up to the last gain, and since then.
+    pub fn proof(&self) -> Proof {
+        self.proof
+    }
+
     /// Continues from the remaining starting points although the ends agree; returns false if there are none.
     ///
     /// # Errors
     /// When the run ends: budget exhausted, or interrupted by the user.
-    pub fn continue_thoroughly(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
-        self.is_thorough = true;
+    pub fn continue_in_doubt(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
+        (self.is_doubted, self.is_stationary) = (true, false);
         let Some(start) = self.next_start(oracle)? else { return Ok(false) };
         self.start_run(oracle, &start)?;
         Ok(true)
@@ -189,33 +216,57 @@ impl Multistart {
 
     /// Returns the merit of the earlier end at which the present run has arrived.
     fn arrival(&self) -> Option<Merit> {
-        let is_global = self.phase == Phase::Sampled && self.restart_round.count == 0 && !self.is_thorough;
+        let is_global = self.phase == Phase::Sampled && self.restart_round.count == 0;
+        let is_global = is_global && !self.is_thorough && !self.is_doubted;
         let here = self.run_best.as_ref().filter(|_| is_global)?;
         let is_near = |point: &Vec<f64>| point.iter().zip(&here.point).all(|(a, b)| (a - b).abs() <= ARRIVED);
         let known = self.end_points.iter().zip(&self.ends).filter(|(point, _)| is_near(point)).map(|(_, merit)| *merit);
-        known.into_iter().find(|merit| merit.is_feasible() && !here.merit.is_better_than(merit))
+        known.into_iter().find(|known| {
+            let is_equal =
+                known.objective - here.merit.objective <= NO_BETTER * (known.objective.abs() + SMALL_OBJECTIVE);
+            known.is_feasible() && (is_equal || !here.merit.is_better_than(known))
+        })
     }
 
     /// Takes the end of the present run into account.
-    fn record_end(&mut self, oracle: &dyn Oracle, progress: Progress, end: Merit) {
+    fn record_end(&mut self, oracle: &mut dyn Oracle, progress: Progress, end: Merit) {
         if self.restart_round.count == 0 {
             self.ends.push(end);
             self.end_points.push(self.run_best.as_ref().map_or_else(Vec::new, |best| best.point.clone()));
         }
         let found = oracle.best().map_or(Merit::FAILED, |best| best.merit);
-        if self.best.is_none_or(|(known, _)| found.is_better_than(&known)) {
-            self.best = Some((found, progress));
-            self.arrived = self.allowed - oracle.remaining();
+        let known = self.best.map(|(known, _)| known);
+        if known.is_some_and(|known| !found.is_better_than(&known)) {
+            return;
+        }
+        self.best = Some((found, progress));
+        self.cost = self.allowed - oracle.remaining();
+        let is_confirmed_elsewhere =
+            self.is_thorough || self.is_doubted || self.restart_round.count > 0 || self.starts < 2;
+        if !is_confirmed_elsewhere && known.is_none_or(|known| is_gain(&found, &known)) {
+            let point = oracle.best().map_or_else(Vec::new, |best| best.point.clone());
+            self.is_stationary = progress == Progress::Converged && optimality(oracle, &point).is_stationary();
         }
     }
 
     /// Returns true if the present run has cost too much for one that has found nothing better.
+    #[allow(clippy::cast_precision_loss)]
     fn is_hopeless(&self, oracle: &dyn Oracle) -> bool {
-        let is_better = |here: &Evaluation| self.best.is_none_or(|(best, _)| here.merit.is_better_than(&best));
+        let is_better = |here: &Evaluation| self.best.is_none_or(|(best, _)| is_gain(&here.merit, &best));
+        let (patience, cost) =
+            if self.is_stationary { (PATIENCE_STATIONARY, self.to_gain) } else { (PATIENCE, self.cost) };
+        let cost = cost.max(oracle.shape().dimension() + 1);
         self.phase == Phase::Sampled
             && !self.is_thorough
             && !self.run_best.as_ref().is_some_and(is_better)
-            && self.allowed - oracle.remaining() > PATIENCE * self.arrived.max(oracle.shape().dimension() + 1)
+            && (self.allowed - oracle.remaining()) as f64 > patience * cost as f64
+    }
+
+    /// Returns true if no further starting point in the whole box is needed.
+    fn is_enough(&self, oracle: &dyn Oracle) -> bool {
+        let factor = if self.is_stationary { STATIONARY } else { NOT_SHOWN };
+        let is_agreed = !self.is_doubted && self.is_settled();
+        !self.is_thorough && (is_agreed || self.runs >= MIN_RUNS && self.proof.is_spent(oracle, factor))
     }
 
     /// Returns the next starting point in the whole box; `None` if there is none or no need for one.
@@ -223,7 +274,7 @@ impl Multistart {
         if self.restart_round.count > 0 {
             return Ok(self.queue.pop());
         }
-        if self.is_settled() && !self.is_thorough {
+        if self.is_enough(oracle) {
             self.queue.clear();
             return Ok(None);
         }
@@ -232,7 +283,7 @@ impl Multistart {
         let n = oracle.shape().dimension() - local.len();
         if self.queue.is_empty() && self.drawn < self.starts && n > 0 {
             let left = self.starts - self.drawn;
-            let count = if self.is_thorough { left } else { AT_ONCE.min(left) };
+            let count = if self.is_thorough || self.is_doubted { left } else { AT_ONCE.min(left) };
             let mut random = oracle.stream(&if self.drawn == 1 {
                 "multistart".to_owned()
             } else {
@@ -284,8 +335,9 @@ impl Solver for Multistart {
         self.queue.clear();
         self.end_points.clear();
         self.ends.clear();
-        self.drawn = 1;
+        (self.drawn, self.runs) = (1, 0);
         self.initial = start.to_vec();
+        self.proof = Proof::begin(oracle);
         self.start_run(oracle, start)
     }
 
@@ -297,6 +349,9 @@ impl Solver for Multistart {
             Phase::Sampled => None,
         };
         let progress = solver.unwrap_or(&mut self.local).step(&mut archive)?;
+        if self.proof.observe(archive.oracle) {
+            self.to_gain = self.allowed - archive.oracle.remaining();
+        }
         if progress == Progress::Continue {
             if let Some(end) = self.arrival() {
                 self.record_end(oracle, Progress::Converged, end);
@@ -317,6 +372,7 @@ impl Solver for Multistart {
             self.record_end(oracle, progress, end);
         }
         self.phase = Phase::Sampled;
+        self.runs += 1;
         if self.best.is_some_and(|(best, progress)| {
             progress == Progress::Converged && best.is_feasible() && oracle.shape().is_noise(best.objective)
         }) {
