@@ -34,7 +34,7 @@ use crate::weighted_chebyshev::WeightedChebyshevOptions;
 ///
 /// Every method for one objective runs from several points (multistart): the initial guess of the study and the best
 /// points of samples of the box, until another optimum is unlikely. What is spent after the last gain is limited in proportion to
-/// what has been spent before it: to three times as much where the point is shown to be stationary, to sixty times elsewhere. Where the best point is then not shown to be stationary,
+/// what has been spent before it: to three times as much where the point is shown to be stationary and no other optimum is known, to sixty times elsewhere. Where the best point is then not shown to be stationary,
 /// or the runs have ended at several optima, and the objective is no sum of squares, a pattern search continues from it, and from the end of the first run if that
 /// has not converged: an optimum may lie at a discontinuity (of a settling time, for example), where gradients are of no use.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -144,10 +144,11 @@ impl Solver for Auto {
                 self.proof = global.proof();
                 let Some(best) = oracle.best().cloned() else { return Ok(Progress::Stalled) };
                 let (converged, confirmed) = (progress == Progress::Converged, global.is_settled());
+                let is_unique = Basins::of(best.merit, &self.ends).optima < 2;
                 // Otherwise the best point may stand in a narrow curved valley, where derivatives show no descent.
-                let is_trusted = converged && (confirmed || Basins::of(best.merit, &self.ends).optima < 2);
+                let is_trusted = converged && (confirmed || is_unique);
                 let optimality = optimality(oracle, &best.point);
-                let proof = if optimality.is_stationary() { STATIONARY } else { NOT_SHOWN };
+                let proof = if is_unique && optimality == Optimality::Stationary { STATIONARY } else { NOT_SHOWN };
                 let status = Status { converged, confirmed, proof, previous_objective: f64::INFINITY };
                 match optimality {
                     Optimality::Stationary if is_trusted => Ok(Progress::Converged),

@@ -4,7 +4,7 @@
 //! optimum that is not yet known is unlikely, until the confirmation has cost its share (see [`crate::proof`]), or until the
 //! residuals of a calibration are noise. A run that comes close to the end of an earlier one is not continued. If enabled, runs from points around the best one follow until nothing changes.
 
-use mops_core::{Basins, Evaluation, Halt, Merit, Oracle, Progress, SMALL_OBJECTIVE, Shape, Solver};
+use mops_core::{Basins, Evaluation, Halt, Merit, Optimality, Oracle, Progress, SMALL_OBJECTIVE, Shape, Solver};
 
 use crate::local_archive::LocalArchive;
 use crate::optimality::optimality;
@@ -245,7 +245,8 @@ impl Multistart {
             self.is_thorough || self.is_doubted || self.restart_round.count > 0 || self.starts < 2;
         if !is_confirmed_elsewhere && known.is_none_or(|known| is_gain(&found, &known)) {
             let point = oracle.best().map_or_else(Vec::new, |best| best.point.clone());
-            self.is_stationary = progress == Progress::Converged && optimality(oracle, &point).is_stationary();
+            self.is_stationary =
+                progress == Progress::Converged && optimality(oracle, &point) == Optimality::Stationary;
         }
     }
 
@@ -264,7 +265,8 @@ impl Multistart {
 
     /// Returns true if no further starting point in the whole box is needed.
     fn is_enough(&self, oracle: &dyn Oracle) -> bool {
-        let factor = if self.is_stationary { STATIONARY } else { NOT_SHOWN };
+        let is_unique = self.best.is_some_and(|(best, _)| Basins::of(best, &self.ends).optima < 2);
+        let factor = if self.is_stationary && is_unique { STATIONARY } else { NOT_SHOWN };
         let is_agreed = !self.is_doubted && self.is_settled();
         !self.is_thorough && (is_agreed || self.runs >= MIN_RUNS && self.proof.is_spent(oracle, factor))
     }

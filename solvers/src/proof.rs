@@ -16,13 +16,13 @@ pub struct Proof {
     merit: Option<Merit>,
 }
 
-/// Factor on the cost of the last gain where the best point is shown to be stationary.
+/// Factor on the cost of the last gain where the best point is shown to be stationary and no other optimum is known.
 ///
 /// With 3, `auto` solves as many problems of the suites `minimax`, `hock-schittkowski` and `control` as without a limit; with 2, it
 /// loses one of `control`.
 pub const STATIONARY: usize = 3;
 
-/// The same factor where no such proof exists: at jumps and in narrow curved valleys, local searches end anywhere. With 20, one of
+/// The same factor elsewhere: at kinks, at jumps and in narrow curved valleys, local searches end anywhere. With 20, one of
 /// five searches for the shortest settling time under a limit of the overshoot ends elsewhere.
 pub const NOT_SHOWN: usize = 60;
 
