@@ -224,7 +224,7 @@ impl Multistart {
         known.into_iter().find(|known| {
             let is_equal =
                 known.objective - here.merit.objective <= NO_BETTER * (known.objective.abs() + SMALL_OBJECTIVE);
-            known.is_feasible() && (is_equal || !here.merit.is_better_than(known))
+            known.is_feasible() && (self.is_stationary && is_equal || !here.merit.is_better_than(known))
         })
     }
 
@@ -253,7 +253,10 @@ impl Multistart {
     /// Returns true if the present run has cost too much for one that has found nothing better.
     #[allow(clippy::cast_precision_loss)]
     fn is_hopeless(&self, oracle: &dyn Oracle) -> bool {
-        let is_better = |here: &Evaluation| self.best.is_none_or(|(best, _)| is_gain(&here.merit, &best));
+        let is_better = |here: &Evaluation| {
+            let of_same_optimum = |best: &Merit| self.is_stationary && !is_gain(&here.merit, best);
+            self.best.is_none_or(|(best, _)| here.merit.is_better_than(&best) && !of_same_optimum(&best))
+        };
         let (patience, cost) =
             if self.is_stationary { (PATIENCE_STATIONARY, self.to_gain) } else { (PATIENCE, self.cost) };
         let cost = cost.max(oracle.shape().dimension() + 1);
