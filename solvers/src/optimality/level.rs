@@ -46,6 +46,11 @@ impl Level {
         (self.objective(shape, values) - self.value).abs() <= ROUNDING * self.size()
     }
 
+    /// Returns true if the objective of scaled values is that at the point, to the last bit.
+    pub fn is_identical(&self, shape: &Shape, values: &[f64]) -> bool {
+        self.objective(shape, values).to_bits() == self.value.to_bits()
+    }
+
     fn size(&self) -> f64 {
         self.value.abs() + SMALL_OBJECTIVE
     }

@@ -3,7 +3,7 @@
 mod cone;
 mod level;
 
-use mops_core::{Linearisation, Optimality, Oracle, Pareto, Shape, Usage};
+use mops_core::{Evaluation, Linearisation, Optimality, Oracle, Pareto, Shape, Usage};
 use nalgebra::DMatrix;
 
 use crate::epigraph::{Direction, Subproblem};
@@ -34,7 +34,8 @@ const SAMPLING_RADIUS: f64 = 0.5 * TRIAL_STEP;
 /// discontinuity. Such a cut says nothing about the point.
 const MAX_CUT_VALUE: f64 = 0.5;
 
-/// Distances from a point at which a plateau is looked for, in the unit box.
+/// Distances from a point at which a plateau is looked for, in the unit box. On a saturated criterion the values at the first
+/// one are identical; those of a very flat minimum differ at the second one at the latest.
 const PLATEAU_REACH: [f64; 2] = [1e-3, 1e-2];
 
 /// Cutting-plane model of what a direction would improve.
@@ -170,12 +171,18 @@ pub fn optimality(oracle: &mut dyn Oracle, point: &[f64]) -> Optimality {
 /// Classifies a point without slope by the values around it.
 fn beside_flat(oracle: &mut dyn Oracle, point: &[f64], level: &Level) -> Optimality {
     let shape = oracle.shape().clone();
-    let around: Vec<Vec<f64>> = PLATEAU_REACH.into_iter().flat_map(|distance| beside(point, distance)).collect();
-    let Ok(answers) = oracle.evaluate(&around) else { return Optimality::NotShown };
-    let values: Vec<&Vec<f64>> = answers.iter().filter_map(|answer| answer.scaled.as_ref()).collect();
-    if values.iter().any(|values| level.is_improvement(&shape, values)) {
+    let [mut near, far] = PLATEAU_REACH.map(|distance| beside(point, distance).collect::<Vec<_>>());
+    let nearest = near.len();
+    near.extend(far);
+    let Ok(answers) = oracle.evaluate(&near) else { return Optimality::NotShown };
+    let (near, far) = answers.split_at(nearest);
+    let values = |answers: &[Evaluation]| answers.iter().filter_map(|answer| answer.scaled.clone()).collect::<Vec<_>>();
+    let (near, far) = (values(near), values(far));
+    if near.iter().chain(&far).any(|values| level.is_improvement(&shape, values)) {
         Optimality::Descent
-    } else if values.iter().all(|values| level.is_equal(&shape, values)) {
+    } else if near.iter().all(|values| level.is_identical(&shape, values))
+        || near.iter().chain(&far).all(|values| level.is_equal(&shape, values))
+    {
         Optimality::Plateau
     } else {
         Optimality::Stationary
