@@ -86,6 +86,84 @@ fn a_plateau_is_neither_converged_nor_certified() {
     assert!((result["objective"].as_f64().unwrap() - 1.0).abs() < 1e-6, "{text}");
 }
 
+/// Paraboloid of two tuners between two limits, `clip(rise + width ((a - a0)^2 + (b - b0)^2), low, high)`.
+struct Saturated {
+    rise: f64,
+    width: f64,
+    centre: [f64; 2],
+    limits: [f64; 2],
+}
+
+impl Saturated {
+    fn random(uniform: &mut impl FnMut() -> f64) -> Self {
+        let mut between = |low: f64, high: f64| low + (high - low) * uniform();
+        let low = between(0.05, 1.5);
+        Self {
+            rise: between(-1.0, 1.0),
+            width: between(0.2, 3.0),
+            centre: [between(-1.0, 3.0), between(-1.0, 3.0)],
+            limits: [low, low + between(0.1, 2.0)],
+        }
+    }
+
+    fn at(&self, [a, b]: [f64; 2]) -> f64 {
+        let [a0, b0] = self.centre;
+        let squares = (a - a0) * (a - a0) + (b - b0) * (b - b0);
+        (self.rise + self.width * squares).clamp(self.limits[0], self.limits[1])
+    }
+
+    fn formula(&self) -> String {
+        let Self { rise, width, centre: [a, b], limits: [low, high] } = self;
+        format!("clip({rise} + {width}*((a - ({a}))^2 + (b - ({b}))^2), {low}, {high})")
+    }
+}
+
+#[test]
+#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+fn no_search_converges_on_a_plateau_of_saturated_criteria() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study.toml");
+    let mut uniform = uniform(7);
+    let [mut plateaus, mut slopes] = [0; 2];
+    for k in 0..40 {
+        let criteria = [Saturated::random(&mut uniform), Saturated::random(&mut uniform)];
+        let start = [2.0 * uniform(), 2.0 * uniform()];
+        let text = format!(
+            "[study]\nname = \"saturated\"\n[models.plant.equations]\nstates = {{ x = \"1\" }}\n\
+             parameters = {{ a = \"1\", b = \"1\" }}\nder = {{ x = \"-x*1 [1/s]\" }}\nhorizon = \"0.1 s\"\n\
+             outputs = {{ y = {{ value = \"{}\", unit = \"1\" }}, z = {{ value = \"{}\", unit = \"1\" }} }}\n\
+             [tuners]\na = {{ start = {}, min = 0, max = 2 }}\nb = {{ start = {}, min = 0, max = 2 }}\n\
+             [criteria]\ny = {{ peak = {{ signal = \"y\" }}, demand = 1 }}\nz = {{ peak = {{ signal = \"z\" }}, demand = 1 }}\n",
+            criteria[0].formula(),
+            criteria[1].formula(),
+            start[0],
+            start[1],
+        );
+        std::fs::write(&study, text).unwrap();
+        let solver = ["auto", "sqp", "pattern-search", "genetic"][k % 4];
+        let more = ["--solver", solver, "--max-evaluations", "1000"];
+        let (result, text) = run(study.to_str().unwrap(), folder.path(), &more);
+        let at = ["a", "b"].map(|name| {
+            let tuner = result["tuners"].as_array().unwrap().iter().find(|tuner| tuner["name"] == name);
+            tuner.unwrap()["value"].as_f64().unwrap()
+        });
+        let objective = |at: [f64; 2]| criteria[0].at(at).max(criteria[1].at(at));
+        // All points of a square of two thousandths of the box.
+        let mut around = (0..200).map(|_| at.map(|u| (u + 4e-3 * (uniform() - 0.5)).clamp(0.0, 2.0)));
+        #[allow(clippy::float_cmp)]
+        let is_plateau = around.all(|there| objective(there) == objective(at));
+        if is_plateau {
+            plateaus += 1;
+            assert_ne!(result["stop"], "converged", "{k}, {solver}: {text}");
+            assert_ne!(result["pareto"], "certified-local", "{k}, {solver}: {text}");
+            assert!(text.contains("On a plateau"), "{k}, {solver}: {text}");
+        } else {
+            slopes += 1;
+        }
+    }
+    assert!(plateaus > 5 && slopes > 5, "{plateaus} and {slopes}");
+}
+
 #[test]
 fn a_discontinuity_and_ends_that_differ_are_the_first_line() {
     let folder = tempfile::tempdir().unwrap();
@@ -114,13 +192,18 @@ dip  = { step-envelope = { signal = "phi", lower = [["1.2 s", "29.7 deg"]] }, us
     }
 }
 
-/// Standard normal numbers by the sum of twelve uniform ones, from a linear congruential generator.
-fn noise(seed: u64) -> impl FnMut() -> f64 {
+/// Uniform numbers between 0 and 1, from a linear congruential generator.
+fn uniform(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
-    let mut uniform = move || {
+    move || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
+    }
+}
+
+/// Standard normal numbers by the sum of twelve uniform ones.
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut uniform = uniform(seed);
     move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
 
