@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Compare the processor times of NSGA-II in mops and in pymoo on ZDT1 (100 members, 250 generations).
+"""Compare the processor times of NSGA-II in mops, pymoo and pagmo2 on ZDT1 (100 members, 250 generations).
 
-    pip install pymoo
-    cargo build --release
-    python3 benches/peers/nsga2_beside_pymoo.py target/release/mops
+    pip install pymoo pygmo
+    cargo build --release -p mops-bench
+    python3 benches/peers/nsga2_beside_others.py target/release/mops-bench
 
-pymoo: J. Blank, K. Deb, pymoo: Multi-Objective Optimization in Python, IEEE Access 8 (2020) 89497.
+pymoo: J. Blank, K. Deb, pymoo: Multi-Objective Optimization in Python, IEEE Access 8 (2020) 89497. pagmo2: F. Biscani, D. Izzo,
+Journal of Open Source Software 5 (2020) 2338.
 """
 
 import argparse
@@ -18,6 +19,7 @@ import time
 from pathlib import Path
 
 import numpy
+import pygmo
 import pymoo
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.indicators.hv import HV
@@ -37,7 +39,7 @@ def of_mops(program, problem, seeds):
     """Return the means of processor time, hypervolume and evaluations per run; the time is of the whole process."""
     with tempfile.TemporaryDirectory() as folder:
         before = of_children()
-        command = [program, "bench", "zdt", "--problems", problem, "--solver", "nsga2", "--quiet"]
+        command = [program, "zdt", "--problems", problem, "--solver", "nsga2", "--quiet"]
         subprocess.run(
             command + ["--seeds", str(seeds), "--jobs", "1", "--out", folder], check=True, stdout=subprocess.DEVNULL
         )
@@ -59,21 +61,38 @@ def of_pymoo(problem, seeds):
     return statistics.mean(seconds), statistics.mean(volumes), MEMBERS * GENERATIONS
 
 
+def of_pagmo(problem, seeds):
+    """Return the means for pagmo2, as far as they are those of NSGA-II; its number of members is a multiple of 4."""
+    number = int(problem[-1])
+    seconds, volumes = [], []
+    for seed in range(1, seeds + 1):
+        population = pygmo.population(pygmo.zdt(number, param=10 if number in (4, 6) else 30), size=MEMBERS, seed=seed)
+        algorithm = pygmo.algorithm(pygmo.nsga2(gen=GENERATIONS - 1, seed=seed))
+        before = time.process_time()
+        population = algorithm.evolve(population)
+        seconds.append(time.process_time() - before)
+        points = population.get_f()
+        volumes.append(pygmo.hypervolume(points[(points < 1.1).all(axis=1)]).compute([1.1, 1.1]))
+    return statistics.mean(seconds), statistics.mean(volumes), MEMBERS * GENERATIONS
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("mops", help="path of the release build")
     parser.add_argument("--problem", default="ZDT1", help="a problem of the suite zdt")
-    parser.add_argument("--seeds", type=int, default=5, help="number of runs of each")
+    parser.add_argument("--seeds", type=int, default=20, help="number of runs of each")
     arguments = parser.parse_args()
     rows = [
         ("mops", *of_mops(arguments.mops, arguments.problem, arguments.seeds)),
         (f"pymoo {pymoo.__version__}", *of_pymoo(arguments.problem, arguments.seeds)),
+        (f"pagmo {pygmo.__version__}", *of_pagmo(arguments.problem, arguments.seeds)),
     ]
     print(f"{arguments.problem}, NSGA-II, {MEMBERS} members, {GENERATIONS} generations, mean of {arguments.seeds} seeds")
     print(f"{'':14}{'CPU s':>9}{'volume':>9}{'evaluations':>13}")
     for name, seconds, volume, evaluations in rows:
         print(f"{name:14}{seconds:9.3f}{volume:9.4f}{evaluations:13.0f}")
-    print(f"mops takes 1/{rows[1][1] / rows[0][1]:.1f} of the processor time of pymoo")
+    for name, seconds, *_ in rows[1:]:
+        print(f"mops takes {rows[0][1] / seconds:.2f} times the processor time of {name}")
 
 
 if __name__ == "__main__":
