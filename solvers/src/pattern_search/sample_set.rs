@@ -16,6 +16,10 @@ const DROP_COUNT: usize = 200;
 /// Radius of the neighbourhood whose points enter the models, in trust-region radii.
 const NEIGHBOURHOOD_RADIUS: f64 = 2.5;
 
+/// Number of points that enter the models, which is that of the coefficients of a quadratic in 20 coordinates. The fit takes time
+/// in proportion to the third power of this number.
+const MOST_NEIGHBOURS: usize = 231;
+
 impl SampleSet {
     /// Creates an empty set for points with `dimension` coordinates and `criteria` values.
     pub fn new(dimension: usize, criteria: usize) -> Self {
@@ -60,7 +64,8 @@ impl SampleSet {
     }
 
     /// Finds the points around a centre with their distances in radii, the nearest first. Their number is limited to
-    /// that of the coefficients of a quadratic.
+    /// that of the coefficients of a quadratic, for many coordinates to the larger of [`MOST_NEIGHBOURS`] and three per
+    /// coordinate.
     pub fn neighbours(&self, centre: &[f64], radius: f64, neighbours: &mut Vec<(f64, usize)>) {
         let n = self.dimension;
         let distance =
@@ -70,7 +75,7 @@ impl SampleSet {
             (0..self.count).map(|i| (distance(i), i)).filter(|(distance, _)| *distance <= NEIGHBOURHOOD_RADIUS),
         );
         neighbours.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        neighbours.truncate((n + 1) * (n + 2) / 2);
+        neighbours.truncate(((n + 1) * (n + 2) / 2).min(MOST_NEIGHBOURS.max(3 * n)));
     }
 }
 
