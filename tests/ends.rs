@@ -148,7 +148,7 @@ fn no_search_converges_on_a_plateau_of_saturated_criteria() {
             tuner.unwrap()["value"].as_f64().unwrap()
         });
         let objective = |at: [f64; 2]| criteria[0].at(at).max(criteria[1].at(at));
-        // All points of a square of two thousandths of the box.
+        // 200 random points in a square with a side of 0.002 in the unit box.
         let mut around = (0..200).map(|_| at.map(|u| (u + 4e-3 * (uniform() - 0.5)).clamp(0.0, 2.0)));
         #[allow(clippy::float_cmp)]
         let is_plateau = around.all(|there| objective(there) == objective(at));

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Calibrate twelve parameters of a drive with a flexible coupling, by mops and by SciPy, from the same start values.
+"""Calibrate twelve parameters of a drive with a flexible coupling, with mops and SciPy from the same initial guess.
 
     pip install scipy numba
     cargo build --release
@@ -22,7 +22,7 @@ import numpy
 from numba import njit
 from scipy.optimize import least_squares
 
-SAMPLES, PERIOD, HELD, NOISE = 1001, 0.02, 25, 0.005
+SAMPLES, PERIOD, SAMPLES_PER_STEP, NOISE = 1001, 0.02, 25, 0.005
 NAMES = ["J1", "J2", "k", "kc", "d", "b1", "b2", "q1", "q2", "G", "g0", "Ta"]
 TRUE = numpy.array([0.02, 0.05, 3.0, 40.0, 0.02, 0.03, 0.01, 0.004, 0.002, 0.6, 0.05, 0.08])
 START = numpy.array([0.01, 0.03, 1.5, 64.0, 0.01, 0.06, 0.005, 0.008, 0.0032, 0.96, 0.08, 0.16])
@@ -88,12 +88,12 @@ def simulate(p, u, steps):
 def data():
     """Return input and measured angles."""
     random = numpy.random.default_rng(8)
-    u = numpy.repeat(random.uniform(-2, 2, SAMPLES // HELD + 1), HELD)[:SAMPLES]
+    u = numpy.repeat(random.uniform(-2, 2, SAMPLES // SAMPLES_PER_STEP + 1), SAMPLES_PER_STEP)[:SAMPLES]
     return u, simulate(TRUE, u, 10) + NOISE * random.standard_normal((SAMPLES, 2))
 
 
-def of_mops(program, u, measured):
-    """Return processor time, objective, evaluations and simulations of mops."""
+def run_mops(program, u, measured):
+    """Return processor time, parameters, evaluations and simulations."""
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
         rows = [f"{i * PERIOD:.2f},{u[i]},{a},{b}" for i, (a, b) in enumerate(measured)]
@@ -113,8 +113,8 @@ def of_mops(program, u, measured):
     return seconds, values, result["evaluations"], result["simulations"]
 
 
-def of_scipy(u, measured):
-    """Return the same of SciPy."""
+def run_scipy(u, measured):
+    """Return processor time, parameters, evaluations and simulations."""
     simulations = 0
 
     def residuals(logarithms):
@@ -138,7 +138,7 @@ def main():
     print("            processor s  evaluations  simulations  residual / noise")
     seconds = {}
     program = parser.parse_args().mops
-    for name, run in [("mops", lambda: of_mops(program, u, measured)), ("SciPy", lambda: of_scipy(u, measured))]:
+    for name, run in [("mops", lambda: run_mops(program, u, measured)), ("SciPy", lambda: run_scipy(u, measured))]:
         # The least of three runs.
         seconds[name], values, evaluations, simulations = min((run() for _ in range(3)), key=lambda found: found[0])
         residual = (simulate(values, u, 10) - measured) / NOISE

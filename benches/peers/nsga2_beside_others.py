@@ -62,13 +62,13 @@ def of_pymoo(problem, seeds):
 
 
 def of_pagmo(problem, seeds):
-    """Return the means for pagmo2, as far as they are those of NSGA-II; its number of members is a multiple of 4."""
+    """Return the means for pagmo2, whose number of members is a multiple of 4; the time excludes import and hypervolume."""
     number = int(problem[-1])
     seconds, volumes = [], []
     for seed in range(1, seeds + 1):
-        population = pygmo.population(pygmo.zdt(number, param=10 if number in (4, 6) else 30), size=MEMBERS, seed=seed)
         algorithm = pygmo.algorithm(pygmo.nsga2(gen=GENERATIONS - 1, seed=seed))
         before = time.process_time()
+        population = pygmo.population(pygmo.zdt(number, param=10 if number in (4, 6) else 30), size=MEMBERS, seed=seed)
         population = algorithm.evolve(population)
         seconds.append(time.process_time() - before)
         points = population.get_f()

@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::chaining::Chain;
+use crate::confirmation::{Confirmation, factor};
 use crate::levenberg_marquardt::LevenbergMarquardtOptions;
 use crate::multimethod::Multimethod;
 use crate::multistart::{Multistart, SMALL};
@@ -16,7 +17,6 @@ use crate::nsga3::Nsga3Options;
 use crate::optimality::optimality;
 use crate::pattern_search::PatternSearchOptions;
 use crate::polishing::pattern_at_best;
-use crate::proof::{NOT_SHOWN, Proof, STATIONARY};
 use crate::quasi_newton::QuasiNewton;
 use crate::sqp::SqpOptions;
 use crate::weighted_chebyshev::WeightedChebyshevOptions;
@@ -33,10 +33,12 @@ use crate::weighted_chebyshev::WeightedChebyshevOptions;
 ///   or lists; otherwise `nsga2` for two criteria and `nsga3` for more.
 ///
 /// Every method for one objective runs from several points (multistart): the initial guess of the study and the best
-/// points of samples of the box, until another optimum is unlikely. What is spent after the last gain is limited in proportion to
-/// what has been spent before it: to three times as much where the point is shown to be stationary and no other optimum is known, to sixty times elsewhere. Where the best point is then not shown to be stationary,
-/// or the runs have ended at several optima, and the objective is no sum of squares, a pattern search continues from it, and from the end of the first run if that
-/// has not converged: an optimum may lie at a discontinuity (of a settling time, for example), where gradients are of no use.
+/// points of samples of the box, until another optimum is unlikely. Where the best point is then not shown to be stationary,
+/// or the runs have ended at several optima, and the objective is no sum of squares, a pattern search continues from it,
+/// and from the end of the first run if that has not converged: an optimum may lie at a discontinuity (of a settling time,
+/// for example), where gradients are of no use. Unless the objective is a sum of squares, the search ends once the
+/// evaluations since the last decrease of the objective by a thousandth exceed a multiple of those before it: 3 times where
+/// the point is shown to be stationary and no other optimum is known, 60 times elsewhere.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {
@@ -55,13 +57,7 @@ impl SolverOptions for AutoOptions {
     const KIND: &'static str = "auto";
 
     fn build(&self) -> Box<dyn Solver> {
-        Box::new(Auto {
-            options: self.clone(),
-            stage: None,
-            methods: Vec::new(),
-            ends: Vec::new(),
-            proof: Proof::default(),
-        })
+        Box::new(Auto { options: self.clone(), stage: None, methods: Vec::new(), ends: Vec::new(), confirmation: None })
     }
 }
 
@@ -71,8 +67,8 @@ struct Auto {
     methods: Vec<&'static str>,
     /// Merits at which the runs from different starting points have ended.
     ends: Vec<Merit>,
-    /// Cost of the last gain, once the runs from different starting points have ended.
-    proof: Proof,
+    /// Evaluations up to the last gain, and since then, once the runs from different starting points have ended.
+    confirmation: Option<Confirmation>,
 }
 
 enum Stage {
@@ -93,8 +89,8 @@ struct Status {
     converged: bool,
     /// True if two runs have reached the best point and another optimum is unlikely.
     confirmed: bool,
-    /// Limit of the proof, as a factor on the cost of the last gain.
-    proof: usize,
+    /// Limit on the evaluations since the last gain, relative to those up to it.
+    limit_factor: usize,
     /// Objective at the start of the last multistart around the best point.
     previous_objective: f64,
 }
@@ -141,33 +137,39 @@ impl Solver for Auto {
                     return Ok(progress);
                 }
                 self.ends = global.ends().to_vec();
-                self.proof = global.proof();
+                self.confirmation = global.confirmation();
                 let Some(best) = oracle.best().cloned() else { return Ok(Progress::Stalled) };
                 let (converged, confirmed) = (progress == Progress::Converged, global.is_settled());
                 let is_unique = Basins::of(best.merit, &self.ends).optima < 2;
                 // Otherwise the best point may stand in a narrow curved valley, where derivatives show no descent.
                 let is_trusted = converged && (confirmed || is_unique);
                 let optimality = optimality(oracle, &best.point);
-                let proof = if is_unique && optimality == Optimality::Stationary { STATIONARY } else { NOT_SHOWN };
-                let status = Status { converged, confirmed, proof, previous_objective: f64::INFINITY };
+                // The test may have found a better point.
+                let is_gain = is_gain(&mut self.confirmation, oracle);
+                let limit_factor =
+                    factor(best.merit, if is_gain { Optimality::Descent } else { optimality }, &self.ends);
+                let status = Status { converged, confirmed, limit_factor, previous_objective: f64::INFINITY };
+                let is_limit_reached = is_limit_reached(self.confirmation, oracle, limit_factor);
                 match optimality {
                     Optimality::Stationary if is_trusted => Ok(Progress::Converged),
                     // At a kink, linear models may hide a narrow valley.
                     Optimality::Kink if is_trusted => self.finish_or_restart(oracle, status, progress),
+                    _ if is_limit_reached => Ok(Progress::Stalled),
                     // Ends that are not optima confirm nothing.
-                    _ if self.proof.is_spent(oracle, NOT_SHOWN) => Ok(progress),
                     _ if global.continue_in_doubt(oracle)? => Ok(Progress::Continue),
                     _ => self.polish(oracle, status),
                 }
             }
             Stage::Polish(pattern, status) => {
-                let status = *status;
                 let progress = pattern.step(oracle)?;
-                self.proof.observe(oracle);
+                status.observe(&mut self.confirmation, oracle);
+                let status = *status;
                 match progress {
-                    Progress::Continue if !self.proof.is_spent(oracle, status.proof) => Ok(Progress::Continue),
+                    _ if is_limit_reached(self.confirmation, oracle, status.limit_factor) => {
+                        Ok(status.final_progress(Progress::Stalled))
+                    }
+                    Progress::Continue => Ok(Progress::Continue),
                     progress => {
-                        let progress = if progress == Progress::Continue { Progress::Stalled } else { progress };
                         // A better point than the ends of the runs is not confirmed by them.
                         let is_settled = |best: &Evaluation| Basins::of(best.merit, &self.ends).is_settled();
                         let confirmed = status.confirmed && oracle.best().is_some_and(is_settled);
@@ -176,11 +178,11 @@ impl Solver for Auto {
                 }
             }
             Stage::LocalRestarts(restarts, status) => {
-                let status = *status;
                 let progress = restarts.step(oracle)?;
-                self.proof.observe(oracle);
+                status.observe(&mut self.confirmation, oracle);
+                let status = *status;
                 match progress {
-                    Progress::Continue if self.proof.is_spent(oracle, status.proof) => {
+                    _ if is_limit_reached(self.confirmation, oracle, status.limit_factor) => {
                         Ok(status.final_progress(Progress::Stalled))
                     }
                     Progress::Continue => Ok(Progress::Continue),
@@ -217,7 +219,24 @@ impl Solver for Auto {
     }
 }
 
+/// Takes the best point into account; returns true if it is a gain.
+fn is_gain(confirmation: &mut Option<Confirmation>, oracle: &dyn Oracle) -> bool {
+    confirmation.as_mut().is_some_and(|confirmation| confirmation.observe(oracle))
+}
+
+/// Returns true if the evaluations since the last gain exceed their limit.
+fn is_limit_reached(confirmation: Option<Confirmation>, oracle: &dyn Oracle, limit_factor: usize) -> bool {
+    confirmation.is_some_and(|confirmation| confirmation.exceeds(oracle, limit_factor))
+}
+
 impl Status {
+    /// Takes the best point into account: of a better one, nothing is known yet.
+    fn observe(&mut self, confirmation: &mut Option<Confirmation>, oracle: &dyn Oracle) {
+        if is_gain(confirmation, oracle) {
+            self.limit_factor = factor(Merit::FAILED, Optimality::NotShown, &[]);
+        }
+    }
+
     fn final_progress(self, progress: Progress) -> Progress {
         if progress == Progress::Stalled && !self.converged { Progress::Stalled } else { Progress::Converged }
     }

@@ -1,14 +1,15 @@
 //! Multistart of a local solver.
 //!
 //! The first run starts from the initial guess of the study, the next ones from the best points of samples of the box, until an
-//! optimum that is not yet known is unlikely, until the confirmation has cost its share (see [`crate::proof`]), or until the
-//! residuals of a calibration are noise. A run that comes close to the end of an earlier one is not continued. If enabled, runs from points around the best one follow until nothing changes.
+//! optimum that is not yet known is unlikely, until the limit of evaluations without a gain is reached (see [`crate::confirmation`]), or until the
+//! residuals of a calibration are noise. A run that comes close to the end of an earlier one is not continued. If enabled, runs
+//! from points around the best one follow until nothing changes.
 
 use mops_core::{Basins, Evaluation, Halt, Merit, Optimality, Oracle, Progress, SMALL_OBJECTIVE, Shape, Solver};
 
+use crate::confirmation::{Confirmation, SAMPLE, factor, is_gain};
 use crate::local_archive::LocalArchive;
 use crate::optimality::optimality;
-use crate::proof::{NOT_SHOWN, Proof, STATIONARY, is_gain};
 use crate::start::{best_of, latin_hypercube};
 
 /// Local solver with a list of starting points.
@@ -25,18 +26,21 @@ pub struct Multistart {
     /// True if all of them are used and every run is brought to its end, whatever the ends show.
     is_thorough: bool,
     /// True if agreement of the ends confirms nothing.
-    is_doubted: bool,
-    /// Number of starting points so far, and number of runs.
+    ignores_agreement: bool,
+    /// Number of starting points so far.
     drawn: usize,
+    /// Number of runs that have ended or were abandoned.
     runs: usize,
     /// Evaluations that the oracle allowed at the beginning of the present run.
     allowed: usize,
-    /// Evaluations of the run that found the best point, up to the last gain and in all.
+    /// Evaluations of the run with the last gain, up to that gain.
     to_gain: usize,
+    /// Evaluations of the run that found the best point.
     cost: usize,
     /// True if the best point is shown to be stationary.
     is_stationary: bool,
-    proof: Proof,
+    /// Evaluations up to the last gain, and since then; `None` before the beginning.
+    confirmation: Option<Confirmation>,
     /// Initial guess of the study.
     initial: Vec<f64>,
     /// Remaining starting points, the next one last.
@@ -72,15 +76,18 @@ const AT_ONCE: usize = 2;
 /// Distance along every coordinate, in the unit box, within which a run has arrived at the end of an earlier one.
 const ARRIVED: f64 = 0.01;
 
-/// Relative difference of two objectives up to which a run that is near an earlier end has not improved it.
+/// Decrease of the objective, relative to the objective plus [`SMALL_OBJECTIVE`], up to which a run that is near an earlier end is
+/// no better.
 const NO_BETTER: f64 = 1e-6;
 
-/// Largest cost of a run that has found nothing better, relative to that of the run that has found the best point. Where this is
-/// shown to be stationary, the latter is counted up to its last gain.
+/// Largest cost of a run that has found nothing better, relative to that of the run that has found the best point.
 const PATIENCE: f64 = 3.0;
+
+/// Largest cost of such a run where the best point is shown to be stationary, relative to the cost up to the last gain: a run needs as much to arrive
+/// at the same optimum. With 3, `sqp` takes twice as many evaluations on `minimax` and solves no more problems.
 const PATIENCE_STATIONARY: f64 = 1.5;
 
-/// Number of runs before their cost is limited by that of the last gain.
+/// Minimum number of runs before the limit of evaluations without a gain applies: three ends at one optimum are not doubted.
 const MIN_RUNS: usize = 3;
 
 /// Objective that is regarded as zero. A scaled value of 1 is the demand.
@@ -110,14 +117,14 @@ impl Multistart {
             phase: Phase::Initial,
             starts,
             is_thorough: false,
-            is_doubted: false,
+            ignores_agreement: false,
             drawn: 0,
             runs: 0,
             allowed: 0,
             to_gain: 0,
             cost: 0,
             is_stationary: false,
-            proof: Proof::default(),
+            confirmation: None,
             initial: Vec::new(),
             queue: Vec::new(),
             best: None,
@@ -181,6 +188,7 @@ impl Multistart {
     /// When the run ends: budget exhausted, or interrupted by the user.
     pub fn begin_local_restarts(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
         self.phase = Phase::Sampled;
+        self.confirmation = Some(Confirmation::begin(oracle));
         self.start_restart_round(oracle)
     }
 
@@ -191,9 +199,9 @@ impl Multistart {
         })
     }
 
-    /// Returns what has been spent up to the last gain, and since then.
-    pub fn proof(&self) -> Proof {
-        self.proof
+    /// Returns the evaluations up to the last gain, and since then; `None` before the beginning.
+    pub fn confirmation(&self) -> Option<Confirmation> {
+        self.confirmation
     }
 
     /// Continues from the remaining starting points although the ends agree; returns false if there are none.
@@ -201,7 +209,7 @@ impl Multistart {
     /// # Errors
     /// When the run ends: budget exhausted, or interrupted by the user.
     pub fn continue_in_doubt(&mut self, oracle: &mut dyn Oracle) -> Result<bool, Halt> {
-        (self.is_doubted, self.is_stationary) = (true, false);
+        (self.ignores_agreement, self.is_stationary) = (true, false);
         let Some(start) = self.next_start(oracle)? else { return Ok(false) };
         self.start_run(oracle, &start)?;
         Ok(true)
@@ -217,14 +225,14 @@ impl Multistart {
     /// Returns the merit of the earlier end at which the present run has arrived.
     fn arrival(&self) -> Option<Merit> {
         let is_global = self.phase == Phase::Sampled && self.restart_round.count == 0;
-        let is_global = is_global && !self.is_thorough && !self.is_doubted;
+        let is_global = is_global && !self.is_thorough && !self.ignores_agreement;
         let here = self.run_best.as_ref().filter(|_| is_global)?;
         let is_near = |point: &Vec<f64>| point.iter().zip(&here.point).all(|(a, b)| (a - b).abs() <= ARRIVED);
         let known = self.end_points.iter().zip(&self.ends).filter(|(point, _)| is_near(point)).map(|(_, merit)| *merit);
         known.into_iter().find(|known| {
-            let is_equal =
+            let is_no_better =
                 known.objective - here.merit.objective <= NO_BETTER * (known.objective.abs() + SMALL_OBJECTIVE);
-            known.is_feasible() && (self.is_stationary && is_equal || !here.merit.is_better_than(known))
+            known.is_feasible() && (self.is_stationary && is_no_better || !here.merit.is_better_than(known))
         })
     }
 
@@ -241,9 +249,8 @@ impl Multistart {
         }
         self.best = Some((found, progress));
         self.cost = self.allowed - oracle.remaining();
-        let is_confirmed_elsewhere =
-            self.is_thorough || self.is_doubted || self.restart_round.count > 0 || self.starts < 2;
-        if !is_confirmed_elsewhere && known.is_none_or(|known| is_gain(&found, &known)) {
+        let skips_test = self.is_thorough || self.ignores_agreement || self.restart_round.count > 0 || self.starts < 2;
+        if !skips_test && (!self.is_stationary || known.is_none_or(|known| is_gain(&found, &known))) {
             let point = oracle.best().map_or_else(Vec::new, |best| best.point.clone());
             self.is_stationary =
                 progress == Progress::Converged && optimality(oracle, &point) == Optimality::Stationary;
@@ -259,7 +266,7 @@ impl Multistart {
         };
         let (patience, cost) =
             if self.is_stationary { (PATIENCE_STATIONARY, self.to_gain) } else { (PATIENCE, self.cost) };
-        let cost = cost.max(oracle.shape().dimension() + 1);
+        let cost = cost.max(SAMPLE * (oracle.shape().dimension() + 1));
         self.phase == Phase::Sampled
             && !self.is_thorough
             && !self.run_best.as_ref().is_some_and(is_better)
@@ -268,10 +275,12 @@ impl Multistart {
 
     /// Returns true if no further starting point in the whole box is needed.
     fn is_enough(&self, oracle: &dyn Oracle) -> bool {
-        let is_unique = self.best.is_some_and(|(best, _)| Basins::of(best, &self.ends).optima < 2);
-        let factor = if self.is_stationary && is_unique { STATIONARY } else { NOT_SHOWN };
-        let is_agreed = !self.is_doubted && self.is_settled();
-        !self.is_thorough && (is_agreed || self.runs >= MIN_RUNS && self.proof.is_spent(oracle, factor))
+        let is_agreed = !self.ignores_agreement && self.is_settled();
+        let optimality = if self.is_stationary { Optimality::Stationary } else { Optimality::NotShown };
+        let best = self.best.map_or(Merit::FAILED, |(best, _)| best);
+        let factor = factor(best, optimality, &self.ends);
+        let is_limit_reached = self.confirmation.is_some_and(|confirmation| confirmation.exceeds(oracle, factor));
+        !self.is_thorough && (is_agreed || self.runs >= MIN_RUNS && is_limit_reached)
     }
 
     /// Returns the next starting point in the whole box; `None` if there is none or no need for one.
@@ -288,13 +297,13 @@ impl Multistart {
         let n = oracle.shape().dimension() - local.len();
         if self.queue.is_empty() && self.drawn < self.starts && n > 0 {
             let left = self.starts - self.drawn;
-            let count = if self.is_thorough || self.is_doubted { left } else { AT_ONCE.min(left) };
+            let count = if self.is_thorough || self.ignores_agreement { left } else { AT_ONCE.min(left) };
             let mut random = oracle.stream(&if self.drawn == 1 {
                 "multistart".to_owned()
             } else {
                 format!("multistart {}", self.drawn)
             });
-            let mut sample = latin_hypercube(count * 5 * (n + 1), self.initial.len(), &mut random);
+            let mut sample = latin_hypercube(count * SAMPLE * (n + 1), self.initial.len(), &mut random);
             sample.iter_mut().for_each(|point| local.iter().for_each(|&j| point[j] = self.initial[j]));
             self.queue = best_of(oracle, &sample, count)?;
             self.drawn += count;
@@ -341,8 +350,9 @@ impl Solver for Multistart {
         self.end_points.clear();
         self.ends.clear();
         (self.drawn, self.runs) = (1, 0);
+        (self.ignores_agreement, self.is_stationary) = (false, false);
         self.initial = start.to_vec();
-        self.proof = Proof::begin(oracle);
+        self.confirmation = Some(Confirmation::begin(oracle));
         self.start_run(oracle, start)
     }
 
@@ -354,7 +364,7 @@ impl Solver for Multistart {
             Phase::Sampled => None,
         };
         let progress = solver.unwrap_or(&mut self.local).step(&mut archive)?;
-        if self.proof.observe(archive.oracle) {
+        if self.confirmation.as_mut().is_some_and(|confirmation| confirmation.observe(archive.oracle)) {
             self.to_gain = self.allowed - archive.oracle.remaining();
         }
         if progress == Progress::Continue {

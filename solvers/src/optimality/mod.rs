@@ -34,8 +34,8 @@ const SAMPLING_RADIUS: f64 = 0.5 * TRIAL_STEP;
 /// discontinuity. Such a cut says nothing about the point.
 const MAX_CUT_VALUE: f64 = 0.5;
 
-/// Distances from a point at which a plateau is looked for, in the unit box. On a saturated criterion the values at the first
-/// one are identical; those of a very flat minimum differ at the second one at the latest.
+/// Distances from a point at which values are compared, in the unit box. Values that are identical to the last bit at the first
+/// distance, or equal to within rounding at both, indicate a plateau.
 const PLATEAU_REACH: [f64; 2] = [1e-3, 1e-2];
 
 /// Cutting-plane model of what a direction would improve.
@@ -180,7 +180,7 @@ fn beside_flat(oracle: &mut dyn Oracle, point: &[f64], level: &Level) -> Optimal
     let (near, far) = (values(near), values(far));
     if near.iter().chain(&far).any(|values| level.is_improvement(&shape, values)) {
         Optimality::Descent
-    } else if near.iter().all(|values| level.is_identical(&shape, values))
+    } else if !near.is_empty() && near.iter().all(|values| level.is_identical(&shape, values))
         || near.iter().chain(&far).all(|values| level.is_equal(&shape, values))
     {
         Optimality::Plateau

@@ -18,7 +18,7 @@ const NEIGHBOURHOOD_RADIUS: f64 = 2.5;
 
 /// Number of points that enter the models, which is that of the coefficients of a quadratic in 20 coordinates. The fit takes time
 /// in proportion to the third power of this number.
-const MOST_NEIGHBOURS: usize = 231;
+const MAX_NEIGHBOURS: usize = 231;
 
 impl SampleSet {
     /// Creates an empty set for points with `dimension` coordinates and `criteria` values.
@@ -64,7 +64,7 @@ impl SampleSet {
     }
 
     /// Finds the points around a centre with their distances in radii, the nearest first. Their number is limited to
-    /// that of the coefficients of a quadratic, for many coordinates to the larger of [`MOST_NEIGHBOURS`] and three per
+    /// that of the coefficients of a quadratic, for many coordinates to the larger of [`MAX_NEIGHBOURS`] and three per
     /// coordinate.
     pub fn neighbours(&self, centre: &[f64], radius: f64, neighbours: &mut Vec<(f64, usize)>) {
         let n = self.dimension;
@@ -75,7 +75,7 @@ impl SampleSet {
             (0..self.count).map(|i| (distance(i), i)).filter(|(distance, _)| *distance <= NEIGHBOURHOOD_RADIUS),
         );
         neighbours.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        neighbours.truncate(((n + 1) * (n + 2) / 2).min(MOST_NEIGHBOURS.max(3 * n)));
+        neighbours.truncate(((n + 1) * (n + 2) / 2).min(MAX_NEIGHBOURS.max(3 * n)));
     }
 }
 
