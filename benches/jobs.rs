@@ -3,16 +3,20 @@
 //! An evaluation sleeps instead of computing. The speed-up is then that of the solver and the engine, independent of other
 //! load of the machine.
 
+mod common;
+
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use mops::Usage;
-use mops::core::{Budget, Evaluation, Evaluator, Run, Shape};
+use mops::core::{Budget, Run, Shape};
 use mops::core::{Solver, SolverOptions};
 use mops::solvers::genetic::GeneticOptions;
 use mops::solvers::pattern_search::PatternSearchOptions;
 use mops::solvers::sqp::SqpOptions;
 use mops_core::math;
+
+use common::ClosedForm;
 
 /// Duration of an evaluation.
 const DURATION: Duration = Duration::from_millis(200);
@@ -24,45 +28,20 @@ const SIZES: [(usize, usize); 2] = [(6, 80), (20, 160)];
 /// Name and constructor of a solver.
 type Named = (&'static str, fn() -> Box<dyn Solver>);
 
-/// Maximum of two paraboloids.
-struct Slow(Shape);
-
-impl Evaluator for Slow {
-    fn shape(&self) -> &Shape {
-        &self.0
-    }
-
-    fn evaluate(&self, point: &[f64]) -> Evaluation {
-        sleep(DURATION);
-        let paraboloid = |centre: f64| point.iter().map(|u| math::powi(u - centre, 2)).sum::<f64>() + 1.0;
-        let scaled = vec![paraboloid(0.3), paraboloid(0.6)];
-        Evaluation {
-            point: point.to_vec(),
-            tuners: point.to_vec(),
-            readings: Vec::new(),
-            merit: self.0.merit(&scaled),
-            scaled: Some(scaled),
-            residuals: Vec::new(),
-            failures: Vec::new(),
-        }
-    }
-
-    fn tuners_at(&self, point: &[f64]) -> Vec<f64> {
-        point.to_vec()
-    }
-
-    fn seed(&self) -> u64 {
-        1
-    }
+/// Returns the values of two paraboloids after a pause.
+fn slow_paraboloids(point: &[f64]) -> Vec<f64> {
+    sleep(DURATION);
+    let paraboloid = |centre: f64| point.iter().map(|u| math::powi(u - centre, 2)).sum::<f64>() + 1.0;
+    vec![paraboloid(0.3), paraboloid(0.6)]
 }
 
 /// Returns the time, s, for a number of evaluations on `threads` threads, and the best objective.
-fn timed(problem: &Slow, evaluations: usize, solver: &mut dyn Solver, threads: usize) -> (f64, f64) {
+fn timed(problem: &ClosedForm, evaluations: usize, solver: &mut dyn Solver, threads: usize) -> (f64, f64) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
     pool.install(|| {
         let start = Instant::now();
         let mut run = Run::new(problem, Budget { evaluations }, &());
-        run.solve(solver, &vec![0.9; problem.0.spacing.len()]);
+        run.solve(solver, &vec![0.9; problem.shape.spacing.len()]);
         let best = run.archive().iter().map(|record| record.merit.objective).fold(f64::INFINITY, f64::min);
         (start.elapsed().as_secs_f64(), best)
     })
@@ -76,7 +55,7 @@ fn main() {
     ];
     for (tuners, evaluations) in SIZES {
         let shape = Shape { spacing: vec![0.0; tuners], rows: vec![(Usage::Minimise, 1.0); 2], ..Shape::default() };
-        let problem = Slow(shape);
+        let problem = ClosedForm { shape, scaled: slow_paraboloids };
         for (name, build) in solvers {
             let [(one, best), (two, same)] =
                 [1, 2].map(|threads| timed(&problem, evaluations, build().as_mut(), threads));

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::chaining::Chain;
-use crate::confirmation::{Confirmation, factor};
+use crate::confirmation::{Confirmation, FACTOR_OTHERWISE, factor};
 use crate::levenberg_marquardt::LevenbergMarquardtOptions;
 use crate::multimethod::Multimethod;
 use crate::multistart::{Multistart, SMALL};
@@ -146,8 +146,7 @@ impl Solver for Auto {
                 let optimality = optimality(oracle, &best.point);
                 // The test may have found a better point.
                 let is_gain = is_gain(&mut self.confirmation, oracle);
-                let limit_factor =
-                    factor(best.merit, if is_gain { Optimality::Descent } else { optimality }, &self.ends);
+                let limit_factor = if is_gain { FACTOR_OTHERWISE } else { factor(best.merit, optimality, &self.ends) };
                 let status = Status { converged, confirmed, limit_factor, previous_objective: f64::INFINITY };
                 let is_limit_reached = is_limit_reached(self.confirmation, oracle, limit_factor);
                 match optimality {
@@ -233,7 +232,7 @@ impl Status {
     /// Takes the best point into account: of a better one, nothing is known yet.
     fn observe(&mut self, confirmation: &mut Option<Confirmation>, oracle: &dyn Oracle) {
         if is_gain(confirmation, oracle) {
-            self.limit_factor = factor(Merit::FAILED, Optimality::NotShown, &[]);
+            self.limit_factor = FACTOR_OTHERWISE;
         }
     }
 

@@ -1,9 +1,9 @@
 //! Multistart of a local solver.
 //!
 //! The first run starts from the initial guess of the study, the next ones from the best points of samples of the box, until an
-//! optimum that is not yet known is unlikely, until the limit of evaluations without a gain is reached (see [`crate::confirmation`]), or until the
-//! residuals of a calibration are noise. A run that comes close to the end of an earlier one is not continued. If enabled, runs
-//! from points around the best one follow until nothing changes.
+//! optimum that is not yet known is unlikely, until the limit of evaluations without a gain is reached (see
+//! [`crate::confirmation`]), or until the residuals of a calibration are noise. A run that comes close to the end of an earlier one
+//! is not continued. If enabled, runs from points around the best one follow until nothing changes.
 
 use mops_core::{Basins, Evaluation, Halt, Merit, Optimality, Oracle, Progress, SMALL_OBJECTIVE, Shape, Solver};
 
@@ -83,8 +83,8 @@ const NO_BETTER: f64 = 1e-6;
 /// Largest cost of a run that has found nothing better, relative to that of the run that has found the best point.
 const PATIENCE: f64 = 3.0;
 
-/// Largest cost of such a run where the best point is shown to be stationary, relative to the cost up to the last gain: a run needs as much to arrive
-/// at the same optimum. With 3, `sqp` takes twice as many evaluations on `minimax` and solves no more problems.
+/// Largest cost of such a run where the best point is shown to be stationary, relative to the cost up to the last gain: a run needs
+/// about as much to arrive at the same optimum.
 const PATIENCE_STATIONARY: f64 = 1.5;
 
 /// Minimum number of runs before the limit of evaluations without a gain applies: three ends at one optimum are not doubted.
