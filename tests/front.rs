@@ -251,3 +251,43 @@ d = { final-value = { signal = "d" }, demand = 1.0 }
     assert!((result["criteria"][0]["value"].as_f64().unwrap() - 1.0).abs() < 1e-6, "{}", result["criteria"]);
     assert!((result["worst_scaled"].as_f64().unwrap() - 2.0).abs() < 1e-12);
 }
+
+/// DTLZ2 with six criteria and eight tuners: the front is the part of the unit sphere with positive coordinates.
+/// Source: K. Deb, L. Thiele, M. Laumanns, E. Zitzler, Scalable test problems (2005).
+#[test]
+fn a_front_of_six_criteria_lies_on_the_sphere() {
+    const CRITERIA: usize = 6;
+    let folder = tempfile::tempdir().unwrap();
+    let objective = |k: usize| {
+        let cosines: String = (0..CRITERIA - 1 - k).map(|j| format!("*cos(p{j}*pi/2)")).collect();
+        let sine = if k == 0 { String::new() } else { format!("*sin(p{}*pi/2)", CRITERIA - 1 - k) };
+        format!("f{k} = {{ value = \"(1 + g){cosines}{sine}\", unit = \"1\" }}")
+    };
+    let join = |rows: Vec<String>, by: &str| rows.join(by);
+    let of_tuners = |row: fn(usize) -> String| (0..8).map(row).collect::<Vec<_>>();
+    let text = [
+        "[study]\nname = \"sphere\"\nobjective = \"each\"\n[models.m.equations]\nstates = { x = \"1\" }".to_owned(),
+        format!("parameters = {{ {} }}", join(of_tuners(|i| format!("p{i} = \"1\"")), ", ")),
+        "let = { g = \"(p5 - 0.5)^2 + (p6 - 0.5)^2 + (p7 - 0.5)^2\" }\nder = { x = \"-x\" }\nhorizon = \"1 s\""
+            .to_owned(),
+        format!("outputs = {{ {} }}\n[tuners]", join((0..CRITERIA).map(objective).collect(), ", ")),
+        join(of_tuners(|i| format!("p{i} = {{ start = 0.4, min = 0.0, max = 1.0 }}")), "\n"),
+        "[criteria]".to_owned(),
+        join(
+            (0..CRITERIA)
+                .map(|k| format!("c{k} = {{ final-value = {{ signal = \"f{k}\" }}, demand = 1.0 }}"))
+                .collect(),
+            "\n",
+        ),
+    ];
+    let study = folder.path().join("study.toml");
+    std::fs::write(&study, text.join("\n")).unwrap();
+    let result = pareto(folder.path(), &[study.to_str().unwrap(), "--points", "30"]);
+    let front = result["front"].as_array().unwrap();
+    assert!(front.len() >= 30, "{}", front.len());
+    for point in front {
+        let objectives = point["objectives"].as_object().unwrap().values().map(|f| f.as_f64().unwrap());
+        let radius = objectives.map(|f| f * f).sum::<f64>().sqrt();
+        assert!((radius - 1.0).abs() < 1e-3, "{radius}");
+    }
+}

@@ -140,7 +140,7 @@ impl End {
         let Basins { searches, arrived, optima, unseen } = self.basins;
         match (searches, unseen) {
             (0, _) => None,
-            (1, _) => Some("A single local search was made: other basins are unexplored.".to_owned()),
+            (1, _) => Some("A single local search was completed: other basins are unexplored.".to_owned()),
             (_, Some(unseen)) => {
                 let of_optima = if optima == 1 { "1 optimum".to_owned() } else { format!("{optima} optima") };
                 Some(format!(

@@ -228,7 +228,12 @@ impl Trace {
 
     fn extremum(&self, better: impl Fn(f64, f64) -> bool) -> (f64, f64) {
         let mut best = (self.first(), self.start());
-        for segment in 0..self.segments.len() {
+        for (segment, c) in self.segments.iter().enumerate() {
+            // The value changes by at most the sum of the coefficients within a segment.
+            let reach: f64 = c[1..].iter().map(|c| c.abs()).sum();
+            if !better(c[0] + reach, best.0) && !better(c[0] - reach, best.0) {
+                continue;
+            }
             self.pieces_of(segment, |piece| {
                 for (value, time) in piece.value.into_iter().zip(piece.time) {
                     if better(value, best.0) {
@@ -359,8 +364,10 @@ fn gauss(a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
 fn cubic_roots(c: [f64; 4]) -> impl Iterator<Item = f64> {
     let mut roots = [f64::NAN; 3];
     let inside = |roots: [f64; 3]| roots.into_iter().filter(|s| *s > 0.0 && *s < 1.0);
-    // Most segments are so short relative to the curvature of the signal that their derivative keeps its sign.
-    if c[0].abs() > c[1].abs() + c[2].abs() + c[3].abs() {
+    // Most segments are so short relative to the curvature of the signal that their derivative keeps its sign: a polynomial
+    // lies within the convex hull of its Bernstein coefficients.
+    let bernstein = [c[0], c[0] + c[1] / 3.0, c[0] + (2.0 * c[1] + c[2]) / 3.0, c[0] + c[1] + c[2] + c[3]];
+    if bernstein.iter().all(|b| *b > 0.0) || bernstein.iter().all(|b| *b < 0.0) {
         return inside(roots);
     }
     let f = |s: f64| ((c[3] * s + c[2]) * s + c[1]) * s + c[0];

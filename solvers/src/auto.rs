@@ -29,7 +29,7 @@ use crate::weighted_chebyshev::WeightedChebyshevOptions;
 ///   to three lines near the initial guess. With noise: `pattern-search`. Smooth: BFGS with a line search, then `sqp`;
 ///   a pattern search from the same initial guess may find a better basin. With kinks: `sqp`.
 /// - All other problems with one objective: `sqp`.
-/// - A front (`objective = "each"`): `weighted-chebyshev` for up to three criteria and 50 tuners without whole numbers
+/// - A front (`objective = "each"`): `weighted-chebyshev` for up to ten criteria and 50 tuners without whole numbers
 ///   or lists; otherwise `nsga2` for two criteria and `nsga3` for more.
 ///
 /// Every method for one objective runs from several points (multistart): the initial guess of the study and the best
@@ -290,12 +290,18 @@ fn has_improved(oracle: &dyn Oracle, previous_objective: f64) -> bool {
     })
 }
 
+/// Largest numbers of criteria and of tuners for `weighted-chebyshev`. On DTLZ2 with 4, 6, 8 and 10 criteria and 6 tuners more than
+/// criteria, from random starts, it found 60 points within 4e-5 of the front in 1,300 to 7,100 evaluations; those of `nsga3` were
+/// up to 0.05 to 0.46 away after 12,000 to 17,000.
+const MAX_CHEBYSHEV: [usize; 2] = [10, 50];
+
 /// Chooses the solver for a front: `weighted-chebyshev` for few criteria, otherwise `nsga2` (crowding) for two criteria
 /// and `nsga3` (reference directions) for more.
 fn front_solver(shape: &Shape) -> (Box<dyn Solver>, &'static str) {
     let objectives = shape.objective_count();
     let chebyshev = WeightedChebyshevOptions::default().build();
-    if objectives <= 3 && shape.dimension() <= 50 && chebyshev.accepts(shape).is_ok() {
+    let [most_criteria, most_tuners] = MAX_CHEBYSHEV;
+    if objectives <= most_criteria && shape.dimension() <= most_tuners && chebyshev.accepts(shape).is_ok() {
         return (chebyshev, WeightedChebyshevOptions::KIND);
     }
     if objectives <= 2 {
