@@ -467,12 +467,22 @@ impl<S: Scalar> Plant<S> for Loop<S> {
         self.sampled.as_ref().map_or(f64::INFINITY, Sampled::next_break)
     }
 
-    fn settle(&mut self, at: &Instant<'_, S>) {
+    fn samples(&self) -> bool {
+        self.sampled.is_some()
+    }
+
+    fn sample(&mut self, at: &Instant<'_, S>, _: &mut [S]) {
         let (r, y) = (at.u[0], self.output(at.x));
         if let Some(sampled) = &mut self.sampled {
             sampled.pass(at.t, &self.controller, self.limit, r, y);
+        }
+    }
+
+    fn settle(&mut self, at: &Instant<'_, S>) {
+        if self.sampled.is_some() {
             return;
         }
+        let (r, y) = (at.u[0], self.output(at.x));
         let wanted = self.wanted(r, y, at.x).value();
         self.saturated = if wanted < self.limit[0] {
             -1.0

@@ -115,6 +115,15 @@ pub trait Plant<S: Scalar> {
         Err("a mode of the model chatters without end".to_owned())
     }
 
+    /// Returns true if [`Plant::sample`] is to be called.
+    fn samples(&self) -> bool {
+        false
+    }
+
+    /// Samples: at the start, at each break of the plant, and at jumps of inputs or forces, before [`Plant::settle`]. States that
+    /// jump get their new values in `x`; `at` has those before.
+    fn sample(&mut self, _at: &Instant<'_, S>, _x: &mut [S]) {}
+
     /// Determines the mode: at the start, at each break of the plant, and at jumps of inputs or forces.
     fn settle(&mut self, _at: &Instant<'_, S>) {}
 
@@ -199,6 +208,12 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Plant<S> for Box<P> {
     }
     fn rest(&mut self, index: usize, event: &EventInstant<'_, S>, close: f64, x: &mut [S]) -> Result<&str, String> {
         (**self).rest(index, event, close, x)
+    }
+    fn samples(&self) -> bool {
+        (**self).samples()
+    }
+    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
+        (**self).sample(at, x)
     }
     fn settle(&mut self, at: &Instant<'_, S>) {
         (**self).settle(at)

@@ -1,11 +1,13 @@
 //! Compiled model: one tape for the derivatives, and small tapes for guards, resets and signals.
 
+use std::ops::Range;
+
 use mops_core::StudyError;
 
 use super::graph::{Id, Op};
 use super::layout::Layout;
 use super::program::Program;
-use super::system::{Contact, System};
+use super::system::{self, Contact, System};
 use super::tape::compile;
 use crate::kernel::groups;
 
@@ -64,6 +66,19 @@ pub struct Happening {
     pub leaves: String,
 }
 
+/// Clock.
+#[derive(Debug)]
+pub struct Clock {
+    /// Memory, as states.
+    pub memory: Range<usize>,
+    /// Period, first instant, and time between an instant and the change of the memory, s.
+    pub period: f64,
+    pub offset: f64,
+    pub delay: f64,
+    /// Computes the new values of the memory.
+    pub next: Program,
+}
+
 /// Compiled model.
 #[derive(Debug)]
 pub struct Compiled {
@@ -91,6 +106,8 @@ pub struct Compiled {
     pub joints: Vec<Joint>,
     /// Events.
     pub happenings: Vec<Happening>,
+    /// Clocks.
+    pub clocks: Vec<Clock>,
     /// States whose initial values are expressions; computes these values.
     pub starts: (Vec<usize>, Program),
     /// Computes the entries of the matrices of equations solved together.
@@ -140,6 +157,7 @@ impl Compiled {
             wanted.push(happening.resets.iter().map(|(_, id)| *id).collect());
             wanted.push(happening.at_rest.iter().map(|(_, id)| *id).collect());
         }
+        wanted.extend(system.clocks.iter().map(|clock| clock.next.clone()));
         let starts: Vec<(usize, Id)> =
             system.starts.iter().enumerate().filter_map(|(s, start)| Some((s, (*start)?))).collect();
         wanted.push(starts.iter().map(|(_, id)| *id).collect());
@@ -167,7 +185,7 @@ impl Compiled {
         };
         let joints = system.contacts.iter().map(|contact| joint(contact, next())).collect();
         let states = |values: &[(usize, Id)]| values.iter().map(|(state, _)| *state).collect();
-        let happening = |h: &super::system::Happening| Happening {
+        let happening = |h: &system::Happening| Happening {
             name: h.name.clone(),
             guard: next(),
             resets: (states(&h.resets), next()),
@@ -176,6 +194,11 @@ impl Compiled {
             leaves: format!("{}: leaves rest", h.name),
         };
         let happenings = system.happenings.iter().map(happening).collect();
+        let clock = |c: &system::Clock| {
+            let system::Clock { memory, period, offset, delay, .. } = c.clone();
+            Clock { memory, period, offset, delay, next: next() }
+        };
+        let clocks = system.clocks.iter().map(clock).collect();
         let starts = (starts.iter().map(|(s, _)| *s).collect(), next());
         let matrices = system.matrices.iter().map(|_| next()).collect();
         let signals = system
@@ -207,6 +230,7 @@ impl Compiled {
             orders,
             joints,
             happenings,
+            clocks,
             starts,
             matrices,
             pattern,

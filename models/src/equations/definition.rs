@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use std::ops::Range;
 use std::sync::Arc;
 
 use mops_core::expression::{Equation, Form, equation};
@@ -88,11 +89,24 @@ pub struct When {
     pub at_rest: Vec<(String, Text)>,
 }
 
+/// Clock whose memory changes at fixed instants only.
+#[derive(Debug, Clone)]
+pub struct Clock {
+    /// Memory, as states.
+    pub memory: Range<usize>,
+    /// Period, first instant, and time between an instant and the change of the memory, as far as given.
+    pub times: [Option<Text>; 3],
+    /// New values of the memory.
+    pub next: Vec<Text>,
+}
+
 /// Definition of a model, checked as far as each table allows on its own.
 #[derive(Debug, Clone, Default)]
 pub struct Definition {
-    /// States, in order.
+    /// States, in order: the continuous ones, then the memory of the clocks.
     pub states: Vec<Declared>,
+    /// Number of continuous states.
+    pub continuous: usize,
     /// Typical sizes of the states, if declared.
     pub scales: Vec<Option<f64>>,
     /// Inputs, in order.
@@ -115,6 +129,8 @@ pub struct Definition {
     pub friction: Vec<Friction>,
     /// Events.
     pub when: Vec<When>,
+    /// Clocks.
+    pub clocks: Vec<Clock>,
     /// Names of joints: name, position, path in the study.
     pub ports: Vec<(String, String, Vec<String>)>,
 }
@@ -187,6 +203,18 @@ impl Definition {
             d.scales.extend(states.iter().map(|_| scale));
             d.states.extend(states);
         }
+        d.continuous = d.states.len();
+        for (name, clock) in &options.clocks.0 {
+            let first = d.states.len();
+            for (key, memory) in &clock.memory.0 {
+                let place = path(&["clocks", name, "memory", key]);
+                let memory = declared_at(place, key, &memory.0.unit, memory.0.about.as_deref())?;
+                d.scales.extend(memory.iter().map(|_| None));
+                d.states.extend(memory);
+            }
+            let memory = first..d.states.len();
+            d.clocks.push(Clock { memory, times: [None, None, None], next: Vec::new() });
+        }
         if d.states.is_empty() {
             return Err(
                 StudyError::new("states", "the model has no state").with_help("for example states = { x = \"m\" }")
@@ -235,11 +263,17 @@ impl Definition {
         d.read_definitions(options)?;
         d.read_mass(options)?;
         d.read_elements(options)?;
+        d.read_clocks(options)?;
         Ok(d)
     }
 
     fn state_names(&self) -> Vec<String> {
         self.states.iter().map(|state| state.name.clone()).collect()
+    }
+
+    /// Returns true if the state is the memory of a clock, by its index.
+    pub fn is_memory(&self, state: usize) -> bool {
+        state >= self.continuous
     }
 
     fn read_definitions(&mut self, options: &EquationsOptions) -> Result<(), StudyError> {
@@ -261,9 +295,16 @@ impl Definition {
         }
         let states = self.state_names();
         let states: Vec<&str> = states.iter().map(String::as_str).collect();
-        self.der = by_state("der", &options.der.0, &states, Text::read)?;
-        self.start = by_state("start", &options.start.0, &states, Text::expression)?;
-        for state in &self.states {
+        let (continuous, memory) = states.split_at(self.continuous);
+        if let Some((key, _)) =
+            options.der.0.iter().find(|(key, _)| memory.contains(&key.as_str()) && !continuous.contains(&key.as_str()))
+        {
+            let fact = format!("`{key}` is the memory of a clock, which has no derivative");
+            return Err(under(&path(&["der", key]), StudyError::here(fact)).with_help("give its new value in `next`"));
+        }
+        self.der = by_state(&["der"], &options.der.0, continuous, Text::read)?;
+        self.start = by_state(&["start"], &options.start.0, &states, Text::expression)?;
+        for state in &self.states[..self.continuous] {
             if !self.der.contains_key(&state.name) {
                 return Err(under(
                     &state.path,
@@ -276,7 +317,8 @@ impl Definition {
     }
 
     fn read_mass(&mut self, options: &EquationsOptions) -> Result<(), StudyError> {
-        let states = self.state_names();
+        let mut states = self.state_names();
+        states.truncate(self.continuous);
         for (key, formula) in &options.mass.0 {
             let place = path(&["mass", key]);
             let (row, column) = key.split_once(',').ok_or_else(|| {
@@ -332,12 +374,48 @@ impl Definition {
     }
 }
 
+impl Definition {
+    fn read_clocks(&mut self, options: &EquationsOptions) -> Result<(), StudyError> {
+        let names = self.state_names();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        for (clock, (name, given)) in self.clocks.iter_mut().zip(&options.clocks.0) {
+            let memory = &names[clock.memory.clone()];
+            let mut next = by_state(&["clocks", name, "next"], &given.next.0, memory, Text::expression)?;
+            let next = memory.iter().map(|memory| {
+                next.remove(*memory).ok_or_else(|| {
+                    let fact = format!("the memory `{memory}` has no new value");
+                    let help = format!("add it to `next`, for example {memory} = \"...\"");
+                    under(&path(&["clocks", name, "next"]), StudyError::here(fact)).with_help(help)
+                })
+            });
+            clock.next = next.collect::<Result<_, _>>()?;
+            if memory.is_empty() {
+                let place = path(&["clocks", name, "memory"]);
+                return Err(under(&place, StudyError::here("the clock has no memory"))
+                    .with_help("declare what it computes, for example memory = { u = \"V\" }"));
+            }
+            let time = |key: &str, formula: Option<&Formula>| {
+                formula.map(|f| Text::expression(path(&["clocks", name, key]), f, None)).transpose()
+            };
+            clock.times = [
+                time("every", Some(&given.every))?,
+                time("offset", given.offset.as_ref())?,
+                time("delay", given.delay.as_ref())?,
+            ];
+        }
+        Ok(())
+    }
+}
+
 fn counts_in(unit: &Unit) -> String {
     format!("a number without a unit is read in `{unit}`")
 }
 
 fn declared(section: &str, key: &str, unit: &str, about: Option<&str>) -> Result<Vec<Declared>, StudyError> {
-    let place = path(&[section, key]);
+    declared_at(path(&[section, key]), key, unit, about)
+}
+
+fn declared_at(place: Vec<String>, key: &str, unit: &str, about: Option<&str>) -> Result<Vec<Declared>, StudyError> {
     let names = Key::parse(key).and_then(|key| key.declared()).map_err(|m| under(&place, m))?;
     let open = unit.trim().is_empty();
     let unit = Unit::parse(unit).map_err(|why| {
@@ -354,7 +432,7 @@ fn declared(section: &str, key: &str, unit: &str, about: Option<&str>) -> Result
 /// Collects texts by state: first from keys that name states, then from keys that apply to all remaining members of a
 /// family.
 fn by_state(
-    section: &str,
+    section: &[&str],
     entries: &[(String, Formula)],
     states: &[&str],
     read: impl Fn(Vec<String>, &Formula, Option<(String, i64)>) -> Result<Text, StudyError>,
@@ -362,7 +440,7 @@ fn by_state(
     let mut texts: BTreeMap<String, Text> = BTreeMap::new();
     let mut rest = Vec::new();
     for (key, formula) in entries {
-        let place = path(&[section, key]);
+        let place = path(&[section, &[key]].concat());
         let parsed = Key::parse(key).map_err(|m| under(&place, m))?;
         let members: Vec<(String, Option<(String, i64)>)> = match &parsed.index {
             Index::None => vec![(parsed.name.clone(), None)],

@@ -47,7 +47,11 @@ pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Stud
     for (_, text) in &d.lets {
         model.measure(text)?;
     }
-    let forces = d.states.iter().map(|state| model.force(&state.name)).collect::<Result<Vec<_>, _>>()?;
+    let force = |(s, state): (usize, &Declared)| match d.is_memory(s) {
+        true => Ok(model.rate(&state.name)),
+        false => model.force(&state.name),
+    };
+    let forces = d.states.iter().enumerate().map(force).collect::<Result<Vec<_>, _>>()?;
     let state = |name: &String| d.states.iter().position(|s| s.name == *name).expect("names of states were checked");
     for (row, column, text) in &d.mass {
         let mass = forces[state(row)].times(&model.rate(column), -1.0);
@@ -87,6 +91,15 @@ pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Stud
             )?;
         }
     }
+    for clock in &d.clocks {
+        for (memory, text) in clock.memory.clone().zip(&clock.next) {
+            let memory = model.names[&d.states[memory].name].clone();
+            model.fits(&memory, text, "the new value of a memory must have the dimension of the memory")?;
+        }
+        for text in clock.times.iter().flatten() {
+            model.fits(&model.time.clone(), text, "the time must have the dimension of a time")?;
+        }
+    }
     Ok(model.measured(&forces))
 }
 
@@ -113,7 +126,8 @@ fn is_dimensionless(d: &Definition) -> bool {
         .flat_map(|w| std::iter::once(&w.guard).chain(w.resets.iter().chain(&w.at_rest).map(|(_, text)| text)));
     let texts = d.lets.iter().map(|(_, text)| text).chain(d.der.values()).chain(d.start.values());
     let texts = texts.chain(d.outputs.iter().map(|(_, text)| text)).chain(d.mass.iter().map(|(.., text)| text));
-    if texts.chain(frictions).chain(events).any(has_units) {
+    let clocks = d.clocks.iter().flat_map(|clock| &clock.next);
+    if texts.chain(frictions).chain(events).chain(clocks).any(has_units) {
         return false;
     }
     let outputs = d.outputs.iter().map(|(output, _)| output);

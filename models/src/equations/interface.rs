@@ -63,7 +63,7 @@ pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Paramet
     Ok((parameters, starts))
 }
 
-/// Returns the ports: joints, equations of all states but positions, inputs, states and outputs. `forces` are the units
+/// Returns the ports: joints, equations of all continuous states but positions, inputs, states and outputs. `forces` are the units
 /// of the terms in the equations of the states.
 pub(super) fn ports(d: &Definition, system: &System, forces: &[Unit]) -> Result<Vec<Port>, StudyError> {
     let name = |s: usize| d.states[s].name.clone();
@@ -77,7 +77,7 @@ pub(super) fn ports(d: &Definition, system: &System, forces: &[Unit]) -> Result<
     }
     let mut ports = Vec::new();
     for s in 0..d.states.len() {
-        if system.joints.iter().any(|&(position, _)| position == s) {
+        if d.is_memory(s) || system.joints.iter().any(|&(position, _)| position == s) {
             continue;
         }
         let position = system.joints.iter().find(|&&(_, velocity)| velocity == s).map(|&(position, _)| position);

@@ -181,6 +181,11 @@ impl<'d> Lowering<'d> {
         Ok(self.sum(a, b, -1.0))
     }
 
+    /// Lowers an expression whose kinks are evaluated by the current values.
+    pub fn as_it_stands(&mut self, text: &Text) -> Result<Affine, StudyError> {
+        self.node(text, &text.equation.right, Kinks::AsTheyStand)
+    }
+
     /// Lowers an expression without derivatives.
     pub fn value(&mut self, text: &Text) -> Result<Id, StudyError> {
         let affine = self.text(text)?;

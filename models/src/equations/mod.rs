@@ -4,6 +4,7 @@
 mod bank;
 mod bounds;
 mod branches;
+mod clocks;
 mod compiled;
 mod definition;
 mod dimensions;

@@ -41,6 +41,18 @@ use crate::kernel::Tolerance;
 ///
 /// Signals are the states, the outputs and the inputs. The initial value of `th` is the parameter `th0`, 0 by default.
 ///
+/// A clock samples the plant at fixed instants, as the program of a sampled controller does:
+///
+/// ```text
+/// [models.rig.equations.clocks]
+/// control = { every = "10 ms", delay = "2 ms", memory = { u = "N m", i = "rad" }, next = { i = "i + e", u = "k*e + ki*i" } }
+/// ```
+///
+/// Its memory is constant between the instants `offset + k every`, at which it takes the values `next`, computed from the
+/// states, inputs and memory just before; without an effect on the plant before `delay` has passed. Clocks that are due at
+/// the same instant read the same values. Memory is a signal, and has an initial value, like a state. With `next = { y_k =
+/// "y" }` a memory holds a sample of `y`.
+///
 /// A state whose derivative is another state, such as `th` above, is a joint. Its friction is given as
 /// `friction.th = { coulomb = "c" }`; a stuck joint is exactly at rest. The places of possible missing effects are
 /// the joints, the equations of the states, the inputs and the signals.
@@ -85,6 +97,10 @@ pub struct EquationsOptions {
     /// negative.
     #[serde(default)]
     pub(super) when: Entries<When>,
+    /// Clocks that sample the model at fixed instants: `control = { every = "10 ms", memory = { u = "V" }, next = { u =
+    /// "-k*x" } }`.
+    #[serde(default)]
+    pub(super) clocks: Entries<Clock>,
     /// Names of joints as places of effects: `arm = { joint = "phi" }`. Default: the name of the position.
     #[serde(default)]
     pub(super) ports: Entries<PortName>,
@@ -195,6 +211,22 @@ pub(super) struct When {
     /// the guard. Without `at-rest`, the simulation fails if the events accumulate.
     #[serde(default)]
     pub at_rest: Entries<Formula>,
+}
+
+/// Clock with memory that changes at fixed instants only.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct Clock {
+    /// Period: a time such as "10 ms", or an expression of constants.
+    pub every: Formula,
+    /// First instant; default 0.
+    pub offset: Option<Formula>,
+    /// Time between an instant and the change of the memory, such as a computation time; at most the period, default 0.
+    pub delay: Option<Formula>,
+    /// Values that are constant between the instants, and their units: `u = "V"`, or a table with `unit`, `about`.
+    pub memory: Entries<Short<Described>>,
+    /// New values of the memory, computed from the values just before the instant.
+    pub next: Entries<Formula>,
 }
 
 /// Name of a place.

@@ -8,10 +8,11 @@ use mops_core::{DIRECTIONS, Dual, Dual7, EventInstant, Failure, Instant, Plant, 
 
 use super::bank::{Bank, Large};
 use super::bounds::{self, moved, signed};
+use super::clocks::Ticking;
 use super::compiled::{Compiled, Signal};
 use super::happenings::Phase;
 use super::program::Program;
-use crate::kernel::Tolerance;
+use crate::kernel::{Tolerance, next_of};
 
 /// Plant of a compiled model; `B` is the bank of registers.
 pub struct Running<'a, S, B> {
@@ -32,6 +33,8 @@ pub struct Running<'a, S, B> {
     flips: Vec<usize>,
     /// Phases of the events.
     pub(super) phases: Vec<Phase>,
+    /// Progress of the clocks.
+    pub(super) ticking: Vec<Ticking<S>>,
     /// States fixed by events at rest.
     pub(super) held: Vec<usize>,
     /// Largest absolute values of the states, at the start and at events.
@@ -75,6 +78,7 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
             spans: vec![0.0; model.switches.len()],
             flips: vec![0; model.switches.len()],
             phases: vec![Phase::Armed(0.0); model.happenings.len()],
+            ticking: vec![Ticking::new(); model.clocks.len()],
             held: Vec::new(),
             sizes: vec![0.0; model.states],
             bounds: RefCell::new(Vec::new()),
@@ -387,6 +391,18 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         true
     }
 
+    fn next_break(&self, _: f64) -> f64 {
+        next_of(self.ticking.iter().zip(&self.model.clocks).map(|(ticking, clock)| ticking.next_break(clock)))
+    }
+
+    fn samples(&self) -> bool {
+        !self.ticking.is_empty()
+    }
+
+    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
+        self.tick(at, x);
+    }
+
     fn settle(&mut self, at: &Instant<'_, S>) {
         self.settle_modes(at);
         if !std::mem::replace(&mut self.started, true) {
@@ -399,6 +415,10 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
     }
 
     fn linearised_at(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<Vec<usize>, Failure> {
+        if !self.ticking.is_empty() {
+            let why = "a model with clocks has no linearisation in continuous time";
+            return Err(Failure::Undefined(why.to_owned()));
+        }
         Ok(self.look(at, at_rest))
     }
 

@@ -1,11 +1,12 @@
 //! Model as a graph: equations solved for the derivatives, friction, events, signals and initial values.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use mops_core::expression::Form;
 use mops_core::{StudyError, suggestion};
 
-use super::definition::{Definition, Text, under};
+use super::definition::{self, Definition, Text, under};
 use super::graph::{Block, Graph, Id, Op};
 use super::lower::{Affine, Lowering, Order, Switch};
 
@@ -48,6 +49,21 @@ pub struct Happening {
     pub at_rest: Vec<(usize, Id)>,
 }
 
+/// Clock whose memory changes at fixed instants only.
+#[derive(Debug, Clone)]
+pub struct Clock {
+    /// Memory, as states.
+    pub memory: Range<usize>,
+    /// Period, s.
+    pub period: f64,
+    /// First instant, s.
+    pub offset: f64,
+    /// Time between an instant and the change of the memory, s.
+    pub delay: f64,
+    /// New values of the memory.
+    pub next: Vec<Id>,
+}
+
 /// Model as a graph.
 #[derive(Debug)]
 pub struct System {
@@ -69,6 +85,8 @@ pub struct System {
     pub contacts: Vec<Contact>,
     /// Events.
     pub happenings: Vec<Happening>,
+    /// Clocks.
+    pub clocks: Vec<Clock>,
     /// Initial values given in the study.
     pub starts: Vec<Option<Id>>,
     /// Joints, as pairs of position and speed.
@@ -87,8 +105,11 @@ impl System {
         let d = definition;
         let mut l = Lowering::new(d)?;
         let state = |name: &str| d.states.iter().position(|s| s.name == name).expect("names of states were checked");
-        let mut rows: Vec<Row> =
-            (0..d.states.len()).map(|s| row(&mut l, d, s, &d.der[&d.states[s].name])).collect::<Result<_, _>>()?;
+        let row_of = |s: usize| match d.is_memory(s) {
+            true => Ok(Row { coefficients: BTreeMap::from([(s, l.graph.number(1.0))]), force: l.graph.number(0.0) }),
+            false => row(&mut l, d, s, &d.der[&d.states[s].name]),
+        };
+        let mut rows: Vec<Row> = (0..d.states.len()).map(row_of).collect::<Result<_, _>>()?;
         let massive: BTreeSet<usize> = d.mass.iter().map(|(row, ..)| state(row)).collect();
         for &row in &massive {
             let text = &d.der[&d.states[row].name];
@@ -148,6 +169,8 @@ impl System {
             let (resets, at_rest) = (values(&when.resets)?, values(&when.at_rest)?);
             happenings.push(Happening { name: when.name.clone(), guard, resets, at_rest });
         }
+        let clocks =
+            d.clocks.iter().map(|clock| self::clock(&mut l, d, clock, &derivatives)).collect::<Result<_, _>>()?;
         let start = |l: &mut Lowering<'_>, s: usize| {
             let (name, unit) = (&d.states[s].name, &d.states[s].unit);
             let value = d.start.get(name).map(|text| {
@@ -182,6 +205,7 @@ impl System {
             signals,
             contacts,
             happenings,
+            clocks,
             starts,
             joints,
             matrices,
@@ -230,9 +254,42 @@ fn joints(graph: &Graph, d: &Definition, rows: &[Row]) -> Vec<(usize, usize)> {
             },
             _ => None,
         };
-        velocity.filter(|&velocity| alone && velocity != position).map(|velocity| (position, velocity))
+        velocity
+            .filter(|&velocity| alone && velocity != position && !d.is_memory(velocity))
+            .map(|velocity| (position, velocity))
     };
     rows.iter().enumerate().filter_map(pair).collect()
+}
+
+/// Lowers a clock. Its new values see every kink as it stands: they are computed at its instants only.
+fn clock(
+    l: &mut Lowering<'_>,
+    d: &Definition,
+    clock: &definition::Clock,
+    derivatives: &[Id],
+) -> Result<Clock, StudyError> {
+    let next = clock.memory.clone().zip(&clock.next).map(|(memory, text)| {
+        let affine = l.as_it_stands(text)?;
+        let value = with_rates(&mut l.graph, affine, derivatives);
+        Ok(l.declared(value, &d.states[memory].unit))
+    });
+    let next = next.collect::<Result<_, StudyError>>()?;
+    let mut time = |text: &Option<Text>, range: [f64; 2], expected: &str| -> Result<f64, StudyError> {
+        let Some(text) = text else { return Ok(0.0) };
+        let id = l.value(text)?;
+        let fact = match l.graph.constant(id) {
+            Some(time) if time.is_finite() && time >= range[0] && time <= range[1] => return Ok(time),
+            Some(time) => format!("expected {expected}, found {time} s"),
+            None => format!("expected {expected}, found an expression that is not constant"),
+        };
+        let help = "a time such as \"10 ms\", or an expression of constants";
+        Err(under(&text.path, StudyError::here(fact).at(text.equation.right.span.clone())).with_help(help))
+    };
+    let [every, offset, delay] = &clock.times;
+    let period = time(every, [f64::MIN_POSITIVE, f64::INFINITY], "a positive period")?;
+    let offset = time(offset, [0.0, f64::INFINITY], "a first instant of at least 0")?;
+    let delay = time(delay, [0.0, period], &format!("a delay between 0 and the period of {period} s"))?;
+    Ok(Clock { memory: clock.memory.clone(), period, offset, delay, next })
 }
 
 /// Limit on the number of joints with dry friction: three contacts of every joint at rest are tried, in all

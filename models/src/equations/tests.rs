@@ -10,6 +10,7 @@ use crate::kernel::Simulated;
 
 type Equations = Simulated<super::Equations>;
 
+mod clocks;
 mod dry_friction;
 mod events;
 mod linear;

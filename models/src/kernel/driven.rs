@@ -5,8 +5,8 @@ use std::cell::RefCell;
 use mops_core::enclosure::Enclosure;
 use mops_core::{EventInstant, Failure, Instant, Plant, Scalar, Span};
 
-use super::Dynamics;
 use super::drive::Drive;
+use super::{Dynamics, next_of};
 
 /// Plant with given inputs and without external forces: the system that a simulation integrates.
 pub struct Driven<'a, S, P> {
@@ -152,7 +152,8 @@ impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
     }
 
     fn next_break(&self, t: f64) -> f64 {
-        self.drives.iter().map(|drive| drive.next_break(t)).fold(self.plant.next_break(t), f64::min)
+        let of_inputs = self.drives.iter().map(|drive| drive.next_break(t));
+        next_of(of_inputs.chain(std::iter::once_with(|| self.plant.next_break(t))))
     }
 
     fn longest_step(&self) -> f64 {
@@ -172,6 +173,10 @@ impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
         let mut inputs = self.inputs.borrow_mut();
         self.take_inputs(t, &mut inputs);
         self.constant = self.drives.iter().all(Drive::is_constant).then(|| inputs.clone());
+        if self.plant.samples() {
+            let before = x.to_vec();
+            self.plant.sample(&Instant { t, x: &before, u: &inputs, w: &self.forces }, x);
+        }
         self.plant.settle(&Instant { t, x, u: &inputs, w: &self.forces });
     }
 }

@@ -223,6 +223,20 @@ pub fn seconds(key: &str, time: Option<&Quantity>) -> Result<Option<f64>, StudyE
     time.map(|q| q.to(&Unit::known("s"))).transpose().map_err(|e| StudyError::new(key, e))
 }
 
+/// Relative difference of two times up to which they are the same instant: 3 times 0.1 s is 0.3 s.
+const SAME_INSTANT: f64 = 8.0 * f64::EPSILON;
+
+/// Returns true if a time has come at `t`, but for rounding.
+pub(crate) fn is_due(time: f64, t: f64) -> bool {
+    time <= t + SAME_INSTANT * t.abs()
+}
+
+/// Returns the first of these times; of those at the same instant, the last, so that all are due.
+pub(crate) fn next_of(times: impl Iterator<Item = f64> + Clone) -> f64 {
+    let first = times.clone().fold(f64::INFINITY, f64::min);
+    times.filter(|&time| is_due(time, first)).fold(first, f64::max)
+}
+
 /// Receiver of the progress of a simulation: of every step, then of the events at its end.
 pub trait Sink<S: Scalar, D: Dynamics<S> + ?Sized> {
     /// Handles an accepted step; `dynamics` is in the mode that was active during the step.

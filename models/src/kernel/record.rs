@@ -248,11 +248,9 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
 
     fn end(&mut self, t: f64, x: &[S], dynamics: &D) {
         for (i, (signal, _)) in self.signals.iter().enumerate() {
-            if self.shows[i].is_some() {
-                continue;
-            }
-            // An input jump at the end of the simulation appears in the signals that depend on it directly.
-            let value = dynamics.signal(*signal, t, x);
+            // An input jump at the end of the simulation appears in the signals that depend on it directly; a sampled state may jump
+            // itself.
+            let value = self.shows[i].map_or_else(|| dynamics.signal(*signal, t, x), |state| x[state]);
             let before = self.traces[0][i].last();
             if (value.value() - before).abs() > self.allowed(i, before.abs().max(value.value().abs())) {
                 self.traces[0][i].jump_at_end(value.value());

@@ -11,7 +11,7 @@ use mops_core::{
 use super::contacts::Contacts;
 use super::{Place, Site, WithEffects};
 use crate::kernel::drive::Drive;
-use crate::kernel::{Dynamics, shown};
+use crate::kernel::{Dynamics, next_of, shown};
 
 /// Effect in a simulation.
 pub(super) struct Actor<S> {
@@ -718,9 +718,9 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         // The output of a sensor effect may be rough, so steps end at all samples.
         let smooth = self.smooth;
         let inputs = self.commands.iter().map(|command| command.next_break(t, smooth)).fold(f64::INFINITY, f64::min);
-        let forces = self.disturbances.iter().map(|drive| drive.next_break(t)).fold(inputs, f64::min);
-        let next = self.plant.next_break(t).min(forces);
-        self.breaks.iter().copied().find(|&at| at > t).map_or(next, |at| at.min(next))
+        let forces = self.disturbances.iter().map(|drive| drive.next_break(t)).fold(f64::INFINITY, f64::min);
+        let own = self.breaks.iter().copied().find(|&at| at > t).unwrap_or(f64::INFINITY);
+        next_of([inputs, forces, own, self.plant.next_break(t)].into_iter())
     }
 
     fn longest_step(&self) -> f64 {
@@ -745,12 +745,17 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
             self.update_hysteresis(t, x);
         }
         let first = !std::mem::replace(&mut self.started, true);
+        let (mut u, mut w) = (Vec::new(), Vec::new());
+        let mut dx = vec![S::from(0.0); self.own];
+        if self.plant.samples() {
+            self.balance(t, x, &mut u, &mut w, &mut dx);
+            let before = x[..self.own].to_vec();
+            self.plant.sample(&Instant { t, x: &before, u: &u, w: &w }, &mut x[..self.own]);
+        }
         if !first && self.guards() == 0 {
             return;
         }
         self.settle_contacts(t, x, None);
-        let (mut u, mut w) = (Vec::new(), Vec::new());
-        let mut dx = vec![S::from(0.0); self.own];
         self.balance(t, x, &mut u, &mut w, &mut dx);
         self.plant.settle(&Instant { t, x: &x[..self.own], u: &u, w: &w });
     }

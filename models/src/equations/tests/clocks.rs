@@ -1,0 +1,205 @@
+//! Clocks, compared with the exact solution: a matrix exponential between any two changes.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::*;
+
+/// Period of the current controller, its delay, period and offset of the speed controller, all in microseconds.
+const RATES: [[u32; 4]; 10] = [
+    [1000, 0, 5000, 0],
+    [1000, 300, 5000, 0],
+    [1000, 1000, 2000, 0],
+    [700, 150, 1900, 0],
+    [3000, 0, 1000, 0],
+    [500, 20, 500, 0],
+    [100, 0, 10_000, 50],
+    [1300, 800, 3100, 700],
+    [10_000, 5000, 10_000, 10_000],
+    [333, 111, 999, 0],
+];
+
+const SPEED: f64 = 20.0;
+const GAINS: [f64; 3] = [0.35, 12.0, 2.5];
+const END: u32 = 50_000;
+
+/// DC motor with a sampled current controller within a sampled speed controller.
+fn motor([period, delay, outer, offset]: [u32; 4]) -> String {
+    format!(
+        "states = {{ i = 'A', w = 'rad/s' }}
+         inputs = {{ r = 'rad/s' }}
+         parameters = {{ kp = 'A s/rad', ki = 'A/rad', kc = 'V/A' }}
+         constants = {{ R = '0.6 ohm', L = '2 mH', K = '0.06 N m/A', J = '1e-3 kg m2', b = '1e-3 N m s', T = '{outer} us' }}
+         der = {{ i = \"L*i' = u - R*i - K*w\", w = \"J*w' = K*i - b*w\" }}
+         outputs = {{ e = 'r - w' }}
+         let = {{ next_sum = 'sum + ki*T*(r - w)' }}
+         clocks.current = {{ every = '{period} us', delay = '{delay} us', memory = {{ u = 'V' }}, next = {{ u = 'clip(kc*(ref - i), -12, 12)' }} }}
+         clocks.speed = {{ every = 'T', offset = '{offset} us', memory = {{ sum = 'A', ref = 'A' }}, next = {{ sum = 'next_sum', ref = 'kp*(r - w) + next_sum' }} }}"
+    )
+}
+
+fn tight(text: &str) -> Equations {
+    read(&format!("{text}\n[tolerance]\nrelative = 1e-13\nabsolute = 1e-14\n")).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Returns the matrix exponential: the Taylor series of a 1024th part, squared ten times.
+fn exponential(of: Matrix3<f64>) -> Matrix3<f64> {
+    let part = of / 1024.0;
+    let mut term = Matrix3::identity();
+    let mut sum = term;
+    for k in 1..=12 {
+        term = term * part / f64::from(k);
+        sum += term;
+    }
+    (0..10).fold(sum, |power, _| power * power)
+}
+
+/// Returns current, speed, voltage, integral and reference at the end.
+fn exact([period, delay, outer, offset]: [u32; 4], gains: [f64; 3]) -> [f64; 5] {
+    let [kp, ki, kc] = gains;
+    let (resistance, inductance, constant, inertia, friction) = (0.6, 2e-3, 0.06, 1e-3, 1e-3);
+    #[rustfmt::skip]
+    let system = Matrix3::new(
+        -resistance / inductance, -constant / inductance, 1.0 / inductance,
+        constant / inertia, -friction / inertia, 0.0,
+        0.0, 0.0, 0.0,
+    );
+    let seconds = |time: u32| f64::from(time) * 1e-6;
+    // Current, speed and voltage.
+    let (mut x, mut sum, mut reference) = (Vector3::zeros(), 0.0, 0.0);
+    let mut pending: Option<(u32, f64)> = None;
+    let mut now = 0;
+    loop {
+        if let Some((_, voltage)) = pending.take_if(|(at, _)| *at == now) {
+            x[2] = voltage;
+        }
+        let before = (x, sum, reference);
+        if now % period == 0 {
+            let voltage = (kc * (before.2 - before.0[0])).clamp(-12.0, 12.0);
+            if delay == 0 { x[2] = voltage } else { pending = Some((now + delay, voltage)) }
+        }
+        if now >= offset && (now - offset) % outer == 0 {
+            let error = SPEED - before.0[1];
+            sum = before.1 + ki * seconds(outer) * error;
+            reference = kp * error + sum;
+        }
+        if now == END {
+            return [x[0], x[1], x[2], sum, reference];
+        }
+        let ticks = [
+            (now / period + 1) * period,
+            if now < offset { offset } else { ((now - offset) / outer + 1) * outer + offset },
+        ];
+        let next = ticks.into_iter().chain(pending.map(|(at, _)| at)).chain([END]).min().unwrap();
+        x = exponential(system * seconds(next - now)) * x;
+        now = next;
+    }
+}
+
+#[test]
+fn sampled_loops_of_ten_pairs_of_rates_agree_with_the_exact_solution() {
+    for rates in RATES {
+        let response = respond(
+            &tight(&motor(rates)),
+            &[("r", Input::Constant(SPEED))],
+            &[("kp", GAINS[0]), ("ki", GAINS[1]), ("kc", GAINS[2])],
+            f64::from(END) * 1e-6,
+        );
+        let size = exact(rates, GAINS);
+        for (signal, exact) in ["i", "w", "u", "sum", "ref"].into_iter().zip(size) {
+            let found = response.trace(signal).unwrap().last();
+            assert!((found - exact).abs() <= 1e-10 * exact.abs().max(1.0), "{signal} {rates:?}: {found} {exact}");
+        }
+    }
+}
+
+#[test]
+fn tangents_of_sampled_loops_agree_with_differences_of_the_exact_solution() {
+    for rates in RATES {
+        let model = tight(&motor(rates));
+        let parameters = values(&model, &[("kp", GAINS[0]), ("ki", GAINS[1]), ("kc", GAINS[2])]);
+        let case = Case { inputs: vec![("r".into(), Input::Constant(SPEED))], ..Case::default() };
+        let job =
+            Job { case: &case, parameters: &parameters, signals: &[0, 1, 2, 3, 4], horizon: f64::from(END) * 1e-6 };
+        let seed = |i: usize| (0..parameters.len()).map(|j| f64::from(u8::from(i == j))).collect();
+        let (_, tangents) = model.tangents(&job, &(0..3).map(seed).collect::<Vec<_>>()).unwrap().unwrap();
+        for (i, tangent) in tangents.iter().enumerate() {
+            let step = 1e-6 * GAINS[i];
+            let moved = |sign: f64| {
+                let mut gains = GAINS;
+                gains[i] += sign * step;
+                exact(rates, gains)
+            };
+            let (up, down) = (moved(1.0), moved(-1.0));
+            for (k, signal) in ["i", "w", "u", "sum", "ref"].into_iter().enumerate() {
+                let difference = (up[k] - down[k]) / (2.0 * step);
+                let found = tangent.trace(signal).last();
+                assert!(
+                    (found - difference).abs() <= 1e-6 * difference.abs().max(1.0),
+                    "{signal} {i} {rates:?}: {found} {difference}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_sample_sees_an_input_that_jumps_at_its_instant_despite_rounding() {
+    // 3 times 0.1 s is above 0.3 s, 29 times 0.01 s is 0.29 s, 7 times 0.1 s is above 0.7 s.
+    for (period, jump) in [(0.1, 0.3), (0.01, 0.29), (0.1, 0.7), (0.01, 0.57), (0.02, 1.14)] {
+        let text = format!(
+            "inputs = {{ u = '1' }}\nstates = {{ x = '1' }}\nder = {{ x = '0 [1/s]*x' }}
+             clocks.c = {{ every = '{period} s', memory = {{ y = '1' }}, next = {{ y = 'u' }} }}"
+        );
+        let input = Input::Step { time: jump, before: 0.0, after: 1.0 };
+        let response = respond(&model(&text), &[("u", input)], &[], jump + 3.0 * period);
+        assert_eq!(at(&response, "y", jump + 0.25 * period), 1.0, "{period} {jump}");
+        assert_eq!(at(&response, "y", jump - 0.25 * period), 0.0, "{period} {jump}");
+    }
+}
+
+#[test]
+fn memory_shifts_and_counts_from_its_initial_value() {
+    let text = "states = { x = '1' }\nder = { x = '1 [1/s]' }
+        clocks.c = { every = '1 s', memory = { n = '1', 'z[1..3]' = '1' }, next = { n = 'n + 1', 'z[1]' = 'x', 'z[k=2..3]' = 'z[k-1]' } }
+        start = { n = 10 }";
+    let response = respond(&model(text), &[], &[], 5.5);
+    assert_eq!(at(&response, "n", 0.0), 11.0);
+    assert_eq!(at(&response, "n", 5.2), 16.0);
+    for (k, expected) in [(1, 5.0), (2, 4.0), (3, 3.0)] {
+        assert!((at(&response, &format!("z[{k}]"), 5.2) - expected).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn wrong_clocks_are_an_error_with_a_remedy() {
+    let clock = |text: &str| {
+        format!(
+            "inputs = {{ u = 'V' }}\nparameters = {{ p = 's' }}\nstates = {{ x = 'V' }}\nder = {{ x = '0 [1/s]*x' }}\nclocks.c = {{ {text} }}"
+        )
+    };
+    for (text, key, fact) in [
+        (
+            "every = '0 s', memory = { m = 'V' }, next = { m = 'u' }",
+            "clocks.c.every",
+            "expected a positive period, found 0 s",
+        ),
+        ("every = '10 V', memory = { m = 'V' }, next = { m = 'u' }", "clocks.c.every", ""),
+        ("every = 'p', memory = { m = 'V' }, next = { m = 'u' }", "clocks.c.every", "not constant"),
+        (
+            "every = '1 s', delay = '2 s', memory = { m = 'V' }, next = { m = 'u' }",
+            "clocks.c.delay",
+            "between 0 and the period of 1 s",
+        ),
+        ("every = '1 s', offset = '-1 s', memory = { m = 'V' }, next = { m = 'u' }", "clocks.c.offset", "at least 0"),
+        ("every = '1 s', memory = { m = 'V', n = 'V' }, next = { m = 'u' }", "clocks.c.next", "`n` has no new value"),
+        ("every = '1 s', memory = {}, next = {}", "clocks.c.memory", "no memory"),
+        ("every = '1 s', memory = { m = 'A' }, next = { m = 'u' }", "clocks.c.next.m", ""),
+        ("every = '1 s', memory = { m = 'V' }, next = { k = 'u' }", "clocks.c.next.k", "no state `k`"),
+        ("every = '1 s', memory = { x = 'V' }, next = { x = 'u' }", "clocks.c.memory.x", "declared twice"),
+    ] {
+        let mistake = read(&clock(text)).err().unwrap_or_else(|| panic!("it was read: {text}"));
+        assert!(mistake.to_string().contains(fact), "{text}: {mistake}");
+        assert!(mistake.help.is_some(), "{text}: {mistake}");
+        assert_eq!(mistake.path.join("."), key, "{text}: {mistake}");
+    }
+}
