@@ -29,6 +29,19 @@ pub struct EventInstant<'a, S> {
     pub delay: S,
 }
 
+/// Quantities over a part of an accepted step, see [`Plant::past`].
+#[derive(Debug, Clone, Copy)]
+pub struct Past<'a, S> {
+    /// Start and end of the part, s.
+    pub time: [f64; 2],
+    /// Values at [`crate::Trace::NODES`] of the part.
+    pub values: &'a [Vec<S>; 5],
+    /// Values at [`crate::Trace::CHECKS`] of the part, to compare the quartic through the others with.
+    pub checks: &'a [Vec<S>; 2],
+    /// True if the part is not halved any more.
+    pub is_last: bool,
+}
+
 /// Bounds on the time, states, inputs and forces of a plant over a time interval, see [`Instant`].
 #[derive(Debug, Clone, Copy)]
 pub struct Span<'a> {
@@ -113,6 +126,30 @@ pub trait Plant<S: Scalar> {
     /// Returns an error if there is no limit state: which events accumulate, and how to avoid them. The simulation fails.
     fn rest(&mut self, _index: usize, _event: &EventInstant<'_, S>, _close: f64, _x: &mut [S]) -> Result<&str, String> {
         Err("a mode of the model chatters without end".to_owned())
+    }
+
+    /// Returns true if the plant depends on its past: [`Plant::begin`] and [`Plant::remember`] are to be called.
+    fn remembers(&self) -> bool {
+        false
+    }
+
+    /// Returns the quantities on whose past the plant depends.
+    fn past(&self, _at: &Instant<'_, S>) -> Vec<S> {
+        Vec::new()
+    }
+
+    /// Takes the past as constant: `at` is the start, with the inputs just before it.
+    fn begin(&mut self, _at: &Instant<'_, S>) {}
+
+    /// Stores the quantities of [`Plant::past`] over a part of an accepted step, or returns false if the quartic through their
+    /// values is not accurate enough: the part is then halved.
+    fn remember(&mut self, _over: &Past<'_, S>) -> bool {
+        true
+    }
+
+    /// Returns the derivatives of the time of the break at `t` along the directions of the scalar, with value 0.
+    fn break_delay(&self, _t: f64) -> S {
+        S::from(0.0)
     }
 
     /// Returns true if [`Plant::sample`] is to be called.
@@ -208,6 +245,21 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Plant<S> for Box<P> {
     }
     fn rest(&mut self, index: usize, event: &EventInstant<'_, S>, close: f64, x: &mut [S]) -> Result<&str, String> {
         (**self).rest(index, event, close, x)
+    }
+    fn remembers(&self) -> bool {
+        (**self).remembers()
+    }
+    fn begin(&mut self, at: &Instant<'_, S>) {
+        (**self).begin(at)
+    }
+    fn past(&self, at: &Instant<'_, S>) -> Vec<S> {
+        (**self).past(at)
+    }
+    fn remember(&mut self, over: &Past<'_, S>) -> bool {
+        (**self).remember(over)
+    }
+    fn break_delay(&self, t: f64) -> S {
+        (**self).break_delay(t)
     }
     fn samples(&self) -> bool {
         (**self).samples()

@@ -15,6 +15,20 @@ pub struct Trace {
     jumped: Option<f64>,
 }
 
+/// Weights of the values at [`Trace::NODES`] in their quartic at the first of [`Trace::CHECKS`]: Lagrange's basis. Reversed, they
+/// apply at the same distance from the end.
+const WEIGHTS: [f64; 5] = {
+    let mut weights = [1.0; 5];
+    let (mut i, mut k) = (0, 0);
+    while i < 5 {
+        if k != i {
+            weights[i] *= (Trace::CHECKS[0] - Trace::NODES[k]) / (Trace::NODES[i] - Trace::NODES[k]);
+        }
+        (i, k) = if k == 4 { (i + 1, 0) } else { (i, k + 1) };
+    }
+    weights
+};
+
 /// A monotone part of a trace: times and values at both ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Piece {
@@ -29,6 +43,20 @@ pub struct Piece {
 impl Trace {
     /// Positions `s` within a segment at which [`Trace::push`] expects samples.
     pub const NODES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+
+    /// Positions within a segment, near the extrema of the interpolation error, at which the quartic through values at
+    /// [`Trace::NODES`] is compared with the signal. An irrational fraction avoids periods that coincide with the nodes.
+    pub const CHECKS: [f64; 2] = [0.112_701_665_379_258_3, 1.0 - 0.112_701_665_379_258_3];
+
+    /// Returns the largest deviation of the quartic through `values` at [`Trace::NODES`] from the values at [`Trace::CHECKS`]; NaN
+    /// if a value is not finite.
+    pub fn deviation(values: [f64; 5], checks: [f64; 2]) -> f64 {
+        let quartic = |node: &dyn Fn(usize) -> usize| -> f64 {
+            WEIGHTS.iter().enumerate().map(|(k, weight)| weight * values[node(k)]).sum()
+        };
+        let [a, b] = [quartic(&|k| k) - checks[0], quartic(&|k| 4 - k) - checks[1]].map(f64::abs);
+        if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+    }
 
     /// Creates an empty trace that starts at `start`, with capacity for `segments`.
     pub fn starting_at(start: f64, segments: usize) -> Self {

@@ -19,6 +19,9 @@ impl Lowering<'_> {
             Function::Sqrt | Function::Ln | Function::Log10 | Function::Asin | Function::Acos => Kinks::AsTheyStand,
             _ => kinks,
         };
+        if function == Function::Delay {
+            return self.delayed(text, arguments);
+        }
         if function == Function::If {
             return self.pieces(text, arguments, kinks);
         }

@@ -108,6 +108,10 @@ pub struct Compiled {
     pub happenings: Vec<Happening>,
     /// Clocks.
     pub clocks: Vec<Clock>,
+    /// Computes the delayed quantities, which are inputs after all others.
+    pub delayed: Program,
+    /// Computes the delays, s.
+    pub delays: Program,
     /// States whose initial values are expressions; computes these values.
     pub starts: (Vec<usize>, Program),
     /// Computes the entries of the matrices of equations solved together.
@@ -158,6 +162,8 @@ impl Compiled {
             wanted.push(happening.at_rest.iter().map(|(_, id)| *id).collect());
         }
         wanted.extend(system.clocks.iter().map(|clock| clock.next.clone()));
+        wanted.push(system.delays.iter().map(|(of, _)| *of).collect());
+        wanted.push(system.delays.iter().map(|(_, time)| *time).collect());
         let starts: Vec<(usize, Id)> =
             system.starts.iter().enumerate().filter_map(|(s, start)| Some((s, (*start)?))).collect();
         wanted.push(starts.iter().map(|(_, id)| *id).collect());
@@ -168,7 +174,8 @@ impl Compiled {
             StudyError::new("states", "the model needs more than 65536 registers")
                 .with_help("write a model of this size in Rust")
         };
-        let mut layout = Layout::new(parameters, names.len(), inputs + forces, system.modes).map_err(too_large)?;
+        let mut layout = Layout::new(parameters, names.len(), inputs + forces + system.delays.len(), system.modes)
+            .map_err(too_large)?;
         let (setup, programs) = compile(&graph, &mut layout, &wanted).map_err(too_large)?;
         let mut programs = programs.into_iter();
         let mut next = || programs.next().expect("every request has a tape");
@@ -199,6 +206,7 @@ impl Compiled {
             Clock { memory, period, offset, delay, next: next() }
         };
         let clocks = system.clocks.iter().map(clock).collect();
+        let (delayed, delays) = (next(), next());
         let starts = (starts.iter().map(|(s, _)| *s).collect(), next());
         let matrices = system.matrices.iter().map(|_| next()).collect();
         let signals = system
@@ -231,6 +239,8 @@ impl Compiled {
             joints,
             happenings,
             clocks,
+            delayed,
+            delays,
             starts,
             matrices,
             pattern,

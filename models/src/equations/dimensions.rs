@@ -111,6 +111,8 @@ struct Model<'d> {
     names: HashMap<String, Measure>,
     outputs: Vec<Measure>,
     lets: HashMap<&'d str, &'d Text>,
+    /// Definitions being determined; with a dimension once they were met in their own delayed value.
+    visited: HashMap<String, Option<Measure>>,
     constants: HashMap<&'d str, f64>,
     time: Measure,
     /// Numbers read in coherent units, by path, position and text.
@@ -159,6 +161,7 @@ impl<'d> Model<'d> {
             names,
             outputs,
             lets: d.lets.iter().map(|(name, text)| (name.as_str(), text)).collect(),
+            visited: HashMap::new(),
             constants: d.constants.iter().map(|c| (c.name.as_str(), c.value)).collect(),
             time: if pure { Measure::pure() } else { Measure::declared("time", &Unit::known("s")) },
             counted: BTreeMap::new(),
@@ -262,8 +265,19 @@ impl Quantities for Within<'_, '_> {
         if let Some(known) = self.model.names.get(&name) {
             return Ok(known.clone());
         }
+        if let Some(visited) = self.model.visited.get_mut(&name) {
+            return Ok(visited.get_or_insert_with(|| dimensions.open(&name)).clone());
+        }
         let text = self.model.lets[name.as_str()];
-        let measure = dimensions.measure(&mut Within { model: &mut *self.model, text }, &text.equation.right)?;
+        self.model.visited.insert(name.clone(), None);
+        let right = &text.equation.right;
+        let mut measure = dimensions.measure(&mut Within { model: &mut *self.model, text }, right)?;
+        if let Some(own) = self.model.visited.remove(&name).flatten() {
+            self.model.names.insert(name.clone(), own.clone());
+            let rule = "a definition must have the dimension of its delayed value";
+            dimensions.fits(&mut Within { model: &mut *self.model, text }, &own, right, rule)?;
+            measure = own;
+        }
         self.model.names.insert(name, measure.clone());
         Ok(measure)
     }

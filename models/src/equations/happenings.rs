@@ -244,6 +244,9 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         for (i, w) in self.forces(at.w).iter().enumerate() {
             bank.set(layout.input(at.u.len() + i), Dual::from(w.value()));
         }
+        for (delay, register) in self.delays.iter().zip(self.delayed_inputs(at)) {
+            bank.set(register, Dual { value: delay.at(at.t).value(), tangent: [time * delay.slope(at.t)] });
+        }
         bank.set(layout.time(), Dual { value: at.t, tangent: [time] });
     }
 }

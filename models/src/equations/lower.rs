@@ -53,6 +53,17 @@ pub struct Order {
     pub what: String,
 }
 
+/// Delayed quantity.
+#[derive(Debug, Clone)]
+pub struct Delayed {
+    /// Text that contains it.
+    pub text: Text,
+    /// Expression of the quantity.
+    pub of: Node,
+    /// Delay, s.
+    pub time: Id,
+}
+
 /// Limit on the nesting depth of definitions: each level uses the call stack.
 const DEEPEST: usize = 200;
 
@@ -95,6 +106,10 @@ pub struct Lowering<'d> {
     pub switches: Vec<Switch>,
     /// Arguments that must increase, so far.
     pub orders: Vec<Order>,
+    /// Delayed quantities so far.
+    pub delays: Vec<Delayed>,
+    /// Number of external forces, which are inputs after the declared ones.
+    forces: usize,
     /// Number of modes so far.
     pub modes: usize,
     /// Nesting depth of the current node, over all definitions.
@@ -102,11 +117,11 @@ pub struct Lowering<'d> {
 }
 
 impl<'d> Lowering<'d> {
-    /// Collects all names.
+    /// Collects all names, for a model with this number of external forces.
     ///
     /// # Errors
     /// Duplicate names.
-    pub fn new(definition: &'d Definition) -> Result<Self, StudyError> {
+    pub fn new(definition: &'d Definition, forces: usize) -> Result<Self, StudyError> {
         let d = definition;
         let mut names: HashMap<&str, (Meaning, &str)> = HashMap::new();
         let states = d.states.iter().enumerate().map(|(i, q)| (&q.name, Meaning::State(i), "a state", &q.path));
@@ -146,6 +161,8 @@ impl<'d> Lowering<'d> {
             graph: Graph::default(),
             switches: Vec::new(),
             orders: Vec::new(),
+            delays: Vec::new(),
+            forces,
             modes: 0,
             depth: 0,
         })
@@ -184,6 +201,12 @@ impl<'d> Lowering<'d> {
     /// Lowers an expression whose kinks are evaluated by the current values.
     pub fn as_it_stands(&mut self, text: &Text) -> Result<Affine, StudyError> {
         self.node(text, &text.equation.right, Kinks::AsTheyStand)
+    }
+
+    /// Lowers the expression of a delayed quantity.
+    pub fn past(&mut self, delay: usize) -> Result<Affine, StudyError> {
+        let Delayed { text, of, .. } = self.delays[delay].clone();
+        self.node(&text, &of, Kinks::ByMode)
     }
 
     /// Lowers an expression without derivatives.
@@ -234,6 +257,36 @@ impl<'d> Lowering<'d> {
                 .with_help("equations must be linear in the derivatives; rewrite the expression without them")
                 .at(span.clone()),
         ))
+    }
+
+    /// Lowers a delayed quantity: an input after the declared ones and the forces. Its expression is lowered later, so that it may
+    /// depend on itself.
+    pub(super) fn delayed(&mut self, text: &Text, arguments: &[Node]) -> Result<Id, StudyError> {
+        let [of, time] = arguments else { unreachable!("the parser requires two arguments") };
+        let is_same = |delayed: &Delayed| {
+            delayed.of.span == of.span && delayed.text.path == text.path && delayed.text.index == text.index
+        };
+        let known = self.delays.iter().position(is_same);
+        let index = known.map_or_else(
+            || {
+                let affine = self.node(text, time, Kinks::AsTheyStand)?;
+                let id = self.without_rates(text, &time.span, affine, "in the time of a `delay`")?;
+                if self.graph.level(id) == Level::Variable {
+                    let mistake = StudyError::here("the time of a `delay` must not change during a simulation")
+                        .with_help("give a time such as \"50 ms\", or an expression of parameters and constants");
+                    return Err(under(&text.path, mistake.at(time.span.clone())));
+                }
+                if let Some(seconds) = self.graph.constant(id).filter(|seconds| *seconds <= 0.0) {
+                    let mistake = StudyError::here(format!("expected a positive time, found {seconds} s"));
+                    return Err(under(&text.path, mistake.with_help("without a delay, write the quantity alone"))
+                        .at(time.span.clone()));
+                }
+                self.delays.push(Delayed { text: text.clone(), of: of.clone(), time: id });
+                Ok(self.delays.len() - 1)
+            },
+            Ok,
+        )?;
+        Ok(self.graph.add_op(Op::Input(self.definition.inputs.len() + self.forces + index)))
     }
 
     fn sum(&mut self, a: Affine, b: Affine, sign: f64) -> Affine {

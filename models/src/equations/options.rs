@@ -29,6 +29,10 @@ use crate::kernel::Tolerance;
 /// `> >= < <=`, `and`, `or`, `not`. A step of the integrator ends where a function with kinks or jumps, a table or an
 /// `if` changes its branch. So no step crosses a kink or a jump.
 ///
+/// `delay(x, "50 ms")` is the value of `x` at an earlier time; `x` is any expression, and before the start it is constant. The
+/// time is a quantity, or an expression of parameters and constants. Jumps of `x` and of its derivatives end a step when they
+/// arrive, at which the plant sees them.
+///
 /// Expressions use coherent SI units for all quantities, whatever unit they are declared in, and their dimensions are
 /// checked. A number in a product is a pure number. A number that is a whole term has the SI unit of the other terms.
 /// If one of these is declared in another unit, the number needs its own unit: `20 [degC]`. A quantity declared in `""`
@@ -48,17 +52,18 @@ use crate::kernel::Tolerance;
 /// control = { every = "10 ms", delay = "2 ms", memory = { u = "N m", i = "rad" }, next = { i = "i + e", u = "k*e + ki*i" } }
 /// ```
 ///
-/// Its memory is constant between the instants `offset + k every`, at which it takes the values `next`, computed from the
-/// states, inputs and memory just before; without an effect on the plant before `delay` has passed. Clocks that are due at
-/// the same instant read the same values. Memory is a signal, and has an initial value, like a state. With `next = { y_k =
-/// "y" }` a memory holds a sample of `y`.
+/// At the instants `offset + k every`, the values `next` are computed from the states, inputs and memory just before; the
+/// memory takes them after `delay`, and is constant until then. Clocks that are due at the same instant read the same values.
+/// A memory is a signal and has an initial value, like a state. `next = { y_k = "y" }` holds a sample of `y`.
 ///
 /// A state whose derivative is another state, such as `th` above, is a joint. Its friction is given as
 /// `friction.th = { coulomb = "c" }`; a stuck joint is exactly at rest. The places of possible missing effects are
 /// the joints, the equations of the states, the inputs and the signals.
 ///
+/// A model with clocks or delays is simulated, but not linearised.
+///
 /// Source: F. Cellier, E. Kofman, Continuous System Simulation (2006), chapters 7 (sorting and solving equations) and 9
-/// (discontinuities).
+/// (discontinuities); A. Bellen, M. Zennaro, Numerical Methods for Delay Differential Equations (2003), section 3.2.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct EquationsOptions {

@@ -4,15 +4,16 @@ use std::cell::RefCell;
 
 use mops_core::enclosure::Enclosure;
 use mops_core::expression::Comparison;
-use mops_core::{DIRECTIONS, Dual, Dual7, EventInstant, Failure, Instant, Plant, Scalar, Span};
+use mops_core::{DIRECTIONS, Dual, Dual7, EventInstant, Failure, Instant, Past, Plant, Scalar, Span, Trace};
 
-use super::bank::{Bank, Large};
+use super::bank::{Bank, Large, Register};
 use super::bounds::{self, moved, signed};
 use super::clocks::Ticking;
 use super::compiled::{Compiled, Signal};
 use super::happenings::Phase;
 use super::program::Program;
-use crate::kernel::{Tolerance, next_of};
+use crate::kernel::elements::Delay;
+use crate::kernel::{Tolerance, allowed, next_of};
 
 /// Plant of a compiled model; `B` is the bank of registers.
 pub struct Running<'a, S, B> {
@@ -33,6 +34,8 @@ pub struct Running<'a, S, B> {
     flips: Vec<usize>,
     /// Phases of the events.
     pub(super) phases: Vec<Phase>,
+    /// Delayed quantities.
+    pub(super) delays: Vec<Delay<S>>,
     /// Progress of the clocks.
     pub(super) ticking: Vec<Ticking<S>>,
     /// States fixed by events at rest.
@@ -65,6 +68,8 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
     pub fn new(model: &'a Compiled, parameters: &'a [S], tolerance: Tolerance) -> Self {
         let mut bank = B::with(model.layout.registers);
         set_up(model, &mut bank, parameters.iter().copied());
+        model.delays.run(&mut bank);
+        let delays = model.delays.results.iter().map(|&time| Delay::new(bank.get(time), S::from(0.0))).collect();
         Self {
             model,
             bank: RefCell::new(bank),
@@ -78,6 +83,7 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
             spans: vec![0.0; model.switches.len()],
             flips: vec![0; model.switches.len()],
             phases: vec![Phase::Armed(0.0); model.happenings.len()],
+            delays,
             ticking: vec![Ticking::new(); model.clocks.len()],
             held: Vec::new(),
             sizes: vec![0.0; model.states],
@@ -113,7 +119,17 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         for (i, &w) in self.forces(at.w).iter().enumerate() {
             bank.set(layout.input(at.u.len() + i), w);
         }
+        for (delay, register) in self.delays.iter().zip(self.delayed_inputs(at)) {
+            bank.set(register, delay.at(at.t));
+        }
         bank.set(layout.time(), S::from(at.t));
+    }
+
+    /// Returns the registers of the delayed quantities.
+    #[inline(always)]
+    pub(super) fn delayed_inputs<'w, T>(&self, at: &Instant<'w, T>) -> impl Iterator<Item = Register> {
+        let first = at.u.len() + self.forces(at.w).len();
+        (first..first + self.delays.len()).map(|index| self.model.layout.input(index))
     }
 
     /// Returns the external forces, if the equations contain them.
@@ -153,6 +169,10 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         registers[usize::from(layout.state(0))..][..x.len()].copy_from_slice(x);
         for (i, input) in u.iter().chain(self.forces(w)).enumerate() {
             registers[usize::from(layout.input(i))] = *input;
+        }
+        let first = u.len() + self.forces(w).len();
+        for k in 0..self.delays.len() {
+            registers[usize::from(layout.input(first + k))] = Enclosure::UNKNOWN;
         }
         registers[usize::from(layout.time())] = *time;
         match self.kind(index) {
@@ -314,6 +334,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
 
     fn switch(&mut self, index: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
         self.note_sizes(x);
+        self.delays.iter_mut().for_each(|delay| delay.restart(0));
         let at = event.at;
         match self.kind(index) {
             Guard::Joint(j) => {
@@ -369,6 +390,9 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         for (i, input) in at.u.iter().chain(self.forces(at.w)).enumerate() {
             bank.set(layout.input(i), Dual::from(input.value()));
         }
+        for (delay, register) in self.delays.iter().zip(self.delayed_inputs(at)) {
+            bank.set(register, Dual::from(delay.at(at.t).value()));
+        }
         bank.set(layout.time(), Dual::from(at.t));
         for groups in model.columns.chunks(DIRECTIONS) {
             for (i, x) in at.x.iter().enumerate() {
@@ -391,15 +415,66 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         true
     }
 
-    fn next_break(&self, _: f64) -> f64 {
-        next_of(self.ticking.iter().zip(&self.model.clocks).map(|(ticking, clock)| ticking.next_break(clock)))
+    fn next_break(&self, t: f64) -> f64 {
+        let ticks = self.ticking.iter().zip(&self.model.clocks).map(|(ticking, clock)| ticking.next_break(clock));
+        next_of(ticks.chain(self.delays.iter().map(|delay| delay.next_break(t))))
+    }
+
+    fn longest_step(&self) -> f64 {
+        self.delays.iter().map(Delay::longest_step).fold(f64::INFINITY, f64::min)
+    }
+
+    fn remembers(&self) -> bool {
+        !self.delays.is_empty()
+    }
+
+    fn begin(&mut self, at: &Instant<'_, S>) {
+        for (delay, before) in self.past(at).into_iter().enumerate() {
+            self.delays[delay].set_before(before);
+        }
+    }
+
+    fn past(&self, at: &Instant<'_, S>) -> Vec<S> {
+        let mut bank = self.bank.borrow_mut();
+        self.load(&mut bank, at);
+        self.model.delayed.run(&mut *bank);
+        self.model.delayed.results.iter().map(|&register| bank.get(register)).collect()
+    }
+
+    fn remember(&mut self, over: &Past<'_, S>) -> bool {
+        let quartic = |k: usize| over.values.each_ref().map(|values| values[k]);
+        let agrees = |(k, delay): (usize, &Delay<S>)| {
+            let (values, checks) =
+                (quartic(k).map(Scalar::value), over.checks.each_ref().map(|values| values[k].value()));
+            let size = values.iter().chain(&checks).fold(0.0, |most: f64, value| most.max(value.abs()));
+            let off = Trace::deviation(values, checks);
+            off.is_nan() || off <= allowed(&self.tolerance, delay.size(), size)
+        };
+        if !over.is_last && !self.delays.iter().enumerate().all(agrees) {
+            return false;
+        }
+        for (k, delay) in self.delays.iter_mut().enumerate() {
+            delay.push(over.time[0], over.time[1], quartic(k));
+        }
+        true
+    }
+
+    fn break_delay(&self, t: f64) -> S {
+        let due = self.delays.iter().find(|delay| delay.jump_at(t).is_some());
+        due.map_or(S::from(0.0), |delay| delay.time() - delay.time().value())
     }
 
     fn samples(&self) -> bool {
-        !self.ticking.is_empty()
+        !self.ticking.is_empty() || self.remembers()
     }
 
     fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
+        // A jump of a delayed quantity appears one derivative higher in the states; other breaks may be jumps of an input.
+        let jump = self.delays.iter().filter_map(|delay| delay.jump_at(at.t)).min().map_or(0, |jump| jump + 1);
+        for delay in &mut self.delays {
+            delay.pass_break(at.t);
+            delay.restart(jump);
+        }
         self.tick(at, x);
     }
 
@@ -416,7 +491,12 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
 
     fn linearised_at(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<Vec<usize>, Failure> {
         if !self.ticking.is_empty() {
-            let why = "a model with clocks has no linearisation in continuous time";
+            let why = "a model with clocks has no linearisation in continuous time: remove `clocks`, and declare their memory as \
+                       inputs";
+            return Err(Failure::Undefined(why.to_owned()));
+        }
+        if !self.delays.is_empty() {
+            let why = "a model with `delay` has no linearisation with finitely many states: declare what is delayed as an input";
             return Err(Failure::Undefined(why.to_owned()));
         }
         Ok(self.look(at, at_rest))

@@ -87,6 +87,8 @@ pub struct System {
     pub happenings: Vec<Happening>,
     /// Clocks.
     pub clocks: Vec<Clock>,
+    /// Delayed quantities, which are inputs after all others, and their delays, s.
+    pub delays: Vec<(Id, Id)>,
     /// Initial values given in the study.
     pub starts: Vec<Option<Id>>,
     /// Joints, as pairs of position and speed.
@@ -103,7 +105,7 @@ impl System {
     /// Unknown names, circular definitions, or equations that do not determine the derivatives.
     pub fn new(definition: &Definition, opened: &[usize]) -> Result<Self, StudyError> {
         let d = definition;
-        let mut l = Lowering::new(d)?;
+        let mut l = Lowering::new(d, opened.len())?;
         let state = |name: &str| d.states.iter().position(|s| s.name == name).expect("names of states were checked");
         let row_of = |s: usize| match d.is_memory(s) {
             true => Ok(Row { coefficients: BTreeMap::from([(s, l.graph.number(1.0))]), force: l.graph.number(0.0) }),
@@ -186,11 +188,14 @@ impl System {
             value.transpose()
         };
         let starts = (0..d.states.len()).map(|s| start(&mut l, s)).collect::<Result<_, _>>()?;
-        // Unused definitions are checked too, but their switches are discarded.
+        let mut delays = Vec::new();
+        lower_delays(&mut l, &derivatives, &mut delays)?;
+        // Unused definitions are checked too, but their switches and delays are discarded.
         let (switches, orders, modes) = (l.switches.len(), l.orders.len(), l.modes);
         for (_, text) in &d.lets {
             l.text(text)?;
         }
+        lower_delays(&mut l, &derivatives, &mut delays.clone())?;
         l.switches.truncate(switches);
         l.orders.truncate(orders);
         l.modes = modes;
@@ -206,6 +211,7 @@ impl System {
             contacts,
             happenings,
             clocks,
+            delays,
             starts,
             joints,
             matrices,
@@ -259,6 +265,16 @@ fn joints(graph: &Graph, d: &Definition, rows: &[Row]) -> Vec<(usize, usize)> {
             .map(|velocity| (position, velocity))
     };
     rows.iter().enumerate().filter_map(pair).collect()
+}
+
+/// Lowers the delayed quantities that are not in the list yet, and those that they depend on.
+fn lower_delays(l: &mut Lowering<'_>, derivatives: &[Id], delays: &mut Vec<(Id, Id)>) -> Result<(), StudyError> {
+    while delays.len() < l.delays.len() {
+        let affine = l.past(delays.len())?;
+        let value = with_rates(&mut l.graph, affine, derivatives);
+        delays.push((value, l.delays[delays.len()].time));
+    }
+    Ok(())
 }
 
 /// Lowers a clock. Its new values see every kink as it stands: they are computed at its instants only.

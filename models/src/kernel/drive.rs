@@ -89,6 +89,11 @@ impl<'a, S: Scalar> Drive<'a, S> {
         }
     }
 
+    /// Returns the value just before time 0.
+    pub fn before(&self) -> S {
+        self.input.map_or(self.value, |input| S::from(input.at(-f64::MIN_POSITIVE)))
+    }
+
     /// Returns true if the value is constant up to the next break.
     pub fn is_constant(&self) -> bool {
         self.curve.is_none() && self.slope == 0.0

@@ -6,7 +6,7 @@ use mops_core::enclosure::Enclosure;
 use mops_core::{EventInstant, Failure, Instant, Plant, Scalar, Span};
 
 use super::drive::Drive;
-use super::{Dynamics, next_of};
+use super::{Dynamics, Step, next_of, remember};
 
 /// Plant with given inputs and without external forces: the system that a simulation integrates.
 pub struct Driven<'a, S, P> {
@@ -25,6 +25,8 @@ pub struct Driven<'a, S, P> {
     shows: &'a [Option<usize>],
     /// Delay of the current events: tangents with zero value.
     delay: S,
+    /// True from the start of the simulation on.
+    begun: bool,
 }
 
 impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
@@ -35,7 +37,17 @@ impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
         let zero = S::from(0.0);
         let inputs = RefCell::new(vec![zero; drives.len()]);
         let bounds = RefCell::default();
-        Self { plant, drives, constant: None, inputs, bounds, forces: vec![zero; forces], shows, delay: zero }
+        Self {
+            plant,
+            drives,
+            constant: None,
+            inputs,
+            bounds,
+            forces: vec![zero; forces],
+            shows,
+            delay: zero,
+            begun: false,
+        }
     }
 
     /// Evaluates a function of the plant at a time and a state.
@@ -168,7 +180,24 @@ impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
         self.look(t, x, |plant, at| plant.jacobian(at, entry))
     }
 
+    fn remembers(&self) -> bool {
+        self.plant.remembers()
+    }
+
+    fn break_delay(&self, t: f64) -> S {
+        self.plant.break_delay(t)
+    }
+
+    fn accepted(&mut self, step: &Step<S>) {
+        let past = |of: &Self, t: f64, x: &[S]| of.look(t, x, |plant, at| plant.past(at));
+        remember(self, step, &past, &|of, over| of.plant.remember(over));
+    }
+
     fn pass_break(&mut self, t: f64, x: &mut [S]) {
+        if !std::mem::replace(&mut self.begun, true) && self.plant.remembers() {
+            let u: Vec<S> = self.drives.iter().map(Drive::before).collect();
+            self.plant.begin(&Instant { t, x, u: &u, w: &self.forces });
+        }
         self.drives.iter_mut().for_each(|drive| drive.pass_break(t));
         let mut inputs = self.inputs.borrow_mut();
         self.take_inputs(t, &mut inputs);

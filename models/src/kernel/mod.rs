@@ -68,7 +68,7 @@ pub use integrate::integrate;
 pub(crate) use local::rests;
 pub(crate) use plant_model::shown;
 pub use plant_model::{PlantModel, Simulated};
-pub(crate) use record::{Recording, record, tangents_of, wanted};
+pub(crate) use record::{Recording, allowed, record, remember, tangents_of, wanted};
 pub use step::Step;
 
 /// Closed system `x' = f(t, x)` that the integrator steps, with modes between which events switch. The system supplies
@@ -209,6 +209,12 @@ pub trait Dynamics<S: Scalar> {
     /// Returns true if [`Dynamics::accepted`] is to be called for accepted steps.
     fn remembers(&self) -> bool {
         false
+    }
+
+    /// Returns the derivatives of the time of the break at `t` along the directions of the scalar, with value 0: the jump of a
+    /// delayed signal moves with the delay. Called only if [`Dynamics::remembers`] returns true.
+    fn break_delay(&self, _t: f64) -> S {
+        S::from(0.0)
     }
 
     /// Handles an accepted step: a delay stores the values that it outputs later.

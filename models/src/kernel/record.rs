@@ -1,7 +1,7 @@
 //! Traces of signals from the dense output of steps, with their tangents.
 
 use mops_core::{
-    Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Response, Scalar, Trace, WithTangents,
+    Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Past, Response, Scalar, Trace, WithTangents,
 };
 
 use super::weights::SHARE;
@@ -93,13 +93,46 @@ struct Resolved {
     longest: f64,
 }
 
-/// Position at which a computed signal is compared with its quartic, as a fraction of the step from its start and from
-/// its end. The position is near the extrema of the interpolation error at [`Trace::NODES`]. An irrational fraction
-/// avoids periods that coincide with the nodes.
-const CHECK: f64 = 0.112_701_665_379_258_3;
-
 /// Permitted deviation of the quartic in units of the tolerance: the dense output of the states is no more accurate.
 const OFF: f64 = 10.0;
+
+/// Returns the permitted deviation of a quartic from a signal with values of this size, and of size `largest` so far.
+pub(crate) fn allowed(tolerance: &Tolerance, largest: f64, size: f64) -> f64 {
+    let Tolerance { relative, absolute, .. } = tolerance;
+    OFF * (absolute.unwrap_or(SHARE * relative * largest) + relative * size)
+}
+
+/// Stores the past of a plant over a part of a step, halved until one quartic per part suffices. `past` evaluates the quantities at
+/// a time and a state; `store` stores them.
+pub(crate) fn remember<S: Scalar, D>(
+    of: &mut D,
+    step: &Step<S>,
+    past: &impl Fn(&D, f64, &[S]) -> Vec<S>,
+    store: &impl Fn(&mut D, &Past<'_, S>) -> bool,
+) {
+    remember_part(of, step, past, store, ([0.0, 1.0], HALVINGS));
+}
+
+fn remember_part<S: Scalar, D>(
+    of: &mut D,
+    step: &Step<S>,
+    past: &impl Fn(&D, f64, &[S]) -> Vec<S>,
+    store: &impl Fn(&mut D, &Past<'_, S>) -> bool,
+    ([from, to], halvings): ([f64; 2], u32),
+) {
+    let time = |s: f64| step.start + s * step.taken;
+    let at = |s: f64| {
+        let s = from + s * (to - from);
+        past(of, time(s), &step.state_at(s))
+    };
+    let (values, checks) = (Trace::NODES.map(at), Trace::CHECKS.map(at));
+    let over = Past { time: [time(from), time(to)], values: &values, checks: &checks, is_last: halvings == 0 };
+    if !store(of, &over) {
+        let middle = 0.5 * (from + to);
+        remember_part(of, step, past, store, ([from, middle], halvings - 1));
+        remember_part(of, step, past, store, ([middle, to], halvings - 1));
+    }
+}
 
 /// Limit on the number of halvings of a step.
 const HALVINGS: u32 = 12;
@@ -114,20 +147,6 @@ const SLOPE: [f64; 5] = [-25.0 / 3.0, 16.0, -12.0, 16.0 / 3.0, -1.0];
 /// Weights at the last node: reversed, with opposite sign.
 const END_SLOPE: [f64; 5] = [1.0, -16.0 / 3.0, 12.0, -16.0, 25.0 / 3.0];
 
-/// Weights of the values at [`Trace::NODES`] in their quartic at [`CHECK`]: Lagrange's basis. Reversed, they apply at
-/// the same distance from the end.
-const WEIGHTS: [f64; 5] = {
-    let mut weights = [1.0; 5];
-    let (mut i, mut k) = (0, 0);
-    while i < 5 {
-        if k != i {
-            weights[i] *= (CHECK - Trace::NODES[k]) / (Trace::NODES[i] - Trace::NODES[k]);
-        }
-        (i, k) = if k == 4 { (i + 1, 0) } else { (i, k + 1) };
-    }
-    weights
-};
-
 impl<S: Scalar> Recorder<'_, S> {
     /// Adds a segment that ends at `end` to the traces of a signal.
     fn push(&mut self, index: usize, end: f64, values: &[S; 5]) {
@@ -141,20 +160,16 @@ impl<S: Scalar> Recorder<'_, S> {
     /// Returns the permitted deviation of the quartic of a signal with values of this size. The rule is that of the
     /// states, with the signal's own scale.
     fn allowed(&self, index: usize, size: f64) -> f64 {
-        let Tolerance { relative, absolute, .. } = self.tolerance;
-        OFF * (absolute.unwrap_or(SHARE * relative * self.resolved[index].size) + relative * size)
+        allowed(self.tolerance, self.resolved[index].size, size)
     }
 
     /// Returns true if the quartic through the values agrees with the signal near both ends. Values that are not finite
     /// count as agreeing.
     fn agrees(&self, index: usize, values: &[S; 5], mut signal: impl FnMut(f64) -> S) -> bool {
-        let [first, last] = [CHECK, 1.0 - CHECK].map(|s| signal(s).value());
-        let quartic = |node: &dyn Fn(usize) -> usize| -> f64 {
-            WEIGHTS.iter().enumerate().map(|(k, weight)| weight * values[node(k)].value()).sum()
-        };
-        let off = [quartic(&|k| k) - first, quartic(&|k| 4 - k) - last].map(f64::abs);
-        let allowed = self.allowed(index, largest(values).max(first.abs()).max(last.abs()));
-        off.iter().all(|off| off.is_nan() || *off <= allowed)
+        let checks = Trace::CHECKS.map(|s| signal(s).value());
+        let off = Trace::deviation(values.map(Scalar::value), checks);
+        off.is_nan()
+            || off <= self.allowed(index, checks.iter().fold(largest(values), |most, check| most.max(check.abs())))
     }
 
     /// Returns true if the quartic of a step of this length must be compared with the signal. Reasons: the step is

@@ -39,6 +39,13 @@ impl<S: Scalar> Step<S> {
         self.start + theta * self.length
     }
 
+    /// Returns the state at `start + s taken`, `s` in [0, 1].
+    pub fn state_at(&self, s: f64) -> Vec<S> {
+        let mut x = self.dense[0].clone();
+        self.state(s, &mut x);
+        x
+    }
+
     /// Writes the state at `start + s taken`, `s` in [0, 1], to `x`.
     #[inline]
     pub fn state(&self, s: f64, x: &mut [S]) {

@@ -11,7 +11,7 @@ use mops_core::{
 use super::contacts::Contacts;
 use super::{Place, Site, WithEffects};
 use crate::kernel::drive::Drive;
-use crate::kernel::{Dynamics, next_of, shown};
+use crate::kernel::{Dynamics, Step, next_of, remember, shown};
 
 /// Effect in a simulation.
 pub(super) struct Actor<S> {
@@ -731,7 +731,29 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         self.damped_step
     }
 
+    fn remembers(&self) -> bool {
+        self.plant.remembers()
+    }
+
+    fn break_delay(&self, t: f64) -> S {
+        self.plant.break_delay(t)
+    }
+
+    fn accepted(&mut self, step: &Step<S>) {
+        let past = |of: &Self, t: f64, x: &[S]| {
+            let (mut u, mut w) = (Vec::new(), Vec::new());
+            of.balance(t, x, &mut u, &mut w, &mut vec![S::from(0.0); of.own]);
+            of.plant.past(&Instant { t, x: &x[..of.own], u: &u, w: &w })
+        };
+        remember(self, step, &past, &|of, over| of.plant.remember(over));
+    }
+
     fn pass_break(&mut self, t: f64, x: &mut [S]) {
+        if !self.started && self.plant.remembers() {
+            let u: Vec<S> = self.commands.iter().map(|command| command.drive.before()).collect();
+            let w = vec![S::from(0.0); self.forces];
+            self.plant.begin(&Instant { t, x: &x[..self.own], u: &u, w: &w });
+        }
         let at_actuator = |actor: &Actor<S>| matches!(actor.place.site, Site::Actuator { .. });
         let remembers = self.actors.iter().any(|actor| at_actuator(actor) && !actor.memory.is_empty());
         // Hysteresis states are updated just before the break, and across it.

@@ -48,12 +48,14 @@ pub enum Function {
     Deadzone,
     /// Lookup table `table(x, x1, y1, x2, y2, ..)`: linear interpolation, extrapolated beyond the first and last point.
     Table,
+    /// Value at an earlier time, `delay(x, time)`: in the equations of a model.
+    Delay,
     /// Selection `if(condition, a, b)` or `if(condition, a, condition, b, .., otherwise)`.
     If,
 }
 
 /// Name, function, smallest and largest number of arguments.
-pub const FUNCTIONS: [(&str, Function, usize, usize); 22] = [
+pub const FUNCTIONS: [(&str, Function, usize, usize); 23] = [
     ("sin", Function::Sin, 1, 1),
     ("cos", Function::Cos, 1, 1),
     ("tan", Function::Tan, 1, 1),
@@ -75,6 +77,7 @@ pub const FUNCTIONS: [(&str, Function, usize, usize); 22] = [
     ("clip", Function::Clip, 3, 3),
     ("deadzone", Function::Deadzone, 3, 3),
     ("table", Function::Table, 5, usize::MAX),
+    ("delay", Function::Delay, 2, 2),
     ("if", Function::If, 3, usize::MAX),
 ];
 

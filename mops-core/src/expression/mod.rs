@@ -35,13 +35,15 @@ impl Expression {
         let mut foreign = None;
         root.walk(&mut |node| match &node.form {
             Form::Name(name) if seen.insert(name) => names.push(name.clone()),
-            Form::Rate(_) | Form::Member(..) => foreign = foreign.take().or(Some(node.span.clone())),
+            Form::Rate(_) | Form::Member(..) | Form::Call(Function::Delay, _) => {
+                foreign = foreign.take().or(Some(node.span.clone()));
+            }
             _ => {}
         });
         match foreign {
             Some(span) => Err(SyntaxError {
                 span,
-                message: "derivatives and families of states are allowed in models only".to_owned(),
+                message: "derivatives, delays and families of states are allowed in models only".to_owned(),
             }),
             None => Ok(Self { root, names }),
         }
@@ -122,6 +124,8 @@ impl Function {
             Self::Clip => min(max(x, values[1]), values[2]),
             Self::Deadzone => x - min(max(x, values[1]), values[2]),
             Self::Table => table(x, &values[1..]),
+            // Where no time passes, a delayed value is the value.
+            Self::Delay => x,
             _ => self.smooth(x).expect("`if` is evaluated by its node, all others are smooth"),
         }
     }

@@ -10,7 +10,7 @@
 //! product     = signed (('*' | '/') signed)*
 //! signed      = ('-' | '+')? power
 //! power       = operand ('^' signed)?
-//! operand     = '(' expression ')' | number ('[' unit ']')? | name '(' expression (',' expression)* ')' | name ('[' sum ']')? "'"?
+//! operand     = '(' expression ')' | number ('[' unit ']')? | '"' number unit '"' | name '(' expression (',' expression)* ')' | name ('[' sum ']')? "'"?
 //! ```
 
 use std::ops::Range;
@@ -244,6 +244,7 @@ fn call(name: &str, place: Range<usize>, span: &Range<usize>, arguments: Vec<Spa
             Function::Table => "x, then x and y of at least two points".to_owned(),
             Function::Clip | Function::Deadzone => "x, the lower and the upper limit".to_owned(),
             Function::Min | Function::Max => "two values or more".to_owned(),
+            Function::Delay => "a quantity and a time".to_owned(),
             _ => format!("{least} value{}", if least == 1 { "" } else { "s" }),
         };
         return wrong(span.clone(), format!("`{name}` takes {wanted}, not {count}"));
@@ -402,7 +403,7 @@ fn power(input: &mut Input<'_>) -> ModalResult<Spanned> {
 }
 
 fn operand(input: &mut Input<'_>) -> ModalResult<Spanned> {
-    alt((bracketed, number, name_or_call, fail.context(expected("a number, a name or `(`")))).parse_next(input)
+    alt((bracketed, number, quoted, name_or_call, fail.context(expected("a number, a name or `(`")))).parse_next(input)
 }
 
 /// Parses a number with an optional unit in brackets.
@@ -418,6 +419,17 @@ fn number(input: &mut Input<'_>) -> ModalResult<Spanned> {
         }
         None => Spanned { raw: Raw::Number(value), span },
     })
+}
+
+/// Parses a quantity in quotation marks: `"50 ms"`, or with apostrophes.
+fn quoted(input: &mut Input<'_>) -> ModalResult<Spanned> {
+    let quote = one_of(['"', '\'']).parse_next(input)?;
+    let inner = (cut_err(float.context(expected("a number with a unit"))), multispace0);
+    let unit = take_while(1.., |c: char| c != quote).with_span();
+    let end = cut_err(quote.context(expected("a closing quotation mark")));
+    let (((value, _), (unit, place), _), span): (((f64, _), (&str, _), _), _) =
+        (inner, cut_err(unit.context(expected("a unit"))), end).with_span().parse_next(input)?;
+    Ok(Spanned { raw: Raw::Quantity(value, unit.to_owned(), place), span: span.start - 1..span.end })
 }
 
 fn bracketed(input: &mut Input<'_>) -> ModalResult<Spanned> {

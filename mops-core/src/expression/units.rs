@@ -483,6 +483,11 @@ impl Dimensions {
                 Measure { loose: of.loose, ..one.times(&of, 0.5) }
             }
             Function::Abs => self.measure(q, all[0])?,
+            Function::Delay => {
+                let time = Node { form: Form::Name("time".to_owned()), span: all[1].span.clone() };
+                self.alike(q, &[all[1], &time], "the second argument of `delay` must be a time")?;
+                self.measure(q, all[0])?
+            }
             Function::Sign => {
                 let of = self.measure(q, all[0])?;
                 Measure::number(if of.bare == Bare::No { Bare::No } else { Bare::Number(None) })
@@ -555,6 +560,7 @@ fn literals(node: &Node) -> Vec<(String, Range<usize>)> {
             let last = arguments.len() - 1;
             all(arguments.iter().enumerate().filter(|(i, _)| i % 2 == 1 || *i == last).map(|(_, node)| node).collect())
         }
+        Form::Call(Function::Delay, arguments) => literals(&arguments[0]),
         Form::Call(Function::Table, arguments) => all(arguments.iter().skip(2).step_by(2).collect()),
         _ if has_names => all(node.children()),
         _ => vec![(node.evaluate(&|_: &str| f64::NAN).to_string(), node.span.clone())],

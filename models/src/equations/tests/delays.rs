@@ -1,0 +1,144 @@
+//! Delays, compared with the polynomials of the method of steps and with closed forms of delayed inputs.
+
+use mops_core::math;
+
+use super::*;
+
+fn tight(text: &str) -> Equations {
+    read(&format!("{text}\n[tolerance]\nrelative = 1e-11\nabsolute = 1e-12\n")).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Returns the derivatives of the last values of the states with respect to a parameter.
+fn tangents_at_end(model: &Equations, inputs: &[(&str, Input)], given: &[(&str, f64)], of: &str, end: f64) -> Vec<f64> {
+    let parameters = values(model, given);
+    let index = model.interface().parameters.iter().position(|p| p.variable.name == of).unwrap();
+    let seed = (0..parameters.len()).map(|i| f64::from(u8::from(i == index))).collect();
+    let inputs = inputs.iter().map(|(name, input)| ((*name).to_owned(), input.clone())).collect();
+    let case = Case { inputs, ..Case::default() };
+    let signals: Vec<usize> = (0..model.interface().states.len()).collect();
+    let job = Job { case: &case, parameters: &parameters, signals: &signals, horizon: end };
+    let (_, tangents) = model.tangents(&job, &[seed]).unwrap().unwrap();
+    model.interface().states.iter().map(|state| tangents[0].trace(&state.name).last()).collect()
+}
+
+/// Returns `y` of `y' = -a y(t - T)`, `y = 1` up to time 0: `1 + sum over k >= 1 of (-a)^k (t - (k - 1) T)^k / k!`.
+fn feedback(a: f64, delay: f64, t: f64) -> f64 {
+    let mut factor = 1.0;
+    let mut sum = 1.0;
+    for k in 1..40 {
+        let since = t - f64::from(k - 1) * delay;
+        if since <= 0.0 {
+            break;
+        }
+        factor *= -a / f64::from(k);
+        sum += factor * math::powi(since, k);
+    }
+    sum
+}
+
+#[test]
+fn a_delayed_feedback_is_its_polynomials_for_any_delay() {
+    let text =
+        "states = { y = '1' }\nparameters = { a = '1/s', T = 's' }\nder = { y = '-a*delay(y, T)' }\nstart = { y = 1 }";
+    let model = tight(text);
+    for (a, delay) in [(1.0, 1.0), (0.7, 1.3), (2.0, 0.37), (1.0, 5.0), (1.5, 0.05)] {
+        let given = [("a", a), ("T", delay)];
+        let response = respond(&model, &[], &given, 4.0);
+        for t in [0.3, 1.0, 2.2, 3.7, 4.0] {
+            let (found, exact) = (at(&response, "y", t), feedback(a, delay, t));
+            assert!((found - exact).abs() < 1e-9, "{a} {delay} {t}: {found} {exact}");
+        }
+        let h = 1e-6;
+        for (name, up, down) in [
+            ("a", feedback(a + h, delay, 4.0), feedback(a - h, delay, 4.0)),
+            ("T", feedback(a, delay + h, 4.0), feedback(a, delay - h, 4.0)),
+        ] {
+            let difference = (up - down) / (2.0 * h);
+            let tangent = tangents_at_end(&model, &[], &given, name, 4.0)[0];
+            assert!(
+                (tangent - difference).abs() < 1e-7 * difference.abs().max(1.0),
+                "{name} {a} {delay}: {tangent} {difference}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_delayed_step_moves_the_response_and_its_tangent() {
+    // x' = -x + u(t - T), u a step of 2 at 0.3 s: x = 2 (1 - exp(-(t - 0.3 - T))).
+    let text = "states = { x = '1' }\ninputs = { u = '1' }\nparameters = { T = 's' }\nder = { x = '(-x + delay(u, T))/1 [s]' }";
+    let model = tight(text);
+    for (step, delay) in [(0.3, 0.5), (0.0, 0.5), (0.3, 0.1), (0.1, 0.2)] {
+        let input = [("u", Input::Step { time: step, before: 0.0, after: 2.0 })];
+        let response = respond(&model, &input, &[("T", delay)], 2.0);
+        let begin = step + delay;
+        assert!(at(&response, "x", begin - 1e-3).abs() < 1e-14, "{step} {delay}");
+        for t in [begin, begin + 0.2, 2.0] {
+            let exact = -2.0 * math::exp_m1(begin - t);
+            assert!((at(&response, "x", t) - exact).abs() < 1e-10, "{step} {delay} {t}");
+        }
+        let exact = -2.0 * math::exp(begin - 2.0);
+        let found = tangents_at_end(&model, &input, &[("T", delay)], "T", 2.0)[0];
+        assert!((found - exact).abs() < 1e-9, "{step} {delay}: {found} {exact}");
+    }
+}
+
+#[test]
+fn jumps_are_carried_on_through_an_echo() {
+    // y = u + y(t - 1)/2, an algebraic recursion: 1, 3/2, 7/4, .. after a step; x is its integral.
+    let text = "states = { x = '1' }\ninputs = { u = '1' }\nlet = { y = \"u + 0.5*delay(y, '1 s')\" }\nder = { x = 'y/1 [s]' }\noutputs = { echo = 'y' }";
+    let input = [("u", Input::Step { time: 0.25, before: 0.0, after: 1.0 })];
+    let response = respond(&tight(text), &input, &[], 4.0);
+    for (t, expected) in [(0.2, 0.0), (0.3, 1.0), (1.2, 1.0), (1.3, 1.5), (2.3, 1.75), (3.3, 1.875)] {
+        assert!((at(&response, "echo", t) - expected).abs() < 1e-12, "{t}: {}", at(&response, "echo", t));
+    }
+    let exact = 1.0 + 1.5 + 1.75 + 0.75 * 1.875;
+    assert!((at(&response, "x", 4.0) - exact).abs() < 1e-11);
+}
+
+#[test]
+fn a_sampled_controller_beside_a_delay_agrees_with_the_exact_solution() {
+    // x' = u(t - T), u = -k x sampled every period; with T a multiple of the period, x_(n+1) = x_n - period k x_(n-m).
+    let text =
+        "states = { x = '1' }\nparameters = { k = '1/s' }\nder = { x = 'delay(u, \"300 ms\")' }\nstart = { x = 1 }
+        clocks.c = { every = '100 ms', memory = { u = '1/s' }, next = { u = '-k*x' } }";
+    let response = respond(&tight(text), &[], &[("k", 2.0)], 2.0);
+    let mut x = vec![1.0];
+    for n in 0..20 {
+        let past = if n >= 3 { x[n - 3] } else { 0.0 };
+        x.push(x[n] - 0.1 * 2.0 * past);
+    }
+    for (n, exact) in x.iter().enumerate() {
+        #[allow(clippy::cast_precision_loss)]
+        let found = at(&response, "x", 0.1 * n as f64);
+        assert!((found - exact).abs() < 1e-10, "{n}: {found} {exact}");
+    }
+}
+
+#[test]
+fn a_delay_in_a_condition_switches_exactly() {
+    // y = sin(time) delayed by 1 s, 0 before: x' = 1 while it is above 1/2.
+    let text = "states = { x = '1' }\nder = { x = 'if(delay(sin(time*1 [1/s]), 1 [s]) > 0.5, 1, 0)*1 [1/s]' }";
+    let response = respond(&tight(text), &[], &[], 8.0);
+    let sixth = std::f64::consts::PI / 6.0;
+    let exact = 4.0 * sixth + (7.0 - (std::f64::consts::TAU + sixth)).max(0.0);
+    assert!((at(&response, "x", 8.0) - exact).abs() < 1e-8, "{} {exact}", at(&response, "x", 8.0));
+}
+
+#[test]
+fn wrong_delays_are_an_error_with_a_remedy() {
+    let model = |of: &str| format!("states = {{ x = 'm' }}\nparameters = {{ T = 's' }}\nder = {{ x = '{of}' }}");
+    for (of, fact) in [
+        ("-delay(x, 2 [m])/1 [s]", "must be a time"),
+        ("-delay(x, time)/1 [s]", "must not change"),
+        ("-delay(x, 0 [s])/1 [s]", "positive time"),
+        ("-delay(x)/1 [s]", "takes a quantity and a time, not 1"),
+        ("-delay(x, \"50\")/1 [s]", "a unit"),
+        ("-delay(x, \"50 ms)/1 [s]", "closing quotation mark"),
+    ] {
+        let mistake = read(&model(of)).err().unwrap_or_else(|| panic!("it was read: {of}"));
+        assert!(mistake.to_string().contains(fact), "{of}: {mistake}");
+    }
+    let failure = attempt(&read(&model("-delay(x, T)/1 [s]")).unwrap(), &[], &[("T", 0.0)], 1.0).unwrap_err();
+    assert!(failure.to_string().contains("expected a positive time"), "{failure}");
+}
