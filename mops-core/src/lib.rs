@@ -85,8 +85,8 @@ pub use least_squares::{LeastSquares, LeastSquaresStep};
 pub use linear::StateSpace;
 pub use linearised::{Linearise, Linearised, Resting, Rough};
 pub use model::{
-    Analysis, AnalysisKind, Event, Interface, Job, Local, Model, OperatingPoint, Parameter, Response, State, Variable,
-    WithTangents, Work,
+    Analysis, AnalysisKind, Cut, Event, Interface, Job, Local, Model, OperatingPoint, Parameter, Response, State,
+    Variable, WithTangents, Work,
 };
 pub use mops_math as math;
 pub use objectives::FrontObjective;

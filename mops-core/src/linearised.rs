@@ -10,7 +10,7 @@ use crate::case::Case;
 use crate::diagnostic::suggestion;
 use crate::failure::Failure;
 use crate::linear::{Balance, NoEquilibrium, Point, StateSpace, equilibrium};
-use crate::model::{Analysis, AnalysisKind, Interface, Job, Local, Model, OperatingPoint, Variable};
+use crate::model::{Analysis, AnalysisKind, Cut, Interface, Job, Local, Model, OperatingPoint, Variable};
 use crate::study_error::StudyError;
 use crate::unit::Quantity;
 
@@ -45,6 +45,8 @@ pub struct Linearised {
     starts: Vec<Option<usize>>,
     /// True for each state, then input, that the equilibrium search may vary; `None` without a search.
     free: Option<Vec<bool>>,
+    /// Input and signal of a cut loop, by their indices: the operating point is that of the closed loop.
+    cut: Option<[usize; 2]>,
 }
 
 /// A linear system and its operating point.
@@ -158,7 +160,60 @@ impl Linearised {
             ..Interface::default()
         };
         let free = options.equilibrium.then_some(free);
-        Ok(Self { model, interface, states, inputs, outputs, given, starts, free })
+        Ok(Self { model, interface, states, inputs, outputs, given, starts, free, cut: None })
+    }
+
+    /// Creates the linearised open loop of a model whose loop is cut at a variable. Its operating point is that of the closed
+    /// loop.
+    ///
+    /// # Errors
+    /// Returns an error if the loop cannot be cut there, or for the reasons of [`Self::new`].
+    pub fn opened(model: &dyn Model, variable: &str, options: Linearise) -> Result<Self, StudyError> {
+        if let Some(key) = [("inputs", &options.inputs), ("outputs", &options.outputs)].iter().find(|o| o.1.is_some()) {
+            let fact = "a cut loop has its own input and output";
+            return Err(StudyError::new(key.0, fact).with_help("remove it, or `open`").within("linearise"));
+        }
+        let Some(cut) = model.cut(variable) else {
+            return Err(StudyError::new("open", "the loop of this kind of model cannot be cut")
+                .with_help("write its equations (kind `equations`); a model with effects is cut without them"));
+        };
+        let Cut { model, input, signal } = cut.map_err(|mistake| mistake.within("open"))?;
+        let of = model.interface();
+        let (inputs, outputs) = (vec![of.inputs[input].name.clone()], vec![of.signals[signal].name.clone()]);
+        let options = Linearise { inputs: Some(inputs), outputs: Some(outputs), ..options };
+        let linearised = Self::new(model, &options).map_err(|mistake| mistake.within("linearise"))?;
+        Ok(Self { cut: Some([input, signal]), ..linearised })
+    }
+
+    /// Evaluates the equations at a point of states and inputs. With a cut loop, its input has the value of the closed loop.
+    fn local(&self, parameters: &[f64], point: &mut [f64]) -> Result<Local, Failure> {
+        let n = self.states.len();
+        let at = |point: &[f64]| {
+            let (states, inputs) = point.split_at(n);
+            let at = OperatingPoint { parameters, states, inputs, at_rest: self.free.is_some() };
+            self.model.local(&at).expect("a model with equations gives them")
+        };
+        if let Some([input, signal]) = self.cut {
+            // The computed value depends on the input through derivatives only, and then linearly: one step of Newton's method.
+            let open = at(point)?;
+            let gain = 1.0 + open.slopes[(n + signal, n + input)];
+            point[n + input] -= (point[n + input] + open.signals[signal]) / gain;
+        }
+        at(point)
+    }
+
+    /// Returns the rates and their slopes with respect to states and inputs; with a cut loop, those of the closed loop.
+    fn balance(&self, parameters: &[f64], point: &[f64]) -> Result<Balance, String> {
+        let n = self.states.len();
+        let mut point = point.to_vec();
+        let Local { rates, slopes, .. } = self.local(parameters, &mut point).map_err(|failure| failure.to_string())?;
+        let mut closed = slopes.rows(0, n).into_owned();
+        if let Some([input, signal]) = self.cut {
+            let gain = 1.0 + slopes[(n + signal, n + input)];
+            let by_input = closed.column(n + input).into_owned();
+            closed -= by_input * slopes.row(n + signal) / gain;
+        }
+        Ok(Balance { rates, slopes: closed })
     }
 
     /// Returns the states of the model.
@@ -182,20 +237,17 @@ impl Linearised {
         };
         let mut point: Vec<f64> =
             self.given.iter().enumerate().map(|(i, given)| given.unwrap_or_else(|| start(i))).collect();
-        let local = |point: &[f64]| {
-            let (states, inputs) = point.split_at(n);
-            let at = OperatingPoint { parameters, states, inputs, at_rest: self.free.is_some() };
-            self.model.local(&at).expect("a model with equations gives them")
-        };
         if let Some(free) = &self.free {
-            let balance = |point: &[f64]| {
-                let Local { rates, slopes, .. } = local(point).map_err(|failure| failure.to_string())?;
-                Ok(Balance { rates, slopes: slopes.rows(0, n).into_owned() })
-            };
+            let balance = |point: &[f64]| self.balance(parameters, point);
             point = equilibrium(balance, &point, free).map_err(|why| Failure::Undefined(self.restless(&why)))?;
         }
-        let here = local(&point)?;
-        let rough = self.rough(&point, &here, |point| local(point).ok());
+        let here = self.local(parameters, &mut point)?;
+        let beside = |point: &[f64]| {
+            let (states, inputs) = point.split_at(n);
+            let at = OperatingPoint { parameters, states, inputs, at_rest: self.free.is_some() };
+            self.model.local(&at)?.ok()
+        };
+        let rough = self.rough(&point, &here, beside);
         let Local { rates, slopes, frictionless, .. } = here;
         let inputs = point.split_off(n);
         Ok(Resting { system: self.system(&slopes), states: point, inputs, rates, frictionless, rough })

@@ -199,6 +199,15 @@ pub trait Model: Send + Sync {
         None
     }
 
+    /// Returns the model with the loop cut at a variable: a new input of this name acts in its place, and a new signal is minus the
+    /// value that the model computes. `None` if the model has no loop that can be cut.
+    ///
+    /// # Errors
+    /// The model has no such variable.
+    fn cut(&self, _variable: &str) -> Option<Result<Cut, StudyError>> {
+        None
+    }
+
     /// Returns the open model, for access at its ports; `None` if the model has no ports.
     fn ported(&self) -> Option<&dyn Open> {
         None
@@ -214,6 +223,16 @@ pub trait Model: Send + Sync {
     fn local(&self, _at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
         None
     }
+}
+
+/// Model with a cut loop.
+pub struct Cut {
+    /// The model.
+    pub model: Arc<dyn Model>,
+    /// Input that acts in the place of the variable, by its index.
+    pub input: usize,
+    /// Signal that is minus the value that the model computes, by its index.
+    pub signal: usize,
 }
 
 /// Operating point at which the model equations are evaluated.

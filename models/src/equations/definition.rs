@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::Arc;
 
-use mops_core::expression::{Equation, Form, equation};
+use mops_core::expression::{Equation, Form, Node, equation};
 use mops_core::{Quantity, StudyError, Unit, suggestion};
 
 use super::key::{Index, Key, member};
@@ -131,6 +131,8 @@ pub struct Definition {
     pub when: Vec<When>,
     /// Clocks.
     pub clocks: Vec<Clock>,
+    /// True if the last input and the last output are those of a cut loop.
+    pub is_cut: bool,
     /// Names of joints: name, position, path in the study.
     pub ports: Vec<(String, String, Vec<String>)>,
 }
@@ -375,6 +377,39 @@ impl Definition {
 }
 
 impl Definition {
+    /// Cuts the loop at a named expression: an input of this name acts in its place; the output that follows the others is minus
+    /// the expression.
+    ///
+    /// # Errors
+    /// There is no such expression.
+    pub fn cut(&mut self, variable: &str) -> Result<(), StudyError> {
+        let Some(index) = self.lets.iter().position(|(name, _)| name == variable) else {
+            let fact = format!("the loop can be cut at a named expression of `let` only, not at `{variable}`");
+            let names = self.lets.iter().map(|(name, _)| name.as_str());
+            return Err(StudyError::here(fact).with_help(suggestion(variable, names)));
+        };
+        let (name, mut text) = self.lets.remove(index);
+        let shown = self.outputs.iter().position(|(output, _)| output.name == name);
+        let unit = shown.map(|k| self.outputs.remove(k).0).map_or_else(Unit::one, |output| output.unit.clone());
+        let declared = |name: String, about: &str| Declared {
+            name,
+            unit: unit.clone(),
+            open: shown.is_none(),
+            about: about.to_owned(),
+            path: text.path.clone(),
+        };
+        let input = declared(name.clone(), "input of the cut loop");
+        let output = declared(format!("-{name}"), "output of the cut loop");
+        let right = text.equation.right.clone();
+        let span = right.span.clone();
+        let right = Node { form: Form::Negative(Box::new(right)), span };
+        text.equation = Arc::new(Equation { left: None, right });
+        self.inputs.push(input);
+        self.outputs.push((output, text));
+        self.is_cut = true;
+        Ok(())
+    }
+
     fn read_clocks(&mut self, options: &EquationsOptions) -> Result<(), StudyError> {
         let names = self.state_names();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();

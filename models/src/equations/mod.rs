@@ -22,10 +22,10 @@ mod system;
 mod tape;
 
 use std::collections::HashMap;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use mops_core::{
-    AnalysisKind, Failure, Interface, Model, ModelOptions, Plant, Port, Scalar, State, StudyError, Unit, Variable,
+    AnalysisKind, Cut, Failure, Interface, Model, ModelOptions, Plant, Port, Scalar, State, StudyError, Unit, Variable,
 };
 
 use crate::kernel::{PlantModel, Simulated, Tolerance};
@@ -168,6 +168,17 @@ impl PlantModel for Equations {
 
     fn tolerance(&self) -> Tolerance {
         self.tolerance
+    }
+
+    fn cut(&self, variable: &str) -> Option<Result<Cut, StudyError>> {
+        let mut definition = self.definition.clone();
+        let model =
+            definition.cut(variable).and_then(|()| Self::compile(definition, self.interface.horizon, self.tolerance));
+        Some(model.map(|model| {
+            let Definition { states, outputs, inputs, .. } = &model.definition;
+            let (input, signal) = (inputs.len() - 1, states.len() + outputs.len() - 1);
+            Cut { input, signal, model: Arc::new(Simulated::new(model)) }
+        }))
     }
 
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {

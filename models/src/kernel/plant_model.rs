@@ -1,8 +1,8 @@
 //! Models given by their plants.
 
 use mops_core::{
-    Analysis, Dual7, Failure, Input, Interface, Job, Local, Model, Open, OperatingPoint, Plant, Scalar, Variable,
-    WithTangents,
+    Analysis, Cut, Dual7, Failure, Input, Interface, Job, Local, Model, Open, OperatingPoint, Plant, Scalar,
+    StudyError, Variable, WithTangents,
 };
 
 use super::drive::Drive;
@@ -48,6 +48,11 @@ pub trait PlantModel: Send + Sync {
     /// Returns the accuracy and the limits of the simulations.
     fn tolerance(&self) -> Tolerance {
         Tolerance::default()
+    }
+
+    /// Returns the model with the loop cut at a variable; see [`Model::cut`].
+    fn cut(&self, _variable: &str) -> Option<Result<Cut, StudyError>> {
+        None
     }
 
     /// Returns the assumptions made in reading the model, one sentence each.
@@ -190,6 +195,10 @@ impl<M: PlantModel> Model for Simulated<M> {
 
     fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
         Some(local::local(&self.of, at))
+    }
+
+    fn cut(&self, variable: &str) -> Option<Result<Cut, StudyError>> {
+        self.of.cut(variable)
     }
 
     fn ported(&self) -> Option<&dyn Open> {

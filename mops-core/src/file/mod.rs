@@ -175,8 +175,10 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
         seed: study.seed.unwrap_or(1),
         ..StudyBuilder::default()
     };
-    for (name, node) in root.table("models")? {
-        draft.models.push((name, read_model(catalogue, &node)?));
+    let models = root.table("models")?;
+    for (name, node) in &models {
+        let node = with_base(&models, node, &mut vec![name.clone()])?;
+        draft.models.push((name.clone(), read_model(catalogue, &node)?));
     }
     for (name, node) in root.table("tuners")? {
         draft.tuners.push((name, read_tuner(&node)?));
@@ -258,17 +260,41 @@ fn kind<'t, 'k, K>(
     })
 }
 
+/// Returns the table of a model with all keys of the model that it is `like`, unless it gives them itself.
+fn with_base<'t>(all: &[(String, Node<'t>)], node: &Node<'t>, path: &mut Vec<String>) -> Result<Node<'t>, Diagnostic> {
+    let Some(like) = node.child("like") else { return Ok(node.clone()) };
+    let name: String = like.read()?;
+    let names = || all.iter().map(|(name, _)| name.as_str());
+    let Some((_, base)) = all.iter().find(|(known, _)| *known == name) else {
+        return Err(like.diagnostic(format!("the study has no model `{name}`")).with_help(suggestion(&name, names())));
+    };
+    if path.contains(&name) {
+        let fact = format!("the model is like itself: {} -> {name}", path.join(" -> "));
+        return Err(like.diagnostic(fact).with_help("one of these models must be defined without `like`"));
+    }
+    path.push(name);
+    with_base(all, base, path)?.overlaid(node, "like")
+}
+
 fn read_model(catalogue: &Catalogue, node: &Node<'_>) -> Result<ModelBuilder, Diagnostic> {
     let (kind, options) = kind(node, ModelCommon::KEYS, &catalogue.models, |k| k.name, "model")?;
     let common: ModelCommon = node.only(ModelCommon::KEYS).read()?;
+    if let Some(like) = &common.like {
+        return Err(node
+            .locate(&StudyError::new("like", format!("`{like}` is a model of a study, and this is a single model")))
+            .with_help("give all keys of the model"));
+    }
     let mut model = options.read_with(&(kind.schema)(), kind.read)?.map_err(|mistake| options.locate(&mistake))?;
     if let Some(place) = node.child("effects") {
         model = effects::add(catalogue, model, common.effects, &place)?;
     }
-    if let Some(section) = common.linearise {
+    let linearise = common.linearise.map(Into::into);
+    if let Some(variable) = common.open {
+        let linearised = Linearised::opened(model.as_ref(), &variable, linearise.unwrap_or_default());
+        model = Box::new(linearised.map_err(|mistake| node.locate(&mistake))?);
+    } else if let Some(linearise) = linearise {
         let place = node.child("linearise").expect("it was just read");
-        let linearised = Linearised::new(model.into(), &section.into()).map_err(|mistake| place.locate(&mistake))?;
-        model = Box::new(linearised);
+        model = Box::new(Linearised::new(model.into(), &linearise).map_err(|mistake| place.locate(&mistake))?);
     }
     Ok(ModelBuilder { model, parameters: common.parameters.0 })
 }

@@ -80,7 +80,12 @@ fn named(schema: Value) -> Value {
 /// Returns the schema of the common keys with exactly one kind, or at most one if the kind is optional.
 fn one_kind(mut common: Value, kinds: Map<String, Value>, must_be: bool) -> Value {
     if must_be {
-        common["oneOf"] = kinds.keys().map(|name| json!({ "required": [name] })).collect();
+        let mut choices: Vec<Value> = kinds.keys().map(|name| json!({ "required": [name] })).collect();
+        if common["properties"]["like"].is_object() {
+            // A table that is like another one takes the kind from there.
+            choices.push(json!({ "required": ["like"], "not": { "anyOf": choices.clone() } }));
+        }
+        common["oneOf"] = choices.into();
     }
     if !common["properties"].is_object() {
         common["properties"] = json!({});

@@ -39,6 +39,13 @@ pub(super) struct ModelCommon {
     /// Parameter values, used unless a tuner or a case sets the parameter.
     #[serde(default)]
     pub parameters: Entries<Quantity>,
+    /// Model from which this one takes all keys that it does not give itself: `like = "servo"`. Tables are merged key by key.
+    pub like: Option<String>,
+    /// Cuts the loop at a variable, and replaces the model by the linearised open loop `L`, for margins and sensitivities:
+    /// `open = "u"`. `L` is the response from the variable, where it acts, to minus its value, where it is computed. The
+    /// operating point is that of the closed loop; `linearise` may give it. For models of the kind `equations`, the variable is
+    /// a named expression of `let`.
+    pub open: Option<String>,
     /// Replaces the model by its linearisation, for criteria of linear systems:
     /// `linearise = { inputs = ["u"], outputs = ["theta"], at = { theta = "180 deg" } }`. `{}` selects all inputs and
     /// outputs.
@@ -51,7 +58,7 @@ pub(super) struct ModelCommon {
 }
 
 impl ModelCommon {
-    pub const KEYS: &[&str] = &["parameters", "linearise", "effects"];
+    pub const KEYS: &[&str] = &["like", "parameters", "open", "linearise", "effects"];
 }
 
 /// Place of an effect. The effect parameters are model parameters, set by tuners, cases and `parameters`. By default they

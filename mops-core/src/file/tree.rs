@@ -205,6 +205,15 @@ impl<'t> Node<'t> {
         Node { source: self.source, key: self.key.clone(), value: Cow::Owned(value) }
     }
 
+    /// Returns this table with the keys of another table added or replaced, but for one key.
+    pub fn overlaid(&self, with: &Self, without: &str) -> Result<Self, Diagnostic> {
+        let mut table: DeTable<'t> = self.as_table()?.clone();
+        merge(&mut table, with.as_table()?.clone());
+        table.remove(without);
+        let value = Spanned::new(with.value.span(), DeValue::Table(table));
+        Ok(Node { source: with.source, key: with.key.clone(), value: Cow::Owned(value) })
+    }
+
     /// Reads the value as a `T`; unknown keys and wrong types are rejected at their position.
     pub fn read<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, Diagnostic> {
         self.read_with(&schema_of::<T>(), T::deserialize)

@@ -1,0 +1,175 @@
+//! Models that take another one as their base, and loops cut at a variable, compared with loops written by hand.
+
+use std::path::Path;
+
+use assert_cmd::cargo::cargo_bin_cmd;
+use mops_core::math;
+use serde_json::Value;
+
+#[path = "common/result.rs"]
+mod result;
+
+fn run(folder: &Path, text: &str) -> Value {
+    let study = folder.join("study.toml");
+    std::fs::write(&study, text).unwrap();
+    let out = folder.join("out");
+    let output = cargo_bin_cmd!("mops")
+        .args(["run", study.to_str().unwrap(), "--json", "--out", out.to_str().unwrap()])
+        .output()
+        .unwrap();
+    result::read(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}\n{text}", String::from_utf8_lossy(&output.stderr)))
+}
+
+fn refused(text: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study.toml");
+    std::fs::write(&study, text).unwrap();
+    let output = cargo_bin_cmd!("mops").args(["check", study.to_str().unwrap()]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+fn value(result: &Value, case: &str, criterion: &str) -> f64 {
+    let all = result["criteria"].as_array().unwrap();
+    let found = all.iter().find(|c| c["case"] == case && c["name"] == criterion);
+    found.unwrap_or_else(|| panic!("no {case}/{criterion}: {result}"))["value"].as_f64().unwrap()
+}
+
+/// Criteria of an open loop in the model `name`.
+fn criteria(name: &str) -> String {
+    ["phase-margin", "gain-margin", "maximum-sensitivity", "crossover-frequency", "delay-margin"]
+        .map(|kind| format!("{name}-{kind} = {{ model = '{name}', {kind} = {{}}, usage = 'monitor' }}\n"))
+        .concat()
+}
+
+/// Asserts that both models have the same margins in a case.
+fn assert_same(result: &Value, case: &str) {
+    for kind in ["phase-margin", "gain-margin", "maximum-sensitivity", "crossover-frequency", "delay-margin"] {
+        let [cut, by_hand] = ["cut", "by-hand"].map(|name| value(result, case, &format!("{name}-{kind}")));
+        assert!((cut - by_hand).abs() <= 1e-9 * by_hand.abs(), "{kind} in {case}: {cut} {by_hand}");
+    }
+}
+
+#[test]
+fn the_margins_of_a_cut_loop_are_those_of_the_loop_written_by_hand() {
+    // A motor with a flexible coupling and a cascade of two controllers; the amplifier is limited and its integrator tracks it.
+    let servo = "
+        [study]
+        name = 'servo'
+        [models.servo.equations]
+        states = { i = 'A', wm = 'rad/s', tw = 'rad', wl = 'rad/s', xv = 'A', xc = 'V' }
+        inputs = { r = 'rad/s' }
+        parameters = { Jl = 'kg m2' }
+        constants = { R = '0.6 ohm', L = '0.8 mH', K = '0.06 N m/A', Jm = '8e-5 kg m2', ks = '8 N m/rad', cs = '4e-3 N m s', kv = '0.05 A s', Tv = '50 ms', kc = '2 V/A', Tc = '5 ms' }
+        horizon = '0.5 s'
+        let = { ts = 'ks*tw + cs*(wm - wl)', ref = 'kv*(r - wm) + xv', v = 'kc*(ref - i) + xc', u = 'clip(v, -24 [V], 24 [V])', ua = 'u' }
+        outputs = { u = { value = 'u', unit = 'V' } }
+        [models.servo.equations.der]
+        i = \"L*i' = ua - R*i - K*wm\"
+        wm = \"Jm*wm' = K*i - ts\"
+        tw = 'wm - wl'
+        wl = \"Jl*wl' = ts\"
+        xv = \"Tv*xv' = kv*(r - wm)\"
+        xc = \"Tc*xc' = kc*(ref - i) + u - v\"
+        [models.cut]
+        like = 'servo'
+        open = 'ua'
+        [models.by-hand]
+        like = 'servo'
+        linearise = { inputs = ['uc'], outputs = ['back'] }
+        equations.inputs = { uc = 'V' }
+        equations.outputs = { back = { value = '-v', unit = 'V' } }
+        equations.der = { i = \"L*i' = uc - R*i - K*wm\", xc = \"Tc*xc' = kc*(ref - i)\" }
+        [cases]
+        light = { Jl = 0.8e-4, inputs.r.step.after = 1.0 }
+        heavy = { Jl = 3.2e-4, inputs.r.step.after = 1.0 }
+        [criteria]
+        peak = { model = 'servo', peak = { signal = 'wl' }, usage = 'monitor' }\n";
+    let folder = tempfile::tempdir().unwrap();
+    let result = run(folder.path(), &[servo, &criteria("cut"), &criteria("by-hand")].concat());
+    assert_same(&result, "light");
+    assert_same(&result, "heavy");
+}
+
+#[test]
+fn a_loop_is_cut_at_the_operating_point_of_the_closed_loop() {
+    // J th'' = torque - m sin(th), torque = u + b u^3, u = p (r - th) - d th' + f; at rest th = 1, torque = m sin(1).
+    let [inertia, weight, bend, p, d] = [0.02, 1.5, 0.4, 6.0, 0.7];
+    let torque = weight * math::sin(1.0);
+    // Newton's iteration for u + b u^3 = torque.
+    let u = (0..50).fold(torque, |u, _| u - (u + bend * math::powi(u, 3) - torque) / (1.0 + 3.0 * bend * u * u));
+    let gain = 1.0 + 3.0 * bend * u * u;
+    let text = format!(
+        "[study]\nname = 'arm'
+        [models.arm.equations]
+        states = {{ th = '1', w = '1/s' }}
+        constants = {{ J = {inertia}, m = {weight}, b = {bend}, p = {p}, d = {d}, f = {u} }}
+        let = {{ u = 'p*(1 - th) - d*w + f', torque = 'u + b*u^3' }}
+        der = {{ th = 'w', w = \"J*w' = torque - m*sin(th)\" }}
+        horizon = '1 s'
+        [models.cut]
+        like = 'arm'
+        open = 'u'
+        linearise = {{ equilibrium = true, at = {{ w = 0 }} }}
+        [models.by-hand]
+        transfer-function = {{ numerator = [{}, {}], denominator = [{inertia}, 0, {}] }}
+        [criteria]\n{}{}",
+        gain * d,
+        gain * p,
+        weight * math::cos(1.0),
+        criteria("cut"),
+        criteria("by-hand"),
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let result = run(folder.path(), &text);
+    for kind in ["phase-margin", "maximum-sensitivity", "crossover-frequency"] {
+        let [cut, by_hand] = ["cut", "by-hand"].map(|name| value(&result, "nominal", &format!("{name}-{kind}")));
+        assert!((cut - by_hand).abs() <= 1e-8 * by_hand.abs(), "{kind}: {cut} {by_hand}");
+    }
+}
+
+#[test]
+fn a_loop_through_a_derivative_is_cut_too() {
+    // x' = -x + u with u = -k x': L = k s/(s + 1).
+    let text = "[study]\nname = 'rate'
+        [models.plant.equations]
+        states = { x = '1' }
+        constants = { k = 3 }
+        let = { u = \"-k*x'*1 [s]\" }
+        der = { x = \"x'*1 [s] = u - x\" }
+        horizon = '1 s'
+        [models.cut]
+        like = 'plant'
+        open = 'u'
+        [criteria]
+        size = { model = 'cut', hinf-norm = {}, usage = 'monitor' }";
+    let folder = tempfile::tempdir().unwrap();
+    let size = value(&run(folder.path(), text), "nominal", "size");
+    assert!((size - 3.0).abs() < 1e-6, "{size}");
+}
+
+#[test]
+fn a_base_or_a_cut_that_does_not_exist_is_refused_at_its_place() {
+    let model = |keys: &str| {
+        format!(
+            "[study]\nname = 'x'\n[models.a.equations]\nstates = {{ x = '1' }}\nlet = {{ u = '-x' }}\n\
+             der = {{ x = 'u/1 [s]' }}\nhorizon = '1 s'\n[models.b]\n{keys}\n[criteria]\nc = {{ model = 'b', phase-margin = {{}}, demand = 1 }}\n"
+        )
+    };
+    for (keys, place, fact) in [
+        ("like = 'c'\nopen = 'u'", "study.toml:9:8", "the study has no model `c`"),
+        ("like = 'b'\nopen = 'u'", "study.toml:9:8", "like itself: b -> b"),
+        ("like = 'a'\nopen = 'v'", "study.toml:10:8", "not at `v`"),
+        ("like = 'a'\nopen = 'x'", "study.toml:10:8", "not at `x`"),
+        ("like = 'a'\nopen = 'u'\nlinearise = { inputs = ['u'] }", "study.toml:11:24", "its own input and output"),
+        ("pid-loop = { plant = { poles = [-1] }, horizon = 5 }\nopen = 'u'", "study.toml:10:8", "cannot be cut"),
+        (
+            "like = 'a'\nopen = 'u'\npid-loop = { plant = { poles = [-1] }, horizon = 5 }",
+            "study.toml:11:1",
+            "two are given",
+        ),
+    ] {
+        let message = refused(&model(keys)).replace('\n', " ");
+        assert!(message.contains(place) && message.contains(fact), "{keys}: {message}");
+    }
+}
