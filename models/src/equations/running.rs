@@ -12,7 +12,7 @@ use super::clocks::Ticking;
 use super::compiled::{Compiled, Signal};
 use super::happenings::Phase;
 use super::program::Program;
-use crate::kernel::elements::Delay;
+use crate::kernel::elements::delay::{Delay, Jump};
 use crate::kernel::{Tolerance, allowed, next_of};
 
 /// Plant of a compiled model; `B` is the bank of registers.
@@ -227,6 +227,11 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         }
     }
 
+    /// Returns the jump of a delayed quantity at the break at `t`, of the lowest derivative.
+    fn arriving(&self, t: f64) -> Option<Jump<S>> {
+        self.delays.iter().filter_map(|delay| delay.jump_at(t)).min_by_key(|jump| jump.derivative)
+    }
+
     fn note_sizes(&mut self, x: &[S]) {
         for (size, x) in self.sizes.iter_mut().zip(x) {
             *size = size.max(x.value().abs());
@@ -334,7 +339,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
 
     fn switch(&mut self, index: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
         self.note_sizes(x);
-        self.delays.iter_mut().for_each(|delay| delay.restart(0));
+        self.delays.iter_mut().for_each(|delay| delay.restart(Jump { derivative: 0, delay: event.delay }));
         let at = event.at;
         match self.kind(index) {
             Guard::Joint(j) => {
@@ -460,8 +465,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
     }
 
     fn break_delay(&self, t: f64) -> S {
-        let due = self.delays.iter().find(|delay| delay.jump_at(t).is_some());
-        due.map_or(S::from(0.0), |delay| delay.time() - delay.time().value())
+        self.arriving(t).map_or(S::from(0.0), |jump| jump.delay)
     }
 
     fn samples(&self) -> bool {
@@ -470,7 +474,8 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
 
     fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
         // A jump of a delayed quantity appears one derivative higher in the states; other breaks may be jumps of an input.
-        let jump = self.delays.iter().filter_map(|delay| delay.jump_at(at.t)).min().map_or(0, |jump| jump + 1);
+        let arriving = self.arriving(at.t).map(|jump| Jump { derivative: jump.derivative + 1, ..jump });
+        let jump = arriving.unwrap_or(Jump { derivative: 0, delay: S::from(0.0) });
         for delay in &mut self.delays {
             delay.pass_break(at.t);
             delay.restart(jump);

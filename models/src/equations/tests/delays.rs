@@ -68,7 +68,7 @@ fn a_delayed_step_moves_the_response_and_its_tangent() {
     // x' = -x + u(t - T), u a step of 2 at 0.3 s: x = 2 (1 - exp(-(t - 0.3 - T))).
     let text = "states = { x = '1' }\ninputs = { u = '1' }\nparameters = { T = 's' }\nder = { x = '(-x + delay(u, T))/1 [s]' }";
     let model = tight(text);
-    for (step, delay) in [(0.3, 0.5), (0.0, 0.5), (0.3, 0.1), (0.1, 0.2)] {
+    for (step, delay) in [(0.3, 0.5), (0.0, 0.5), (0.3, 0.1), (0.1, 0.2), (0.1, 0.1), (0.2, 0.1)] {
         let input = [("u", Input::Step { time: step, before: 0.0, after: 2.0 })];
         let response = respond(&model, &input, &[("T", delay)], 2.0);
         let begin = step + delay;
@@ -94,6 +94,16 @@ fn jumps_are_carried_on_through_an_echo() {
     }
     let exact = 1.0 + 1.5 + 1.75 + 0.75 * 1.875;
     assert!((at(&response, "x", 4.0) - exact).abs() < 1e-11);
+}
+
+#[test]
+fn the_tangent_of_an_echo_knows_that_its_jumps_move() {
+    // x' = y = u + y(t - T)/2: x = sum over k of (t - s - k T)/2^k for a step at s.
+    let text = "states = { x = '1' }\ninputs = { u = '1' }\nparameters = { T = 's' }\nlet = { y = 'u + 0.5*delay(y, T)' }\nder = { x = 'y/1 [s]' }";
+    let input = [("u", Input::Step { time: 0.25, before: 0.0, after: 1.0 })];
+    let tangent = tangents_at_end(&tight(text), &input, &[("T", 0.8)], "T", 3.0)[0];
+    let exact = -(0.5 + 2.0 * 0.25 + 3.0 * 0.125);
+    assert!((tangent - exact).abs() < 1e-10, "{tangent} {exact}");
 }
 
 #[test]

@@ -24,8 +24,17 @@ pub struct Delay<S> {
     size: f64,
     /// Time up to which jumps of `u` have reached the output, s.
     passed: f64,
-    /// Lowest derivative of `u` that may jump at the start of the next piece.
-    jump: Option<u8>,
+    /// Jump at the start of the next piece.
+    jump: Option<Jump<S>>,
+}
+
+/// Possible jump of a signal or of its derivatives.
+#[derive(Debug, Clone, Copy)]
+pub struct Jump<S> {
+    /// Lowest derivative that may jump.
+    pub derivative: u8,
+    /// Derivatives of the time of the jump along the directions of the scalar, with value 0.
+    pub delay: S,
 }
 
 /// Course of `u` over a step.
@@ -36,8 +45,8 @@ struct Piece<S> {
     end: f64,
     /// Coefficients in powers of the position within the piece, from 0 to 1.
     coefficients: [S; 5],
-    /// Lowest derivative of `u` that may jump at the start of the piece.
-    jump: Option<u8>,
+    /// Jump at the start of the piece.
+    jump: Option<Jump<S>>,
 }
 
 /// Highest derivative whose jumps end steps: the method has order five.
@@ -49,7 +58,14 @@ impl<S: Scalar> Delay<S> {
 
     /// Creates a delay of `time` (s, positive).
     pub fn new(time: S, before: S) -> Self {
-        Self { time, before, pieces: VecDeque::new(), size: 0.0, passed: f64::NEG_INFINITY, jump: Some(0) }
+        Self {
+            time,
+            before,
+            pieces: VecDeque::new(),
+            size: 0.0,
+            passed: f64::NEG_INFINITY,
+            jump: Some(Jump { derivative: 0, delay: S::from(0.0) }),
+        }
     }
 
     /// Returns the delay, s.
@@ -103,12 +119,17 @@ impl<S: Scalar> Delay<S> {
     /// Stores `u` over an accepted step, given at [`Delay::NODES`].
     pub fn push(&mut self, start: f64, end: f64, u: [S; 5]) {
         self.size = u.iter().fold(self.size, |most, u| most.max(u.value().abs()));
-        let jumps = self.pieces.back().is_none_or(|piece| {
-            let last = piece.coefficients.iter().fold(0.0, |sum, c| sum + c.value());
-            (last - u[0].value()).abs() > 1e-9 * last.abs().max(u[0].value().abs())
-        });
-        let jump = if jumps { Some(0) } else { self.jump };
-        self.jump = None;
+        let last = self
+            .pieces
+            .back()
+            .map_or(self.before.value(), |piece| piece.coefficients.iter().fold(0.0, |sum, c| sum + c.value()));
+        let jumps = (last - u[0].value()).abs() > 1e-9 * last.abs().max(u[0].value().abs());
+        let jump = match self.jump.take() {
+            // A derivative that arrives causes no jump of the signal itself, so that this one is of other origin, at a fixed time.
+            Some(jump) if jumps && jump.derivative > 1 => Some(Jump { derivative: 0, delay: S::from(0.0) }),
+            Some(jump) => Some(Jump { derivative: if jumps { 0 } else { jump.derivative.max(1) }, ..jump }),
+            None => jumps.then_some(Jump { derivative: 0, delay: S::from(0.0) }),
+        };
         let [a, b, c, d] = [1, 2, 3, 4].map(|i| u[i] - u[0]);
         // Newton's forward differences on the nodes k/4, expanded in powers of s.
         let coefficients = [
@@ -124,9 +145,9 @@ impl<S: Scalar> Delay<S> {
         }
     }
 
-    /// Notes that the integration restarts now, where this derivative of `u` or a higher one may jump.
-    pub fn restart(&mut self, derivative: u8) {
-        self.jump = (derivative <= HIGHEST).then_some(derivative);
+    /// Notes that the integration restarts now, where `u` or its derivatives may jump.
+    pub fn restart(&mut self, jump: Jump<S>) {
+        self.jump = (jump.derivative <= HIGHEST).then_some(jump);
     }
 
     /// Returns the pieces whose jumps have not reached the output yet.
@@ -140,9 +161,11 @@ impl<S: Scalar> Delay<S> {
         self.ahead().map(|(_, out)| out).find(|&out| out > t).unwrap_or(f64::INFINITY)
     }
 
-    /// Returns the lowest derivative of `u` whose jump reaches the output at the break at `t`; `None` without such a jump.
-    pub fn jump_at(&self, t: f64) -> Option<u8> {
-        self.ahead().filter(|(_, out)| is_due(*out, t)).filter_map(|(piece, _)| piece.jump).min()
+    /// Returns the jump of the output at the break at `t`, of the lowest derivative; `None` without a jump.
+    pub fn jump_at(&self, t: f64) -> Option<Jump<S>> {
+        let moves = self.time - self.time.value();
+        let due = self.ahead().filter(|(_, out)| is_due(*out, t)).filter_map(|(piece, _)| piece.jump);
+        due.map(|jump| Jump { delay: jump.delay + moves, ..jump }).min_by_key(|jump| jump.derivative)
     }
 
     /// Handles a break: jumps that are due reach the output.
