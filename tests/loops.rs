@@ -110,7 +110,6 @@ fn a_loop_is_cut_at_the_operating_point_of_the_closed_loop() {
         [models.cut]
         like = 'arm'
         open = 'u'
-        linearise = {{ equilibrium = true, at = {{ w = 0 }} }}
         [models.by-hand]
         transfer-function = {{ numerator = [{}, {}], denominator = [{inertia}, 0, {}] }}
         [criteria]\n{}{}",
@@ -158,7 +157,7 @@ fn a_base_or_a_cut_that_does_not_exist_is_refused_at_its_place() {
     };
     for (keys, place, fact) in [
         ("like = 'c'\nopen = 'u'", "study.toml:9:8", "the study has no model `c`"),
-        ("like = 'b'\nopen = 'u'", "study.toml:9:8", "like itself: b -> b"),
+        ("like = 'b'\nopen = 'u'", "study.toml:9:8", "circular `like`: b -> b"),
         ("like = 'a'\nopen = 'v'", "study.toml:10:8", "not at `v`"),
         ("like = 'a'\nopen = 'x'", "study.toml:10:8", "not at `x`"),
         ("like = 'a'\nopen = 'u'\nlinearise = { inputs = ['u'] }", "study.toml:11:24", "its own input and output"),

@@ -97,6 +97,10 @@ impl Linearised {
     /// Returns an error if the model has no equations that can be linearised, for unknown names and for quantities in a
     /// wrong unit.
     pub fn new(model: Arc<dyn Model>, options: &Linearise) -> Result<Self, StudyError> {
+        if let Some(why) = model.not_linear() {
+            let help = "replace the sampled or delayed quantity by an input, in a model that is `like` this one";
+            return Err(StudyError::here(why).with_help(help));
+        }
         let states = model.equation_states();
         let of = model.interface();
         if states.is_empty() {
@@ -173,11 +177,19 @@ impl Linearised {
             let fact = "a cut loop has its own input and output";
             return Err(StudyError::new(key.0, fact).with_help("remove it, or `open`").within("linearise"));
         }
+        if let Some(why) = model.not_linear() {
+            return Err(StudyError::new("open", why).with_help("cut the loop of a model without clocks and delays"));
+        }
         let Some(cut) = model.cut(variable) else {
             return Err(StudyError::new("open", "the loop of this kind of model cannot be cut")
-                .with_help("write its equations (kind `equations`); a model with effects is cut without them"));
+                .with_help("write its equations (kind `equations`), and remove `effects`"));
         };
         let Cut { model, input, signal } = cut.map_err(|mistake| mistake.within("open"))?;
+        let at = options.at.iter().map(|(name, _)| ("at", name)).chain(options.free.iter().map(|name| ("free", name)));
+        if let Some((key, _)) = at.into_iter().find(|(_, name)| *name == variable) {
+            let fact = "the value of the variable at which the loop is cut follows from the closed loop";
+            return Err(StudyError::new(variable, fact).with_help("remove it").within(key).within("linearise"));
+        }
         let of = model.interface();
         let (inputs, outputs) = (vec![of.inputs[input].name.clone()], vec![of.signals[signal].name.clone()]);
         let options = Linearise { inputs: Some(inputs), outputs: Some(outputs), ..options };

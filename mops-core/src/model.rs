@@ -199,6 +199,11 @@ pub trait Model: Send + Sync {
         None
     }
 
+    /// Returns the reason why the equations have no linearisation in continuous time, if so.
+    fn not_linear(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Returns the model with the loop cut at a variable: a new input of this name acts in its place, and a new signal is minus the
     /// value that the model computes. `None` if the model has no loop that can be cut.
     ///

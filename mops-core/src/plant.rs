@@ -147,11 +147,6 @@ pub trait Plant<S: Scalar> {
         true
     }
 
-    /// Returns the derivatives of the time of the break at `t` along the directions of the scalar, with value 0.
-    fn break_delay(&self, _t: f64) -> S {
-        S::from(0.0)
-    }
-
     /// Returns true if [`Plant::sample`] is to be called.
     fn samples(&self) -> bool {
         false
@@ -257,9 +252,6 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Plant<S> for Box<P> {
     }
     fn remember(&mut self, over: &Past<'_, S>) -> bool {
         (**self).remember(over)
-    }
-    fn break_delay(&self, t: f64) -> S {
-        (**self).break_delay(t)
     }
     fn samples(&self) -> bool {
         (**self).samples()

@@ -16,7 +16,7 @@ impl Lowering<'_> {
         kinks: Kinks,
     ) -> Result<Id, StudyError> {
         let inner = match function {
-            Function::Sqrt | Function::Ln | Function::Log10 | Function::Asin | Function::Acos => Kinks::AsTheyStand,
+            Function::Sqrt | Function::Ln | Function::Log10 | Function::Asin | Function::Acos => kinks.inside(),
             _ => kinks,
         };
         if function == Function::Delay {
@@ -51,7 +51,7 @@ impl Lowering<'_> {
             }
             Function::Sign => {
                 let minus = self.graph.number(-1.0);
-                let positive = self.condition(Comparison::AtLeast, x, zero, true, Kinks::ByMode);
+                let positive = self.condition(Comparison::AtLeast, x, zero, true, kinks.of_jumps());
                 self.graph.choose(positive, one, minus)
             }
             Function::Min | Function::Max => {
@@ -141,26 +141,26 @@ impl Lowering<'_> {
         let mut value = branch(self, otherwise)?;
         for pair in pairs.chunks_exact(2).rev() {
             let here = branch(self, &pair[1])?;
-            value = self.decide(text, &pair[0], here, value)?;
+            value = self.decide(text, &pair[0], [here, value], kinks.of_jumps())?;
         }
         Ok(value)
     }
 
     /// Adds a selection: `a` if the condition is true, else `b`.
-    fn decide(&mut self, text: &Text, condition: &Node, a: Id, b: Id) -> Result<Id, StudyError> {
+    fn decide(&mut self, text: &Text, condition: &Node, [a, b]: [Id; 2], kinks: Kinks) -> Result<Id, StudyError> {
         match &condition.form {
             Form::Compare(comparison, left, right) => {
                 let mut side = |node: &Node| {
-                    let affine = self.node(text, node, Kinks::ByMode)?;
+                    let affine = self.node(text, node, kinks)?;
                     self.without_rates(text, &node.span, affine, "in a condition")
                 };
                 let (left, right) = (side(left)?, side(right)?);
-                let condition = self.condition(*comparison, left, right, true, Kinks::ByMode);
+                let condition = self.condition(*comparison, left, right, true, kinks);
                 Ok(self.graph.choose(condition, a, b))
             }
-            Form::All(conditions) => conditions.iter().rev().try_fold(a, |a, of| self.decide(text, of, a, b)),
-            Form::Any(conditions) => conditions.iter().rev().try_fold(b, |b, of| self.decide(text, of, a, b)),
-            Form::Not(inner) => self.decide(text, inner, b, a),
+            Form::All(conditions) => conditions.iter().rev().try_fold(a, |a, of| self.decide(text, of, [a, b], kinks)),
+            Form::Any(conditions) => conditions.iter().rev().try_fold(b, |b, of| self.decide(text, of, [a, b], kinks)),
+            Form::Not(inner) => self.decide(text, inner, [b, a], kinks),
             _ => unreachable!("the parser requires a condition"),
         }
     }
@@ -173,7 +173,7 @@ impl Lowering<'_> {
     /// Adds a node that is positive if the condition is true: the mode of a switch, unless the condition depends on
     /// parameters only.
     fn condition(&mut self, comparison: Comparison, a: Id, b: Id, jumps: bool, kinks: Kinks) -> Id {
-        if self.graph.level(a).max(self.graph.level(b)) < Level::Variable {
+        if kinks == Kinks::Sampled || self.graph.level(a).max(self.graph.level(b)) < Level::Variable {
             return self.graph.holds(comparison, a, b);
         }
         let (left, right, strict) = match comparison {
@@ -196,7 +196,7 @@ impl Lowering<'_> {
         };
         match kinks {
             Kinks::ByMode => self.graph.add_op(Op::Mode(mode)),
-            Kinks::AsTheyStand => self.graph.holds(comparison, a, b),
+            _ => self.graph.holds(comparison, a, b),
         }
     }
 }

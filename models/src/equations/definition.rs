@@ -390,7 +390,7 @@ impl Definition {
         };
         let (name, mut text) = self.lets.remove(index);
         let shown = self.outputs.iter().position(|(output, _)| output.name == name);
-        let unit = shown.map(|k| self.outputs.remove(k).0).map_or_else(Unit::one, |output| output.unit.clone());
+        let unit = shown.map(|k| self.outputs.remove(k).0).map_or_else(Unit::one, |output| output.unit.difference());
         let declared = |name: String, about: &str| Declared {
             name,
             unit: unit.clone(),

@@ -100,7 +100,8 @@ pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Stud
             model.fits(&memory, text, "the new value of a memory must have the dimension of the memory")?;
         }
         for text in clock.times.iter().flatten() {
-            model.fits(&model.time.clone(), text, "the time must have the dimension of a time")?;
+            let time = if has_units(text) { Measure::declared("time", &Unit::known("s")) } else { model.time.clone() };
+            model.fits(&time, text, "the time must have the dimension of a time")?;
         }
     }
     Ok(model.measured(&forces))

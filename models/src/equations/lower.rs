@@ -87,6 +87,20 @@ enum Meaning {
 pub(super) enum Kinks {
     ByMode,
     AsTheyStand,
+    /// Kinks and jumps by the current values, without events: the expression is evaluated at the instants of a clock only.
+    Sampled,
+}
+
+impl Kinks {
+    /// Returns the evaluation of kinks inside roots, powers and divisors.
+    pub fn inside(self) -> Self {
+        if self == Self::Sampled { Self::Sampled } else { Self::AsTheyStand }
+    }
+
+    /// Returns the evaluation of jumps.
+    pub fn of_jumps(self) -> Self {
+        if self == Self::Sampled { Self::Sampled } else { Self::ByMode }
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -198,9 +212,9 @@ impl<'d> Lowering<'d> {
         Ok(self.sum(a, b, -1.0))
     }
 
-    /// Lowers an expression whose kinks are evaluated by the current values.
-    pub fn as_it_stands(&mut self, text: &Text) -> Result<Affine, StudyError> {
-        self.node(text, &text.equation.right, Kinks::AsTheyStand)
+    /// Lowers an expression that is evaluated at the instants of a clock only.
+    pub fn sampled(&mut self, text: &Text) -> Result<Affine, StudyError> {
+        self.node(text, &text.equation.right, Kinks::Sampled)
     }
 
     /// Lowers the expression of a delayed quantity.
@@ -349,6 +363,10 @@ impl<'d> Lowering<'d> {
                         suggestion(&name, states()),
                     );
                 };
+                if self.definition.is_memory(state) {
+                    let help = "it changes at the instants of the clock only".to_owned();
+                    return wrong(format!("`{name}` has no derivative because it is the memory of a clock"), help);
+                }
                 // This factor converts the rate of a state from its declared unit to coherent units.
                 let factor = self.definition.states[state].unit.factor();
                 Affine { rest: self.graph.number(0.0), rates: BTreeMap::from([(state, self.graph.number(factor))]) }
@@ -380,7 +398,7 @@ impl<'d> Lowering<'d> {
         let mut factors: Vec<Id> = Vec::new();
         let mut varies = self.varies(&result);
         for (operator, node) in rest {
-            let kinks = if *operator == Operator::Divide { Kinks::AsTheyStand } else { kinks };
+            let kinks = if *operator == Operator::Divide { kinks.inside() } else { kinks };
             let operand = self.node(text, node, kinks)?;
             match operator {
                 Operator::Add => result = self.sum(result, operand, 1.0),
@@ -425,7 +443,7 @@ impl<'d> Lowering<'d> {
         let exponent = self.node(text, b, kinks)?;
         let exponent = self.without_rates(text, &b.span, exponent, "in an exponent")?;
         let whole = self.graph.constant(exponent).is_some_and(|e| e.fract() == 0.0 && e > 0.0);
-        let base = self.node(text, a, if whole { kinks } else { Kinks::AsTheyStand })?;
+        let base = self.node(text, a, if whole { kinks } else { kinks.inside() })?;
         if self.graph.is(exponent, 1.0) {
             return Ok(base);
         }

@@ -96,7 +96,8 @@ impl Equations {
             signals: signals.map(variable).collect(),
             states: starts.iter().enumerate().map(state).collect(),
             inputs: d.inputs.iter().map(variable).collect(),
-            ports: ports(d, &system, &measured.forces)?,
+            // Windows of records, and effects on what is sampled or delayed, need a state that the plant does not show.
+            ports: if is_past_free(d, &system) { ports(d, &system, &measured.forces)? } else { Vec::new() },
             parameters,
             horizon,
             analysis: AnalysisKind::Time,
@@ -153,6 +154,11 @@ impl Equations {
     }
 }
 
+/// Returns true if the model has neither clocks nor delays.
+fn is_past_free(d: &Definition, system: &System) -> bool {
+    d.clocks.is_empty() && system.delays.is_empty()
+}
+
 impl PlantModel for Equations {
     fn interface(&self) -> &Interface {
         &self.interface
@@ -168,6 +174,14 @@ impl PlantModel for Equations {
 
     fn tolerance(&self) -> Tolerance {
         self.tolerance
+    }
+
+    fn not_linear(&self) -> Option<&'static str> {
+        match (&self.definition.clocks[..], self.compiled.delays.results.len()) {
+            ([_, ..], _) => Some("a model with clocks has no linearisation in continuous time"),
+            (_, 1..) => Some("a model with delays has no linearisation with finitely many states"),
+            _ => None,
+        }
     }
 
     fn cut(&self, variable: &str) -> Option<Result<Cut, StudyError>> {

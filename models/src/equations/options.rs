@@ -30,8 +30,8 @@ use crate::kernel::Tolerance;
 /// `if` changes its branch. So no step crosses a kink or a jump.
 ///
 /// `delay(x, "50 ms")` is the value of `x` at an earlier time; `x` is any expression, and before the start it is constant. The
-/// time is a quantity, or an expression of parameters and constants. Jumps of `x` and of its derivatives end a step when they
-/// arrive, at which the plant sees them.
+/// time is a quantity, or an expression of parameters and constants. A step ends where a jump of `x` or of its
+/// derivatives arrives.
 ///
 /// Expressions use coherent SI units for all quantities, whatever unit they are declared in, and their dimensions are
 /// checked. A number in a product is a pure number. A number that is a whole term has the SI unit of the other terms.
@@ -52,15 +52,15 @@ use crate::kernel::Tolerance;
 /// control = { every = "10 ms", delay = "2 ms", memory = { u = "N m", i = "rad" }, next = { i = "i + e", u = "k*e + ki*i" } }
 /// ```
 ///
-/// At the instants `offset + k every`, the values `next` are computed from the states, inputs and memory just before; the
-/// memory takes them after `delay`, and is constant until then. Clocks that are due at the same instant read the same values.
+/// At the instants `offset + k every`, the values `next` are computed from the states and memory just before, and the inputs
+/// then; the memory takes them after `delay`, and is constant in between. Clocks that are due at the same instant read the same values.
 /// A memory is a signal and has an initial value, like a state. `next = { y_k = "y" }` holds a sample of `y`.
 ///
 /// A state whose derivative is another state, such as `th` above, is a joint. Its friction is given as
 /// `friction.th = { coulomb = "c" }`; a stuck joint is exactly at rest. The places of possible missing effects are
 /// the joints, the equations of the states, the inputs and the signals.
 ///
-/// A model with clocks or delays is simulated, but not linearised.
+/// A model with clocks or delays is simulated, but not linearised, and has no places for effects.
 ///
 /// Source: F. Cellier, E. Kofman, Continuous System Simulation (2006), chapters 7 (sorting and solving equations) and 9
 /// (discontinuities); A. Bellen, M. Zennaro, Numerical Methods for Delay Differential Equations (2003), section 3.2.
@@ -230,7 +230,7 @@ pub(super) struct Clock {
     pub delay: Option<Formula>,
     /// Values that are constant between the instants, and their units: `u = "V"`, or a table with `unit`, `about`.
     pub memory: Entries<Short<Described>>,
-    /// New values of the memory, computed from the values just before the instant.
+    /// New values of the memory, computed from the states and memory just before the instant and the inputs then.
     pub next: Entries<Formula>,
 }
 

@@ -12,7 +12,7 @@ use super::clocks::Ticking;
 use super::compiled::{Compiled, Signal};
 use super::happenings::Phase;
 use super::program::Program;
-use crate::kernel::elements::delay::{Delay, Jump};
+use crate::kernel::elements::delay::{Delay, Restart};
 use crate::kernel::{Tolerance, allowed, next_of};
 
 /// Plant of a compiled model; `B` is the bank of registers.
@@ -51,6 +51,9 @@ pub struct Running<'a, S, B> {
 /// Number of changes from which a condition is reported as the cause of a reached step limit: a thousandth of the
 /// default limit.
 const FLIPS: usize = 100;
+
+/// Limit on the number of passes to determine the past: an echo of half the size is then below rounding.
+const MOST_PASSES: usize = 100;
 
 /// Message for conditions that switch without end.
 const TO_AND_FRO: &str =
@@ -220,6 +223,9 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         self.load(&mut bank, &event.at);
         if S::DIRECTIONS > 0 {
             bank.set(self.model.layout.time(), event.delay + event.at.t);
+            for (delay, register) in self.delays.iter().zip(self.delayed_inputs(&event.at)) {
+                bank.set(register, delay.at(event.at.t) + event.delay * delay.slope(event.at.t));
+            }
         }
         tape.run(&mut *bank);
         for (&state, &register) in states.iter().zip(&tape.results) {
@@ -227,9 +233,37 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         }
     }
 
-    /// Returns the jump of a delayed quantity at the break at `t`, of the lowest derivative.
-    fn arriving(&self, t: f64) -> Option<Jump<S>> {
-        self.delays.iter().filter_map(|delay| delay.jump_at(t)).min_by_key(|jump| jump.derivative)
+    /// Lets the jumps of delayed quantities that are due take effect. A jump that moves with the parameters moves the state by the
+    /// jump of its rates.
+    fn pass_delays(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
+        let mut restarts = vec![Restart::fixed(); self.delays.len()];
+        for k in 0..self.delays.len() {
+            let moves = S::DIRECTIONS > 0 && self.delays[k].jumps_at(at.t);
+            let look = |running: &Self, x: &[S]| {
+                let (at, mut rates) = (Instant { x, ..*at }, x.to_vec());
+                running.rates(&at, &mut rates);
+                (rates, running.past(&at))
+            };
+            let before = moves.then(|| look(self, x));
+            let Some(arrival) = self.delays[k].pass_break(at.t) else { continue };
+            for restart in &mut restarts {
+                // A jump that arrives in the rates is one derivative higher in the states.
+                let derivative = arrival.derivative + 1;
+                restart.derivative = Some(restart.derivative.map_or(derivative, |known| known.min(derivative)));
+            }
+            let Some((rates_before, past_before)) = before else { continue };
+            self.settle_modes(&Instant { x, ..*at });
+            let (rates, past) = look(self, x);
+            for ((x, before), after) in x.iter_mut().zip(rates_before).zip(rates) {
+                *x += arrival.moves * (before.value() - after.value());
+            }
+            for ((restart, before), after) in restarts.iter_mut().zip(past_before).zip(past) {
+                if before.value() != after.value() {
+                    restart.moves = arrival.moves;
+                }
+            }
+        }
+        self.delays.iter_mut().zip(restarts).for_each(|(delay, restart)| delay.restart(restart));
     }
 
     fn note_sizes(&mut self, x: &[S]) {
@@ -339,7 +373,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
 
     fn switch(&mut self, index: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
         self.note_sizes(x);
-        self.delays.iter_mut().for_each(|delay| delay.restart(Jump { derivative: 0, delay: event.delay }));
+        self.delays.iter_mut().for_each(|delay| delay.restart(Restart { derivative: None, moves: event.delay }));
         let at = event.at;
         match self.kind(index) {
             Guard::Joint(j) => {
@@ -434,8 +468,15 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
     }
 
     fn begin(&mut self, at: &Instant<'_, S>) {
-        for (delay, before) in self.past(at).into_iter().enumerate() {
-            self.delays[delay].set_before(before);
+        // Delays of delays, and a quantity that contains its own past, need several passes.
+        for _ in 0..MOST_PASSES {
+            self.settle_modes(at);
+            let past = self.past(at);
+            let is_known = self.delays.iter().zip(&past).all(|(delay, past)| delay.before().value() == past.value());
+            self.delays.iter_mut().zip(past).for_each(|(delay, past)| delay.set_before(past));
+            if is_known {
+                break;
+            }
         }
     }
 
@@ -459,13 +500,11 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
             return false;
         }
         for (k, delay) in self.delays.iter_mut().enumerate() {
-            delay.push(over.time[0], over.time[1], quartic(k));
+            let values = quartic(k);
+            let size = values.iter().fold(delay.size(), |most, value| most.max(value.value().abs()));
+            delay.push(over.time, values, allowed(&self.tolerance, size, size));
         }
         true
-    }
-
-    fn break_delay(&self, t: f64) -> S {
-        self.arriving(t).map_or(S::from(0.0), |jump| jump.delay)
     }
 
     fn samples(&self) -> bool {
@@ -473,13 +512,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
     }
 
     fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
-        // A jump of a delayed quantity appears one derivative higher in the states; other breaks may be jumps of an input.
-        let arriving = self.arriving(at.t).map(|jump| Jump { derivative: jump.derivative + 1, ..jump });
-        let jump = arriving.unwrap_or(Jump { derivative: 0, delay: S::from(0.0) });
-        for delay in &mut self.delays {
-            delay.pass_break(at.t);
-            delay.restart(jump);
-        }
+        self.pass_delays(at, x);
         self.tick(at, x);
     }
 
@@ -495,15 +528,6 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
     }
 
     fn linearised_at(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<Vec<usize>, Failure> {
-        if !self.ticking.is_empty() {
-            let why = "a model with clocks has no linearisation in continuous time: remove `clocks`, and declare their memory as \
-                       inputs";
-            return Err(Failure::Undefined(why.to_owned()));
-        }
-        if !self.delays.is_empty() {
-            let why = "a model with `delay` has no linearisation with finitely many states: declare what is delayed as an input";
-            return Err(Failure::Undefined(why.to_owned()));
-        }
         Ok(self.look(at, at_rest))
     }
 

@@ -277,7 +277,7 @@ fn lower_delays(l: &mut Lowering<'_>, derivatives: &[Id], delays: &mut Vec<(Id, 
     Ok(())
 }
 
-/// Lowers a clock. Its new values see every kink as it stands: they are computed at its instants only.
+/// Lowers a clock.
 fn clock(
     l: &mut Lowering<'_>,
     d: &Definition,
@@ -285,7 +285,7 @@ fn clock(
     derivatives: &[Id],
 ) -> Result<Clock, StudyError> {
     let next = clock.memory.clone().zip(&clock.next).map(|(memory, text)| {
-        let affine = l.as_it_stands(text)?;
+        let affine = l.sampled(text)?;
         let value = with_rates(&mut l.graph, affine, derivatives);
         Ok(l.declared(value, &d.states[memory].unit))
     });

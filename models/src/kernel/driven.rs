@@ -26,7 +26,7 @@ pub struct Driven<'a, S, P> {
     /// Delay of the current events: tangents with zero value.
     delay: S,
     /// True from the start of the simulation on.
-    begun: bool,
+    has_started: bool,
 }
 
 impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
@@ -46,7 +46,7 @@ impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
             forces: vec![zero; forces],
             shows,
             delay: zero,
-            begun: false,
+            has_started: false,
         }
     }
 
@@ -184,17 +184,13 @@ impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
         self.plant.remembers()
     }
 
-    fn break_delay(&self, t: f64) -> S {
-        self.plant.break_delay(t)
-    }
-
     fn accepted(&mut self, step: &Step<S>) {
         let past = |of: &Self, t: f64, x: &[S]| of.look(t, x, |plant, at| plant.past(at));
         remember(self, step, &past, &|of, over| of.plant.remember(over));
     }
 
     fn pass_break(&mut self, t: f64, x: &mut [S]) {
-        if !std::mem::replace(&mut self.begun, true) && self.plant.remembers() {
+        if !std::mem::replace(&mut self.has_started, true) && self.plant.remembers() {
             let u: Vec<S> = self.drives.iter().map(Drive::before).collect();
             self.plant.begin(&Instant { t, x, u: &u, w: &self.forces });
         }

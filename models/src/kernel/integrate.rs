@@ -158,17 +158,8 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
                 method.advance();
                 continue;
             }
-            // The tangents of the state at a jump of a delayed signal refer to its time, which moves with the delay.
-            let delay = if remembers { dynamics.break_delay(t) } else { S::from(0.0) };
-            let moves = delay.tangents().iter().any(|tangent| *tangent != 0.0);
-            if moves {
-                shift(dynamics, t, &mut x, &mut spare, delay);
-            }
             pass_break(dynamics, (t, end), &mut x, sink);
             events.settle(dynamics, t, &mut x, sink)?;
-            if moves {
-                shift(dynamics, t, &mut x, &mut spare, -delay);
-            }
             if t < end {
                 stop = dynamics.next_break(t).min(end);
                 method.restart(dynamics, t, &x, &mut work);

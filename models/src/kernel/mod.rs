@@ -211,12 +211,6 @@ pub trait Dynamics<S: Scalar> {
         false
     }
 
-    /// Returns the derivatives of the time of the break at `t` along the directions of the scalar, with value 0: the jump of a
-    /// delayed signal moves with the delay. Called only if [`Dynamics::remembers`] returns true.
-    fn break_delay(&self, _t: f64) -> S {
-        S::from(0.0)
-    }
-
     /// Handles an accepted step: a delay stores the values that it outputs later.
     fn accepted(&mut self, _step: &Step<S>) {}
 }

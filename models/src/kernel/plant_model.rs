@@ -50,6 +50,11 @@ pub trait PlantModel: Send + Sync {
         Tolerance::default()
     }
 
+    /// Returns the reason why the model has no linearisation, if so; see [`Model::not_linear`].
+    fn not_linear(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Returns the model with the loop cut at a variable; see [`Model::cut`].
     fn cut(&self, _variable: &str) -> Option<Result<Cut, StudyError>> {
         None
@@ -195,6 +200,10 @@ impl<M: PlantModel> Model for Simulated<M> {
 
     fn local(&self, at: &OperatingPoint<'_>) -> Option<Result<Local, Failure>> {
         Some(local::local(&self.of, at))
+    }
+
+    fn not_linear(&self) -> Option<&'static str> {
+        self.of.not_linear()
     }
 
     fn cut(&self, variable: &str) -> Option<Result<Cut, StudyError>> {

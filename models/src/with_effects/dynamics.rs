@@ -11,7 +11,7 @@ use mops_core::{
 use super::contacts::Contacts;
 use super::{Place, Site, WithEffects};
 use crate::kernel::drive::Drive;
-use crate::kernel::{Dynamics, Step, next_of, remember, shown};
+use crate::kernel::{Dynamics, shown};
 
 /// Effect in a simulation.
 pub(super) struct Actor<S> {
@@ -718,9 +718,9 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         // The output of a sensor effect may be rough, so steps end at all samples.
         let smooth = self.smooth;
         let inputs = self.commands.iter().map(|command| command.next_break(t, smooth)).fold(f64::INFINITY, f64::min);
-        let forces = self.disturbances.iter().map(|drive| drive.next_break(t)).fold(f64::INFINITY, f64::min);
-        let own = self.breaks.iter().copied().find(|&at| at > t).unwrap_or(f64::INFINITY);
-        next_of([inputs, forces, own, self.plant.next_break(t)].into_iter())
+        let forces = self.disturbances.iter().map(|drive| drive.next_break(t)).fold(inputs, f64::min);
+        let next = self.plant.next_break(t).min(forces);
+        self.breaks.iter().copied().find(|&at| at > t).map_or(next, |at| at.min(next))
     }
 
     fn longest_step(&self) -> f64 {
@@ -731,29 +731,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         self.damped_step
     }
 
-    fn remembers(&self) -> bool {
-        self.plant.remembers()
-    }
-
-    fn break_delay(&self, t: f64) -> S {
-        self.plant.break_delay(t)
-    }
-
-    fn accepted(&mut self, step: &Step<S>) {
-        let past = |of: &Self, t: f64, x: &[S]| {
-            let (mut u, mut w) = (Vec::new(), Vec::new());
-            of.balance(t, x, &mut u, &mut w, &mut vec![S::from(0.0); of.own]);
-            of.plant.past(&Instant { t, x: &x[..of.own], u: &u, w: &w })
-        };
-        remember(self, step, &past, &|of, over| of.plant.remember(over));
-    }
-
     fn pass_break(&mut self, t: f64, x: &mut [S]) {
-        if !self.started && self.plant.remembers() {
-            let u: Vec<S> = self.commands.iter().map(|command| command.drive.before()).collect();
-            let w = vec![S::from(0.0); self.forces];
-            self.plant.begin(&Instant { t, x: &x[..self.own], u: &u, w: &w });
-        }
         let at_actuator = |actor: &Actor<S>| matches!(actor.place.site, Site::Actuator { .. });
         let remembers = self.actors.iter().any(|actor| at_actuator(actor) && !actor.memory.is_empty());
         // Hysteresis states are updated just before the break, and across it.
@@ -767,17 +745,12 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
             self.update_hysteresis(t, x);
         }
         let first = !std::mem::replace(&mut self.started, true);
-        let (mut u, mut w) = (Vec::new(), Vec::new());
-        let mut dx = vec![S::from(0.0); self.own];
-        if self.plant.samples() {
-            self.balance(t, x, &mut u, &mut w, &mut dx);
-            let before = x[..self.own].to_vec();
-            self.plant.sample(&Instant { t, x: &before, u: &u, w: &w }, &mut x[..self.own]);
-        }
         if !first && self.guards() == 0 {
             return;
         }
         self.settle_contacts(t, x, None);
+        let (mut u, mut w) = (Vec::new(), Vec::new());
+        let mut dx = vec![S::from(0.0); self.own];
         self.balance(t, x, &mut u, &mut w, &mut dx);
         self.plant.settle(&Instant { t, x: &x[..self.own], u: &u, w: &w });
     }

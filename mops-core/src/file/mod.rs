@@ -35,7 +35,7 @@ use crate::data::read_regular;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::experiment::Input;
 use crate::expression::Expression;
-use crate::linearised::Linearised;
+use crate::linearised::{Linearise, Linearised};
 use crate::model::{AnalysisKind, Interface};
 use crate::study::{CaseBuilder, CriterionBuilder, ModelBuilder, Study, StudyBuilder, TunerBuilder};
 use crate::study_error::StudyError;
@@ -269,7 +269,7 @@ fn with_base<'t>(all: &[(String, Node<'t>)], node: &Node<'t>, path: &mut Vec<Str
         return Err(like.diagnostic(format!("the study has no model `{name}`")).with_help(suggestion(&name, names())));
     };
     if path.contains(&name) {
-        let fact = format!("the model is like itself: {} -> {name}", path.join(" -> "));
+        let fact = format!("circular `like`: {} -> {name}", path.join(" -> "));
         return Err(like.diagnostic(fact).with_help("one of these models must be defined without `like`"));
     }
     path.push(name);
@@ -288,9 +288,11 @@ fn read_model(catalogue: &Catalogue, node: &Node<'_>) -> Result<ModelBuilder, Di
     if let Some(place) = node.child("effects") {
         model = effects::add(catalogue, model, common.effects, &place)?;
     }
-    let linearise = common.linearise.map(Into::into);
+    let at_equilibrium = common.linearise.as_ref().and_then(|section| section.equilibrium).unwrap_or(true);
+    let linearise = common.linearise.map(Linearise::from);
     if let Some(variable) = common.open {
-        let linearised = Linearised::opened(model.as_ref(), &variable, linearise.unwrap_or_default());
+        let options = Linearise { equilibrium: at_equilibrium, ..linearise.unwrap_or_default() };
+        let linearised = Linearised::opened(model.as_ref(), &variable, options);
         model = Box::new(linearised.map_err(|mistake| node.locate(&mistake))?);
     } else if let Some(linearise) = linearise {
         let place = node.child("linearise").expect("it was just read");

@@ -42,9 +42,10 @@ pub(super) struct ModelCommon {
     /// Model from which this one takes all keys that it does not give itself: `like = "servo"`. Tables are merged key by key.
     pub like: Option<String>,
     /// Cuts the loop at a variable, and replaces the model by the linearised open loop `L`, for margins and sensitivities:
-    /// `open = "u"`. `L` is the response from the variable, where it acts, to minus its value, where it is computed. The
-    /// operating point is that of the closed loop; `linearise` may give it. For models of the kind `equations`, the variable is
-    /// a named expression of `let`.
+    /// `open = "u"`. `L` is the transfer function from an input in the place of the variable to minus its computed value, so
+    /// that the poles of the closed loop are the zeros of `1 + L`. The operating point is the equilibrium of the closed loop
+    /// with the inputs of the case at time 0; `linearise = { equilibrium = false, at = { .. } }` gives another one. For models
+    /// of the kind `equations`, the variable is a named expression of `let`.
     pub open: Option<String>,
     /// Replaces the model by its linearisation, for criteria of linear systems:
     /// `linearise = { inputs = ["u"], outputs = ["theta"], at = { theta = "180 deg" } }`. `{}` selects all inputs and
@@ -84,9 +85,9 @@ pub(super) struct LineariseSection {
     /// initial value of the case.
     #[serde(default)]
     pub at: Entries<Quantity>,
-    /// `true` moves the operating point to the nearest equilibrium; the inputs, and the states in `at`, stay fixed.
+    /// `true` moves the operating point to the nearest equilibrium (default with `open`); the inputs, and the states in `at`, stay fixed.
     #[serde(default)]
-    pub equilibrium: bool,
+    pub equilibrium: Option<bool>,
     /// States and inputs that the equilibrium search may vary although they would be fixed.
     #[serde(default)]
     pub free: Vec<String>,
@@ -95,7 +96,7 @@ pub(super) struct LineariseSection {
 impl From<LineariseSection> for Linearise {
     fn from(section: LineariseSection) -> Self {
         let LineariseSection { inputs, outputs, at, equilibrium, free } = section;
-        Self { inputs, outputs, at: at.0, equilibrium, free }
+        Self { inputs, outputs, at: at.0, equilibrium: equilibrium.unwrap_or(false), free }
     }
 }
 

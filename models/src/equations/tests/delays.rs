@@ -152,3 +152,50 @@ fn wrong_delays_are_an_error_with_a_remedy() {
     let failure = attempt(&read(&model("-delay(x, T)/1 [s]")).unwrap(), &[], &[("T", 0.0)], 1.0).unwrap_err();
     assert!(failure.to_string().contains("expected a positive time"), "{failure}");
 }
+
+#[test]
+fn the_past_is_that_of_the_start_through_kinks_and_delays_of_delays() {
+    for (of, past) in [
+        ("delay(abs(x), \"1 s\")", 2.0),
+        ("delay(clip(x, -3, 1), \"1 s\")", 1.0),
+        ("delay(if(x > 0, 5, 7), \"1 s\")", 5.0),
+        ("delay(delay(x, \"1 s\"), \"2 s\")", 2.0),
+        ("delay(y, \"1 s\")", 4.0),
+    ] {
+        let text = format!(
+            "states = {{ x = '1' }}\nlet = {{ y = \"x + 0.5*delay(y, '1 s')\" }}\nder = {{ x = '{of}/1 [s]' }}\nstart = {{ x = 2 }}"
+        );
+        let found = at(&respond(&tight(&text), &[], &[], 0.5), "x", 0.5);
+        assert!((found - (2.0 + 0.5 * past)).abs() < 1e-12, "{of}: {found}");
+    }
+}
+
+#[test]
+fn a_jump_that_moves_leaves_the_tangents_of_others_at_its_time_alone() {
+    // x' = a u + delay(u, T), u a staircase whose samples are a divisor of T apart: only the delayed part moves.
+    let text =
+        "states = { x = '1' }\ninputs = { u = '1' }\nparameters = { T = 's' }\nder = { x = '(u + delay(u, T))/1 [s]' }";
+    let times: Vec<f64> = (0..40).map(|k| 0.05 * f64::from(k)).collect();
+    let values: Vec<f64> = (0..40).map(|k| f64::from(k * 7919 % 13) - 6.0).collect();
+    let input = [("u", Input::Sampled { times, values: values.clone(), hold: mops_core::Hold::Zero })];
+    // x depends on T through the integral of u from -T, where it is its first sample, to 1.02 s - T = 0.82 s.
+    let tangent = tangents_at_end(&tight(text), &input, &[("T", 0.2)], "T", 1.02)[0];
+    let exact = values[0] - values[16];
+    assert!((tangent - exact).abs() < 1e-9, "{tangent} {exact}");
+    // Two delays of the same length: each moves its own jump.
+    let text = "states = { x = '1' }\ninputs = { u = '1' }\nparameters = { T1 = 's', T2 = 's' }\nder = { x = '(delay(u, T1) + 2*delay(u, T2))/1 [s]' }";
+    let input = [("u", Input::Step { time: 0.1, before: 0.0, after: 1.0 })];
+    for (of, exact) in [("T1", -1.0), ("T2", -2.0)] {
+        let tangent = tangents_at_end(&tight(text), &input, &[("T1", 0.5), ("T2", 0.5)], of, 1.0)[0];
+        assert!((tangent - exact).abs() < 1e-9, "{of}: {tangent}");
+    }
+}
+
+#[test]
+fn a_fast_clock_beside_a_delay_takes_few_steps() {
+    let text = "states = { x = '1' }\nder = { x = '(u - delay(x, \"3.3 ms\"))/1 [s]' }\nstart = { x = 1 }
+        clocks.c = { every = '1 ms', delay = '0.3 ms', memory = { u = '1' }, next = { u = 'if(x > 0.5, -x, 0)' } }";
+    let response = respond(&read(text).unwrap_or_else(|e| panic!("{e}")), &[], &[], 3.0);
+    assert!(response.work.steps < 30_000, "{:?}", response.work);
+    assert!(response.events.is_empty(), "{:?}", response.events.len());
+}

@@ -10,8 +10,8 @@ use crate::kernel::is_due;
 ///
 /// The model that owns a delay takes steps no longer than [`Delay::longest_step`] and ends steps at
 /// [`Delay::next_break`]. It passes on `u` along every accepted step ([`crate::kernel::Dynamics::accepted`]). `u` is
-/// stored as the quartic through its values at five nodes of each step. Where the integration restarts, `u` or a derivative may
-/// jump ([`Delay::restart`]), and so does the output later.
+/// stored as the quartic through its values at five nodes of each step. A step ends where a jump of `u`, of its rate or of its
+/// curvature reaches the output.
 ///
 /// Source: A. Bellen, M. Zennaro, Numerical Methods for Delay Differential Equations (2003), section 3.2 (method of
 /// steps), 2.2 (propagation of jumps).
@@ -20,21 +20,14 @@ pub struct Delay<S> {
     time: S,
     before: S,
     pieces: VecDeque<Piece<S>>,
+    /// Jumps of `u` that have not reached the output yet.
+    ahead: VecDeque<Arrival<S>>,
     /// Largest absolute value of `u` so far.
     size: f64,
     /// Time up to which jumps of `u` have reached the output, s.
     passed: f64,
-    /// Jump at the start of the next piece.
-    jump: Option<Jump<S>>,
-}
-
-/// Possible jump of a signal or of its derivatives.
-#[derive(Debug, Clone, Copy)]
-pub struct Jump<S> {
-    /// Lowest derivative that may jump.
-    pub derivative: u8,
-    /// Derivatives of the time of the jump along the directions of the scalar, with value 0.
-    pub delay: S,
+    /// Restart of the integration at the next piece.
+    restart: Option<Restart<S>>,
 }
 
 /// Course of `u` over a step.
@@ -45,12 +38,60 @@ struct Piece<S> {
     end: f64,
     /// Coefficients in powers of the position within the piece, from 0 to 1.
     coefficients: [S; 5],
-    /// Jump at the start of the piece.
-    jump: Option<Jump<S>>,
+    /// True if `u` or a derivative jumps at the start of the piece.
+    jumps: bool,
 }
 
-/// Highest derivative whose jumps end steps: the method has order five.
-const HIGHEST: u8 = 5;
+/// Jump on its way to the output.
+#[derive(Debug, Clone, Copy)]
+pub struct Arrival<S> {
+    /// Time at which it reaches the output, s.
+    pub time: f64,
+    /// Derivatives of this time along the directions of the scalar, with value 0.
+    pub moves: S,
+    /// Lowest derivative of `u` that jumps.
+    pub derivative: u8,
+}
+
+/// Restart of the integration, where `u` or its derivatives may jump.
+#[derive(Debug, Clone, Copy)]
+pub struct Restart<S> {
+    /// Lowest derivative that is known to jump; `None` if a jump shows in `u` only.
+    pub derivative: Option<u8>,
+    /// Derivatives of its time along the directions of the scalar, with value 0.
+    pub moves: S,
+}
+
+impl<S: Scalar> Restart<S> {
+    /// Restart at a fixed time.
+    pub fn fixed() -> Self {
+        Self { derivative: None, moves: S::from(0.0) }
+    }
+}
+
+/// Highest derivative whose jump ends a step because a lower one has arrived. The tangents with respect to the delay jump one
+/// derivative lower, and are not part of the error of a step.
+const HIGHEST: u8 = 4;
+
+/// Smallest jump of the value, relative to its size: above the rounding of a quartic at its end.
+const JUMP: f64 = 1e-9;
+
+/// Smallest jumps of rate and curvature, times the length of the shorter piece and its square, in units of the permitted error of a
+/// quartic. An error of a quartic that is 1 at most appears as up to 16 and 160 there (weights of its derivatives at its ends).
+const BENDS: [f64; 2] = [100.0, 1000.0];
+
+impl<S: Scalar> Piece<S> {
+    /// Returns value, rate and curvature at a position.
+    fn motion(&self, s: f64) -> [f64; 3] {
+        let [c0, c1, c2, c3, c4] = self.coefficients.map(Scalar::value);
+        let length = self.end - self.start;
+        [
+            c0 + s * (c1 + s * (c2 + s * (c3 + s * c4))),
+            (c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * 4.0 * c4))) / length,
+            (2.0 * c2 + s * (6.0 * c3 + s * 12.0 * c4)) / (length * length),
+        ]
+    }
+}
 
 impl<S: Scalar> Delay<S> {
     /// Nodes of a step, as fractions from 0 to 1, at which [`Delay::push`] expects `u`.
@@ -58,14 +99,8 @@ impl<S: Scalar> Delay<S> {
 
     /// Creates a delay of `time` (s, positive).
     pub fn new(time: S, before: S) -> Self {
-        Self {
-            time,
-            before,
-            pieces: VecDeque::new(),
-            size: 0.0,
-            passed: f64::NEG_INFINITY,
-            jump: Some(Jump { derivative: 0, delay: S::from(0.0) }),
-        }
+        let (pieces, ahead) = (VecDeque::new(), VecDeque::new());
+        Self { time, before, pieces, ahead, size: 0.0, passed: f64::NEG_INFINITY, restart: Some(Restart::fixed()) }
     }
 
     /// Returns the delay, s.
@@ -83,6 +118,11 @@ impl<S: Scalar> Delay<S> {
         self.before = before;
     }
 
+    /// Returns the value before the start.
+    pub fn before(&self) -> S {
+        self.before
+    }
+
     /// Returns the longest step for which all required past values are known, s.
     pub fn longest_step(&self) -> f64 {
         0.5 * self.time.value()
@@ -92,12 +132,12 @@ impl<S: Scalar> Delay<S> {
     fn piece_at(&self, t: f64) -> Option<&Piece<S>> {
         let time = self.time.value();
         // A jump that has not reached the output yet hides the pieces after it.
-        let begun = |piece: &&Piece<S>| match piece.jump {
-            Some(_) => is_due(piece.start + time, self.passed) && is_due(piece.start + time, t),
-            None => piece.start + time <= t,
+        let has_started = |piece: &&Piece<S>| match piece.jumps {
+            true => is_due(piece.start + time, self.passed) && is_due(piece.start + time, t),
+            false => piece.start + time <= t,
         };
         let later = self.pieces.partition_point(|piece| is_due(piece.start + time, t));
-        self.pieces.range(..later).rev().find(begun)
+        self.pieces.range(..later).rev().find(has_started)
     }
 
     /// Returns the delayed signal at `t`.
@@ -109,27 +149,13 @@ impl<S: Scalar> Delay<S> {
 
     /// Returns the rate of the delayed signal at `t`, per s.
     pub fn slope(&self, t: f64) -> f64 {
-        let Some(piece) = self.piece_at(t) else { return 0.0 };
-        let length = piece.end - piece.start;
-        let s = (t - piece.start - self.time.value()) / length;
-        let [_, a, b, c, d] = piece.coefficients.map(Scalar::value);
-        (a + s * (2.0 * b + s * (3.0 * c + s * 4.0 * d))) / length
+        self.piece_at(t)
+            .map_or(0.0, |piece| piece.motion((t - piece.start - self.time.value()) / (piece.end - piece.start))[1])
     }
 
-    /// Stores `u` over an accepted step, given at [`Delay::NODES`].
-    pub fn push(&mut self, start: f64, end: f64, u: [S; 5]) {
+    /// Stores `u` over a part of an accepted step, given at [`Delay::NODES`]; `error` is the permitted error of its quartic.
+    pub fn push(&mut self, [start, end]: [f64; 2], u: [S; 5], error: f64) {
         self.size = u.iter().fold(self.size, |most, u| most.max(u.value().abs()));
-        let last = self
-            .pieces
-            .back()
-            .map_or(self.before.value(), |piece| piece.coefficients.iter().fold(0.0, |sum, c| sum + c.value()));
-        let jumps = (last - u[0].value()).abs() > 1e-9 * last.abs().max(u[0].value().abs());
-        let jump = match self.jump.take() {
-            // A derivative that arrives causes no jump of the signal itself, so that this one is of other origin, at a fixed time.
-            Some(jump) if jumps && jump.derivative > 1 => Some(Jump { derivative: 0, delay: S::from(0.0) }),
-            Some(jump) => Some(Jump { derivative: if jumps { 0 } else { jump.derivative.max(1) }, ..jump }),
-            None => jumps.then_some(Jump { derivative: 0, delay: S::from(0.0) }),
-        };
         let [a, b, c, d] = [1, 2, 3, 4].map(|i| u[i] - u[0]);
         // Newton's forward differences on the nodes k/4, expanded in powers of s.
         let coefficients = [
@@ -139,37 +165,61 @@ impl<S: Scalar> Delay<S> {
             a * 96.0 - b * 128.0 + c * (224.0 / 3.0) - d * 16.0,
             (b * 192.0 - a * 128.0 - c * 128.0 + d * 32.0) / 3.0,
         ];
-        self.pieces.push_back(Piece { start, end, coefficients, jump });
+        let mut piece = Piece { start, end, coefficients, jumps: false };
+        let (last, length) = self
+            .pieces
+            .back()
+            .map_or(([self.before.value(), 0.0, 0.0], f64::INFINITY), |last| (last.motion(1.0), last.end - last.start));
+        let now = piece.motion(0.0);
+        let length = length.min(end - start);
+        let off = |k: usize| (now[k] - last[k]).abs();
+        let is_of_value = off(0) > JUMP * last[0].abs().max(now[0].abs());
+        if let Some(Restart { derivative, moves }) = self.restart.take() {
+            let found =
+                match [is_of_value, off(1) * length > BENDS[0] * error, off(2) * length * length > BENDS[1] * error] {
+                    [true, ..] => Some(0),
+                    [_, true, _] => Some(1),
+                    [.., true] => Some(2),
+                    _ => None,
+                };
+            let known = derivative.filter(|&derivative| derivative <= HIGHEST);
+            if let Some(derivative) = found.into_iter().chain(known).min() {
+                let moves = moves + (self.time - self.time.value());
+                self.ahead.push_back(Arrival { time: start + self.time.value(), moves, derivative });
+                piece.jumps = true;
+            }
+        }
+        self.pieces.push_back(piece);
         while self.pieces.len() > 1 && self.pieces[1].start < start - self.time.value() {
             self.pieces.pop_front();
         }
     }
 
-    /// Notes that the integration restarts now, where `u` or its derivatives may jump.
-    pub fn restart(&mut self, jump: Jump<S>) {
-        self.jump = (jump.derivative <= HIGHEST).then_some(jump);
-    }
-
-    /// Returns the pieces whose jumps have not reached the output yet.
-    fn ahead(&self) -> impl Iterator<Item = (&Piece<S>, f64)> + Clone {
-        let jumps = self.pieces.iter().filter(|piece| piece.jump.is_some());
-        jumps.map(|piece| (piece, piece.start + self.time.value())).filter(|(_, out)| !is_due(*out, self.passed))
+    /// Notes that the integration restarts now.
+    pub fn restart(&mut self, restart: Restart<S>) {
+        self.restart = Some(restart);
     }
 
     /// Returns the next time after `t` at which a jump of `u` reaches the output, s.
     pub fn next_break(&self, t: f64) -> f64 {
-        self.ahead().map(|(_, out)| out).find(|&out| out > t).unwrap_or(f64::INFINITY)
+        self.ahead.iter().map(|arrival| arrival.time).find(|&time| time > t).unwrap_or(f64::INFINITY)
     }
 
-    /// Returns the jump of the output at the break at `t`, of the lowest derivative; `None` without a jump.
-    pub fn jump_at(&self, t: f64) -> Option<Jump<S>> {
-        let moves = self.time - self.time.value();
-        let due = self.ahead().filter(|(_, out)| is_due(*out, t)).filter_map(|(piece, _)| piece.jump);
-        due.map(|jump| Jump { delay: jump.delay + moves, ..jump }).min_by_key(|jump| jump.derivative)
-    }
-
-    /// Handles a break: jumps that are due reach the output.
-    pub fn pass_break(&mut self, t: f64) {
+    /// Handles a break: jumps that are due reach the output. Returns that of the lowest derivative.
+    pub fn pass_break(&mut self, t: f64) -> Option<Arrival<S>> {
         self.passed = t;
+        let mut arrived: Option<Arrival<S>> = None;
+        while let Some(arrival) = self.ahead.front().copied().filter(|arrival| is_due(arrival.time, t)) {
+            if arrived.is_none_or(|known| arrival.derivative < known.derivative) {
+                arrived = Some(arrival);
+            }
+            self.ahead.pop_front();
+        }
+        arrived
+    }
+
+    /// Returns true if a jump of the value is due at the output at `t`.
+    pub fn jumps_at(&self, t: f64) -> bool {
+        self.ahead.iter().take_while(|arrival| is_due(arrival.time, t)).any(|arrival| arrival.derivative == 0)
     }
 }

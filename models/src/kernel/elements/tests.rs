@@ -3,6 +3,7 @@
 use mops_core::math;
 use mops_core::{Dual, Scalar, Trace};
 
+use super::delay::Restart;
 use super::*;
 use crate::kernel::{Dynamics, Sink, Step, Tolerance, integrate};
 
@@ -250,7 +251,8 @@ impl<S: Scalar> Dynamics<S> for Delayed<S> {
         self.0.next_break(t)
     }
     fn pass_break(&mut self, t: f64, _: &mut [S]) {
-        self.0.pass_break(t);
+        let derivative = self.0.pass_break(t).map(|arrival| arrival.derivative + 1);
+        self.0.restart(Restart { derivative, moves: S::from(0.0) });
     }
     fn remembers(&self) -> bool {
         true
@@ -261,7 +263,7 @@ impl<S: Scalar> Dynamics<S> for Delayed<S> {
             step.state(s, &mut x);
             x[0]
         });
-        self.0.push(step.start, step.start + step.taken, nodes);
+        self.0.push([step.start, step.start + step.taken], nodes, 1e-10);
     }
 }
 
@@ -296,13 +298,14 @@ impl Dynamics<f64> for DelayedStep {
     }
     fn pass_break(&mut self, t: f64, _: &mut [f64]) {
         self.0.pass_break(t);
+        self.0.restart(Restart::fixed());
         self.1 = f64::from(u8::from(t >= 0.3));
     }
     fn remembers(&self) -> bool {
         true
     }
     fn accepted(&mut self, step: &Step<f64>) {
-        self.0.push(step.start, step.start + step.taken, [self.1; 5]);
+        self.0.push([step.start, step.start + step.taken], [self.1; 5], 1e-10);
     }
 }
 
