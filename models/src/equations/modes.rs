@@ -139,7 +139,9 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
             }
         }
         drop(bank);
-        if let Some(delay) = self.delays.iter().map(|delay| delay.time().value()).find(|time| !(*time > 0.0)) {
+        if let Some(delay) =
+            self.delays.iter().map(|delay| delay.time().value()).find(|time| time.is_nan() || *time <= 0.0)
+        {
             return Err(Failure::Undefined(format!("the time of a `delay` is {delay} s; expected a positive time")));
         }
         let mut slope = at.x.to_vec();

@@ -226,7 +226,7 @@ pub fn seconds(key: &str, time: Option<&Quantity>) -> Result<Option<f64>, StudyE
 /// Relative difference of two times up to which they are the same instant: 3 times 0.1 s is 0.3 s.
 const SAME_INSTANT: f64 = 8.0 * f64::EPSILON;
 
-/// Returns true if a time has come at `t`, but for rounding.
+/// Returns true if `t` has reached a time, within rounding.
 pub(crate) fn is_due(time: f64, t: f64) -> bool {
     time <= t + SAME_INSTANT * t.abs()
 }

@@ -124,7 +124,7 @@ impl Function {
             Self::Clip => min(max(x, values[1]), values[2]),
             Self::Deadzone => x - min(max(x, values[1]), values[2]),
             Self::Table => table(x, &values[1..]),
-            // Where no time passes, a delayed value is the value.
+            // The delayed value of a constant is the constant.
             Self::Delay => x,
             _ => self.smooth(x).expect("`if` is evaluated by its node, all others are smooth"),
         }
