@@ -88,7 +88,7 @@ impl Subject {
     /// Takes it from a study.
     ///
     /// # Errors
-    /// No experiment for calibration, no channels, several models, or a model that does not open its equations.
+    /// No experiment for calibration, no channels, several models, or a model without places for effects or without a linearisation.
     pub fn new(study: &Study) -> Result<Self, StudyError> {
         let measured = |job: &usize| {
             let case = &study.cases()[study.jobs()[*job].case];
@@ -108,6 +108,10 @@ impl Subject {
             .with_help("keep one model in the study"));
         }
         let (name, model) = &study.models()[index];
+        if let Some(why) = model.not_linear() {
+            let fact = format!("the model `{name}` cannot be diagnosed, because {why}");
+            return Err(StudyError::new("models", fact).with_help("calibrate it with `mops run`"));
+        }
         if model.ported().is_none() && model.augmented().is_none() {
             let fact = format!("the model `{name}` does not open its equations: no effect can be added to it");
             return Err(
