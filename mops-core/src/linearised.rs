@@ -200,18 +200,20 @@ impl Linearised {
     /// Evaluates the equations at a point of states and inputs. With a cut loop, its input has the value of the closed loop.
     fn local(&self, parameters: &[f64], point: &mut [f64]) -> Result<Local, Failure> {
         let n = self.states.len();
-        let at = |point: &[f64]| {
-            let (states, inputs) = point.split_at(n);
-            let at = OperatingPoint { parameters, states, inputs, at_rest: self.free.is_some() };
-            self.model.local(&at).expect("a model with equations gives them")
-        };
         if let Some([input, signal]) = self.cut {
             // The computed value depends on the input through derivatives only, and then linearly: one step of Newton's method.
-            let open = at(point)?;
+            let open = self.evaluate(parameters, point)?;
             let gain = 1.0 + open.slopes[(n + signal, n + input)];
             point[n + input] -= (point[n + input] + open.signals[signal]) / gain;
         }
-        at(point)
+        self.evaluate(parameters, point)
+    }
+
+    /// Evaluates the equations at a point of states and inputs, as they are given.
+    fn evaluate(&self, parameters: &[f64], point: &[f64]) -> Result<Local, Failure> {
+        let (states, inputs) = point.split_at(self.states.len());
+        let at = OperatingPoint { parameters, states, inputs, at_rest: self.free.is_some() };
+        self.model.local(&at).expect("a model with equations gives them")
     }
 
     /// Returns the rates and their slopes with respect to states and inputs; with a cut loop, those of the closed loop.
@@ -254,12 +256,7 @@ impl Linearised {
             point = equilibrium(balance, &point, free).map_err(|why| Failure::Undefined(self.restless(&why)))?;
         }
         let here = self.local(parameters, &mut point)?;
-        let beside = |point: &[f64]| {
-            let (states, inputs) = point.split_at(n);
-            let at = OperatingPoint { parameters, states, inputs, at_rest: self.free.is_some() };
-            self.model.local(&at)?.ok()
-        };
-        let rough = self.rough(&point, &here, beside);
+        let rough = self.rough(&point, &here, |point| self.evaluate(parameters, point).ok());
         let Local { rates, slopes, frictionless, .. } = here;
         let inputs = point.split_off(n);
         Ok(Resting { system: self.system(&slopes), states: point, inputs, rates, frictionless, rough })

@@ -128,7 +128,8 @@ pub trait Plant<S: Scalar> {
         Err("a mode of the model chatters without end".to_owned())
     }
 
-    /// Returns true if the plant depends on its past: [`Plant::begin`] and [`Plant::remember`] are to be called.
+    /// Returns true if the plant depends on its past: [`Plant::begin`] and [`Plant::remember`] are to be called. They are not called
+    /// for a model with effects, so that such a plant has no ports.
     fn remembers(&self) -> bool {
         false
     }
@@ -147,7 +148,8 @@ pub trait Plant<S: Scalar> {
         true
     }
 
-    /// Returns true if [`Plant::sample`] is to be called.
+    /// Returns true if [`Plant::sample`] is to be called. It is not called for a model with effects, so that such a plant has no
+    /// ports.
     fn samples(&self) -> bool {
         false
     }

@@ -2,6 +2,8 @@
 //!
 //! Criteria read traces, not samples, so that a peak or a settling time does not depend on the step size.
 
+use crate::scalar::Scalar;
+
 /// A signal as a piecewise quartic over consecutive segments, with jumps allowed between them.
 ///
 /// On segment `i`, from `knots[i]` to `knots[i + 1]`, let `t = knots[i] + s (knots[i + 1] - knots[i])` with `s` in [0, 1].
@@ -67,19 +69,20 @@ impl Trace {
 
     /// Appends the segment from the last knot to `end` that interpolates `samples` at [`Trace::NODES`].
     pub fn push(&mut self, end: f64, samples: [f64; 5]) {
-        let [f0, f1, f2, f3, f4] = samples;
+        self.push_polynomial(end, Self::quartic(samples));
+    }
+
+    /// Returns the coefficients of `s^0 ... s^4` of the quartic through `samples` at [`Trace::NODES`].
+    pub fn quartic<S: Scalar>(samples: [S; 5]) -> [S; 5] {
+        let [a, b, c, d] = [1, 2, 3, 4].map(|i| samples[i] - samples[0]);
         // Newton's forward differences on the nodes k/4, expanded in powers of s.
-        let (a, b, c, d) = (f1 - f0, f2 - f0, f3 - f0, f4 - f0);
-        self.push_polynomial(
-            end,
-            [
-                f0,
-                16.0 * a - 12.0 * b + 16.0 / 3.0 * c - d,
-                (-208.0 * a + 228.0 * b - 112.0 * c + 22.0 * d) / 3.0,
-                96.0 * a - 128.0 * b + 224.0 / 3.0 * c - 16.0 * d,
-                (-128.0 * a + 192.0 * b - 128.0 * c + 32.0 * d) / 3.0,
-            ],
-        );
+        [
+            samples[0],
+            a * 16.0 - b * 12.0 + c * (16.0 / 3.0) - d,
+            (b * 228.0 - a * 208.0 - c * 112.0 + d * 22.0) / 3.0,
+            a * 96.0 - b * 128.0 + c * (224.0 / 3.0) - d * 16.0,
+            (b * 192.0 - a * 128.0 - c * 128.0 + d * 32.0) / 3.0,
+        ]
     }
 
     /// Appends the segment from the last knot to `end` with the given coefficients of `s^0 ... s^4`.

@@ -27,11 +27,8 @@ impl<S> Ticking<S> {
         self.pending.as_ref().map_or(tick, |(at, _)| at.min(tick))
     }
 
-    /// Returns true if an instant is due at `t`, and moves on to the next one. Instants before `t` are left out: a window of a
-    /// record begins after them.
+    /// Returns true if an instant is due at `t`, and moves on to the next one.
     fn ticks(&mut self, clock: &Clock, t: f64) -> bool {
-        let first = ((t - clock.offset) / clock.period - 0.5).ceil().max(0.0);
-        self.next = self.next.max(first);
         let is_due = is_due(clock.offset + self.next * clock.period, t);
         self.next += f64::from(u8::from(is_due));
         is_due

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use mops_core::Scalar;
+use mops_core::{Scalar, Trace};
 
 use crate::kernel::is_due;
 
@@ -94,9 +94,6 @@ impl<S: Scalar> Piece<S> {
 }
 
 impl<S: Scalar> Delay<S> {
-    /// Nodes of a step, as fractions from 0 to 1, at which [`Delay::push`] expects `u`.
-    pub const NODES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-
     /// Creates a delay of `time` (s, positive).
     pub fn new(time: S, before: S) -> Self {
         let (pieces, ahead) = (VecDeque::new(), VecDeque::new());
@@ -153,19 +150,10 @@ impl<S: Scalar> Delay<S> {
             .map_or(0.0, |piece| piece.motion((t - piece.start - self.time.value()) / (piece.end - piece.start))[1])
     }
 
-    /// Stores `u` over a part of an accepted step, given at [`Delay::NODES`]; `error` is the permitted error of its quartic.
+    /// Stores `u` over a part of an accepted step, given at [`Trace::NODES`]; `error` is the permitted error of its quartic.
     pub fn push(&mut self, [start, end]: [f64; 2], u: [S; 5], error: f64) {
         self.size = u.iter().fold(self.size, |most, u| most.max(u.value().abs()));
-        let [a, b, c, d] = [1, 2, 3, 4].map(|i| u[i] - u[0]);
-        // Newton's forward differences on the nodes k/4, expanded in powers of s.
-        let coefficients = [
-            u[0],
-            a * 16.0 - b * 12.0 + c * (16.0 / 3.0) - d,
-            (b * 228.0 - a * 208.0 - c * 112.0 + d * 22.0) / 3.0,
-            a * 96.0 - b * 128.0 + c * (224.0 / 3.0) - d * 16.0,
-            (b * 192.0 - a * 128.0 - c * 128.0 + d * 32.0) / 3.0,
-        ];
-        let mut piece = Piece { start, end, coefficients, jumps: false };
+        let mut piece = Piece { start, end, coefficients: Trace::quartic(u), jumps: false };
         let (last, length) = self
             .pieces
             .back()

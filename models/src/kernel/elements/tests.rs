@@ -259,7 +259,7 @@ impl<S: Scalar> Dynamics<S> for Delayed<S> {
     }
     fn accepted(&mut self, step: &Step<S>) {
         let mut x = [S::from(0.0)];
-        let nodes = Delay::<S>::NODES.map(|s| {
+        let nodes = Trace::NODES.map(|s| {
             step.state(s, &mut x);
             x[0]
         });
