@@ -95,9 +95,10 @@ pub fn study() -> Result<Study, Box<dyn Error>> {
             ("cp".into(), TunerBuilder::new(0.0001, 0.0, 0.001)),
         ],
         cases: vec![
-            file::experiment("horizontal", EXPERIMENT_HORIZONTAL, &Data)?,
-            file::experiment("upright", EXPERIMENT_UPRIGHT, &Data)?,
-        ],
+            file::experiments("horizontal", EXPERIMENT_HORIZONTAL, &Data)?,
+            file::experiments("upright", EXPERIMENT_UPRIGHT, &Data)?,
+        ]
+        .concat(),
         criteria: vec![
             ("phi".into(), file::criterion(&catalogue, CRITERION_PHI)?),
             ("theta".into(), file::criterion(&catalogue, CRITERION_THETA)?),

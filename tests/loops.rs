@@ -172,3 +172,47 @@ fn a_base_or_a_cut_that_does_not_exist_is_refused_at_its_place() {
         assert!(message.contains(place) && message.contains(fact), "{keys}: {message}");
     }
 }
+
+#[test]
+fn a_delay_in_the_loop_is_a_delay_of_the_cut_loop() {
+    // A tank behind a pipe and a sensor with a dead time: both delays lie in the loop, one is a tuner.
+    let text = "
+        [study]
+        name = 'tank'
+        [models.tank.equations]
+        states = { h = '1', i = '1' }
+        inputs = { r = '1' }
+        parameters = { T = 's' }
+        constants = { k = 2, Ti = '4 s', A = '3 s' }
+        let = { seen = \"delay(h, '0.3 s')\", e = 'r - seen', u = 'k*e + i', q = 'delay(u, T)' }
+        der = { h = \"A*h' = q - h\", i = 'k*e/Ti' }
+        horizon = '20 s'
+        [models.cut]
+        like = 'tank'
+        open = 'u'
+        [models.by-hand]
+        transfer-function = { numerator = [8, 2], denominator = [12, 4, 0], delay = '0.7 s' }
+        [models.sensor]
+        like = 'tank'
+        linearise = { inputs = ['r'], outputs = ['h'] }
+        [cases]
+        slow = { T = '0.4 s', inputs.r.constant = 1.5 }
+        [criteria]
+        overshoot = { model = 'tank', peak = { signal = 'h' }, usage = 'monitor' }\n";
+    let folder = tempfile::tempdir().unwrap();
+    let values = |time: &str| {
+        let text = text.replace("T = '0.4 s'", &format!("T = '{time}'"));
+        run(folder.path(), &[&text, &criteria("cut")[..], &criteria("by-hand")].concat())
+    };
+    let result = values("0.4 s");
+    assert_same(&result, "slow");
+    let [short, long] = ["0.35 s", "0.45 s"].map(|time| value(&values(time), "slow", "cut-delay-margin"));
+    assert!((short - long - 0.1).abs() < 1e-10, "{short} {long}");
+    let closed = [text, "size = { model = 'sensor', hinf-norm = {}, usage = 'monitor' }"].concat();
+    let study = folder.path().join("closed.toml");
+    std::fs::write(&study, closed).unwrap();
+    let output = cargo_bin_cmd!("mops").args(["run", study.to_str().unwrap()]).output().unwrap();
+    let undefined = [&output.stdout[..], &output.stderr].concat();
+    let undefined = String::from_utf8_lossy(&undefined);
+    assert!(undefined.contains("a delay lies in a feedback loop"), "{undefined}");
+}

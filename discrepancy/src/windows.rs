@@ -5,7 +5,7 @@
 //! Problems (1983) 95.
 
 use mops_core::math;
-use mops_core::{Case, Input, Model};
+use mops_core::{Case, Model};
 
 use crate::fit::Piece;
 use crate::subject::{Local, Measurement, Series};
@@ -43,7 +43,7 @@ pub fn cut(index: usize, measurement: &Measurement, model: &dyn Model, count: us
                 }
             })
             .collect();
-        let inputs = measurement.case.inputs.iter().map(|(name, input)| (name.clone(), shifted(input, from)));
+        let inputs = measurement.case.inputs.iter().map(|(name, input)| (name.clone(), input.since(from)));
         let case = Case { inputs: inputs.collect(), begins: from, ..measurement.case.clone() };
         Piece {
             measurement: index,
@@ -117,23 +117,4 @@ fn derivative(series: &Series) -> Series {
     let pairs = (0..series.times.len().saturating_sub(step))
         .map(|i| (series.values[i + step] - series.values[i]) / (series.times[i + step] - series.times[i]));
     Series { values: pairs.collect(), ..series.clone() }
-}
-
-/// An input as a clock meets it that begins at a later time: what was before has a time below 0.
-fn shifted(input: &Input, from: f64) -> Input {
-    match input {
-        Input::Constant(value) => Input::Constant(*value),
-        Input::Step { time, before, after } => Input::Step { time: time - from, before: *before, after: *after },
-        Input::Sine { amplitude, frequency, phase, offset } => Input::Sine {
-            amplitude: *amplitude,
-            frequency: *frequency,
-            phase: phase + std::f64::consts::TAU * frequency * from,
-            offset: *offset,
-        },
-        Input::Sampled { times, values, hold } => {
-            // Where a window begins with a sample, rounding does not part them.
-            let later = |t: &f64| if (t - from).abs() <= 1e-12 * (1.0 + from.abs()) { 0.0 } else { t - from };
-            Input::Sampled { times: times.iter().map(later).collect(), values: values.clone(), hold: *hold }
-        }
-    }
 }

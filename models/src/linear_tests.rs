@@ -70,7 +70,7 @@ fn bearings_rest_without_dry_friction_and_slide_where_they_move() {
     let parameters: Vec<f64> = furuta.interface().parameters.iter().map(value).collect();
     let look = |dphi: f64, at_rest: bool| {
         let states = [0.0, dphi, std::f64::consts::PI, 0.0];
-        let at = OperatingPoint { parameters: &parameters, states: &states, inputs: &[0.0], at_rest };
+        let at = OperatingPoint { parameters: &parameters, states: &states, inputs: &[0.0], past: &[], at_rest };
         furuta.local(&at).unwrap().unwrap()
     };
     let (resting, forward, backward) = (look(0.0, false), look(2.0, false), look(-2.0, false));
@@ -91,7 +91,7 @@ fn coulomb_friction_of_the_furuta_pendulum_has_its_sign_where_a_joint_moves() {
     let furuta = Furuta::model(None, Tolerance::default());
     let look = |dphi: f64, at_rest: bool| {
         let states = [0.0, dphi, 0.0, 0.0];
-        let at = OperatingPoint { parameters: &FURUTA, states: &states, inputs: &[0.0], at_rest };
+        let at = OperatingPoint { parameters: &FURUTA, states: &states, inputs: &[0.0], past: &[], at_rest };
         furuta.local(&at).unwrap().unwrap()
     };
     let (resting, sliding) = (look(0.0, false), look(1.0, false));
@@ -106,7 +106,10 @@ fn derivatives_at_any_state_agree_with_central_differences() {
     let furuta = Furuta::model(None, Tolerance::default());
     let (states, inputs) = ([0.3, -1.2, 2.1, 4.0], [0.01]);
     let local = |states: &[f64], inputs: &[f64]| {
-        furuta.local(&OperatingPoint { parameters: &FURUTA, states, inputs, at_rest: false }).unwrap().unwrap()
+        furuta
+            .local(&OperatingPoint { parameters: &FURUTA, states, inputs, past: &[], at_rest: false })
+            .unwrap()
+            .unwrap()
     };
     let here = local(&states, &inputs);
     let h = 1e-5;

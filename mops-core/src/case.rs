@@ -1,7 +1,8 @@
 //! Cases: situations in which every criterion is evaluated.
 
 use crate::cancellation::Cancellation;
-use crate::experiment::{Experiment, Input, Role};
+use crate::experiment::{Experiment, Role};
+use crate::input::Input;
 
 /// A set of parameter values, inputs and, in an identification, a measurement.
 #[derive(Debug, Clone, Default)]

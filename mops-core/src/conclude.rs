@@ -6,6 +6,7 @@ use crate::catalogue::SolverChoice;
 use crate::end::End;
 use crate::evaluation::Evaluation;
 use crate::experiment::{Channel, Role};
+use crate::failure::Failure;
 use crate::front;
 use crate::identification::{self, Local, Point, SensitivityReport};
 use crate::math;
@@ -95,12 +96,21 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
             "the run was cancelled before the result was complete: values, errors or plots are missing".to_owned(),
         );
     }
+    let of_job = |job: usize| (&study.models[study.jobs[job].model].0, &study.cases[study.jobs[job].case].name);
+    if best.merit.objective.is_finite() {
+        warnings.extend(best.failures.iter().filter(|(_, failure)| *failure != Failure::Cancelled).map(
+            |(job, failure)| {
+                let (model, case) = of_job(*job);
+                format!("a monitored criterion of {model} in {case} has no value: {failure}")
+            },
+        ));
+    }
     let failures = run
         .failures()
         .iter()
         .map(|failed| FailureReport {
-            model: study.models[study.jobs[failed.job].model].0.clone(),
-            case: study.cases[study.jobs[failed.job].case].name.clone(),
+            model: of_job(failed.job).0.clone(),
+            case: of_job(failed.job).1.clone(),
             failure: failed.first.kind().to_owned(),
             first: failed.first.to_string(),
             count: failed.count,

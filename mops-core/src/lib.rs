@@ -27,6 +27,7 @@ mod failure;
 pub mod file;
 pub mod front;
 pub mod identification;
+mod input;
 mod known;
 mod least_squares;
 pub mod linear;
@@ -56,6 +57,7 @@ mod trade_offs;
 mod tuner;
 mod uncertainty;
 mod unit;
+mod wildcard;
 
 pub use between::Between;
 pub use cancellation::{Cancellation, Halt};
@@ -77,9 +79,10 @@ pub use effect::{
 pub use end::{Basins, End, Optimality, SMALL_OBJECTIVE};
 pub use evaluation::{Evaluation, FEASIBLE, Merit, Objective, Reading};
 pub use evaluator::Evaluator;
-pub use experiment::{Channel, Experiment, Hold, Input, ResponseData, Role};
+pub use experiment::{Channel, Experiment, ResponseData, Role};
 pub use expression::{Expression, SyntaxError};
 pub use failure::Failure;
+pub use input::{Chirp, Hold, Input, PRBS_STAGES};
 pub use known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes, RowValue, Store};
 pub use least_squares::{LeastSquares, LeastSquaresStep};
 pub use linear::StateSpace;

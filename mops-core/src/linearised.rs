@@ -4,7 +4,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::case::Case;
 use crate::diagnostic::suggestion;
@@ -79,6 +79,32 @@ pub struct Rough {
     pub at: f64,
 }
 
+/// A variable that the equations compute for themselves, by its column in [`Local::slopes`]: the value of a row, times a sign.
+struct Tie {
+    column: usize,
+    row: usize,
+    sign: f64,
+}
+
+/// Largest number of Newton steps to the values of tied variables. Ties are linear unless a delayed quantity depends on another.
+const NEWTON: usize = 50;
+
+/// Difference of a tied variable from its computed value that counts as rounding, relative to the variable, or to 1 if it is less.
+const ROUNDING: f64 = 1e-12;
+
+/// Such a difference that counts as rounding if a step does not halve it.
+const CLOSE: f64 = 1e-6;
+
+/// Returns the derivatives of tied variables minus their computed values.
+fn tied(slopes: &DMatrix<f64>, ties: &[Tie]) -> DMatrix<f64> {
+    let entry = |k: usize, l: usize| f64::from(u8::from(k == l)) - ties[k].sign * slopes[(ties[k].row, ties[l].column)];
+    DMatrix::from_fn(ties.len(), ties.len(), entry)
+}
+
+fn singular() -> Failure {
+    Failure::Undefined("the algebraic loop through the cut variable or the delays is singular".into())
+}
+
 impl fmt::Display for Rough {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { of, is_rate, along, at } = self;
@@ -98,7 +124,7 @@ impl Linearised {
     /// wrong unit.
     pub fn new(model: Arc<dyn Model>, options: &Linearise) -> Result<Self, StudyError> {
         if let Some(why) = model.not_linear() {
-            let help = "replace the sampled or delayed quantity by an input, in a model that is `like` this one";
+            let help = "replace the sampled quantity by an input, in a model that is `like` this one";
             return Err(StudyError::here(why).with_help(help));
         }
         let states = model.equation_states();
@@ -178,7 +204,7 @@ impl Linearised {
             return Err(StudyError::new(key.0, fact).with_help("remove it, or `open`").within("linearise"));
         }
         if let Some(why) = model.not_linear() {
-            return Err(StudyError::new("open", why).with_help("cut the loop of a model without clocks and delays"));
+            return Err(StudyError::new("open", why).with_help("cut the loop of a model without clocks"));
         }
         let Some(cut) = model.cut(variable) else {
             return Err(StudyError::new("open", "the loop of this kind of model cannot be cut")
@@ -197,37 +223,63 @@ impl Linearised {
         Ok(Self { cut: Some([input, signal]), ..linearised })
     }
 
-    /// Evaluates the equations at a point of states and inputs. With a cut loop, its input has the value of the closed loop.
-    fn local(&self, parameters: &[f64], point: &mut [f64]) -> Result<Local, Failure> {
-        let n = self.states.len();
-        if let Some([input, signal]) = self.cut {
-            // The computed value depends on the input through derivatives only, and then linearly: one step of Newton's method.
-            let open = self.evaluate(parameters, point)?;
-            let gain = 1.0 + open.slopes[(n + signal, n + input)];
-            point[n + input] -= (point[n + input] + open.signals[signal]) / gain;
-        }
-        self.evaluate(parameters, point)
+    /// Returns what the equations compute for themselves: the input of a cut loop, and quantities that do not change have their
+    /// present values.
+    fn ties(&self, delays: usize) -> Vec<Tie> {
+        let (n, of) = (self.states.len(), self.model.interface());
+        let cut = self.cut.map(|[input, signal]| Tie { column: n + input, row: n + signal, sign: -1.0 });
+        let delayed =
+            (0..delays).map(|k| Tie { column: n + of.inputs.len() + k, row: n + of.signals.len() + k, sign: 1.0 });
+        cut.into_iter().chain(delayed).collect()
     }
 
-    /// Evaluates the equations at a point of states and inputs, as they are given.
+    /// Evaluates the equations at a point of states, inputs and delayed quantities, after it has moved to where its ties hold.
+    fn local(&self, parameters: &[f64], point: &mut [f64], ties: &[Tie]) -> Result<Local, Failure> {
+        let mut last = f64::INFINITY;
+        for _ in 0..NEWTON {
+            let here = self.evaluate(parameters, point)?;
+            let values = [&here.rates[..], &here.signals, &here.past].concat();
+            let off = DVector::from_fn(ties.len(), |k, _| point[ties[k].column] - ties[k].sign * values[ties[k].row]);
+            let relative = |(tie, off): (&Tie, &f64)| off.abs() / point[tie.column].abs().max(1.0);
+            let most = ties.iter().zip(off.iter()).map(relative).fold(0.0, f64::max);
+            // Rounding within the values may exceed that of a value, and is not reduced by a further step.
+            if most <= ROUNDING || (most <= CLOSE && most > 0.5 * last) {
+                return Ok(here);
+            }
+            last = most;
+            let step = tied(&here.slopes, ties).lu().solve(&off).ok_or_else(singular)?;
+            ties.iter().zip(step.iter()).for_each(|(tie, step)| point[tie.column] -= step);
+        }
+        Err(Failure::Undefined("the loop through the cut variable or the delays has no constant solution".into()))
+    }
+
+    /// Evaluates the equations at a point of states, inputs and delayed quantities, as they are given.
     fn evaluate(&self, parameters: &[f64], point: &[f64]) -> Result<Local, Failure> {
-        let (states, inputs) = point.split_at(self.states.len());
-        let at = OperatingPoint { parameters, states, inputs, at_rest: self.free.is_some() };
+        let (states, others) = point.split_at(self.states.len());
+        let (inputs, past) = others.split_at(self.model.interface().inputs.len());
+        let at = OperatingPoint { parameters, states, inputs, past, at_rest: self.free.is_some() };
         self.model.local(&at).expect("a model with equations gives them")
     }
 
-    /// Returns the rates and their slopes with respect to states and inputs; with a cut loop, those of the closed loop.
-    fn balance(&self, parameters: &[f64], point: &[f64]) -> Result<Balance, String> {
+    /// Returns the rates and their slopes with respect to states and inputs, while the ties hold. `point` lacks the delayed
+    /// quantities.
+    fn balance(&self, parameters: &[f64], point: &[f64], ties: &[Tie], delays: usize) -> Result<Balance, String> {
         let n = self.states.len();
-        let mut point = point.to_vec();
-        let Local { rates, slopes, .. } = self.local(parameters, &mut point).map_err(|failure| failure.to_string())?;
+        let mut point = [point, &vec![0.0; delays]].concat();
+        let told = |failure: Failure| failure.to_string();
+        let Local { rates, slopes, .. } = self.local(parameters, &mut point, ties).map_err(told)?;
         let mut closed = slopes.rows(0, n).into_owned();
-        if let Some([input, signal]) = self.cut {
-            let gain = 1.0 + slopes[(n + signal, n + input)];
-            let by_input = closed.column(n + input).into_owned();
-            closed -= by_input * slopes.row(n + signal) / gain;
+        if !ties.is_empty() {
+            let [columns, rows] =
+                [|tie: &Tie| tie.column, |tie: &Tie| tie.row].map(|of| ties.iter().map(of).collect::<Vec<_>>());
+            let mut computed = slopes.select_rows(&rows);
+            computed.row_iter_mut().zip(ties).for_each(|(mut row, tie)| row *= tie.sign);
+            // A tied variable has no value of its own.
+            columns.iter().for_each(|&column| computed.column_mut(column).fill(0.0));
+            let moved = tied(&slopes, ties).lu().solve(&computed).ok_or_else(|| told(singular()))?;
+            closed += closed.select_columns(&columns) * moved;
         }
-        Ok(Balance { rates, slopes: closed })
+        Ok(Balance { rates, slopes: closed.columns(0, point.len() - delays).into_owned() })
     }
 
     /// Returns the states of the model.
@@ -251,35 +303,44 @@ impl Linearised {
         };
         let mut point: Vec<f64> =
             self.given.iter().enumerate().map(|(i, given)| given.unwrap_or_else(|| start(i))).collect();
+        let delays = self.model.delays(parameters)?;
+        let ties = self.ties(delays.len());
         if let Some(free) = &self.free {
-            let balance = |point: &[f64]| self.balance(parameters, point);
+            let balance = |point: &[f64]| self.balance(parameters, point, &ties, delays.len());
             point = equilibrium(balance, &point, free).map_err(|why| Failure::Undefined(self.restless(&why)))?;
         }
-        let here = self.local(parameters, &mut point)?;
+        point.resize(point.len() + delays.len(), 0.0);
+        let here = self.local(parameters, &mut point, &ties)?;
         let rough = self.rough(&point, &here, |point| self.evaluate(parameters, point).ok());
         let Local { rates, slopes, frictionless, .. } = here;
-        let inputs = point.split_off(n);
-        Ok(Resting { system: self.system(&slopes), states: point, inputs, rates, frictionless, rough })
+        let system = self.system(&slopes, &delays).map_err(Failure::Undefined)?;
+        let mut inputs = point.split_off(n);
+        inputs.truncate(of.inputs.len());
+        Ok(Resting { system, states: point, inputs, rates, frictionless, rough })
     }
 
     /// Returns the rates and outputs of the system that are not differentiable at a point.
     fn rough(&self, point: &[f64], here: &Local, local: impl Fn(&[f64]) -> Option<Local>) -> Vec<Rough> {
         let n = self.states.len();
-        let values = |at: &Local| [&at.rates[..], &at.signals].concat();
-        let rows: Vec<usize> = (0..n).chain(self.outputs.iter().map(|i| n + i)).collect();
-        let columns: Vec<usize> = (0..n).chain(self.inputs.iter().map(|j| n + j)).collect();
-        let at = Point { x: point, values: &values(here), slopes: &here.slopes };
+        let values = |at: &Local| [&at.rates[..], &at.signals, &at.past].concat();
         let of = self.model.interface();
-        let found = at.rough(|point| local(point).map(|local| values(&local)), &rows, &columns);
-        found
-            .into_iter()
-            .map(|(row, column)| Rough {
-                of: if row < n { self.states[row].name.clone() } else { of.signals[row - n].name.clone() },
-                is_rate: row < n,
-                along: if column < n { self.states[column].name.clone() } else { of.inputs[column - n].name.clone() },
-                at: point[column],
-            })
-            .collect()
+        let delayed = |first: usize| first..first + here.past.len();
+        let rows = (0..n).chain(self.outputs.iter().map(|i| n + i)).chain(delayed(n + of.signals.len()));
+        let columns = (0..n).chain(self.inputs.iter().map(|j| n + j)).chain(delayed(n + of.inputs.len()));
+        let at = Point { x: point, values: &values(here), slopes: &here.slopes };
+        let find = |point: &[f64]| local(point).map(|local| values(&local));
+        let found = at.rough(find, &rows.collect::<Vec<_>>(), &columns.collect::<Vec<_>>());
+        let name = |index: usize, others: &[Variable]| {
+            let all = self.states.iter().chain(others).map(|v| v.name.clone());
+            all.skip(index).next().unwrap_or_else(|| "a delayed quantity".to_owned())
+        };
+        let rough = |(row, column)| Rough {
+            of: name(row, &of.signals),
+            is_rate: row < n,
+            along: name(column, &of.inputs),
+            at: point[column],
+        };
+        found.into_iter().map(rough).collect()
     }
 
     /// Returns the reason why there is no equilibrium, and a remedy.
@@ -306,21 +367,30 @@ impl Linearised {
         text
     }
 
-    fn system(&self, slopes: &DMatrix<f64>) -> StateSpace {
-        let n = self.states.len();
-        let names = |variables: &[Variable]| variables.iter().map(|v| v.name.clone()).collect();
-        let (of_outputs, of_inputs) = (|i: usize| n + self.outputs[i], |j: usize| n + self.inputs[j]);
-        let (inputs, outputs) = (self.inputs.len(), self.outputs.len());
-        StateSpace {
+    /// Returns the linear system between the chosen inputs and outputs.
+    ///
+    /// # Errors
+    /// If it is not a system with one delay, see [`StateSpace::with_delays`].
+    fn system(&self, slopes: &DMatrix<f64>, delays: &[f64]) -> Result<StateSpace, String> {
+        let (n, of) = (self.states.len(), self.model.interface());
+        let names = |variables: &[Variable]| variables.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
+        let indices = |chosen: &[usize], all: usize| -> Vec<usize> {
+            chosen.iter().map(|i| n + i).chain((0..delays.len()).map(|k| n + all + k)).collect()
+        };
+        let columns = indices(&self.inputs, of.inputs.len());
+        let rows = indices(&self.outputs, of.signals.len());
+        let past = vec![String::new(); delays.len()];
+        let system = StateSpace {
             a: slopes.view((0, 0), (n, n)).into_owned(),
-            b: DMatrix::from_fn(n, inputs, |i, j| slopes[(i, of_inputs(j))]),
-            c: DMatrix::from_fn(outputs, n, |i, j| slopes[(of_outputs(i), j)]),
-            d: DMatrix::from_fn(outputs, inputs, |i, j| slopes[(of_outputs(i), of_inputs(j))]),
+            b: slopes.rows(0, n).select_columns(&columns),
+            c: slopes.columns(0, n).select_rows(&rows),
+            d: slopes.select_rows(&rows).select_columns(&columns),
             states: names(&self.states),
-            inputs: names(&self.interface.inputs),
-            outputs: names(&self.interface.signals),
+            inputs: [names(&self.interface.inputs), past.clone()].concat(),
+            outputs: [names(&self.interface.signals), past].concat(),
             delay: 0.0,
-        }
+        };
+        if delays.is_empty() { Ok(system) } else { system.with_delays(delays) }
     }
 }
 
@@ -388,6 +458,7 @@ mod tests {
                 rates: vec![speed, g * math::sin(angle) - u],
                 signals: vec![math::sin(angle), speed],
                 slopes: DMatrix::from_fn(4, 3, |i, j| slopes[i][j]),
+                past: Vec::new(),
                 frictionless: Vec::new(),
             }))
         }

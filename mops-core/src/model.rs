@@ -199,6 +199,14 @@ pub trait Model: Send + Sync {
         None
     }
 
+    /// Returns the delays of the equations, s: one for each quantity whose delayed value they contain.
+    ///
+    /// # Errors
+    /// Returns an error if the model is not defined for the parameters.
+    fn delays(&self, _parameters: &[f64]) -> Result<Vec<f64>, Failure> {
+        Ok(Vec::new())
+    }
+
     /// Returns the reason why the equations have no linearisation in continuous time, if so.
     fn not_linear(&self) -> Option<&'static str> {
         None
@@ -249,6 +257,8 @@ pub struct OperatingPoint<'a, S = f64> {
     pub states: &'a [S],
     /// Values of the inputs, in the order of [`Interface::inputs`].
     pub inputs: &'a [S],
+    /// Delayed values of the quantities in [`Model::delays`].
+    pub past: &'a [S],
     /// True at an equilibrium, or during the search for one: no joint then has dry friction, whatever its speed. If false,
     /// dry friction is omitted only for joints with practically zero speed; the others slide in their direction of motion.
     pub at_rest: bool,
@@ -261,7 +271,10 @@ pub struct Local {
     pub rates: Vec<f64>,
     /// Values of the signals, in the order of [`Interface::signals`].
     pub signals: Vec<f64>,
-    /// Derivatives of the rates, then of the signals (rows), with respect to the states, then to the inputs (columns).
+    /// Values of the quantities in [`Model::delays`], without delay.
+    pub past: Vec<f64>,
+    /// Derivatives of the rates, then of the signals, then of the quantities in [`Model::delays`] (rows), with respect to the
+    /// states, then to the inputs, then to the delayed quantities (columns).
     pub slopes: DMatrix<f64>,
     /// Joints whose dry friction is omitted, as names of their positions: dry friction at rest has no derivative.
     pub frictionless: Vec<String>,

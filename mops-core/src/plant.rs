@@ -139,6 +139,14 @@ pub trait Plant<S: Scalar> {
         Vec::new()
     }
 
+    /// Returns the times by which these quantities are delayed, s.
+    fn delays(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// Takes the past as constant, with these values of the quantities.
+    fn hold(&mut self, _past: &[S]) {}
+
     /// Takes the past as constant: `at` is the start, with the inputs just before it.
     fn begin(&mut self, _at: &Instant<'_, S>) {}
 
@@ -251,6 +259,12 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Plant<S> for Box<P> {
     }
     fn past(&self, at: &Instant<'_, S>) -> Vec<S> {
         (**self).past(at)
+    }
+    fn delays(&self) -> Vec<f64> {
+        (**self).delays()
+    }
+    fn hold(&mut self, past: &[S]) {
+        (**self).hold(past)
     }
     fn remember(&mut self, over: &Past<'_, S>) -> bool {
         (**self).remember(over)

@@ -215,7 +215,7 @@ fn values(study: &Study, job: usize, given: &[String]) -> Result<(Vec<f64>, Name
     Ok((parameters, rest))
 }
 
-/// Linearises the model with all its inputs and outputs.
+/// Linearises the model between the requested inputs and outputs.
 fn found(
     study: &Study,
     job: usize,
@@ -248,8 +248,14 @@ fn found(
             Analysis::Time(_) => unreachable!("a linear model gives linear systems"),
         };
     }
-    let options =
-        Linearise { at, equilibrium: arguments.equilibrium, free: arguments.free.clone(), ..Linearise::default() };
+    let named = |name: &Option<String>| name.clone().map(|name| vec![name]);
+    let options = Linearise {
+        inputs: named(&arguments.input),
+        outputs: named(&arguments.output),
+        at,
+        equilibrium: arguments.equilibrium,
+        free: arguments.free.clone(),
+    };
     let diagnostic = |StudyError { message, help, .. }: StudyError| Diagnostic { help, ..Diagnostic::new(message) };
     let linearised = Linearised::new(Arc::clone(model), &options).map_err(diagnostic)?;
     let found = linearised.at(case, parameters).map_err(undefined)?;

@@ -171,7 +171,8 @@ fn effect(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diagnosis, f
     // An effect of one experiment has its null value in all others.
     if let (Some(only), Some(first)) = (&found.only, known.and_then(|effect| effect.parameters().first())) {
         let parameter = format!("{name}.{}", first.name);
-        for experiment in text.keys(&["experiments"]).iter().filter(|experiment| *experiment != only) {
+        let is_other = |name: &&String| *name != only && !only.starts_with(&format!("{name}-"));
+        for experiment in text.keys(&["experiments"]).iter().filter(is_other) {
             text.set(&["experiments", experiment, "parameters", &parameter], &number(first.null_value.unwrap_or(0.0)));
         }
     }

@@ -29,8 +29,8 @@ pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String 
         items
     };
     let models = items(list("models", &|name, text| entry(name, &format!("file::model(&catalogue, {text})?"))), 4);
-    let mut cases = list("cases", &|name, text| format!("file::case({name:?}, {text}, &models)?"));
-    cases.extend(list("experiments", &|name, text| format!("file::experiment({name:?}, {text}, &Data)?")));
+    let mut cases = list("cases", &|name, text| format!("file::cases({name:?}, {text}, &models, &Data)?"));
+    cases.extend(list("experiments", &|name, text| format!("file::experiments({name:?}, {text}, &Data)?")));
     let cases = items(cases, 8);
     let criteria = list("criteria", &|name, text| entry(name, &format!("file::criterion(&catalogue, {text})?")));
     let criteria = items(criteria, 8);
@@ -68,6 +68,11 @@ impl Files for Data {{
     fn show(&self, path: &str) -> String {{
         Path::new(FOLDER).join(path).display().to_string()
     }}
+
+    fn list(&self, folder: &str) -> std::io::Result<Vec<String>> {{
+        let entries = std::fs::read_dir(Path::new(FOLDER).join(folder))?;
+        entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned())).collect()
+    }}
 }}
 
 /// Builds the recalibrated study.
@@ -78,7 +83,7 @@ pub fn study() -> Result<Study, Box<dyn Error>> {{
         name: {name:?}.into(),
         task: Task::Calibration,
 {seed}        tuners: {tuners},
-        cases: {cases},
+        cases: {cases}.concat(),
 {sensors}        criteria: {criteria},
         models,
         ..StudyBuilder::default()

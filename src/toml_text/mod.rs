@@ -84,10 +84,16 @@ pub(crate) fn settled(text: &str, settings: &[String], locate: &dyn Fn(&str) -> 
             text.set(&path.iter().map(String::as_str).collect::<Vec<_>>(), &value);
         }
     }
-    for experiment in text.keys(&["experiments"]) {
-        let place = ["experiments", &experiment, "file"];
-        if let Some(file) = text.words(&place) {
-            text.set(&place, &quoted(&locate(&file)));
+    for (path, _) in text.values() {
+        let path: Vec<&str> = path.iter().map(String::as_str).collect();
+        let is_data = match path[..] {
+            ["experiments", _, key] => key == "file" || key == "files",
+            ["experiments", _, "channels" | "inputs", _, "file"] => true,
+            ["cases", _, "inputs", _, "file", "path"] => true,
+            _ => false,
+        };
+        if let (true, Some(file)) = (is_data, text.words(&path)) {
+            text.set(&path, &quoted(&locate(&file)));
         }
     }
     text

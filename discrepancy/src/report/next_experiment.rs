@@ -2,7 +2,7 @@
 //! the distance of the predictions.
 
 use mops_core::math;
-use mops_core::{Case, Input, Job};
+use mops_core::{Case, Job};
 
 use crate::selection::FittedSet;
 use crate::settings::settings;
@@ -59,7 +59,7 @@ fn outputs(set: &FittedSet<'_>, piece: usize, input: f64, start: f64) -> Option<
             return None;
         }
     }
-    let inputs = p.case.inputs.iter().map(|(name, given)| (name.clone(), scaled(given, input)));
+    let inputs = p.case.inputs.iter().map(|(name, given)| (name.clone(), given.mapped(&|value| value * input, input)));
     let case = Case { inputs: inputs.collect(), ..p.case.clone() };
     let signals = p.signals();
     let job = Job { case: &case, parameters: &parameters, signals: &signals, horizon: p.horizon };
@@ -69,17 +69,4 @@ fn outputs(set: &FittedSet<'_>, piece: usize, input: f64, start: f64) -> Option<
         trace.into_iter().map(|y| y / s.noise).collect::<Vec<f64>>()
     };
     Some(p.series.iter().flat_map(sample).collect())
-}
-
-fn scaled(input: &Input, by: f64) -> Input {
-    match input {
-        Input::Constant(value) => Input::Constant(value * by),
-        Input::Step { time, before, after } => Input::Step { time: *time, before: before * by, after: after * by },
-        Input::Sine { amplitude, frequency, phase, offset } => {
-            Input::Sine { amplitude: amplitude * by, frequency: *frequency, phase: *phase, offset: offset * by }
-        }
-        Input::Sampled { times, values, hold } => {
-            Input::Sampled { times: times.clone(), values: values.iter().map(|v| v * by).collect(), hold: *hold }
-        }
-    }
 }

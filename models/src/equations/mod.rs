@@ -177,11 +177,8 @@ impl PlantModel for Equations {
     }
 
     fn not_linear(&self) -> Option<&'static str> {
-        match (&self.definition.clocks[..], self.compiled.delays.results.len()) {
-            ([_, ..], _) => Some("a model with clocks has no linearisation in continuous time"),
-            (_, 1..) => Some("a model with delays has no linearisation with finitely many states"),
-            _ => None,
-        }
+        let has_clocks = !self.definition.clocks.is_empty();
+        has_clocks.then_some("a model with clocks has no linearisation in continuous time")
     }
 
     fn cut(&self, variable: &str) -> Option<Result<Cut, StudyError>> {

@@ -60,7 +60,7 @@ use crate::kernel::Tolerance;
 /// `friction.th = { coulomb = "c" }`; a stuck joint is exactly at rest. The places of possible missing effects are
 /// the joints, the equations of the states, the inputs and the signals.
 ///
-/// A model with clocks or delays is simulated, but not linearised, and has no places for effects.
+/// A model with clocks is simulated, but not linearised. A model with clocks or delays has no places for effects.
 ///
 /// Source: F. Cellier, E. Kofman, Continuous System Simulation (2006), chapters 7 (sorting and solving equations) and 9
 /// (discontinuities); A. Bellen, M. Zennaro, Numerical Methods for Delay Differential Equations (2003), section 3.2.

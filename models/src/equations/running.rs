@@ -487,6 +487,14 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         self.model.delayed.results.iter().map(|&register| bank.get(register)).collect()
     }
 
+    fn delays(&self) -> Vec<f64> {
+        self.delays.iter().map(|delay| delay.time().value()).collect()
+    }
+
+    fn hold(&mut self, past: &[S]) {
+        self.delays.iter_mut().zip(past).for_each(|(delay, &past)| delay.set_before(past));
+    }
+
     fn remember(&mut self, over: &Past<'_, S>) -> bool {
         let quartic = |k: usize| over.values.each_ref().map(|values| values[k]);
         let agrees = |(k, delay): (usize, &Delay<S>)| {

@@ -411,7 +411,13 @@ fn derivatives_at_an_operating_point_are_those_of_the_equations() {
     use mops_core::OperatingPoint;
     let model = model(&format!("{}friction.q = {{ coulomb = 0.3 }}", text!("servo")));
     let (j, b) = (2.0, 0.5);
-    let point = OperatingPoint { parameters: &[j, b, 0.0, 0.0], states: &[0.1, 0.0], inputs: &[3.0], at_rest: false };
+    let point = OperatingPoint {
+        parameters: &[j, b, 0.0, 0.0],
+        states: &[0.1, 0.0],
+        inputs: &[3.0],
+        past: &[],
+        at_rest: false,
+    };
     let local = model.local(&point).unwrap().unwrap();
     assert_eq!(local.rates, [0.0, 0.052 * 3.0 / j]);
     assert!((local.slopes[(1, 1)] + b / j).abs() < 1e-15 && (local.slopes[(1, 2)] - 0.052 / j).abs() < 1e-15);
@@ -438,7 +444,7 @@ fn dry_friction_is_omitted_at_an_equilibrium_and_in_its_derivatives() {
         assert!((found.system.a[(1, 1)] + 0.2).abs() < 1e-12 && found.frictionless == ["ph"]);
     }
     let rate = |w: f64, at_rest: bool| {
-        let point = OperatingPoint { parameters: &[0.0, 0.0], states: &[0.0, w], inputs: &[0.0], at_rest };
+        let point = OperatingPoint { parameters: &[0.0, 0.0], states: &[0.0, w], inputs: &[0.0], past: &[], at_rest };
         let local = model(text).local(&point).unwrap().unwrap();
         (local.rates[1], local.frictionless.len())
     };

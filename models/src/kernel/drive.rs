@@ -3,7 +3,7 @@
 use mops_core::band_limited::{piece, polynomial};
 use mops_core::enclosure::Enclosure;
 use mops_core::math;
-use mops_core::{Hold, Input, Scalar};
+use mops_core::{Chirp, Hold, Input, Scalar};
 
 /// Input with its current value and rate.
 ///
@@ -21,18 +21,22 @@ pub struct Drive<'a, S = f64> {
     /// Index of the first sample under zero-order hold that differs from the one before.
     change: usize,
     /// Curve added to the value instead of a straight line.
-    curve: Option<Curve>,
+    curve: Option<Curve<'a>>,
 }
 
-#[derive(Debug, Clone, Copy)]
-enum Curve {
+#[derive(Debug, Clone)]
+enum Curve<'a> {
     /// Sine `amplitude sin(angular t + phase)`; the angular frequency in rad/s.
     Sine { amplitude: f64, angular: f64, phase: f64 },
     /// Polynomial in `(t - since)/step`.
     Piece { since: f64, step: f64, coefficients: [f64; 6] },
+    /// Sine of changing frequency, between its start and its end.
+    Chirp(&'a Chirp),
+    /// Sum of inputs.
+    Sum(Vec<Drive<'a>>),
 }
 
-impl Curve {
+impl Curve<'_> {
     // If inlined, the sine would be evaluated for every input: the compiler considers it cheap enough to compute
     // speculatively.
     #[inline(never)]
@@ -40,7 +44,13 @@ impl Curve {
         match self {
             Self::Sine { amplitude, angular, phase } => amplitude * math::sin(angular * t + phase),
             Self::Piece { since, step, coefficients } => polynomial(coefficients, (t - since) / step).0,
+            Self::Chirp(chirp) => chirp.sine(t),
+            Self::Sum(parts) => parts.iter().map(|part| part.at(t)).sum(),
         }
+    }
+
+    fn is_constant(&self) -> bool {
+        matches!(self, Self::Sum(parts) if parts.iter().all(Drive::is_constant))
     }
 
     fn enclose(&self, time: Enclosure) -> Enclosure {
@@ -54,6 +64,10 @@ impl Curve {
                 let horner = |sum: Enclosure, c: &f64| sum * share + Enclosure::from(*c);
                 coefficients.iter().rev().fold(Enclosure::from(0.0), horner)
             }
+            Self::Chirp(chirp) => chirp.enclose(time),
+            Self::Sum(parts) => {
+                parts.iter().map(|part| part.enclose(time)).fold(Enclosure::from(0.0), |sum, part| sum + part)
+            }
         }
     }
 
@@ -61,6 +75,8 @@ impl Curve {
         match self {
             Self::Sine { amplitude, angular, phase } => amplitude * angular * math::cos(angular * t + phase),
             Self::Piece { since, step, coefficients } => polynomial(coefficients, (t - since) / step).1 / step,
+            Self::Chirp(chirp) => chirp.slope(t),
+            Self::Sum(parts) => parts.iter().map(|part| part.slope(t)).sum(),
         }
     }
 }
@@ -75,8 +91,13 @@ impl<S: Scalar> Drive<'_, S> {
 impl<'a, S: Scalar> Drive<'a, S> {
     /// Creates a drive at time 0; without an `input` it is zero.
     pub fn new(input: Option<&'a Input>) -> Self {
-        let mut drive = Self { input, since: 0.0, value: S::from(0.0), slope: 0.0, after: 0, change: 0, curve: None };
-        drive.pass_break(0.0);
+        input.map_or_else(|| Self::held(S::from(0.0)), |input| Self::from(input, 0.0))
+    }
+
+    /// Creates a drive with the value that is valid from `t` on.
+    fn from(input: &'a Input, t: f64) -> Self {
+        let mut drive = Self { input: Some(input), ..Self::held(S::from(0.0)) };
+        drive.pass_break(t);
         drive
     }
 
@@ -96,7 +117,7 @@ impl<'a, S: Scalar> Drive<'a, S> {
 
     /// Returns true if the value is constant up to the next break.
     pub fn is_constant(&self) -> bool {
-        self.curve.is_none() && self.slope == 0.0
+        self.curve.as_ref().is_none_or(Curve::is_constant) && self.slope == 0.0
     }
 
     /// Returns bounds over a time span between two breaks.
@@ -117,6 +138,9 @@ impl<'a, S: Scalar> Drive<'a, S> {
     /// Returns the next time after `t` at which the value or its rate jumps. Under zero-order hold, samples equal to
     /// the previous one are skipped.
     pub fn next_break(&self, t: f64) -> f64 {
+        if let Some(Curve::Sum(parts)) = &self.curve {
+            return parts.iter().map(|part| part.next_break(t)).fold(f64::INFINITY, f64::min);
+        }
         let Some(Input::Sampled { times, values, hold: Hold::Zero }) = self.input else { return self.next_sample(t) };
         let after = self.first_after(times, t);
         let is_ahead = (self.after..=self.change).contains(&after);
@@ -144,10 +168,13 @@ impl<'a, S: Scalar> Drive<'a, S> {
         near.into_iter().find(|&k| behind && times[k] > t).unwrap_or_else(|| times.partition_point(|&time| time <= t))
     }
 
-    /// Returns one sixteenth of the period of a sine, s; infinity for all other inputs.
+    /// Returns one sixteenth of the shortest period of a sine, s; infinity for inputs without sines.
     pub fn longest_step(&self) -> f64 {
-        match self.input {
-            Some(Input::Sine { frequency, .. }) => 1.0 / (16.0 * frequency.abs()),
+        let sixteenth = |frequency: f64| 1.0 / (16.0 * frequency.abs());
+        match (self.input, &self.curve) {
+            (Some(Input::Sine { frequency, .. }), _) => sixteenth(*frequency),
+            (Some(Input::Chirp(Chirp { frequencies: [from, to], .. })), Some(_)) => sixteenth(from.max(*to)),
+            (_, Some(Curve::Sum(parts))) => parts.iter().map(Drive::longest_step).fold(f64::INFINITY, f64::min),
             _ => f64::INFINITY,
         }
     }
@@ -163,6 +190,13 @@ impl<'a, S: Scalar> Drive<'a, S> {
                 let angular = std::f64::consts::TAU * frequency;
                 self.curve = Some(Curve::Sine { amplitude: *amplitude, angular, phase: *phase });
             }
+            Input::Chirp(chirp) => {
+                self.curve = (chirp.start <= t && t < chirp.end()).then_some(Curve::Chirp(chirp));
+            }
+            Input::Sum(inputs) => match &mut self.curve {
+                Some(Curve::Sum(parts)) => parts.iter_mut().for_each(|part| part.pass_break(t)),
+                _ => self.curve = Some(Curve::Sum(inputs.iter().map(|input| Drive::from(input, t)).collect())),
+            },
             Input::Sampled { times, hold: Hold::First, .. } => {
                 self.after = self.first_after(times, t);
                 let value = input.at(t);

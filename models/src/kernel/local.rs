@@ -16,7 +16,7 @@ pub fn rests<S: Scalar>(at_rest: bool, speed: S) -> bool {
 
 /// Values of the equations at an operating point.
 struct Here<S> {
-    /// Rates of the states, then the signals.
+    /// Rates of the states, then the signals, then the quantities whose past matters.
     values: Vec<S>,
     /// Positions, as states, of the joints whose dry friction is left out.
     left_out: Vec<usize>,
@@ -24,12 +24,14 @@ struct Here<S> {
 
 fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Result<Here<S>, Failure> {
     let mut plant = model.plant(at.parameters)?;
+    plant.hold(at.past);
     let w = vec![S::from(0.0); model.interface().forces()];
     let here = Instant { t: 0.0, x: at.states, u: at.inputs, w: &w };
     let left_out = plant.linearised_at(&here, at.at_rest)?;
     let mut values = at.states.to_vec();
     plant.rates(&here, &mut values);
     values.extend((0..model.interface().signals.len()).map(|signal| plant.signal(signal, &here)));
+    values.extend(plant.past(&here));
     Ok(Here { values, left_out })
 }
 
@@ -38,26 +40,28 @@ fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Resul
 /// # Errors
 /// The parameters are outside the domain of the model, or derivatives at the operating point are not finite.
 pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, Failure> {
-    let OperatingPoint { parameters, states, inputs, at_rest } = *at;
+    let OperatingPoint { parameters, states, inputs, past, at_rest } = *at;
     let Here { values, left_out } = look(model, at)?;
     let constants: Vec<Dual7> = parameters.iter().map(|&p| p.into()).collect();
-    let columns = states.len() + inputs.len();
+    let columns = states.len() + inputs.len() + past.len();
     let mut slopes = DMatrix::zeros(values.len(), columns);
     for first in (0..columns).step_by(DIRECTIONS) {
         let variable = |(j, &value): (usize, &f64)| {
             let direction = j.wrapping_sub(first);
             if direction < DIRECTIONS { Dual::variable(value, direction) } else { Dual::from(value) }
         };
-        let all: Vec<Dual7> = states.iter().chain(inputs).enumerate().map(variable).collect();
-        let (states, inputs) = all.split_at(states.len());
-        let along = look(model, &OperatingPoint { parameters: &constants, states, inputs, at_rest })?;
+        let all: Vec<Dual7> = states.iter().chain(inputs).chain(past).enumerate().map(variable).collect();
+        let (states, others) = all.split_at(states.len());
+        let (inputs, past) = others.split_at(inputs.len());
+        let along = look(model, &OperatingPoint { parameters: &constants, states, inputs, past, at_rest })?;
         for (i, row) in along.values.iter().enumerate() {
             for j in first..columns.min(first + DIRECTIONS) {
                 slopes[(i, j)] = row.tangent[j - first];
             }
         }
     }
-    let (rates, signals) = values.split_at(states.len());
+    let (rates, others) = values.split_at(states.len());
+    let (signals, past) = others.split_at(others.len() - past.len());
     if !slopes.iter().chain(rates).all(|x| x.is_finite()) {
         return Err(Failure::Undefined(
             "the derivatives of the equations are not finite at the operating point".into(),
@@ -65,5 +69,5 @@ pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, 
     }
     let names = model.states();
     let frictionless = left_out.into_iter().map(|position| names[position].name.clone()).collect();
-    Ok(Local { rates: rates.to_vec(), signals: signals.to_vec(), slopes, frictionless })
+    Ok(Local { rates: rates.to_vec(), signals: signals.to_vec(), past: past.to_vec(), slopes, frictionless })
 }

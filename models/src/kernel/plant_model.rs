@@ -202,6 +202,10 @@ impl<M: PlantModel> Model for Simulated<M> {
         Some(local::local(&self.of, at))
     }
 
+    fn delays(&self, parameters: &[f64]) -> Result<Vec<f64>, Failure> {
+        Ok(self.of.plant(parameters)?.delays())
+    }
+
     fn not_linear(&self) -> Option<&'static str> {
         self.of.not_linear()
     }

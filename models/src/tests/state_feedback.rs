@@ -105,7 +105,7 @@ fn the_linear_pendulum_falls_with_its_unstable_pole() {
 fn linearised(model: &dyn Model, given: &[(&str, f64)]) -> (Vec<Vec<f64>>, Vec<f64>) {
     let parameters = values_of(model, given);
     let states = vec![0.0; model.equation_states().len()];
-    let at = OperatingPoint { parameters: &parameters, states: &states, inputs: &[0.0], at_rest: false };
+    let at = OperatingPoint { parameters: &parameters, states: &states, inputs: &[0.0], past: &[], at_rest: false };
     let local = model.local(&at).expect("it can be linearised").expect("it is defined");
     let n = states.len();
     (

@@ -462,7 +462,8 @@ fn a_plant_of_ones_own_is_simulated_linearised_and_takes_effects_like_one_of_tex
     assert!(both(&[("d", 4.0)], &[]) < 1e-8);
     assert!(both(&[("d", 4.0), ("e0.c", 0.05)], &[("coulomb-friction", "joint:theta")]) < 1e-7);
 
-    let at = OperatingPoint { parameters: &[4.0, 0.0, 0.0], states: &[0.3, 0.0], inputs: &[0.0], at_rest: true };
+    let at =
+        OperatingPoint { parameters: &[4.0, 0.0, 0.0], states: &[0.3, 0.0], inputs: &[0.0], past: &[], at_rest: true };
     let local = own.local(&at).expect("it has equations").expect("it is defined");
     assert!((local.slopes[(1, 0)] + 4.0 * math::cos(0.3)).abs() < 1e-14 && local.slopes[(1, 2)] == 1.0);
     assert_eq!(own.start_values(at.parameters), Some(vec![0.0, 0.0]));

@@ -1,5 +1,6 @@
 //! CSV reader: a header with names and units, and rows of numbers.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -7,6 +8,7 @@ use std::sync::Arc;
 use csv::{ByteRecord, ReaderBuilder};
 
 use super::Variable;
+use super::stamps::nanoseconds;
 use crate::diagnostic::{Diagnostic, Source};
 use crate::unit::Unit;
 
@@ -48,7 +50,18 @@ pub(super) fn read(source: &Arc<Source>) -> Result<(Vec<Variable>, Vec<String>, 
     }
     let (mut variables, mut skipped) = (Vec::new(), Vec::new());
     for (cell, (column, (name, unit))) in columns.into_iter().zip(&header.names).enumerate() {
-        if let Some(row) = column.bad {
+        if let Some((values, origin)) = column.stamps(|row| layout.cell(&source.text, cell, row), &source.text) {
+            layout.cells.push(cell);
+            let (name, rows) = (name.clone(), values.len());
+            variables.push(Variable {
+                name,
+                unit: Some("s".to_owned()),
+                rows,
+                columns: 1,
+                values,
+                origin: Some(origin),
+            });
+        } else if let Some(row) = column.bad {
             let span = layout.cell(&source.text, cell, row).expect("the row is in the layout");
             skipped.push(format!("{name}: text (`{}`)", shortened(&source.text[span])));
         } else if cell + 1 == header.names.len() && is_unnamed(&header, source) && !column.has_numbers {
@@ -56,12 +69,12 @@ pub(super) fn read(source: &Arc<Source>) -> Result<(Vec<Variable>, Vec<String>, 
         } else {
             layout.cells.push(cell);
             let (name, unit, rows) = (name.clone(), unit.clone(), column.values.len());
-            variables.push(Variable { name, unit, rows, columns: 1, values: column.values });
+            variables.push(Variable { name, unit, rows, columns: 1, values: column.values, origin: None });
         }
     }
     if variables.is_empty() {
         return Err(Diagnostic::new("no column of the file contains numbers")
-            .with_help("separate the cells by commas, semicolons or tabs")
+            .with_help("separate the cells by commas, semicolons, tabs or blanks")
             .at(source, header.span));
     }
     Ok((variables, skipped, layout))
@@ -119,10 +132,38 @@ fn first_line(text: &str) -> Option<usize> {
     None
 }
 
-/// Returns the separator: a semicolon if the line contains one, else a tab, else a comma.
+/// Returns the separator: a semicolon if the line contains one, else a tab, else a comma, else a blank if the next line has as many
+/// cells between blanks.
 fn separator(text: &str, start: usize) -> u8 {
-    let separates = |separator: u8| cells(text, start, separator).nth(1).is_some();
-    [b';', b'\t'].into_iter().find(|separator| separates(*separator)).unwrap_or(b',')
+    let count = |start: usize, separator: u8| cells(text, start, separator).count();
+    if let Some(separator) = [b';', b'\t', b','].into_iter().find(|&separator| count(start, separator) > 1) {
+        return separator;
+    }
+    let next = text[start..].find(['\n', '\r']).and_then(|end| {
+        let rest = &text[start + end..];
+        first_line(rest).map(|line| start + end + line)
+    });
+    let by_blanks = count(start, BLANK);
+    let is_table = next.is_some_and(|next| {
+        let mut row = cells(text, next, BLANK);
+        count(next, BLANK) == by_blanks && row.all(|cell| number(text[cell].as_bytes(), BLANK).is_some())
+    });
+    if by_blanks > 1 && is_table { BLANK } else { b',' }
+}
+
+/// Separator of cells between blanks; any number of them counts as one.
+const BLANK: u8 = b' ';
+
+/// Returns the text with a semicolon in place of the first blank between two cells, of the same length.
+fn with_semicolons(text: &str) -> Vec<u8> {
+    let mut bytes = text.as_bytes().to_vec();
+    let mut start = 0;
+    for line in text.split_inclusive(['\n', '\r']) {
+        let ends: Vec<usize> = cells(text, start, BLANK).map(|cell| cell.end).collect();
+        ends.iter().rev().skip(1).for_each(|&end| bytes[end] = b';');
+        start += line.len();
+    }
+    bytes
 }
 
 /// Splits a label into name and unit: `u [N*m]`, or `u (N*m)` if the parentheses contain a unit.
@@ -206,6 +247,22 @@ impl Reading {
         }
     }
 
+    /// Returns the times of a column of time stamps, s from the first one on, and the first one, ns since 1970; `None` if a cell is
+    /// no time stamp.
+    fn stamps(&self, cell: impl Fn(usize) -> Option<Range<usize>>, text: &str) -> Option<(Vec<f64>, i64)> {
+        let first = self.bad.filter(|_| !self.has_numbers)?;
+        let stamp = |row: usize| nanoseconds(&text[cell(row)?]);
+        let origin = stamp(first)?;
+        let is_gap = |row: usize| cell(row).is_some_and(|span| number(text[span].as_bytes(), b';').is_some());
+        #[allow(clippy::cast_precision_loss)]
+        let value = |row: usize| match stamp(row) {
+            Some(ns) => Some((ns - origin) as f64 * 1e-9),
+            None => is_gap(row).then_some(f64::NAN),
+        };
+        let values: Option<Vec<f64>> = (0..self.values.len()).map(value).collect();
+        values.map(|values| (values, origin))
+    }
+
     /// Returns the first bad row of a column that contains numbers; a column of text only has none.
     fn mistake(&self) -> Option<usize> {
         self.bad.filter(|_| self.has_numbers)
@@ -215,11 +272,12 @@ impl Reading {
 fn read_rows(source: &Arc<Source>, header: &Header, layout: &mut Layout) -> Result<Vec<Reading>, Diagnostic> {
     let text = &source.text;
     let mut columns = vec![Reading::default(); header.names.len()];
-    let mut reader = ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .delimiter(header.separator)
-        .from_reader(&text.as_bytes()[header.body..]);
+    let (bytes, delimiter) = match header.separator {
+        BLANK => (Cow::from(with_semicolons(text)), b';'),
+        separator => (Cow::from(text.as_bytes()), separator),
+    };
+    let mut reader =
+        ReaderBuilder::new().has_headers(false).flexible(true).delimiter(delimiter).from_reader(&bytes[header.body..]);
     let mut record = ByteRecord::new();
     let mut marks = DecimalMarks::of(header.separator);
     while reader.read_byte_record(&mut record).expect("reading from memory does not fail") {
@@ -338,6 +396,11 @@ fn cells(text: &str, start: usize, separator: u8) -> impl Iterator<Item = Range<
     let mut next = Some(start);
     std::iter::from_fn(move || {
         let begin = next?;
+        if separator == BLANK {
+            let (cell, after) = cell_between_blanks(bytes, begin);
+            next = after;
+            return Some(cell);
+        }
         let mut quotes = Quotes::Before;
         let mut end = begin;
         while let Some(&byte) = bytes.get(end) {
@@ -350,6 +413,36 @@ fn cells(text: &str, start: usize, separator: u8) -> impl Iterator<Item = Range<
         next = (bytes.get(end) == Some(&separator)).then_some(end + 1);
         Some(begin..end)
     })
+}
+
+/// Returns the cell between blanks that starts at `begin` or later in a line, and where the next one starts. A unit in brackets belongs
+/// to the cell before it.
+fn cell_between_blanks(bytes: &[u8], begin: usize) -> (Range<usize>, Option<usize>) {
+    let is_blank = |at: usize| bytes.get(at) == Some(&BLANK);
+    let skip = |mut at: usize| {
+        while is_blank(at) {
+            at += 1;
+        }
+        at
+    };
+    let ends_line = |at: usize| matches!(bytes.get(at), None | Some(b'\n' | b'\r'));
+    let start = skip(begin);
+    let (mut end, mut bracket) = (start, None);
+    while !ends_line(end) && (!is_blank(end) || bracket.is_some()) {
+        match (bytes[end], bracket) {
+            (b'[', None) => bracket = Some(b']'),
+            (b'(', None) => bracket = Some(b')'),
+            (byte, Some(closing)) if byte == closing => bracket = None,
+            _ => {}
+        }
+        end += 1;
+        let next = skip(end);
+        if is_blank(end) && bracket.is_none() && matches!(bytes.get(next), Some(b'[' | b'(')) {
+            end = next;
+        }
+    }
+    let next = skip(end);
+    (start..end, (!ends_line(next)).then_some(next))
 }
 
 /// Parser state within a cell: a quote opens the cell at its first byte only, and is doubled inside.

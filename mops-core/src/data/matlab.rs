@@ -106,9 +106,16 @@ impl Contents {
             self.skip(&name, "empty");
         } else if rows < columns {
             let turned = (0..rows).flat_map(|row| values.iter().skip(row).step_by(rows)).copied().collect();
-            self.variables.push(Variable { name, unit: None, rows: columns, columns: rows, values: turned });
+            self.variables.push(Variable {
+                name,
+                unit: None,
+                rows: columns,
+                columns: rows,
+                values: turned,
+                origin: None,
+            });
         } else {
-            self.variables.push(Variable { name, unit: None, rows, columns, values });
+            self.variables.push(Variable { name, unit: None, rows, columns, values, origin: None });
         }
     }
 

@@ -5,6 +5,7 @@ mod mat4;
 mod mat5;
 mod matlab;
 mod sources;
+mod stamps;
 #[cfg(test)]
 mod tests;
 
@@ -24,7 +25,7 @@ pub(crate) use sources::{FILE as SOURCES, source_of};
 /// File format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// Text with a comma, a semicolon or a tab between cells.
+    /// Text with a comma, a semicolon, a tab or blanks between cells.
     Csv,
     /// MATLAB level 4, `save -v4`.
     Mat4,
@@ -58,6 +59,8 @@ pub struct Variable {
     pub columns: usize,
     /// Values column by column, `rows * columns` of them; NaN is a gap.
     pub values: Vec<f64>,
+    /// Origin of a column of time stamps, whose values are in s from its first stamp on: ns since 1970.
+    pub origin: Option<i64>,
 }
 
 /// Data file in memory.
@@ -85,6 +88,8 @@ pub struct Column<'a> {
     pub unit: Option<&'a str>,
     /// One value per sample, finite or NaN; NaN is a gap.
     pub values: &'a [f64],
+    /// Origin of a column of time stamps, ns since 1970; see [`Variable::origin`].
+    pub origin: Option<i64>,
 }
 
 impl DataFile {
@@ -159,7 +164,7 @@ impl DataFile {
     }
 
     /// Returns the default time column: `t`, or `time` in any case, or `T` with a time unit (without one, `T` may be a
-    /// temperature).
+    /// temperature), or the first column of time stamps.
     pub fn time_column(&self) -> Option<String> {
         let names = self.column_names();
         let is_time = |name: &&String| name.as_str() == "t" || name.eq_ignore_ascii_case("time");
@@ -167,7 +172,9 @@ impl DataFile {
             let unit = self.column(name).ok().and_then(|column| column.unit).map(Unit::parse);
             name.as_str() == "T" && unit.is_some_and(|unit| unit.is_ok_and(|u| u.is_compatible(&Unit::known("s"))))
         };
-        names.iter().find(is_time).or_else(|| names.iter().find(in_seconds)).cloned()
+        let has_stamps = |name: &&String| self.column(name).is_ok_and(|column| column.origin.is_some());
+        let find = |is_one: &dyn Fn(&&String) -> bool| names.iter().find(is_one).cloned();
+        find(&is_time).or_else(|| find(&in_seconds)).or_else(|| find(&has_stamps))
     }
 
     /// Returns the column called `name`.
@@ -180,13 +187,13 @@ impl DataFile {
     /// so that the caller can point to the name.
     pub fn column(&self, name: &str) -> Result<Column<'_>, Diagnostic> {
         let (variable, k) = self.find(name).ok_or_else(|| self.unknown(name))?;
-        let Variable { unit, rows, values, .. } = &self.variables[variable];
+        let Variable { unit, rows, values, origin, .. } = &self.variables[variable];
         let values = &values[k * rows..(k + 1) * rows];
         if let Some(row) = values.iter().position(|value| value.is_infinite()) {
             let fact = format!("column `{name}` of {} is infinite in row {}", self.source.name, row + 1);
             return Err(Diagnostic::new(fact).with_help("write NaN for a gap"));
         }
-        Ok(Column { name: name.to_owned(), unit: unit.as_deref(), values })
+        Ok(Column { name: name.to_owned(), unit: unit.as_deref(), values, origin: *origin })
     }
 
     /// Returns every name that [`Self::column`] accepts, in the order of the file.

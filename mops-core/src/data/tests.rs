@@ -45,6 +45,41 @@ mod csv {
     }
 
     #[test]
+    fn blanks_separate_cells_and_units_belong_to_names() {
+        for text in
+            ["t [s]  u (V)   y\n 0.0   1.5  -2\n 0.1  2,5   3e-1 \n", "  t[s] u[V] y\n0.0 1.5 -2\n\n0.1 2.5 0.3"]
+        {
+            let text = if text.contains(',') {
+                text.replace("1.5", "1,5").replace("0.", "0,").replace("3e-1", "0,3")
+            } else {
+                text.into()
+            };
+            let file = read(text.as_str());
+            assert_eq!(file.column_names(), ["t", "u", "y"]);
+            assert_eq!(file.column("u").unwrap().unit, Some("V"));
+            assert_same(values(&file, "u"), &[1.5, 2.5]);
+            assert_same(values(&file, "y"), &[-2.0, 0.3]);
+            let cell = file.span_of("y", 1);
+            assert_eq!(&file.source.text[cell], if text.contains(',') { "0,3" } else { "0.3" });
+        }
+        // Without a header.
+        assert_same(values(&read("0 1\n0.1 2\n"), "2"), &[1.0, 2.0]);
+        // A header of several words over one column.
+        assert_eq!(read("motor voltage\n1\n2\n").column_names(), ["motor voltage"]);
+    }
+
+    #[test]
+    fn time_stamps_count_from_the_first_one() {
+        let file = read("when,y\n2024-02-29T23:59:59.5Z,1\n,2\n2024-03-01T00:00:01Z,3\n");
+        let column = file.column("when").unwrap();
+        assert_eq!((column.unit, column.origin), (Some("s"), Some(1_709_251_199_500_000_000)));
+        assert_same(column.values, &[0.0, f64::NAN, 1.5]);
+        assert_eq!(file.time_column().as_deref(), Some("when"));
+        // One cell that is no time stamp makes the column a text.
+        assert_eq!(read("when,y\n2024-02-29,1\nlater,2\n").column_names(), ["y"]);
+    }
+
+    #[test]
     fn parentheses_with_a_unit_are_brackets_and_a_column_answers_to_its_label() {
         let file = read("t (ms),T (\u{b0}C),speed (deg/s),trial (2),motor (left)\n0,1,2,3,4\n");
         assert_eq!(file.column_names(), ["t", "T", "speed", "trial (2)", "motor (left)"]);
@@ -151,8 +186,8 @@ mod csv {
                 "t[s]",
             ),
             (
-                "t y\n0 1\n",
-                "data:1:1: no column of the file contains numbers; separate the cells by commas, semicolons or tabs",
+                "t y\n0 1 2\n",
+                "data:1:1: no column of the file contains numbers; separate the cells by commas, semicolons, tabs or blanks",
                 "t y",
             ),
         ];

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 pub(crate) use block::{Block, serialize};
 
-use crate::experiment::{Hold, Role};
+use crate::experiment::Role;
+use crate::input::Hold;
 
 /// Verdict on the model.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

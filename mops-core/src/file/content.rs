@@ -51,6 +51,10 @@ impl<'f> Listed<'f> {
 }
 
 impl Files for Listed<'_> {
+    fn list(&self, folder: &str) -> io::Result<Vec<String>> {
+        self.inner.list(folder)
+    }
+
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
         let bytes = self.inner.read(path)?;
         let mut read = self.read.borrow_mut();

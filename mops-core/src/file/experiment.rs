@@ -1,38 +1,112 @@
 //! Experiments of a study file: from the columns of a data file to channels and inputs.
 
+use std::cell::RefCell;
 use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
+use super::entries::Short;
 use super::sections::{ChannelTable, ExperimentSection, InputTable};
 use super::tree::Node;
 use super::{Files, UNIT_HELP, at_key, frequency, read_seconds, read_unit};
 use crate::data::{Column, DataFile, SOURCES, source_of};
 use crate::diagnostic::{Diagnostic, Source};
-use crate::experiment::Input;
+use crate::input::{Hold, Input};
 use crate::study::{CaseBuilder, ChannelBuilder, Free, Measured};
 use crate::unit::{Quantity, Unit};
+use crate::wildcard;
 
-/// Reads an experiment and its data file.
-pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<CaseBuilder, Diagnostic> {
+/// Reads an experiment and its data: several experiments from several files, or if it is divided into windows.
+pub(super) fn read(name: &str, node: &Node<'_>, files: &dyn Files) -> Result<Vec<CaseBuilder>, Diagnostic> {
     let section: ExperimentSection = node.read()?;
-    let file = open(node, &section.file, files)?;
-    if section.frequency.is_some() || !section.responses.0.is_empty() {
-        return frequency::read(name, node, section, &file);
+    let opened = Opened { files, known: RefCell::default() };
+    let mut found = Vec::new();
+    for (own, path) in paths(name, node, &section, files)? {
+        let key = if section.file.is_some() { "file" } else { "files" };
+        let file = opened.open(node, key, &path)?;
+        if section.frequency.is_some() || !section.responses.0.is_empty() {
+            found.push(frequency::read(own, node, &section, &file)?);
+            continue;
+        }
+        let table = Table::new(node, &section, file)?;
+        let windows = table.windows(node, &section)?;
+        for (index, table) in windows.iter().enumerate() {
+            let own = if section.windows.is_some() { format!("{own}-{}", index + 1) } else { own.clone() };
+            found.push(experiment(own, node, &section, table, &opened)?);
+        }
     }
-    let table = Table::new(node, &section, &file)?;
+    Ok(found)
+}
 
+/// Returns names and data files of the experiments of a table.
+fn paths(
+    name: &str,
+    node: &Node<'_>,
+    section: &ExperimentSection,
+    files: &dyn Files,
+) -> Result<Vec<(String, String)>, Diagnostic> {
+    let pattern = match (&section.file, &section.files) {
+        (Some(file), None) => return Ok(vec![(name.to_owned(), file.clone())]),
+        (None, Some(pattern)) => pattern,
+        (None, None) => {
+            return Err(node
+                .key_diagnostic("`file` is missing".to_owned())
+                .with_help("add file = \"...\", or files = \"swing_*.csv\" for several"));
+        }
+        (Some(_), Some(_)) => {
+            let place = node.child("files").expect("it was just read");
+            return Err(place.key_diagnostic("both `file` and `files` are given".to_owned()).with_help("remove one"));
+        }
+    };
+    let (folder, wanted) = pattern.rsplit_once('/').unwrap_or(("", pattern));
+    let place = node.child("files").expect("it was just read");
+    let mut names = files.list(folder).map_err(|error| {
+        let shown = files.show(folder);
+        place.diagnostic(format!("the folder `{shown}` cannot be read: {error}")).with_help(
+            "paths are relative to the folder of the study file; `*` stands for text in the name of a file only",
+        )
+    })?;
+    names.retain(|name| wildcard::matches(wanted, name));
+    names.sort();
+    if names.is_empty() {
+        let fact = format!("no data file matches `{}`", files.show(pattern));
+        return Err(place.diagnostic(fact).with_help("`*` stands for any text in the name of a file"));
+    }
+    let path = |file: String| {
+        let stem = file.rsplit_once('.').map_or(file.as_str(), |(stem, _)| stem).to_owned();
+        let path = if folder.is_empty() { file.clone() } else { format!("{folder}/{file}") };
+        (format!("{name}-{stem}"), path)
+    };
+    Ok(names.into_iter().map(path).collect())
+}
+
+fn experiment(
+    name: String,
+    node: &Node<'_>,
+    section: &ExperimentSection,
+    table: &Table,
+    opened: &Opened<'_>,
+) -> Result<CaseBuilder, Diagnostic> {
     let mut channels = Vec::new();
-    for (signal, channel) in &section.channels.0 {
+    for (signal, Short(channel)) in &section.channels.0 {
         let place = entry(node, "channels", signal);
-        channels.push(table.channel(&place, signal, &channel.0)?);
+        let keys = Elsewhere::of(&channel.file, &channel.time, &channel.time_unit, &channel.sample_time);
+        let other = keys.table(&place, &channel.column, table, opened)?;
+        channels.push(other.as_ref().unwrap_or(table).channel(&place, signal, channel)?);
     }
     let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
-    for (input, column) in &section.inputs.0 {
+    for (input, Short(column)) in &section.inputs.0 {
         let place = entry(node, "inputs", input);
-        let (values, unit) = table.input(&place, &column.0)?;
-        if column.0.hold.is_none() && values.looks_smooth() {
+        let keys = Elsewhere::of(&column.file, &column.time, &column.time_unit, &column.sample_time);
+        let other = keys.table(&place, &column.column, table, opened)?;
+        let (values, unit, missing) = other.as_ref().unwrap_or(table).input(&place, column)?;
+        if missing > 0 {
+            warnings.push(format!(
+                "input `{input}` of `{name}` has {missing} missing samples: the value before each is held"
+            ));
+        }
+        if column.hold.is_none() && values.looks_smooth() {
             warnings.push(format!(
                 "input `{input}` of `{name}` looks smooth, but is constant between its samples: use hold = \"first\" for \
                  linear interpolation, \"band-limited\" for an input filtered before sampling, or \
@@ -41,15 +115,15 @@ pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<C
         }
         inputs.push((input.clone(), values, unit));
     }
-    let free = section.free.0.into_iter().map(|(state, given)| Free {
-        state,
-        start: given.start,
-        min: given.min,
-        max: given.max,
+    let free = section.free.0.iter().map(|(state, given)| Free {
+        state: state.clone(),
+        start: given.start.clone(),
+        min: given.min.clone(),
+        max: given.max.clone(),
     });
     Ok(CaseBuilder {
         name,
-        parameters: section.parameters.0,
+        parameters: section.parameters.0.clone(),
         inputs,
         horizon: None,
         measured: Some(Measured { channels, responses: Vec::new(), role: section.role, free: free.collect() }),
@@ -57,11 +131,53 @@ pub(super) fn read(name: String, node: &Node<'_>, files: &dyn Files) -> Result<C
     })
 }
 
+/// Reads an input of a case from a data file, in `unit`.
+pub(super) fn recorded(
+    place: &Node<'_>,
+    path: &str,
+    column: &InputTable,
+    unit: &Unit,
+    files: &dyn Files,
+) -> Result<Input, Diagnostic> {
+    let file = Opened { files, known: RefCell::default() }.open(place, "path", path)?;
+    let keys = Elsewhere::of(&None, &column.time, &column.time_unit, &column.sample_time);
+    let clock = Clock::new(place, &file, keys.time, keys.unit, keys.sample_time, &column.column)?;
+    check_times(&file, &clock.column, &clock.times, 0)?;
+    let rows = 0..clock.times.len();
+    let table = Table { file, driving: rows.clone(), rows, clock, zero: 0.0, until: f64::INFINITY };
+    let shift = read_seconds(place, "shift", column.shift.as_ref())?.unwrap_or(0.0);
+    let (input, own, _) = table.sampled(place, column, shift, table.rows.clone())?;
+    let Some(own) = own.filter(|own| own != unit) else { return Ok(input) };
+    let Some(factor) = own.factor_to(unit) else {
+        let fact = format!("the column `{}` is in `{own}`, but the input is in `{unit}`", column.column);
+        return Err(place.diagnostic(fact).with_help("choose another column, or set `unit`"));
+    };
+    Ok(input.mapped(&|value| own.convert(value, unit).expect("the units are compatible"), factor))
+}
+
 pub(super) fn entry<'t>(node: &Node<'t>, table: &str, key: &str) -> Node<'t> {
     node.child(table).and_then(|table| table.child(key)).expect("it was just read")
 }
 
-fn open(node: &Node<'_>, path: &str, files: &dyn Files) -> Result<DataFile, Diagnostic> {
+/// Data files that an experiment has opened.
+struct Opened<'a> {
+    files: &'a dyn Files,
+    known: RefCell<Vec<(String, Arc<DataFile>)>>,
+}
+
+impl Opened<'_> {
+    /// Opens the file that a key of a table names.
+    fn open(&self, node: &Node<'_>, key: &str, path: &str) -> Result<Arc<DataFile>, Diagnostic> {
+        if let Some((_, file)) = self.known.borrow().iter().find(|(known, _)| known == path) {
+            return Ok(Arc::clone(file));
+        }
+        let file = Arc::new(open(node, key, path, self.files)?);
+        self.known.borrow_mut().push((path.to_owned(), Arc::clone(&file)));
+        Ok(file)
+    }
+}
+
+fn open(node: &Node<'_>, key: &str, path: &str, files: &dyn Files) -> Result<DataFile, Diagnostic> {
     let shown = files.show(path);
     let error = match files.read(path) {
         Ok(bytes) => return DataFile::parse(&shown, bytes),
@@ -79,38 +195,60 @@ fn open(node: &Node<'_>, path: &str, files: &dyn Files) -> Result<DataFile, Diag
         ErrorKind::IsADirectory => format!("`{shown}` is a folder, not a data file"),
         _ => format!("the data file `{shown}` cannot be read: {error}"),
     };
-    let place = node.child("file").expect("it was just read");
+    let place = node.child(key).expect("it was just read");
     Err(place
         .diagnostic(why)
         .with_help(way_out.as_deref().unwrap_or("paths are relative to the folder of the study file")))
 }
 
-/// The part of a data file that an experiment uses, with its time.
-struct Table<'f> {
-    file: &'f DataFile,
-    /// Name of the time column.
-    time: String,
-    /// Times of all rows, s, in the time of the study.
+/// Time axis of a data file.
+#[derive(Clone)]
+struct Clock {
+    /// Name of the time column; empty if the samples are counted.
+    column: String,
+    /// Times of all rows, s.
     times: Vec<f64>,
-    /// Rows used for measurements.
-    rows: Range<usize>,
-    /// Rows that inputs may be taken from.
-    driving: Range<usize>,
+    /// Time stamp of time 0, ns since 1970, if the file has time stamps.
+    origin: Option<i64>,
 }
 
-impl<'f> Table<'f> {
-    fn new(node: &Node<'_>, section: &ExperimentSection, file: &'f DataFile) -> Result<Self, Diagnostic> {
-        let place = node.child("time").unwrap_or_else(|| node.child("file").expect("it was just read"));
-        let time = match &section.time {
-            Some(time) => time.clone(),
+impl Clock {
+    /// Reads the time column, or counts samples. `column` is one of the columns that were sampled then.
+    fn new(
+        node: &Node<'_>,
+        file: &DataFile,
+        time: Option<&str>,
+        time_unit: Option<&str>,
+        sample_time: Option<&Quantity>,
+        column: &str,
+    ) -> Result<Self, Diagnostic> {
+        if let Some(step) = read_seconds(node, "sample-time", sample_time)? {
+            let place = node.child("sample-time").expect("it was just read");
+            if let Some(time) = node.child("time") {
+                return Err(time
+                    .key_diagnostic("both `time` and `sample-time` are given".to_owned())
+                    .with_help("remove one of them"));
+            }
+            if !(step > 0.0 && step.is_finite()) {
+                return Err(place.diagnostic(format!("`sample-time` must be above 0 s, and is {step} s")));
+            }
+            let rows = file.column(column).map_or(file.variables[0].rows, |column| column.values.len());
+            let times = (0..rows).map(|row| row as f64 * step).collect();
+            return Ok(Self { column: String::new(), times, origin: None });
+        }
+        let at = ["time", "file", "files", "path"].iter().find_map(|key| node.child(key));
+        let place = at.unwrap_or_else(|| node.clone());
+        let time = match time {
+            Some(time) => time.to_owned(),
             None => file.time_column().ok_or_else(|| {
-                place
-                    .diagnostic("no column of the file is called `t` or `time`".to_owned())
-                    .with_help(format!("set time = \"...\" to one of {}", file.column_names().join(", ")))
+                let names = file.column_names().join(", ");
+                place.diagnostic("no column of the file is called `t` or `time`".to_owned()).with_help(format!(
+                    "set time = \"...\" to one of {names}, or sample-time = \"...\" if none is the time"
+                ))
             })?,
         };
         let column = column_at(&place, file, &time)?;
-        let unit = match (&section.time_unit, column.unit) {
+        let unit = match (time_unit, column.unit) {
             (Some(unit), _) => read_unit(node, "time-unit", unit)?,
             (None, Some(unit)) => unit_of_header(&place, file, &time, unit, "time-unit")?,
             (None, None) => Unit::known("s"),
@@ -121,9 +259,93 @@ impl<'f> Table<'f> {
                 .diagnostic(format!("the time column `{time}` is in `{unit}`, which is not a unit of time"))
                 .with_help("set time-unit = \"s\"")
         })?;
-        let times: Vec<f64> = column.values.iter().map(|t| t * factor).collect();
+        Ok(Self { times: column.values.iter().map(|t| t * factor).collect(), origin: column.origin, column: time })
+    }
+
+    /// Moves time 0 to a later time.
+    fn start_at(&mut self, start: f64) {
+        self.times.iter_mut().for_each(|t| *t -= start);
+    }
+}
+
+/// Keys of a column that is in another file than that of its experiment.
+struct Elsewhere<'a> {
+    file: Option<&'a str>,
+    time: Option<&'a str>,
+    unit: Option<&'a str>,
+    sample_time: Option<&'a Quantity>,
+}
+
+impl<'a> Elsewhere<'a> {
+    fn of(
+        file: &'a Option<String>,
+        time: &'a Option<String>,
+        unit: &'a Option<String>,
+        sample_time: &'a Option<Quantity>,
+    ) -> Self {
+        Self { file: file.as_deref(), time: time.as_deref(), unit: unit.as_deref(), sample_time: sample_time.as_ref() }
+    }
+
+    /// Returns the table of the other file or the other time axis, on the clock of `main`; `None` if both are those of `main`.
+    fn table(
+        &self,
+        place: &Node<'_>,
+        column: &str,
+        main: &Table,
+        opened: &Opened<'_>,
+    ) -> Result<Option<Table>, Diagnostic> {
+        if self.file.is_none() && self.time.is_none() && self.sample_time.is_none() {
+            return Ok(None);
+        }
+        let file = match self.file {
+            Some(path) => opened.open(place, "file", path)?,
+            None => Arc::clone(&main.file),
+        };
+        let mut clock = Clock::new(place, &file, self.time, self.unit, self.sample_time, column)?;
+        check_times(&file, &clock.column, &clock.times, 0)?;
+        let between = match (clock.origin, main.clock.origin) {
+            #[allow(clippy::cast_precision_loss)]
+            (Some(own), Some(main)) => (own - main) as f64 * 1e-9,
+            (None, None) => 0.0,
+            (own, _) => {
+                let (with, without) = if own.is_some() { ("this file", "that") } else { ("that", "this file") };
+                let fact = format!("{with} has time stamps and {without} has not, so that they have no common clock");
+                let fact = fact.replace("that", "the file of the experiment");
+                return Err(place.diagnostic(fact).with_help("give both the same kind of time"));
+            }
+        };
+        clock.start_at(main.zero - between);
+        let first = clock.times.partition_point(|&t| t < main.clock.times[main.rows.start]);
+        let last = clock.times.partition_point(|&t| t <= main.until).max(first);
+        Ok(Some(Table { file, rows: first..last, driving: 0..last, clock, zero: main.zero, until: main.until }))
+    }
+}
+
+/// The part of a data file that an experiment uses, with its time.
+struct Table {
+    file: Arc<DataFile>,
+    /// Time axis, in the time of the study.
+    clock: Clock,
+    /// Rows used for measurements.
+    rows: Range<usize>,
+    /// Rows that inputs may be taken from.
+    driving: Range<usize>,
+    /// Time 0 of the study on the clock of the file, s.
+    zero: f64,
+    /// End of the used part in the time of the study, s.
+    until: f64,
+}
+
+impl Table {
+    fn new(node: &Node<'_>, section: &ExperimentSection, file: Arc<DataFile>) -> Result<Self, Diagnostic> {
+        let columns = section.channels.0.iter().map(|(_, Short(channel))| &channel.column);
+        let column = columns.chain(section.inputs.0.iter().map(|(_, Short(input))| &input.column)).next();
+        let (time, unit) = (section.time.as_deref(), section.time_unit.as_deref());
+        let column = column.map_or("", String::as_str);
+        let mut clock = Clock::new(node, &file, time, unit, section.sample_time.as_ref(), column)?;
+        let times = &clock.times;
         let skip = section.skip.min(times.len());
-        check_times(file, &time, &times, skip)?;
+        check_times(&file, &clock.column, times, skip)?;
 
         let from = read_seconds(node, "from", section.from.as_ref())?;
         let to = read_seconds(node, "to", section.to.as_ref())?;
@@ -146,56 +368,126 @@ impl<'f> Table<'f> {
             )
             .with_help(format!("the file has {all}")));
         }
-        let origin = if section.reset_time == Some(false) { 0.0 } else { times[first] };
-        let times: Vec<f64> = times.iter().map(|t| t - origin).collect();
-        Ok(Self { file, time, times, rows: first..last, driving: skip..last })
+        let zero = if section.reset_time == Some(false) { 0.0 } else { times[first] };
+        clock.start_at(zero);
+        let until = to.map_or(f64::INFINITY, |to| to - zero);
+        Ok(Self { file, clock, rows: first..last, driving: skip..last, zero, until })
+    }
+
+    /// Returns the windows into which an experiment is divided, each from its own time 0 on; the whole table without windows.
+    fn windows(self, node: &Node<'_>, section: &ExperimentSection) -> Result<Vec<Self>, Diagnostic> {
+        let Some(length) = read_seconds(node, "windows", section.windows.as_ref())? else { return Ok(vec![self]) };
+        let place = node.child("windows").expect("it was just read");
+        if section.reset_time == Some(false) {
+            let place = node.child("reset-time").expect("it was just read");
+            return Err(place
+                .key_diagnostic("each of several windows starts at its own time 0".to_owned())
+                .with_help("remove `reset-time`"));
+        }
+        let mut windows = Vec::new();
+        let mut first = self.rows.start;
+        // Half a nanosecond covers the rounding of sample times.
+        const CLOSE: f64 = 5e-10;
+        while first < self.rows.end {
+            let start = self.clock.times[first];
+            let next = self.clock.times[..self.rows.end].partition_point(|&t| t < start + length - CLOSE);
+            let end = (next + 1).min(self.rows.end);
+            let covers = self.clock.times[end - 1] - start;
+            if end < first + 2 || !(length > 0.0) {
+                let fact = format!("a window of {length} s at {} s has less than two samples", start + self.zero);
+                return Err(place.diagnostic(fact).with_help("choose a longer time"));
+            }
+            if covers < 0.5 * length {
+                break;
+            }
+            let mut clock = self.clock.clone();
+            clock.start_at(start);
+            let driving = self.driving.start..end;
+            let file = Arc::clone(&self.file);
+            windows.push(Self { file, clock, rows: first..end, driving, zero: self.zero + start, until: covers });
+            // The last sample of a window is the first of the next one.
+            first = next;
+            if next + 1 >= self.rows.end {
+                break;
+            }
+        }
+        if windows.is_empty() {
+            let all = self.clock.times[self.rows.end - 1] - self.clock.times[self.rows.start];
+            let fact = format!("a window of {length} s is more than twice as long as the record of {all} s");
+            return Err(place.diagnostic(fact).with_help("choose a shorter time"));
+        }
+        Ok(windows)
     }
 
     /// Returns the rows used for an input whose time stamps are shifted: from the last one before the start of the simulation at 0 s,
     /// which may precede the first measurement. `None` if the file starts after that.
     fn driven(&self, shift: f64) -> Option<Range<usize>> {
         let Range { start, end } = self.driving;
-        let before = self.times[start..end].partition_point(|&t| t + shift <= 0.0);
+        let before = self.clock.times[start..end].partition_point(|&t| t + shift <= 0.0);
         before.checked_sub(1).map(|row| start + row..end)
     }
 
     fn channel(&self, place: &Node<'_>, signal: &str, table: &ChannelTable) -> Result<ChannelBuilder, Diagnostic> {
         let (values, unit) =
             self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
+        let shift = read_seconds(place, "shift", table.shift.as_ref())?.unwrap_or(0.0);
+        // A shifted sample before the start of the simulation has no counterpart in it.
+        let rows = self.rows.clone().filter(|&row| shift == 0.0 || self.clock.times[row] + shift >= 0.0);
+        let (times, values) = rows.map(|row| (self.clock.times[row] + shift, values[row])).unzip();
         Ok(ChannelBuilder {
             signal: signal.to_owned(),
-            times: self.times[self.rows.clone()].to_vec(),
-            values: values[self.rows.clone()].to_vec(),
+            times,
+            values,
             noise: table.noise.as_ref().map(|noise| in_unit_of_column(noise, unit.as_ref())),
             unit,
+            unwrap: table.unwrap,
         })
     }
 
-    fn input(&self, place: &Node<'_>, table: &InputTable) -> Result<(Input, Option<Unit>), Diagnostic> {
-        let (values, unit) =
-            self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
+    /// Returns an input, its unit, and the number of missing samples.
+    fn input(&self, place: &Node<'_>, table: &InputTable) -> Result<(Input, Option<Unit>, usize), Diagnostic> {
         let shift = read_seconds(place, "shift", table.shift.as_ref())?.unwrap_or(0.0);
         let Some(rows) = self.driven(shift) else {
-            let first = self.times[self.driving.start] + shift;
+            let first = self.clock.times.get(self.driving.start).map_or(f64::INFINITY, |first| first + shift);
             let fact = format!("the simulation starts at 0 s, but `{}` is unknown before {first} s", table.column);
             return Err(place
                 .diagnostic(fact)
                 .with_help("omit `reset-time = false` to start at the first sample, or record the input from 0 s on"));
         };
-        let times = self.times[rows.clone()].iter().map(|t| t + shift).collect();
-        let values = values[rows.clone()].to_vec();
-        if let Some(gap) = values.iter().position(|v| !v.is_finite()) {
-            let fact = format!(
-                "the input column `{}` has a missing sample at {} s",
-                table.column,
-                self.times[rows.start + gap]
-            );
-            return Err(self
-                .at(&table.column, rows.start + gap, &fact)
-                .unwrap_or_else(|| place.diagnostic(fact))
-                .with_help("an input has no missing samples: add the sample, or cut it off with `from` and `to`"));
+        self.sampled(place, table, shift, rows)
+    }
+
+    /// Returns an input from these rows; under zero-order hold, missing samples are left out.
+    fn sampled(
+        &self,
+        place: &Node<'_>,
+        table: &InputTable,
+        shift: f64,
+        mut rows: Range<usize>,
+    ) -> Result<(Input, Option<Unit>, usize), Diagnostic> {
+        let (values, unit) =
+            self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
+        let hold = table.hold.unwrap_or_default();
+        if hold == Hold::Zero {
+            // The value at the start may be older.
+            while rows.start > self.driving.start && !values[rows.start].is_finite() {
+                rows.start -= 1;
+            }
         }
-        Ok((Input::Sampled { times, values, hold: table.hold.unwrap_or_default() }, unit))
+        let is_missing = |&row: &usize| !values[row].is_finite();
+        if let Some(row) = rows.clone().find(is_missing).filter(|&row| hold != Hold::Zero || row == rows.start) {
+            let fact =
+                format!("the input column `{}` has a missing sample at {} s", table.column, self.clock.times[row]);
+            let help = match hold {
+                Hold::Zero => "the first sample is needed: cut the record with `from`, or drop samples with `skip`",
+                _ => "add the sample, cut it off with `from` and `to`, or use hold = \"zero\", which keeps the value",
+            };
+            return Err(self.at(&table.column, row, &fact).unwrap_or_else(|| place.diagnostic(fact)).with_help(help));
+        }
+        let kept = rows.clone().filter(|row| !is_missing(row));
+        let (times, kept): (Vec<f64>, Vec<f64>) = kept.map(|row| (self.clock.times[row] + shift, values[row])).unzip();
+        let missing = rows.len() - times.len();
+        Ok((Input::Sampled { times, values: kept, hold }, unit, missing))
     }
 
     fn values(
@@ -207,20 +499,24 @@ impl<'f> Table<'f> {
         offset: Option<&Quantity>,
     ) -> Result<(Vec<f64>, Option<Unit>), Diagnostic> {
         let at = place.child("column").unwrap_or_else(|| place.clone());
-        let column = column_at(&at, self.file, name)?;
-        let time_rows = self.file.column(&self.time)?.values.len();
+        let column = column_at(&at, &self.file, name)?;
+        let time_rows = self.clock.times.len();
         if column.values.len() != time_rows {
             return Err(at
                 .diagnostic(format!(
-                    "`{name}` has {} samples, but the time column `{}` has {time_rows}",
+                    "`{name}` has {} samples, but the time{} has {time_rows}",
                     column.values.len(),
-                    self.time
+                    if self.clock.column.is_empty() {
+                        String::new()
+                    } else {
+                        format!(" column `{}`", self.clock.column)
+                    }
                 ))
-                .with_help("set the matching time column with `time`, if necessary in a separate experiment"));
+                .with_help("set the matching time column of this table with `time`"));
         }
         let unit = match (unit, column.unit) {
             (Some(unit), _) => Some(read_unit(place, "unit", unit)?),
-            (None, Some(unit)) => Some(unit_of_header(&at, self.file, name, unit, "unit")?),
+            (None, Some(unit)) => Some(unit_of_header(&at, &self.file, name, unit, "unit")?),
             (None, None) => None,
         };
         let scale = scale.unwrap_or(1.0);

@@ -15,7 +15,7 @@ use crate::unit::Unit;
 pub(super) fn read(
     name: String,
     node: &Node<'_>,
-    section: ExperimentSection,
+    section: &ExperimentSection,
     file: &DataFile,
 ) -> Result<CaseBuilder, Diagnostic> {
     for (key, is_there) in [("channels", !section.channels.0.is_empty()), ("inputs", !section.inputs.0.is_empty())] {
@@ -32,7 +32,7 @@ pub(super) fn read(
             .with_help("set frequency = \"...\" to the name of the column"));
     };
     let place = node.child("frequency").expect("it was just read");
-    let frequencies = frequencies(node, &place, column, &section, file)?;
+    let frequencies = frequencies(node, &place, column, section, file)?;
     let mut responses = Vec::new();
     for (signal, table) in &section.responses.0 {
         let place = entry(node, "responses", signal);
@@ -55,7 +55,12 @@ pub(super) fn read(
         responses.push(ResponseData { signal: signal.clone(), frequencies, values, unit });
     }
     let measured = Measured { responses, role: section.role, ..Measured::default() };
-    Ok(CaseBuilder { name, parameters: section.parameters.0, measured: Some(measured), ..CaseBuilder::default() })
+    Ok(CaseBuilder {
+        name,
+        parameters: section.parameters.0.clone(),
+        measured: Some(measured),
+        ..CaseBuilder::default()
+    })
 }
 
 /// Returns the frequencies, rad/s.
@@ -170,7 +175,7 @@ mod tests {
         let text = Text::new("study.toml", &format!("[e]\nfile = 'sweep.csv'\n{experiment}\n"), &[]);
         let root = text.parse().unwrap();
         let read = super::super::experiment::read("e".into(), &root.child("e").unwrap(), &Data(data));
-        read.map(|case| case.measured.unwrap().responses).map_err(|diagnostic| diagnostic.to_string())
+        read.map(|mut cases| cases.remove(0).measured.unwrap().responses).map_err(|diagnostic| diagnostic.to_string())
     }
 
     #[test]

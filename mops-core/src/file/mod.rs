@@ -7,6 +7,7 @@ mod effects;
 mod entries;
 mod experiment;
 mod frequency;
+mod inputs;
 mod manual;
 mod parts;
 mod robustness;
@@ -25,7 +26,7 @@ pub use built::built;
 pub use content::digest;
 pub use entries::{Entries, Short};
 pub use manual::{Entry, about, describe, entries};
-pub use parts::{case, criterion, experiment, model};
+pub use parts::{cases, criterion, experiments, model};
 pub use schema::{study_schema, tables, tables_with};
 
 use crate::catalogue::{Catalogue, SolverChoice};
@@ -33,13 +34,15 @@ use crate::catalogue_study::Shipped;
 use crate::criterion::Usage;
 use crate::data::read_regular;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
-use crate::experiment::Input;
 use crate::expression::Expression;
+use crate::input::Input;
 use crate::linearised::{Linearise, Linearised};
 use crate::model::{AnalysisKind, Interface};
 use crate::study::{CaseBuilder, CriterionBuilder, ModelBuilder, Study, StudyBuilder, TunerBuilder};
 use crate::study_error::StudyError;
 use crate::unit::{Quantity, Unit};
+use experiment::entry;
+use inputs::Reader;
 use sections::{CaseOptions, CriterionCommon, ModelCommon, SensorSection, SolverCommon, StudySection, TunerSection};
 use tree::{Node, Text};
 
@@ -53,6 +56,14 @@ pub trait Files {
 
     /// Returns the path as shown to the user.
     fn show(&self, path: &str) -> String;
+
+    /// Returns the names of the files in a folder, in any order.
+    ///
+    /// # Errors
+    /// Returns an error if the folder cannot be read, or if files are known by their paths only.
+    fn list(&self, _folder: &str) -> io::Result<Vec<String>> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
 }
 
 /// Data files in a folder, usually that of the study file. Devices and pipes are refused: they may have no end.
@@ -66,6 +77,12 @@ impl Files for Folder {
 
     fn show(&self, path: &str) -> String {
         self.0.join(path).display().to_string()
+    }
+
+    fn list(&self, folder: &str) -> io::Result<Vec<String>> {
+        let entries = std::fs::read_dir(self.0.join(folder))?;
+        let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
+        names.collect()
     }
 }
 
@@ -184,8 +201,8 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
         draft.tuners.push((name, read_tuner(&node)?));
     }
     for (name, node) in root.table("cases")? {
-        let case = read_case(name, &node, &draft.models)?;
-        draft.cases.push(case);
+        let cases = read_cases(&name, &node, &draft.models, files)?;
+        draft.cases.extend(cases);
     }
     for (name, node) in root.table("experiments")? {
         if draft.cases.iter().any(|case| case.name == name) {
@@ -193,7 +210,7 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
                 .key_diagnostic(format!("a case and an experiment are both called `{name}`"))
                 .with_help("rename one of them: results are listed by these names"));
         }
-        draft.cases.push(experiment::read(name, &node, files)?);
+        draft.cases.extend(experiment::read(&name, &node, files)?);
     }
     for (signal, node) in root.table("sensors")? {
         let SensorSection { noise } = node.read()?;
@@ -336,7 +353,16 @@ fn at_key(node: &Node<'_>, key: &str, why: String) -> Diagnostic {
     node.child(key).as_ref().unwrap_or(node).diagnostic(why)
 }
 
-fn read_case(name: String, node: &Node<'_>, models: &[(String, ModelBuilder)]) -> Result<CaseBuilder, Diagnostic> {
+/// Largest number of cases of a grid.
+const MOST_CASES: usize = 1000;
+
+/// Reads the cases of a table: one, or one for every combination of the values in its `grid`.
+fn read_cases(
+    name: &str,
+    node: &Node<'_>,
+    models: &[(String, ModelBuilder)],
+    files: &dyn Files,
+) -> Result<Vec<CaseBuilder>, Diagnostic> {
     let entries = node.entries()?;
     let options: CaseOptions = node.only(CaseOptions::KEYS).read()?;
     let mut parameters = Vec::new();
@@ -346,17 +372,44 @@ fn read_case(name: String, node: &Node<'_>, models: &[(String, ModelBuilder)]) -
         }
     }
     let horizon = read_seconds(node, "horizon", options.horizon.as_ref())?;
+    let interfaces = || models.iter().map(|(_, draft)| draft.model.interface());
+    let longest = interfaces().filter_map(|interface| interface.horizon).reduce(f64::max);
+    let until = horizon.or(longest);
     let mut inputs = Vec::new();
     for (name, section) in &options.inputs.0 {
-        let known = models.iter().flat_map(|(_, draft)| &draft.model.interface().inputs);
-        let input = match known.into_iter().find(|v| v.name == *name) {
-            Some(v) => section.input(&v.unit).map_err(|mistake| node.locate(&mistake.within(name).within("inputs")))?,
+        let known = interfaces().flat_map(|interface| &interface.inputs).find(|v| v.name == *name);
+        let input = match known {
+            Some(v) => Reader { unit: &v.unit, until, files }.read(section, &entry(node, "inputs", name))?,
             // Rejected when the study is built.
             None => Input::Constant(0.0),
         };
         inputs.push((name.clone(), input, None));
     }
-    Ok(CaseBuilder { name, parameters, inputs, horizon, ..CaseBuilder::default() })
+    let one = CaseBuilder { name: name.to_owned(), parameters, inputs, horizon, ..CaseBuilder::default() };
+    let mut cases = vec![one];
+    for (parameter, values) in &options.grid.0 {
+        let place = entry(node, "grid", parameter);
+        if values.is_empty() {
+            return Err(place.diagnostic(format!("`{parameter}` has no values")).with_help("list at least one"));
+        }
+        if cases[0].parameters.iter().any(|(known, _)| known == parameter) {
+            let fact = format!("`{parameter}` has a value beside those of the grid");
+            return Err(place.key_diagnostic(fact).with_help("remove one of them"));
+        }
+        if cases.len() * values.len() > MOST_CASES {
+            let fact = format!("the grid has more than {MOST_CASES} cases");
+            return Err(place.key_diagnostic(fact).with_help("list fewer values"));
+        }
+        let with = |case: &CaseBuilder, value: &Quantity| {
+            let unit = value.unit.as_ref().map(|unit| unit.to_string().replace(' ', "")).unwrap_or_default();
+            let mut case = case.clone();
+            case.name += &format!("-{parameter}={}{unit}", value.number);
+            case.parameters.push((parameter.clone(), value.clone()));
+            case
+        };
+        cases = cases.iter().flat_map(|case| values.iter().map(|value| with(case, value))).collect();
+    }
+    Ok(cases)
 }
 
 fn read_seconds(node: &Node<'_>, key: &str, quantity: Option<&Quantity>) -> Result<Option<f64>, Diagnostic> {

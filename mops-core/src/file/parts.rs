@@ -1,8 +1,8 @@
 //! Readers of single tables of a study file, for studies assembled in Rust.
 
-use super::experiment::read as read_experiment;
+use super::experiment::read as read_experiments;
 use super::tree::Text;
-use super::{Files, read_case, read_criterion, read_model};
+use super::{Files, read_cases, read_criterion, read_model};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::Diagnostic;
 use crate::study::{CaseBuilder, CriterionBuilder, ModelBuilder};
@@ -16,22 +16,27 @@ pub fn model(catalogue: &Catalogue, text: &str) -> Result<ModelBuilder, Diagnost
     read_model(catalogue, &text.parse()?)
 }
 
-/// Reads a case from its table under `[cases]`; `models` provide the units of the inputs.
+/// Reads cases from a table under `[cases]`: one, or all of its `grid`. `models` provide the units of the inputs.
 ///
 /// # Errors
-/// Returns the first error, with its location in `text`.
-pub fn case(name: &str, text: &str, models: &[(String, ModelBuilder)]) -> Result<CaseBuilder, Diagnostic> {
+/// Returns the first error, with its location in `text` or in the data of inputs.
+pub fn cases(
+    name: &str,
+    text: &str,
+    models: &[(String, ModelBuilder)],
+    files: &dyn Files,
+) -> Result<Vec<CaseBuilder>, Diagnostic> {
     let text = Text::new(name, text, &[]);
-    read_case(name.to_owned(), &text.parse()?, models)
+    read_cases(name, &text.parse()?, models, files)
 }
 
-/// Reads an experiment from the contents of `[experiments.NAME]`.
+/// Reads experiments from the contents of `[experiments.NAME]`: one, or several from several files or windows.
 ///
 /// # Errors
 /// Returns the first error, with its location in `text` or in the data.
-pub fn experiment(name: &str, text: &str, files: &dyn Files) -> Result<CaseBuilder, Diagnostic> {
+pub fn experiments(name: &str, text: &str, files: &dyn Files) -> Result<Vec<CaseBuilder>, Diagnostic> {
     let text = Text::new(name, text, &[]);
-    read_experiment(name.to_owned(), &text.parse()?, files)
+    read_experiments(name, &text.parse()?, files)
 }
 
 /// Reads a criterion from its table under `[criteria]`.

@@ -5,15 +5,16 @@ use std::fmt;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 
-use super::entries::Entries;
+use super::entries::{Entries, Short};
+use super::inputs::InputEntry;
 use crate::criterion::Usage;
 use crate::evaluation::Objective;
-use crate::experiment::{Hold, Input, Role};
+use crate::experiment::Role;
+use crate::input::Hold;
 use crate::linearised::Linearise;
 use crate::study::Task;
-use crate::study_error::StudyError;
 use crate::tuner::Scale;
-use crate::unit::{Quantity, Unit};
+use crate::unit::Quantity;
 
 /// General settings of the study.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
@@ -137,91 +138,23 @@ pub(super) struct TunerSection {
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct CaseOptions {
-    /// Inputs of the model; all others are 0. Each is a `constant`, `step` or `sine`:
-    /// `inputs.u.step = { time = "1 s", before = 0, after = "60 deg" }`. Numbers without a unit are in the unit of the
-    /// input. Recorded inputs belong in [experiments].
+    /// Inputs of the model; all others are 0. Each is a quantity, which is constant, or one of `constant`, `step`, `ramp`, `pulse`,
+    /// `doublet`, `sine`, `multisine`, `chirp`, `prbs`, `table` and `file`:
+    /// `inputs.u.step = { time = "1 s", before = 0, after = "60 deg" }`. A list is their sum:
+    /// `inputs.u = [{ constant = 2 }, { sine = { amplitude = 1, frequency = "3 Hz" } }]`. Numbers without a unit are in the unit of
+    /// the input.
     #[serde(default)]
-    pub inputs: Entries<InputSection>,
+    pub inputs: Entries<InputEntry>,
     /// End of the simulation.
     pub horizon: Option<Quantity>,
+    /// Parameters with lists of values: one case for every combination, `grid = { J = [1, 2], load = ["0 N", "5 N"] }`. Case `NAME`
+    /// becomes `NAME-J=1-load=0N` and so on; `cases = ["NAME-*"]` selects them all for a criterion.
+    #[serde(default)]
+    pub grid: Entries<Vec<Quantity>>,
 }
 
 impl CaseOptions {
-    pub const KEYS: &[&str] = &["inputs", "horizon"];
-}
-
-/// An input as a function of time.
-#[derive(Debug, serde::Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(super) enum InputSection {
-    /// Constant value.
-    Constant(Quantity),
-    /// A step.
-    Step(StepSection),
-    /// A sine.
-    Sine(SineSection),
-}
-
-/// Step from one value to another.
-#[derive(Debug, serde::Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(super) struct StepSection {
-    /// Time of the step; a number without a unit is in s. Default 0.
-    pub time: Option<Quantity>,
-    /// Value before the step; default 0.
-    pub before: Option<Quantity>,
-    /// Value after the step.
-    pub after: Quantity,
-}
-
-/// Sine `offset + amplitude sin(2 pi frequency t + phase)`.
-#[derive(Debug, serde::Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(super) struct SineSection {
-    /// Amplitude.
-    pub amplitude: Quantity,
-    /// Frequency; a number without a unit is in Hz.
-    pub frequency: Quantity,
-    /// Phase; a number without a unit is in rad. Default 0.
-    pub phase: Option<Quantity>,
-    /// Mean value; default 0.
-    pub offset: Option<Quantity>,
-}
-
-impl InputSection {
-    /// Returns the input, with values in `unit`. Errors have the key of the value.
-    pub fn input(&self, unit: &Unit) -> Result<Input, StudyError> {
-        let number = |key: &'static str, quantity: &Quantity, unit: &Unit| {
-            let unitless = |m: StudyError| m.with_help(format!("a number without a unit is in `{unit}`"));
-            let value = quantity.to(unit).map_err(|why| unitless(StudyError::new(key, why)))?;
-            let finite = || StudyError::new(key, format!("expected a finite value of the input, found {value}"));
-            value.is_finite().then_some(value).ok_or_else(|| finite().with_help("give a number"))
-        };
-        let or_zero = |key: &'static str, quantity: &Option<Quantity>, unit: &Unit| {
-            quantity.as_ref().map_or(Ok(0.0), |quantity| number(key, quantity, unit))
-        };
-        let known = Unit::known;
-        Ok(match self {
-            Self::Constant(value) => Input::Constant(number("constant", value, unit)?),
-            Self::Step(step) => {
-                let within = |m: StudyError| m.within("step");
-                Input::Step {
-                    time: or_zero("time", &step.time, &known("s")).map_err(within)?,
-                    before: or_zero("before", &step.before, unit).map_err(within)?,
-                    after: number("after", &step.after, unit).map_err(within)?,
-                }
-            }
-            Self::Sine(sine) => {
-                let within = |m: StudyError| m.within("sine");
-                Input::Sine {
-                    amplitude: number("amplitude", &sine.amplitude, &unit.difference()).map_err(within)?,
-                    frequency: number("frequency", &sine.frequency, &known("Hz")).map_err(within)?,
-                    phase: or_zero("phase", &sine.phase, &known("rad")).map_err(within)?,
-                    offset: or_zero("offset", &sine.offset, unit).map_err(within)?,
-                }
-            }
-        })
-    }
+    pub const KEYS: &[&str] = &["inputs", "horizon", "grid"];
 }
 
 /// A measurement.
@@ -229,11 +162,20 @@ impl InputSection {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct ExperimentSection {
     /// Data file: CSV, or MATLAB level 4 or 5; the path is relative to the folder of the study.
-    pub file: String,
-    /// Time column; its unit is taken from the header, by default s.
+    pub file: Option<String>,
+    /// Data files of several experiments with the same columns: `files = "swing_*.csv"`, where `*` stands for any text in the name
+    /// of a file. Each file is an experiment of its own, called `NAME-FILE`.
+    pub files: Option<String>,
+    /// Length of windows: `windows = "2 s"` divides the used part of each file into experiments of this length, called `NAME-1`,
+    /// `NAME-2`, .. Each has initial states of its own. A rest of less than half the length is left out.
+    pub windows: Option<Quantity>,
+    /// Time column, of numbers or of time stamps such as `2024-05-17T10:30:00.5`, which count from the first one on. The unit of
+    /// numbers is taken from the header, by default s.
     pub time: Option<String>,
     /// Unit of the time column, if its header has none.
     pub time_unit: Option<String>,
+    /// Time between two samples, if the file has no time column; the first sample is at 0.
+    pub sample_time: Option<Quantity>,
     /// Frequency column, for frequency responses instead of signals over time; its unit is taken from the header, by default
     /// rad/s.
     pub frequency: Option<String>,
@@ -243,13 +185,15 @@ pub(super) struct ExperimentSection {
     /// `y = { real = "column", imaginary = "column" }`.
     #[serde(default)]
     pub responses: Entries<ResponseTable>,
-    /// Measured signals: `theta = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `noise`.
+    /// Measured signals: `theta = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `noise`, `unwrap`, `shift`. A signal
+    /// from another file, also with another rate, has the keys `file` and `time` or `sample-time`.
     #[serde(default)]
-    pub channels: Entries<ChannelSection>,
-    /// Recorded inputs: `u = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `hold`, `shift`. Between samples an
+    pub channels: Entries<Short<ChannelTable>>,
+    /// Recorded inputs: `u = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `hold`, `shift`. An input from another file
+    /// has the keys `file` and `time` or `sample-time`. Between samples an
     /// input is constant (`hold = "zero"`, default) or interpolated linearly (`hold = "first"`).
     #[serde(default)]
-    pub inputs: Entries<InputColumn>,
+    pub inputs: Entries<Short<InputTable>>,
     /// Role: `calibration` (default), `selection` or `validation`.
     #[serde(default)]
     pub role: Role,
@@ -298,7 +242,7 @@ pub(super) struct SensorSection {
 }
 
 /// Column of a measured signal, and its conversion to the signal of the model.
-#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct ChannelTable {
     /// Column of the file.
@@ -311,10 +255,23 @@ pub(super) struct ChannelTable {
     pub offset: Option<Quantity>,
     /// Standard deviation of the noise, used to weight residuals.
     pub noise: Option<Quantity>,
+    /// `true` for an angle that a sensor counts within one turn: whole turns are added so that no step exceeds half a turn. `false`
+    /// confirms that steps of a turn are real.
+    pub unwrap: Option<bool>,
+    /// Time added to the time stamps of the channel, such as a negative one for a sensor that reports late.
+    pub shift: Option<Quantity>,
+    /// File of this column, if it is not that of the experiment. Its times are on the same clock.
+    pub file: Option<String>,
+    /// Time column of that file.
+    pub time: Option<String>,
+    /// Unit of that time column, if its header has none.
+    pub time_unit: Option<String>,
+    /// Time between two samples of that file, if it has no time column; the first is at 0.
+    pub sample_time: Option<Quantity>,
 }
 
 /// Column of a recorded input, and its conversion to the input of the model.
-#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct InputTable {
     /// Column of the file.
@@ -325,13 +282,33 @@ pub(super) struct InputTable {
     pub scale: Option<f64>,
     /// Offset added after scaling, in the unit of the column.
     pub offset: Option<Quantity>,
-    /// Interpolation between samples. `zero` (default): constant until the next sample, as a digital controller outputs it.
-    /// `first`: linear interpolation, for smooth inputs. `band-limited`: no content above half the sampling frequency, for
-    /// inputs filtered before sampling.
+    /// Interpolation between samples. `zero` (default): constant until the next sample, as a digital controller outputs it; a
+    /// missing sample keeps the value. `first`: linear interpolation, for smooth inputs. `band-limited`: no content above half the
+    /// sampling frequency, for inputs filtered before sampling.
     pub hold: Option<Hold>,
     /// Time added to the time stamps of the input: negative for an input that acts before them, such as a flow that is logged at the
     /// end of its interval.
     pub shift: Option<Quantity>,
+    /// File of this column, if it is not that of the experiment. Its times are on the same clock.
+    pub file: Option<String>,
+    /// Time column of that file.
+    pub time: Option<String>,
+    /// Unit of that time column, if its header has none.
+    pub time_unit: Option<String>,
+    /// Time between two samples of that file, if it has no time column; the first is at 0.
+    pub sample_time: Option<Quantity>,
+}
+
+impl From<String> for ChannelTable {
+    fn from(column: String) -> Self {
+        Self { column, ..Self::default() }
+    }
+}
+
+impl From<String> for InputTable {
+    fn from(column: String) -> Self {
+        Self { column, ..Self::default() }
+    }
 }
 
 /// A state whose initial value is estimated; absent values are derived from the data.
@@ -381,59 +358,6 @@ pub(super) struct SolverCommon {
 impl SolverCommon {
     pub const KEYS: &[&str] = &["max-evaluations"];
 }
-
-/// A string, or a table: `"column"` is short for `{ column = "column" }`.
-macro_rules! column_or_table {
-    ($name:ident, $table:ident, $short:expr) => {
-        #[derive(Debug)]
-        pub(super) struct $name(pub $table);
-
-        impl<'de> Deserialize<'de> for $name {
-            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                struct Either;
-                impl<'de> Visitor<'de> for Either {
-                    type Value = $name;
-                    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                        f.write_str("a column name, or a table with `column`")
-                    }
-                    fn visit_str<E>(self, column: &str) -> Result<$name, E> {
-                        let make: fn(String) -> $table = $short;
-                        Ok($name(make(column.to_owned())))
-                    }
-                    fn visit_map<M: MapAccess<'de>>(self, map: M) -> Result<$name, M::Error> {
-                        $table::deserialize(serde::de::value::MapAccessDeserializer::new(map)).map($name)
-                    }
-                }
-                deserializer.deserialize_any(Either)
-            }
-        }
-
-        impl JsonSchema for $name {
-            fn schema_name() -> std::borrow::Cow<'static, str> {
-                stringify!($name).into()
-            }
-            fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-                json_schema!({ "anyOf": [{ "type": "string" }, generator.subschema_for::<$table>()] })
-            }
-        }
-    };
-}
-
-column_or_table!(ChannelSection, ChannelTable, |column| ChannelTable {
-    column,
-    unit: None,
-    scale: None,
-    offset: None,
-    noise: None
-});
-column_or_table!(InputColumn, InputTable, |column| InputTable {
-    column,
-    unit: None,
-    scale: None,
-    offset: None,
-    hold: None,
-    shift: None
-});
 
 /// Free initial states: a list of states, or a table.
 #[derive(Debug, Default)]

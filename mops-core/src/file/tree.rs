@@ -263,7 +263,19 @@ impl<'t> Node<'t> {
             // `free = ["phi"]` has its entries as elements; the options of a kind are in the table of its name.
             let element = || node.elements().into_iter().find(|e| e.value().as_str() == Some(key));
             let option = || node.entries().ok()?.into_iter().find_map(|(_, kind)| kind.child(key));
-            match node.child(key).or_else(element).or_else(option) {
+            // A table may stand for several cases, whose names begin with its key.
+            let family = || {
+                let begins = |(name, _): &(String, Self)| {
+                    key.strip_prefix(name.as_str()).is_some_and(|rest| rest.starts_with('-'))
+                };
+                node.entries()
+                    .ok()?
+                    .into_iter()
+                    .filter(begins)
+                    .max_by_key(|(name, _)| name.len())
+                    .map(|(_, below)| below)
+            };
+            match node.child(key).or_else(element).or_else(option).or_else(family) {
                 Some(below) => node = below,
                 None => break,
             }

@@ -5,7 +5,7 @@ use super::local::start_parameters;
 use super::report::ExcitationReport;
 use super::words::{counted, percent};
 use crate::case::Case;
-use crate::experiment::Input;
+use crate::input::Input;
 use crate::study::{ExcitationQuestion, Study};
 use crate::tuner::Tuner;
 
@@ -115,7 +115,7 @@ fn tuners_in(study: &Study, case: usize) -> usize {
 /// Returns equally spaced samples of an input and their sample time, s; `None` if its duration is unknown.
 fn samples(case: &Case, input: &Input, wanted: Option<f64>, horizon: Option<f64>) -> Option<(Vec<f64>, f64)> {
     let recorded = match input {
-        Input::Sampled { times, .. } => Some(times.as_slice()),
+        Input::Sampled { times, .. } if case.experiment.is_some() => Some(times.as_slice()),
         _ => case.experiment.as_ref().and_then(|e| e.channels.first()).map(|c| c.times.as_slice()),
     };
     if let (None, Input::Sampled { times, values, .. }) = (wanted, input)
@@ -123,7 +123,7 @@ fn samples(case: &Case, input: &Input, wanted: Option<f64>, horizon: Option<f64>
     {
         return Some((values.clone(), step));
     }
-    let first = if let Input::Sampled { times, .. } = input { times[0] } else { 0.0 };
+    let first = if let (Some(times), Input::Sampled { .. }) = (recorded, input) { times[0] } else { 0.0 };
     let end = recorded.and_then(|times| times.last().copied()).or(horizon)?;
     let step = wanted.or_else(|| recorded.map(median_step)).unwrap_or(end / 1000.0);
     if !(step > 0.0 && end > first) {

@@ -6,6 +6,7 @@
 mod bounded_response;
 mod components;
 mod controllability;
+mod delays;
 mod eigen;
 mod equilibrium;
 mod lyapunov;

@@ -3,7 +3,8 @@
 use super::{Study, Task, TasksBuilder};
 use crate::criterion::{CriterionSpec, Usage};
 use crate::evaluation::Objective;
-use crate::experiment::{Input, ResponseData, Role};
+use crate::experiment::{ResponseData, Role};
+use crate::input::Input;
 use crate::model::Model;
 use crate::study_error::StudyError;
 use crate::tuner::Scale;
@@ -155,6 +156,9 @@ pub struct ChannelBuilder {
     pub unit: Option<Unit>,
     /// Standard deviation of the noise.
     pub noise: Option<Quantity>,
+    /// True for an angle counted within one turn, to which whole turns are added so that no step exceeds half a turn. False if steps
+    /// of a turn are real; `None` if that is not known.
+    pub unwrap: Option<bool>,
 }
 
 /// A criterion with its usage in the study.

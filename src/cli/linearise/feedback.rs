@@ -50,12 +50,17 @@ impl Wanted {
     /// Designs the feedback; returns it as text and as JSON.
     ///
     /// # Errors
-    /// If no such feedback exists for the system.
+    /// If no such feedback exists for the system, or if it has a delay.
     pub(super) fn design(
         &self,
         system: &StateSpace,
         unit: &dyn Fn(&str) -> String,
     ) -> Result<(String, Value), Diagnostic> {
+        if system.delay != 0.0 {
+            return Err(Diagnostic::new("state feedback cannot be designed for a system with a delay").with_help(
+                "model the delay as a rational function, or design for a model without it and check the margins",
+            ));
+        }
         match self {
             Self::Poles(poles) => {
                 let placed = place(&system.a, &system.b, poles);

@@ -5,7 +5,8 @@ use super::values::{check_horizon, converted, in_range, signal_names};
 use crate::cancellation::Cancellation;
 use crate::case::Case;
 use crate::diagnostic::suggestion;
-use crate::experiment::{Channel, Experiment, Input, ResponseData};
+use crate::experiment::{Channel, Experiment, ResponseData};
+use crate::input::Input;
 use crate::model::{AnalysisKind, Parameter, Variable};
 use crate::study::draft::{CaseBuilder, ChannelBuilder, Measured};
 use crate::study_error::StudyError;
@@ -78,17 +79,8 @@ fn build_input(
             .with_help("choose another column, or correct the unit in the file header or in `unit`")
             .within("inputs")
         })?;
-        let convert =
-            |value: &mut f64| *value = unit.convert(*value, &variable.unit).expect("the units are compatible");
-        match &mut input {
-            Input::Constant(value) => convert(value),
-            Input::Step { before, after, .. } => [before, after].into_iter().for_each(convert),
-            Input::Sine { amplitude, offset, .. } => {
-                *amplitude *= difference;
-                convert(offset);
-            }
-            Input::Sampled { values, .. } => values.iter_mut().for_each(convert),
-        }
+        let convert = |value: f64| unit.convert(value, &variable.unit).expect("the units are compatible");
+        input = input.mapped(&convert, difference);
     }
     if let Some(at) = input.uneven() {
         return Err(StudyError::new(name, format!("the input `{name}` is not evenly sampled at {at} s"))
@@ -122,7 +114,8 @@ pub(super) fn assumed_units(drafts: &[CaseBuilder], models: &Models) -> Vec<Stri
         let channels = draft.measured.iter().flat_map(|m| &m.channels).filter(|channel| channel.unit.is_none());
         let channels = channels.map(|channel| (channel.signal.as_str(), &signals));
         let sampled = |input: &Input| matches!(input, Input::Sampled { .. });
-        let recorded = draft.inputs.iter().filter(|(_, input, unit)| unit.is_none() && sampled(input));
+        let recorded =
+            draft.inputs.iter().filter(|(_, input, unit)| draft.measured.is_some() && unit.is_none() && sampled(input));
         for (name, known) in channels.chain(recorded.map(|(name, ..)| (name.as_str(), &inputs))) {
             let Some(unit) = unit(name, known) else { continue };
             let own = format!("`{}`", draft.name);
@@ -155,6 +148,7 @@ fn build_experiment(
         same_unit(&channel.signal, &variable.unit, &known).map_err(|m| m.within("channels"))?;
         let built = build_channel(channel, &variable.unit).map_err(|m| m.within(&channel.signal).within("channels"))?;
         warnings.extend(suspicious_start(name, &built));
+        warnings.extend(channel.unwrap.is_none().then(|| wrapped(name, &built, &variable.unit)).flatten());
         channels.push(built);
     }
     for response in &draft.responses {
@@ -244,7 +238,14 @@ fn build_channel(draft: &ChannelBuilder, to: &Unit) -> Result<Channel, StudyErro
     let noise = draft.noise.as_ref().map(|noise| standard_deviation(noise, to)).transpose()?;
     let samples = draft.times.iter().zip(&draft.values).filter(|(_, value)| value.is_finite());
     let in_model = |value: f64| unit.convert(value, to).expect("the units are compatible");
-    let (times, values): (Vec<f64>, Vec<f64>) = samples.map(|(&t, &value)| (t, in_model(value))).unzip();
+    let (times, mut values): (Vec<f64>, Vec<f64>) = samples.map(|(&t, &value)| (t, in_model(value))).unzip();
+    if draft.unwrap == Some(true) {
+        let turn = turn(to).ok_or_else(|| {
+            let fact = format!("the signal `{}` in `{to}` is not an angle", draft.signal);
+            StudyError::new("unwrap", fact).with_help("remove `unwrap`")
+        })?;
+        unwrap(&mut values, turn);
+    }
     if let Some(early) = times.first().filter(|&&t| t < 0.0) {
         return Err(StudyError::new(
             "column",
@@ -258,6 +259,46 @@ fn build_channel(draft: &ChannelBuilder, to: &Unit) -> Result<Channel, StudyErro
             .with_help("missing samples and samples cut off by `from`, `to` and `skip` do not count"));
     }
     Ok(Channel { signal: draft.signal.clone(), times, values, noise })
+}
+
+/// Returns a whole turn in a unit; `None` for units other than of an angle.
+fn turn(unit: &Unit) -> Option<f64> {
+    let radian = Unit::known("rad");
+    let is_angle = unit.to_string() != "1" && unit.is_compatible(&radian);
+    is_angle.then(|| radian.factor_to(unit)).flatten().map(|factor| std::f64::consts::TAU * factor)
+}
+
+/// Adds whole turns so that no step exceeds half a turn.
+fn unwrap(values: &mut [f64], turn: f64) {
+    let mut added = 0.0;
+    for k in 1..values.len() {
+        let step = values[k] + added - values[k - 1];
+        added -= turn * (step / turn).round();
+        values[k] += added;
+    }
+}
+
+/// Steps that look like a sensor that starts a new turn, in turns, if the median step is at most [`SLOW`].
+const WRAPS: std::ops::Range<f64> = 0.75..1.25;
+
+/// Largest median step of an angle that is sampled fast enough to tell a new turn from a motion, in turns.
+const SLOW: f64 = 0.1;
+
+/// Returns a warning if an angle steps by a whole turn.
+fn wrapped(experiment: &str, channel: &Channel, unit: &Unit) -> Option<String> {
+    let turn = turn(unit)?;
+    let steps: Vec<f64> = channel.values.windows(2).map(|pair| (pair[1] - pair[0]).abs() / turn).collect();
+    let first = steps.iter().position(|step| WRAPS.contains(step))?;
+    let mut sorted = steps;
+    sorted.sort_by(f64::total_cmp);
+    (sorted[sorted.len() / 2] <= SLOW).then(|| {
+        format!(
+            "`{}` in `{experiment}` steps by about a turn at {} s: use unwrap = true for an angle that is counted within one turn, \
+             or unwrap = false to confirm the step and suppress this warning",
+            channel.signal,
+            channel.times[first + 1]
+        )
+    })
 }
 
 /// Returns a warning if the first sample lies far from the extrapolation of the next ones. The thesis (4.2.3) found the very

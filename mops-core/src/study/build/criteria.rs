@@ -14,6 +14,7 @@ use crate::study::draft::CriterionBuilder;
 use crate::study::{Row, Study};
 use crate::study_error::StudyError;
 use crate::unit::{Quantity, Unit};
+use crate::wildcard;
 
 pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -> Result<(), StudyError> {
     let model = match &draft.model {
@@ -96,27 +97,25 @@ fn cases_of(study: &Study, draft: &CriterionBuilder) -> Result<Vec<usize>, Study
     };
     let chosen: Vec<usize> = match &draft.cases {
         None => (0..study.cases.len()).filter(|&i| measures(&study.cases[i])).collect(),
-        Some(wanted) => wanted
-            .iter()
-            .map(|name| {
-                let found = study.cases.iter().position(|c| c.name == *name).ok_or_else(|| {
-                    StudyError::new(name, format!("the study has no case `{name}`"))
-                        .with_help(suggestion(name, study.cases.iter().map(|c| c.name.as_str())))
-                        .within("cases")
-                })?;
-                if measures(&study.cases[found]) {
-                    Ok(found)
-                } else {
+        Some(wanted) => {
+            let mut chosen: Vec<usize> = Vec::new();
+            for name in wanted {
+                let found = named(study, name).map_err(|mistake| mistake.within("cases"))?;
+                // A pattern chooses among the cases that the criterion can read.
+                let able: Vec<usize> = found.iter().copied().filter(|&case| measures(&study.cases[case])).collect();
+                if able.is_empty() {
                     let fact = match signal {
                         "" => {
                             format!("`{name}` has frequency responses only and is not simulated over time")
                         }
                         signal => format!("`{name}` does not measure `{signal}`"),
                     };
-                    Err(StudyError::new(name, fact).with_help(way_out.clone()).within("cases"))
+                    return Err(StudyError::new(name, fact).with_help(way_out.clone()).within("cases"));
                 }
-            })
-            .collect::<Result<_, _>>()?,
+                chosen.extend(able.into_iter().filter(|case| !chosen.contains(case)).collect::<Vec<_>>());
+            }
+            chosen
+        }
     };
     if chosen.is_empty() {
         let help = match reads {
@@ -130,6 +129,21 @@ fn cases_of(study: &Study, draft: &CriterionBuilder) -> Result<Vec<usize>, Study
         });
     }
     Ok(chosen)
+}
+
+/// Returns the cases with a name, or whose names match a pattern.
+fn named(study: &Study, name: &str) -> Result<Vec<usize>, StudyError> {
+    let found: Vec<usize> =
+        (0..study.cases.len()).filter(|&case| wildcard::matches(name, &study.cases[case].name)).collect();
+    if !found.is_empty() {
+        return Ok(found);
+    }
+    let all = study.cases.iter().map(|c| c.name.as_str());
+    let fact = match name.contains('*') {
+        true => format!("no case matches `{name}`"),
+        false => format!("the study has no case `{name}`"),
+    };
+    Err(StudyError::new(name, fact).with_help(suggestion(name, all)))
 }
 
 /// Returns the demand of a criterion in its unit, checked against the sense and the range of its kind.

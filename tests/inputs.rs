@@ -1,0 +1,270 @@
+//! Inputs of cases and recordings as they come: waveforms against closed forms, and data files of other forms.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use assert_cmd::cargo::cargo_bin_cmd;
+use mops_core::math;
+use serde_json::Value;
+
+#[path = "common/result.rs"]
+mod result;
+
+fn run(folder: &Path, text: &str) -> Value {
+    let study = folder.join("study.toml");
+    std::fs::write(&study, text).unwrap();
+    let out = folder.join("out");
+    let output = cargo_bin_cmd!("mops")
+        .args(["run", study.to_str().unwrap(), "--json", "--out", out.to_str().unwrap()])
+        .output()
+        .unwrap();
+    result::read(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}\n{text}", String::from_utf8_lossy(&output.stderr)))
+}
+
+/// Returns standard error of `mops check`.
+fn check(folder: &Path, text: &str) -> String {
+    let study = folder.join("study.toml");
+    std::fs::write(&study, text).unwrap();
+    let output = cargo_bin_cmd!("mops").args(["check", study.to_str().unwrap()]).output().unwrap();
+    let all = [&output.stdout[..], &output.stderr].concat();
+    String::from_utf8(all).unwrap()
+}
+
+fn value(result: &Value, case: &str, criterion: &str) -> f64 {
+    let all = result["criteria"].as_array().unwrap();
+    let found = all.iter().find(|c| c["case"] == case && c["name"] == criterion);
+    found.unwrap_or_else(|| panic!("no {case}/{criterion}: {result}"))["value"].as_f64().unwrap()
+}
+
+/// A study of an integrator `x' = u` with a case for each input.
+fn integrators(cases: &[(&str, &str)], horizon: f64) -> String {
+    let cases: String = cases.iter().map(|(name, input)| format!("{name} = {{ inputs.u{input} }}\n")).collect();
+    format!(
+        "[study]\nname = 'inputs'\n[models.plant.equations]\nstates = {{ x = '1' }}\ninputs = {{ u = '1/s' }}\n\
+         der = {{ x = 'u' }}\nhorizon = '{horizon} s'\n[cases]\n{cases}\
+         [criteria]\nend = {{ final-value = {{ signal = 'x' }}, usage = 'monitor' }}\n"
+    )
+}
+
+#[test]
+fn every_waveform_has_its_integral() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("u.csv"), "t[s],u[1/min]\n0,60\n1,120\n3,0\n").unwrap();
+    let chirp = |from: f64, to: f64, t: f64| {
+        // Simpson's rule over many intervals, of the phase as the integral of the frequency.
+        let sine = |s: f64| math::sin(TAU * (from + 0.5 * (to - from) * s / t) * s);
+        let n = 20_000;
+        let h = t / f64::from(n);
+        (0..n)
+            .map(|k| {
+                h / 6.0 * (sine(h * f64::from(k)) + 4.0 * sine(h * (f64::from(k) + 0.5)) + sine(h * f64::from(k + 1)))
+            })
+            .sum::<f64>()
+    };
+    let logarithmic = |from: f64, to: f64, t: f64| {
+        let rate = math::ln(to / from) / t;
+        let sine = |s: f64| math::sin(TAU * from / rate * (math::exp(rate * s) - 1.0));
+        let n = 20_000;
+        let h = t / f64::from(n);
+        (0..n)
+            .map(|k| {
+                h / 6.0 * (sine(h * f64::from(k)) + 4.0 * sine(h * (f64::from(k) + 0.5)) + sine(h * f64::from(k + 1)))
+            })
+            .sum::<f64>()
+    };
+    let sine = |w: f64, phase: f64| (math::cos(phase) - math::cos(w * 10.0 + phase)) / w;
+    let expected: Vec<(&str, &str, f64)> = vec![
+        ("number", " = 2.5", 25.0),
+        ("quantity", " = '30 1/min'", 5.0),
+        ("step", ".step = { time = 4, before = 1, after = 3 }", 22.0),
+        ("ramp", ".ramp = { time = 2, duration = '4 s', before = 1, after = 3 }", 2.0 + 8.0 + 12.0),
+        ("pulse", ".pulse = { time = 1, width = 0.5, value = 3, before = 1 }", 11.0),
+        ("train", ".pulse = { time = 1, width = 0.5, value = 3, before = 1, period = 2 }", 15.0),
+        ("doublet", ".doublet = { time = 1, width = 2, amplitude = 3, offset = 0.5 }", 5.0),
+        ("half", ".doublet = { time = 7, width = 2, amplitude = 3 }", 3.0),
+        ("sine", ".sine = { amplitude = 2, frequency = '0.3 Hz', phase = 1 }", 2.0 * sine(TAU * 0.3, 1.0)),
+        ("chirp", ".chirp = { amplitude = 1, from = 0.2, to = 2 }", chirp(0.2, 2.0, 10.0)),
+        (
+            "late",
+            ".chirp = { amplitude = 2, from = 0.2, to = 1, time = 3, duration = 4, offset = 1 }",
+            10.0 + 2.0 * chirp(0.2, 1.0, 4.0),
+        ),
+        ("log", ".chirp = { amplitude = 1, from = 0.2, to = 2, sweep = 'logarithmic' }", logarithmic(0.2, 2.0, 10.0)),
+        // 7 intervals of 1 s: the sequence of three stages has one more upper value.
+        ("prbs", ".prbs = { amplitude = 2, interval = 1, stages = 3, time = 2, offset = 0.1 }", 1.0 + 2.0 + 2.0),
+        ("zero", ".table = { time = [1, 2, 4], value = [1, 5, 0], hold = 'zero' }", 1.0 + 1.0 + 10.0),
+        ("first", ".table = { time = [1, 2, 4], value = [1, 5, 0] }", 1.0 + 3.0 + 5.0),
+        ("file", ".file = { path = 'u.csv', column = 'u', hold = 'first' }", 1.5 + 2.0),
+        (
+            "sum",
+            " = [1, { step = { time = 4, after = 2 } }, { sine = { amplitude = 2, frequency = '0.3 Hz' } }]",
+            10.0 + 12.0 + 2.0 * sine(TAU * 0.3, 0.0),
+        ),
+    ];
+    let cases: Vec<(&str, &str)> = expected.iter().map(|(name, input, _)| (*name, *input)).collect();
+    let found = run(folder.path(), &integrators(&cases, 10.0));
+    for (name, _, expected) in expected {
+        let found = value(&found, name, "end");
+        assert!((found - expected).abs() < 1e-7 * (1.0 + expected.abs()), "{name}: {found}, not {expected}");
+    }
+    // Sines of 1, 2, .., 5 Hz have no mean over whole periods; what remains is the offset.
+    let multisine = ".multisine = { amplitude = 1, from = 1, to = 5, count = 5, offset = 0.2 }";
+    let found = run(folder.path(), &integrators(&[("many", multisine)], 3.0));
+    assert!((value(&found, "many", "end") - 0.6).abs() < 1e-7);
+}
+
+#[test]
+fn a_wrong_input_is_refused_at_its_key() {
+    let folder = tempfile::tempdir().unwrap();
+    for (input, place, fact) in [
+        (".ramp = { duration = 0, after = 1 }", "study.toml:9:38", "above 0 s"),
+        (".pulse = { width = 2, value = 1, period = 1 }", "9:", "not longer than the pulse"),
+        (".table = { time = [1, 1], value = [0, 1] }", "9:", "must increase"),
+        (".table = { time = [1, 2], value = [0] }", "9:", "2 numbers"),
+        (".prbs = { amplitude = 1, interval = 1, stages = 19 }", "9:", "from 2 to 18"),
+        (".chirp = { amplitude = 1, from = 0, to = 1 }", "9:", "above 0 Hz"),
+        (" = '3 kg'", "9:", "expected"),
+        (" = [1, { step = { after = '2 kg' } }]", "9:43", "expected"),
+        (" = { sine = { amplitude = 1, frequency = 1 }, constant = 2 }", "9:", "exactly one"),
+        (".file = { path = 'none.csv', column = 'u' }", "9:", "no data file"),
+        (".prbs = { amplitude = 1, interval = '1 ns' }", "9:", "more than 1000000 changes"),
+        (".sign = { after = 1 }", "9:", "unknown key `sign`"),
+    ] {
+        let message = check(folder.path(), &integrators(&[("one", input)], 10.0)).replace('\n', " ");
+        assert!(message.contains(place) && message.contains(fact), "{input}: {message}");
+    }
+}
+
+/// A study that identifies the gain of `x' = k u` from these experiments.
+fn gain(experiments: &str) -> String {
+    format!(
+        "[study]\nname = 'gain'\ntask = 'calibration'\n[models.plant.equations]\nstates = {{ x = 'rad' }}\n\
+         inputs = {{ u = 'rad/s' }}\nparameters = {{ k = '1' }}\nder = {{ x = 'k*u' }}\n\
+         [tuners]\nk = {{ start = 0.5, min = 0.1, max = 10 }}\n{experiments}\
+         [criteria]\nx = {{ fit = {{ signal = 'x' }}, demand = 1e-3 }}\n"
+    )
+}
+
+fn found_gain(folder: &Path, experiments: &str) -> f64 {
+    let result = run(folder, &gain(experiments));
+    result["tuners"][0]["value"].as_f64().unwrap()
+}
+
+/// Writes `x = 2 t` for `u = 1`, sampled every 0.1 s for 4 s, with a row per time.
+fn record(folder: &Path, name: &str, header: &str, row: impl Fn(f64) -> String) {
+    let rows: String = (0..=40).map(|k| row(f64::from(k) * 0.1) + "\n").collect();
+    std::fs::write(folder.join(name), format!("{header}\n{rows}")).unwrap();
+}
+
+#[test]
+fn recordings_are_read_as_they_come() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    // Time stamps across midnight; the second second begins at 00:00:00.
+    let of_day = |t: f64| {
+        let ms = (t * 1e3).round() as u64;
+        if ms < 1000 {
+            format!("2024-05-17T23:59:59.{ms:03}Z")
+        } else {
+            format!("2024-05-18 00:00:{:02}.{:03}Z", ms / 1000 - 1, ms % 1000)
+        }
+    };
+    record(folder, "stamps.csv", "when,x[rad],u[rad/s]", |t| format!("{},{},1", of_day(t), 2.0 * t));
+    record(folder, "blanks.txt", "  t [s]   x (rad)  u (rad/s)", |t| format!("  {t:.1}   {:.2}   1.0", 2.0 * t));
+    record(folder, "untimed.csv", "x[rad],u[rad/s]", |t| format!("{},1", 2.0 * t));
+    record(folder, "gaps.csv", "t[s],x[rad],u[rad/s]", |t| {
+        format!("{t},{},{}", 2.0 * t, if (t - 1.05).abs() < 0.5 { String::new() } else { "1".into() })
+    });
+    record(folder, "wrapped.csv", "t[s],x[rad],u[rad/s]", |t| format!("{t},{},1", (2.0 * t).rem_euclid(TAU)));
+    record(folder, "swing_1.csv", "t[s],x[rad],u[rad/s]", |t| format!("{t},{},1", 2.0 * t));
+    record(folder, "swing_2.csv", "t[s],x[rad],u[rad/s]", |t| format!("{t},{},2", 4.0 * t));
+    // The input from a faster logger, started two seconds earlier on the same clock.
+    let fast: String =
+        (0..=600).map(|k| format!("{},{}\n", f64::from(k) * 0.01 - 2.0, if k < 200 { 0 } else { 1 })).collect();
+    std::fs::write(folder.join("fast.csv"), format!("t[s],u[rad/s]\n{fast}")).unwrap();
+    let plain = "channels = { x = 'x' }\ninputs = { u = 'u' }\nfree = ['x']\n";
+    for (name, experiment) in [
+        ("stamps", format!("file = 'stamps.csv'\n{plain}")),
+        ("blanks", format!("file = 'blanks.txt'\n{plain}")),
+        ("untimed", format!("file = 'untimed.csv'\nsample-time = '100 ms'\n{plain}")),
+        ("gaps", format!("file = 'gaps.csv'\n{plain}")),
+        ("wrapped", "file = 'wrapped.csv'\nchannels = { x = { column = 'x', unwrap = true } }\ninputs = { u = 'u' }\n".into()),
+        ("pattern", format!("files = 'swing_*.csv'\n{plain}")),
+        ("windows", format!("file = 'swing_1.csv'\nwindows = '1 s'\n{plain}")),
+        ("rates", "file = 'blanks.txt'\nchannels = { x = 'x' }\ninputs = { u = { file = 'fast.csv', column = 'u' } }\n".into()),
+        ("late", "file = 'fast.csv'\nfrom = 0\nchannels = { x = { file = 'swing_1.csv', column = 'x' } }\ninputs = { u = 'u' }\n".into()),
+    ] {
+        let found = found_gain(folder, &format!("[experiments.e]\n{experiment}"));
+        assert!((found - 2.0).abs() < 1e-6, "{name}: {found}");
+    }
+    let names = |experiment: &str| {
+        let result = run(folder, &gain(&format!("[experiments.e]\n{experiment}")));
+        let rows = result["criteria"].as_array().unwrap().clone();
+        rows.iter().map(|row| row["case"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(names(&format!("files = 'swing_*.csv'\n{plain}")), ["e-swing_1", "e-swing_2"]);
+    assert_eq!(names(&format!("file = 'swing_1.csv'\nwindows = '1.2 s'\n{plain}")), ["e-1", "e-2", "e-3"]);
+}
+
+#[test]
+fn what_a_recording_suggests_is_a_note_and_what_it_lacks_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    record(folder, "wrapped.csv", "t[s],x[rad],u[rad/s]", |t| format!("{t},{},1", (2.0 * t).rem_euclid(TAU)));
+    record(folder, "gaps.csv", "t[s],x[rad],u[rad/s]", |t| {
+        format!("{t},{},{}", 2.0 * t, if (t - 1.05).abs() < 0.5 { String::new() } else { "1".into() })
+    });
+    record(folder, "stamps.csv", "when,x[rad]", |t| format!("2024-05-17T10:00:{:04.1},{}", t, 2.0 * t));
+    let told = |experiment: &str| check(folder, &gain(&format!("[experiments.e]\n{experiment}")));
+    let plain = "channels = { x = 'x' }\ninputs = { u = 'u' }\n";
+    assert!(told(&format!("file = 'wrapped.csv'\n{plain}")).contains("steps by about a turn at 3.2 s"));
+    let confirmed = "file = 'wrapped.csv'\nchannels = { x = { column = 'x', unwrap = false } }\ninputs = { u = 'u' }\n";
+    assert!(!told(confirmed).contains("turn"));
+    assert!(told(&format!("file = 'gaps.csv'\n{plain}")).contains("has 10 missing samples"));
+    for (experiment, fact) in [
+        (plain.to_owned(), "`file` is missing"),
+        (format!("files = 'none_*.csv'\n{plain}"), "no data file matches"),
+        (format!("file = 'gaps.csv'\nfiles = '*.csv'\n{plain}"), "both `file` and `files`"),
+        (format!("file = 'gaps.csv'\nwindows = '20 s'\n{plain}"), "more than twice as long"),
+        (format!("file = 'gaps.csv'\nwindows = '0 s'\n{plain}"), "less than two samples"),
+        (format!("file = 'gaps.csv'\nsample-time = '1 s'\ntime = 't'\n{plain}"), "both `time` and `sample-time`"),
+        (
+            "file = 'gaps.csv'\nchannels = { x = 'x' }\ninputs = { u = { column = 'u', hold = 'first' } }\n".to_owned(),
+            "missing sample at 0.6",
+        ),
+        (
+            "file = 'gaps.csv'\nchannels = { x = { column = 'x', file = 'stamps.csv' } }\ninputs = { u = 'u' }\n"
+                .to_owned(),
+            "no common clock",
+        ),
+    ] {
+        let message = told(&experiment).replace('\n', " ");
+        assert!(message.contains(fact), "{experiment}: {message}");
+    }
+}
+
+#[test]
+fn a_grid_is_a_case_for_every_combination_and_patterns_choose_among_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "[study]\nname = 'grid'\n[models.plant.equations]\nstates = { x = '1' }\ninputs = { u = '1/s' }\n\
+                parameters = { k = '1', m = 'kg' }\nder = { x = 'k*u*m/1 [kg]' }\nhorizon = '1 s'\n\
+                [cases]\nrun = { grid = { k = [1, 2], m = ['1 kg', '500 g'] }, inputs.u = 1 }\nlast = { k = 5, m = 1, inputs.u = 1 }\n\
+                [criteria]\nall = { final-value = { signal = 'x' }, usage = 'monitor' }\n\
+                heavy = { final-value = { signal = 'x' }, cases = ['run-*-m=1kg'], usage = 'monitor' }\n";
+    let result = run(folder.path(), text);
+    for (case, expected) in [
+        ("run-k=1-m=1kg", 1.0),
+        ("run-k=1-m=500g", 0.5),
+        ("run-k=2-m=1kg", 2.0),
+        ("run-k=2-m=500g", 1.0),
+        ("last", 5.0),
+    ] {
+        assert!((value(&result, case, "all") - expected).abs() < 1e-9, "{case}");
+    }
+    assert_eq!(value(&result, "run-k=2-m=1kg", "heavy"), value(&result, "run-k=2-m=1kg", "all"));
+    assert_eq!(result["criteria"].as_array().unwrap().len(), 7);
+    let wrong = check(folder.path(), &text.replace("run-*-m=1kg", "walk-*"));
+    assert!(wrong.contains("no case matches `walk-*`"), "{wrong}");
+    let double = check(folder.path(), &text.replace("k = [1, 2], m", "k = [], m"));
+    assert!(double.contains("`k` has no values"), "{double}");
+}
