@@ -114,6 +114,63 @@ fn every_waveform_has_its_integral() {
 }
 
 #[test]
+fn a_criterion_reads_a_window_as_if_the_simulation_began_there() {
+    // x' = -x + u + d: a setpoint step at 0 s and a disturbance at 20 s share a simulation.
+    let text = "[study]\nname = 'window'\n[models.plant.equations]\nstates = { x = 'rad' }\ninputs = { u = 'rad', d = 'rad' }\n\
+                der = { x = \"1 [s]*x' = u + d - x\" }\nhorizon = '40 s'\n\
+                [cases]\nboth = { inputs.u.step.after = 1, inputs.d.step = { time = 20, after = 0.5 } }\n\
+                [criteria]\n\
+                first = { settling-time = { signal = 'x', target = 1, from = 0, band = 0.02 }, until = '20 s', demand = '5000 ms' }\n\
+                second = { settling-time = { signal = 'x', target = 1.5, from = 1, band = 0.02 }, from = '20 s', usage = 'monitor' }\n\
+                late = { peak = { signal = 'x' }, from = '21 s', until = '22 s', unit = 'deg', usage = 'monitor' }\n\
+                area = { iae = { signal = 'x', target = 1.5 }, from = 20, usage = 'monitor' }\n\
+                sum = { expression = { value = 'first + 2*second' }, usage = 'monitor' }\n\
+                most = { expression = { value = 'maximum(x)', unit = 'deg' }, from = 10, until = 20, usage = 'monitor' }\n";
+    let folder = tempfile::tempdir().unwrap();
+    let result = run(folder.path(), text);
+    let found = |name: &str| value(&result, "both", name);
+    let settled = -math::ln(0.02);
+    // Asked in milliseconds, answered in milliseconds.
+    assert!((found("first") - 1e3 * settled).abs() < 1e-3, "{}", found("first"));
+    let recovered = math::ln(0.5 / 0.02);
+    assert!((found("second") - recovered).abs() < 1e-6, "{}", found("second"));
+    let degrees = 360.0 / TAU;
+    assert!((found("late") - degrees * (1.5 - 0.5 * math::exp(-2.0))).abs() < 1e-5, "{}", found("late"));
+    assert!((found("area") - 0.5 * (1.0 - math::exp(-20.0))).abs() < 1e-6, "{}", found("area"));
+    assert!((found("sum") - settled - 2.0 * recovered).abs() < 1e-5, "{}", found("sum"));
+    assert!((found("most") - degrees * (1.0 - math::exp(-20.0))).abs() < 1e-5, "{}", found("most"));
+    let row = result["criteria"].as_array().unwrap().iter().find(|row| row["name"] == "first").unwrap();
+    assert_eq!((row["unit"].as_str(), row["demand"].as_f64()), (Some("ms"), Some(5000.0)));
+    for (change, fact) in [
+        ("from = '21 s', until = '22 s'\u{2192}from = '21 s', until = '20 s'", "is not after `from`"),
+        ("from = '21 s', until = '22 s'\u{2192}from = '-1 s'", "before the start"),
+        ("unit = 'deg', usage\u{2192}unit = 'm', usage", "not in `m`"),
+        ("first + 2*second\u{2192}sum + 1 [s]", "circular reference"),
+        ("first + 2*second\u{2192}first + late", "same dimension"),
+        ("first + 2*second\u{2192}third", "neither another criterion"),
+    ] {
+        let (from, to) = change.split_once('\u{2192}').unwrap();
+        let message = check(folder.path(), &text.replace(from, to)).replace('\n', " ");
+        assert!(message.contains(fact), "{change}: {message}");
+    }
+}
+
+#[test]
+fn a_formula_has_the_derivatives_of_its_parts() {
+    // The minimum of k^2/1 + 1/k^2 over the gain, through a signal, a parameter and another criterion, lies at k = 1.
+    let text = "[study]\nname = 'formula'\n[models.plant.equations]\nstates = { x = '1' }\nparameters = { k = '1/s' }\n\
+                der = { x = 'k' }\nhorizon = '1 s'\n[tuners]\nk = { start = 3, min = 0.1, max = 10 }\n[criteria]\n\
+                end = { final-value = { signal = 'x' }, usage = 'monitor' }\n\
+                cost = { expression = { value = 'end*final(x) + 1/(k*1 [s])^2' }, demand = 1 }\n";
+    let folder = tempfile::tempdir().unwrap();
+    for solver in ["auto", "sqp"] {
+        let result = run(folder.path(), &text.replace("[criteria]", &format!("[solver]\n{solver} = {{}}\n[criteria]")));
+        let k = result["tuners"][0]["value"].as_f64().unwrap();
+        assert!((k - 1.0).abs() < 1e-3, "{solver}: {k}");
+    }
+}
+
+#[test]
 fn a_wrong_input_is_refused_at_its_key() {
     let folder = tempfile::tempdir().unwrap();
     for (input, place, fact) in [

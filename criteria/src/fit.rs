@@ -106,7 +106,7 @@ impl Criterion for Bound {
     fn samples(&self, case: &Case) -> Option<Samples> {
         let channel = case.experiment.as_ref()?.channel(&self.signal.name)?;
         let weights = (0..channel.times.len()).map(|i| self.root_weight(&channel.times, i)).collect();
-        Some(Samples { signal: self.signal.name.clone(), weights, noise: channel.noise })
+        Some(Samples { signal: self.signal.name.clone(), first: 0, weights, noise: channel.noise })
     }
 }
 

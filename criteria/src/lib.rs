@@ -16,6 +16,7 @@ pub mod crossover_frequency;
 pub mod damping_ratio;
 pub mod delay_margin;
 pub mod delay_time;
+pub mod expression;
 pub mod final_value;
 pub mod fit;
 pub mod fit_percent;
@@ -62,6 +63,7 @@ pub fn kinds() -> Vec<CriterionKind> {
         CriterionKind::of::<delay_time::DelayTime>(),
         CriterionKind::of::<steady_state_error::SteadyStateError>(),
         CriterionKind::of::<final_value::FinalValue>(),
+        CriterionKind::of::<expression::Expression>(),
         CriterionKind::of::<ise::Ise>(),
         CriterionKind::of::<iae::Iae>(),
         CriterionKind::of::<itae::Itae>(),

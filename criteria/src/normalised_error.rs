@@ -111,7 +111,7 @@ impl Criterion for Bound {
     fn samples(&self, case: &Case) -> Option<Samples> {
         let channel = case.experiment.as_ref()?.channel(&self.signal)?;
         let weights = vec![self.scale(channel).ok()?; channel.times.len()];
-        Some(Samples { signal: self.signal.clone(), weights, noise: self.noise.or(channel.noise) })
+        Some(Samples { signal: self.signal.clone(), first: 0, weights, noise: self.noise.or(channel.noise) })
     }
 }
 

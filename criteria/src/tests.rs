@@ -15,7 +15,7 @@ use serde::Deserialize;
 use crate::kinds;
 
 /// Every kind, with options as written in a study file.
-const EXAMPLES: [(&str, &str); 32] = [
+const EXAMPLES: [(&str, &str); 33] = [
     ("overshoot", "{ signal = 'y', target = 1, from = 0, step-time = '0 s', absolute = false }"),
     ("undershoot", "{ signal = 'y', target = '100 cm' }"),
     ("peak", "{ signal = 'y', of = 'absolute' }"),
@@ -24,6 +24,7 @@ const EXAMPLES: [(&str, &str); 32] = [
     ("delay-time", "{ signal = 'y', target = 1, level = 0.5 }"),
     ("steady-state-error", "{ signal = 'y', target = 1, window = '1 s' }"),
     ("final-value", "{ signal = 'y' }"),
+    ("expression", "{ value = 'maximum(y) - integral(y^2)/1 [m s]' }"),
     ("ise", "{ signal = 'y', target = 1, step-time = 0 }"),
     ("iae", "{ signal = 'y', target = 1 }"),
     ("itae", "{ signal = 'y', target = 1 }"),

@@ -68,7 +68,7 @@ pub use catalogue::{
 };
 pub use catalogue_study::{BuiltStudy, CatalogueStudy, Shipped, StudyFolder};
 pub use conclude::{Ending, conclude};
-pub use criterion::{Criterion, CriterionSpec, Mark, Missed, Sense, Tangent, Usage, Value};
+pub use criterion::{Criterion, CriterionSpec, Mark, Missed, Other, Sense, Tangent, Usage, Value};
 pub use demand::{Demand, Scaled};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use differences::Differences;

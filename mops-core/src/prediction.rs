@@ -18,7 +18,7 @@ impl Problem {
         let parameters = self.study().parameters(plan, tuners);
         let request = Job { case, parameters: &parameters, signals: &plan.signals, horizon: plan.horizon };
         let analysis = self.study().analyse(plan.model, &request).ok()?;
-        row.value(case, &analysis).ok().map(|value| value.number).filter(|number| number.is_finite())
+        row.value(case, &analysis, &parameters).ok().map(|value| value.number).filter(|number| number.is_finite())
     }
 
     /// Returns a signal of a job at increasing times, and its derivative with respect to every active tuner, in the tuner's

@@ -309,7 +309,7 @@ impl Problem {
         let request = Job { case, parameters: &parameters, signals: &plan.signals, horizon: plan.horizon };
         let analysis = study.analyse(plan.model, &request)?;
         let rows = study.rows.iter().enumerate().filter(|(_, row)| row.job == job);
-        let value = |row: &Row| match row.value(case, &analysis) {
+        let value = |row: &Row| match row.value(case, &analysis, &parameters) {
             Ok(value) if !value.number.is_finite() => Err("its value is not finite".to_owned()),
             other => other,
         };
@@ -435,11 +435,12 @@ impl Problem {
             if case.cancellation.requested().is_some() {
                 return None;
             }
-            let value = row.criterion.value(case, &analysis).ok()?;
+            let value = row.criterion.value_with(case, &analysis, &parameters).ok()?;
             let still = Value { residuals: vec![0.0; value.residuals.len()], ..Value::default() };
             let mut slopes = vec![still; seeds.len()];
             for (&j, along) in moving.iter().zip(&tangents) {
-                let tangent = Tangent { analysis: &analysis, value: &value, along, reach };
+                let (parameters, seed) = (&parameters[..], &seeds[j][..]);
+                let tangent = Tangent { analysis: &analysis, value: &value, along, parameters, seed, reach };
                 slopes[j] = row.criterion.slope(case, &tangent).ok()?;
             }
             Some((index, value, slopes))

@@ -5,6 +5,8 @@
 pub struct Samples {
     /// Measured signal.
     pub signal: String,
+    /// Index of the first of them among the samples of the signal.
+    pub first: usize,
     /// Residual divided by (simulated - measured), for every sample; positive.
     pub weights: Vec<f64>,
     /// Standard deviation of the noise of one sample, in the unit of the signal, if known.

@@ -142,6 +142,27 @@ impl Trace {
         late
     }
 
+    /// Returns the part between two times, on a clock that starts at the first of them, or at the start of the trace if that is later.
+    #[must_use]
+    pub fn between(&self, from: f64, until: f64) -> Self {
+        let (from, until) = (from.max(self.start()), until.min(self.end()));
+        let mut part = Self::starting_at(0.0, self.segments.len());
+        for (segment, c) in self.segments.iter().enumerate() {
+            let (t0, t1) = (self.knots[segment], self.knots[segment + 1]);
+            if t1 <= from || t0 >= until {
+                continue;
+            }
+            if from <= t0 && t1 <= until {
+                part.push_polynomial(t1 - from, *c);
+                continue;
+            }
+            let [low, high] = [from.max(t0), until.min(t1)].map(|t| (t - t0) / (t1 - t0));
+            part.push(until.min(t1) - from, Self::NODES.map(|s| polynomial(c, low + s * (high - low))));
+        }
+        part.jumped = self.jumped.filter(|_| until >= self.end());
+        part
+    }
+
     /// Returns true if the trace has no segment.
     pub fn is_empty(&self) -> bool {
         self.segments.is_empty()
@@ -151,6 +172,15 @@ impl Trace {
     pub fn at(&self, t: f64) -> f64 {
         let segment = self.segment_at(t);
         self.value_on(segment, t)
+    }
+
+    /// Returns the value just before `t`; at the start, the value there.
+    pub fn before(&self, t: f64) -> f64 {
+        let segment = self.knots.partition_point(|&knot| knot < t).saturating_sub(1);
+        let segment = segment.min(self.segments.len().saturating_sub(1));
+        let Some(c) = self.segments.get(segment) else { return f64::NAN };
+        let (t0, t1) = (self.knots[segment], self.knots[segment + 1]);
+        polynomial(c, ((t - t0) / (t1 - t0)).clamp(0.0, 1.0))
     }
 
     /// Returns the values at increasing times, in one pass.

@@ -58,7 +58,7 @@ impl Identity {
             data: file.data.clone(),
             program: file.program.clone(),
             tuners: study.tuners().iter().map(|tuner| tuner.name.clone()).collect(),
-            rows: study.rows().iter().map(|row| study.key(row)).collect(),
+            rows: study.rows().iter().map(|row| format!("{} [{}]", study.key(row), row.unit)).collect(),
             uncertain: study.tasks().uncertain.iter().map(|u| format!("{}[{}]", u.name, u.unit)).collect(),
             solver: solver.to_owned(),
             seed: study.seed(),

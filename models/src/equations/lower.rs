@@ -381,6 +381,7 @@ impl<'d> Lowering<'d> {
             Form::Compare(..) | Form::All(_) | Form::Any(_) | Form::Not(_) => {
                 unreachable!("the parser accepts conditions in `if` only")
             }
+            Form::Reduced(..) => unreachable!("the parser accepts reductions in criteria only"),
         })
     }
 

@@ -7,7 +7,7 @@ pub mod units;
 
 pub use functions::{FUNCTIONS, Function};
 pub use parse::{DEEPEST, Equation, SyntaxError, equation};
-pub use tree::{Comparison, Form, Node, Operator};
+pub use tree::{Comparison, Form, Node, Operator, REDUCTIONS, Reduction};
 
 use std::collections::HashSet;
 
@@ -30,23 +30,53 @@ impl Expression {
     /// # Errors
     /// If the text is not an expression, with the position of the first mistake.
     pub fn parse(text: &str) -> Result<Self, SyntaxError> {
-        let root = parse::expression(text)?;
+        Self::of(parse::expression(text)?)
+    }
+
+    fn of(root: Node) -> Result<Self, SyntaxError> {
         let (mut names, mut seen): (Vec<String>, HashSet<&str>) = Default::default();
         let mut foreign = None;
         root.walk(&mut |node| match &node.form {
             Form::Name(name) if seen.insert(name) => names.push(name.clone()),
             Form::Rate(_) | Form::Member(..) | Form::Call(Function::Delay, _) => {
-                foreign = foreign.take().or(Some(node.span.clone()));
+                let why = "derivatives, delays and families of states are allowed in models only";
+                foreign = foreign.take().or(Some((node.span.clone(), why)));
+            }
+            Form::Reduced(..) => {
+                foreign = foreign.take().or(Some((node.span.clone(), IN_CRITERIA)));
             }
             _ => {}
         });
         match foreign {
-            Some(span) => Err(SyntaxError {
-                span,
-                message: "derivatives, delays and families of states are allowed in models only".to_owned(),
-            }),
+            Some((span, message)) => Err(SyntaxError { span, message: message.to_owned() }),
             None => Ok(Self { root, names }),
         }
+    }
+
+    /// Parses an expression with reductions of courses over time. In the expression that it returns each reduction is a name, its
+    /// own text; the reductions and what they reduce are returned with it.
+    ///
+    /// # Errors
+    /// If the text is not such an expression, with the position of the first mistake.
+    pub fn with_reductions(text: &str) -> Result<(Self, Vec<Reduced>), SyntaxError> {
+        let mut root = parse::expression(text)?;
+        let mut reduced = Vec::new();
+        let mut within = Ok(());
+        root.replace(&mut |node| {
+            let Form::Reduced(reduction, of) = &node.form else { return None };
+            let name = text[node.span.clone()].to_owned();
+            match Self::of(of.as_ref().clone()) {
+                Ok(of) => reduced.push(Reduced { name: name.clone(), reduction: *reduction, of }),
+                Err(SyntaxError { span, message }) if message == IN_CRITERIA => {
+                    let message = "a reduction gives one number, which has no course over time".to_owned();
+                    within = Err(SyntaxError { span, message });
+                }
+                Err(mistake) => within = Err(mistake),
+            }
+            Some(Form::Name(name))
+        });
+        within?;
+        Ok((Self::of(root)?, reduced))
     }
 
     /// Returns the root of the expression tree.
@@ -66,6 +96,20 @@ impl Expression {
             values[index]
         })
     }
+}
+
+/// Message for a reduction in an expression that has none.
+pub const IN_CRITERIA: &str = "a course over time is reduced to a number in criteria only";
+
+/// Reduction of a course over time in an expression.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reduced {
+    /// Text of the reduction, by which the expression names it.
+    pub name: String,
+    /// What the course is reduced to.
+    pub reduction: Reduction,
+    /// The course.
+    pub of: Expression,
 }
 
 impl Node {

@@ -22,8 +22,9 @@ use winnow::prelude::*;
 use winnow::stream::{LocatingSlice, Stateful};
 use winnow::token::{one_of, take_while};
 
+use super::IN_CRITERIA;
 use super::functions::{FUNCTIONS, Function};
-use super::tree::{Comparison, Form, Node, Operator};
+use super::tree::{Comparison, Form, Node, Operator, REDUCTIONS};
 use crate::unit::Unit;
 
 /// Syntax error: its position and cause.
@@ -104,10 +105,22 @@ pub fn equation(text: &str) -> Result<Equation, SyntaxError> {
     }
     let right = opt(preceded('=', cut_err((multispace0, disjunction, multispace0))));
     let (_, first, _, second) = run(text, (multispace0, disjunction, multispace0, right))?;
-    Ok(match second {
+    let equation = match second {
         Some((_, right, _)) => Equation { left: Some(number_of(first)?), right: number_of(right)? },
         None => Equation { left: None, right: number_of(first)? },
-    })
+    };
+    for side in equation.left.iter().chain([&equation.right]) {
+        let mut reduced = None;
+        side.walk(&mut |node| {
+            if matches!(node.form, Form::Reduced(..)) {
+                reduced = reduced.take().or(Some(node.span.clone()));
+            }
+        });
+        if let Some(span) = reduced {
+            return Err(SyntaxError { span, message: IN_CRITERIA.to_owned() });
+        }
+    }
+    Ok(equation)
 }
 
 /// Parses a text that is only a number with a unit, as elsewhere in a study: `20 degC`.
@@ -228,6 +241,11 @@ fn call(name: &str, place: Range<usize>, span: &Range<usize>, arguments: Vec<Spa
             Form::Name(_) | Form::Member(..) => Ok(Form::Rate(Box::new(of))),
             _ => wrong(of.span, "`der` takes the name of a state".to_owned()),
         };
+    }
+    if let Some((_, reduction)) = REDUCTIONS.iter().find(|(known, _)| *known == name) {
+        let [of] = <[Spanned; 1]>::try_from(arguments)
+            .map_err(|_| SyntaxError { span: span.clone(), message: format!("`{name}` takes one argument") })?;
+        return Ok(Form::Reduced(*reduction, Box::new(number_of(of)?)));
     }
     let Some(&(_, function, least, most)) = FUNCTIONS.iter().find(|(known, ..)| *known == name) else {
         let names: Vec<&str> = FUNCTIONS.iter().map(|(name, ..)| *name).collect();

@@ -37,6 +37,8 @@ pub enum Form {
     Power(Box<Node>, Box<Node>),
     /// Function call `f(a, b, ..)`.
     Call(Function, Vec<Node>),
+    /// Number to which a course over time is reduced: `integral(u^2)`.
+    Reduced(Reduction, Box<Node>),
     /// Condition `a > b`.
     Compare(Comparison, Box<Node>, Box<Node>),
     /// Conjunction of conditions, `a and b`.
@@ -46,6 +48,36 @@ pub enum Form {
     /// Negated condition.
     Not(Box<Node>),
 }
+
+/// Reduction of a course over time to a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reduction {
+    /// Value at the start.
+    Initial,
+    /// Value at the end.
+    Final,
+    /// Largest value.
+    Maximum,
+    /// Smallest value.
+    Minimum,
+    /// Integral over time, s.
+    Integral,
+    /// Integral divided by the duration.
+    Mean,
+    /// Square root of the mean square.
+    Rms,
+}
+
+/// Names of the reductions in expressions.
+pub const REDUCTIONS: [(&str, Reduction); 7] = [
+    ("initial", Reduction::Initial),
+    ("final", Reduction::Final),
+    ("maximum", Reduction::Maximum),
+    ("minimum", Reduction::Minimum),
+    ("integral", Reduction::Integral),
+    ("mean", Reduction::Mean),
+    ("rms", Reduction::Rms),
+];
 
 /// Arithmetic operator between the operands of a [`Form::Chain`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,12 +139,34 @@ impl Node {
     pub fn children(&self) -> Vec<&Self> {
         match &self.form {
             Form::Number(_) | Form::Quantity(..) | Form::Name(_) => Vec::new(),
-            Form::Member(_, a) | Form::Rate(a) | Form::Negative(a) | Form::Not(a) => vec![a],
+            Form::Member(_, a) | Form::Rate(a) | Form::Negative(a) | Form::Not(a) | Form::Reduced(_, a) => vec![a],
             Form::Chain(first, rest) => {
                 std::iter::once(first.as_ref()).chain(rest.iter().map(|(_, node)| node)).collect()
             }
             Form::Power(a, b) | Form::Compare(_, a, b) => vec![a, b],
             Form::Call(_, nodes) | Form::All(nodes) | Form::Any(nodes) => nodes.iter().collect(),
+        }
+    }
+
+    /// Replaces the form of every node for which `with` returns one; nodes below these are not visited.
+    pub(super) fn replace(&mut self, with: &mut impl FnMut(&Self) -> Option<Form>) {
+        if let Some(form) = with(self) {
+            self.form = form;
+            return;
+        }
+        match &mut self.form {
+            Form::Number(_) | Form::Quantity(..) | Form::Name(_) => {}
+            Form::Member(_, a) | Form::Rate(a) | Form::Negative(a) | Form::Not(a) | Form::Reduced(_, a) => {
+                a.replace(with)
+            }
+            Form::Chain(first, rest) => {
+                first.replace(with);
+                rest.iter_mut().for_each(|(_, node)| node.replace(with));
+            }
+            Form::Power(a, b) | Form::Compare(_, a, b) => [a, b].into_iter().for_each(|node| node.replace(with)),
+            Form::Call(_, nodes) | Form::All(nodes) | Form::Any(nodes) => {
+                nodes.iter_mut().for_each(|node| node.replace(with));
+            }
         }
     }
 

@@ -31,7 +31,7 @@ pub use schema::{study_schema, tables, tables_with};
 
 use crate::catalogue::{Catalogue, SolverChoice};
 use crate::catalogue_study::Shipped;
-use crate::criterion::Usage;
+use crate::criterion::{Other, Usage};
 use crate::data::read_regular;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::expression::Expression;
@@ -432,6 +432,9 @@ fn read_criterion(catalogue: &Catalogue, node: &Node<'_>) -> Result<CriterionBui
         good: common.good,
         bad: common.bad,
         weight: common.weight.unwrap_or(1.0),
+        from: common.from,
+        until: common.until,
+        unit: common.unit.as_deref().map(|unit| read_unit(node, "unit", unit)).transpose()?,
     })
 }
 
@@ -452,6 +455,22 @@ impl crate::criterion::CriterionSpec for Located {
 
     fn needs_measurement(&self) -> Option<&str> {
         self.inner.needs_measurement()
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.inner.names()
+    }
+
+    fn reads_any(&self) -> bool {
+        self.inner.reads_any()
+    }
+
+    fn bind_with(
+        &self,
+        model: &Interface,
+        others: &[Other],
+    ) -> Result<Box<dyn crate::criterion::Criterion>, StudyError> {
+        self.inner.bind_with(model, others).map_err(|mistake| mistake.within(self.kind))
     }
 }
 

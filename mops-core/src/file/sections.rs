@@ -329,7 +329,7 @@ pub(super) struct FreeTable {
 pub(super) struct CriterionCommon {
     /// Model that the criterion reads; required if there are several.
     pub model: Option<String>,
-    /// Cases in which the criterion is evaluated; default all.
+    /// Cases in which the criterion is evaluated; default all. `*` stands for any text: `cases = ["load-*"]`.
     pub cases: Option<Vec<String>>,
     /// `minimise` (the default), `inequality`, `equality` or `monitor`.
     pub usage: Option<Usage>,
@@ -341,10 +341,17 @@ pub(super) struct CriterionCommon {
     pub bad: Option<Quantity>,
     /// Weight of the scaled value in the objective; default 1.
     pub weight: Option<f64>,
+    /// Start of the part of the simulation that the criterion reads; default is the start of the simulation. All times of the
+    /// criterion count from there, so that a settling time with `from = "5 s"` is that of a disturbance at 5 s.
+    pub from: Option<Quantity>,
+    /// End of the part of the simulation that the criterion reads; default is the end of the simulation.
+    pub until: Option<Quantity>,
+    /// Unit of the values in all outputs; default is the unit of `demand`, `bad` or `good`, or else that of the kind.
+    pub unit: Option<String>,
 }
 
 impl CriterionCommon {
-    pub const KEYS: &[&str] = &["model", "cases", "usage", "demand", "good", "bad", "weight"];
+    pub const KEYS: &[&str] = &["model", "cases", "usage", "demand", "good", "bad", "weight", "from", "until", "unit"];
 }
 
 /// Common keys of all solvers.

@@ -15,6 +15,8 @@ pub struct Record {
     pub signal: Option<String>,
     /// Declared noise level of one sample, in the unit of the signal.
     pub noise: Option<f64>,
+    /// Index of the first sample among those of the channel.
+    first: usize,
     /// Blocks of consecutive residuals, one residual per sample.
     blocks: Vec<Block>,
 }
@@ -31,7 +33,7 @@ struct Block {
 impl Record {
     /// Creates a record of one block of residuals that starts at index `first`.
     pub fn new(case: usize, signal: Option<String>, noise: Option<f64>, first: usize, weights: Vec<f64>) -> Self {
-        Self { case, signal, noise, blocks: vec![Block { first, weights }] }
+        Self { case, signal, noise, first: 0, blocks: vec![Block { first, weights }] }
     }
 
     /// Returns the number of samples.
@@ -85,17 +87,23 @@ pub fn records(problem: &Problem, tuners: &[f64]) -> Option<Vec<Record>> {
         let record = match row.criterion.samples(&study.cases[case]) {
             Some(samples) => {
                 let weights = samples.weights.iter().map(|weight| factor * weight).collect();
-                Record::new(case, Some(samples.signal), samples.noise, first, weights)
+                let record = Record::new(case, Some(samples.signal), samples.noise, first, weights);
+                Record { first: samples.first, ..record }
             }
             None => {
                 let analysis = problem.analyse_all(row.job, tuners, None).ok()?;
-                let count = row.value(&study.cases[case], &analysis).ok()?.residuals.len();
+                let count = row
+                    .value(&study.cases[case], &analysis, &study.parameters(&study.jobs[row.job], tuners))
+                    .ok()?
+                    .residuals
+                    .len();
                 Record::new(case, None, None, first, vec![factor; count])
             }
         };
         first += record.len();
         let same = |other: &&mut Record| {
-            record.signal.is_some() && (other.case, &other.signal, other.len()) == (case, &record.signal, record.len())
+            let samples = |of: &Record| (of.case, of.signal.clone(), of.first, of.len());
+            record.signal.is_some() && samples(other) == samples(&record)
         };
         match records.iter_mut().find(same) {
             Some(known) => {

@@ -179,6 +179,13 @@ pub struct CriterionBuilder {
     pub bad: Option<Quantity>,
     /// Weight in the objective.
     pub weight: f64,
+    /// Start of the part of the simulation that the criterion reads; `None` for its start. All times of the criterion count from
+    /// there.
+    pub from: Option<Quantity>,
+    /// End of the part of the simulation that the criterion reads; `None` for its end.
+    pub until: Option<Quantity>,
+    /// Unit of the values; `None` for that of `demand`, or else of `bad`, or else of the kind.
+    pub unit: Option<Unit>,
 }
 
 impl CriterionBuilder {
@@ -193,6 +200,9 @@ impl CriterionBuilder {
             good: None,
             bad: None,
             weight: 1.0,
+            from: None,
+            until: None,
+            unit: None,
         }
     }
 

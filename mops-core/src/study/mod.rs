@@ -244,8 +244,8 @@ pub struct Row {
 
 impl Row {
     /// Computes the value for one case; a panic of the criterion is an error.
-    pub(crate) fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
-        caught(|| self.criterion.value(case, analysis)).unwrap_or_else(Err)
+    pub(crate) fn value(&self, case: &Case, analysis: &Analysis, parameters: &[f64]) -> Result<Value, String> {
+        caught(|| self.criterion.value_with(case, analysis, parameters)).unwrap_or_else(Err)
     }
 
     /// Returns the reading of a value: the value scaled by the demand.

@@ -6,7 +6,7 @@ use super::Models;
 use super::jobs::job;
 use super::values::converted;
 use crate::case::Case;
-use crate::criterion::{Criterion, Sense, Usage};
+use crate::criterion::{Criterion, CriterionSpec, InUnit, Other, Sense, Usage, Window};
 use crate::demand::Demand;
 use crate::diagnostic::suggestion;
 use crate::model::AnalysisKind;
@@ -30,8 +30,12 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -
         }
     };
     let interface = study.models[model].1.interface();
-    check_sort(draft.criterion.reads(), interface.analysis, &study.models, model)?;
-    let criterion: Arc<dyn Criterion> = Arc::from(draft.criterion.bind(interface)?);
+    let reads = if draft.criterion.reads_any() { interface.analysis } else { draft.criterion.reads() };
+    check_sort(reads, interface.analysis, &study.models, model)?;
+    let others = others(study, model, draft.criterion.as_ref());
+    let criterion = draft.criterion.bind_with(interface, &others)?;
+    let criterion = in_unit(windowed(criterion, &draft, reads)?, &draft)?;
+    let criterion: Arc<dyn Criterion> = Arc::from(criterion);
     let unit = criterion.unit();
     let demand = demand(&draft, &unit, criterion.as_ref())?;
     if let Some(assumption) = criterion.assumption() {
@@ -41,7 +45,19 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -
         return Err(StudyError::new("weight", format!("a weight must be positive, not {}", draft.weight))
             .with_help("usage = \"monitor\" keeps a criterion out of the objective"));
     }
-    for case in cases_of(study, &draft)? {
+    let mut cases = cases_of(study, &draft, reads)?;
+    for (name, _) in &others {
+        let has_other = |case: &usize| {
+            let is_other = |row: &Row| row.name == *name && study.jobs[row.job].model == model;
+            study.rows.iter().any(|row| is_other(row) && study.jobs[row.job].case == *case)
+        };
+        if let (Some(case), true) = (cases.iter().find(|case| !has_other(case)), draft.cases.is_some()) {
+            let fact = format!("`{name}` is not evaluated in case `{}`", study.cases[*case].name);
+            return Err(StudyError::new("cases", fact).with_help("list cases in which it is"));
+        }
+        cases.retain(has_other);
+    }
+    for case in cases {
         criterion.suits(&study.cases[case])?;
         let job = job(study, model, case, &criterion.signals())?;
         study.rows.push(Row {
@@ -56,6 +72,68 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -
         });
     }
     Ok(())
+}
+
+/// Returns the criteria of the model that a criterion refers to.
+fn others(study: &Study, model: usize, of: &dyn CriterionSpec) -> Vec<Other> {
+    let find = |name: String| {
+        let row = study.rows.iter().find(|row| row.name == name && study.jobs[row.job].model == model)?;
+        Some((name, Arc::clone(&row.criterion)))
+    };
+    of.names().into_iter().filter_map(find).collect()
+}
+
+/// Restricts a criterion to a part of the simulation, if the study wants that.
+fn windowed(
+    criterion: Box<dyn Criterion>,
+    draft: &CriterionBuilder,
+    reads: AnalysisKind,
+) -> Result<Box<dyn Criterion>, StudyError> {
+    let second = Unit::known("s");
+    let time = |key: &str, given: &Option<Quantity>| {
+        given.as_ref().map(|given| converted(given, &second).map_err(|m| m.within(key))).transpose()
+    };
+    let (from, until) = (time("from", &draft.from)?, time("until", &draft.until)?);
+    if from.is_none() && until.is_none() {
+        return Ok(criterion);
+    }
+    if reads == AnalysisKind::Linear {
+        let key = if from.is_some() { "from" } else { "until" };
+        return Err(StudyError::new(key, "a linear system has no times").with_help(format!("remove `{key}`")));
+    }
+    let (from, until) = (from.unwrap_or(0.0), until.unwrap_or(f64::INFINITY));
+    if from.is_nan() || from < 0.0 {
+        let fact = format!("`from` is at {from} s, before the start of the simulation");
+        return Err(StudyError::new("from", fact).with_help("give a time from 0 s on"));
+    }
+    if until.is_nan() || until <= from {
+        let fact = format!("`until` at {until} s is not after `from` at {from} s");
+        return Err(StudyError::new("until", fact).with_help("give a later time"));
+    }
+    Ok(Box::new(Window::new(criterion, from, until)))
+}
+
+/// Converts a criterion to the unit in which the study asks.
+fn in_unit(criterion: Box<dyn Criterion>, draft: &CriterionBuilder) -> Result<Box<dyn Criterion>, StudyError> {
+    if let Some(unit) = draft.unit.as_ref() {
+        let fail = |why| StudyError::new("unit", why).with_help("give a unit of the same dimension");
+        return Ok(Box::new(InUnit::new(criterion, unit).map_err(fail)?));
+    }
+    let asked = [&draft.demand, &draft.bad, &draft.good].into_iter().flatten().find_map(|q| q.unit.as_ref());
+    match asked.filter(|unit| **unit != criterion.unit()) {
+        Some(unit) if criterion.unit().factor_to(unit).is_some() && criterion.unit().zero() == unit.zero() => {
+            let angles = [criterion.unit().is_angle(), unit.is_angle()];
+            if criterion.unit().dimension().is_none() && angles[0] != angles[1] {
+                // Refused with the demand.
+                return Ok(criterion);
+            }
+            InUnit::new(criterion, unit)
+                .map(|converted| Box::new(converted) as Box<dyn Criterion>)
+                .map_err(StudyError::here)
+        }
+        // Another dimension is refused with the demand; a temperature on another scale is converted with it.
+        _ => Ok(criterion),
+    }
 }
 
 /// Rejects a criterion for a model whose analyses it cannot read.
@@ -79,8 +157,7 @@ fn check_sort(reads: AnalysisKind, gives: AnalysisKind, models: &Models, model: 
     Err(StudyError::here(fact).with_help(way_out))
 }
 
-fn cases_of(study: &Study, draft: &CriterionBuilder) -> Result<Vec<usize>, StudyError> {
-    let reads = draft.criterion.reads();
+fn cases_of(study: &Study, draft: &CriterionBuilder, reads: AnalysisKind) -> Result<Vec<usize>, StudyError> {
     let measures = |case: &Case| match (draft.criterion.needs_measurement(), &case.experiment, reads) {
         (Some(signal), Some(experiment), AnalysisKind::Time) => experiment.channel(signal).is_some(),
         (Some(signal), Some(experiment), AnalysisKind::Linear) => experiment.response(signal).is_some(),

@@ -13,7 +13,7 @@ use crate::case::Case;
 use crate::criterion::Usage;
 use crate::evaluation::Objective;
 use crate::model::{Interface, Model};
-use crate::study::draft::{CaseBuilder, StudyBuilder};
+use crate::study::draft::{CaseBuilder, CriterionBuilder, StudyBuilder};
 use crate::study::{JobPlan, Study, Task, Tasks, diagnosis, tasks};
 use crate::study_error::StudyError;
 use cases::{assumed_units, build_case, with_sensors};
@@ -106,9 +106,11 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
             "add one, such as [criteria] followed by overshoot = { overshoot = { signal = \"y\" }, demand = 0.1 }",
         ));
     }
-    for (name, criterion) in draft.criteria {
+    let order: Vec<String> = draft.criteria.iter().map(|(name, _)| name.clone()).collect();
+    for (name, criterion) in in_order(draft.criteria)? {
         add_rows(&mut study, &name, criterion).map_err(|m| m.within(&name).within("criteria"))?;
     }
+    study.rows.sort_by_key(|row| order.iter().position(|name| *name == row.name));
     if study.task == Task::Diagnosis {
         for (model, case, measured) in diagnosis::measured(&study) {
             job(&mut study, model, case, &measured)?;
@@ -142,6 +144,23 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
         study.notes.push(fact.to_owned());
     }
     Ok(study)
+}
+
+/// Orders criteria so that each follows those that it refers to.
+fn in_order(mut left: Vec<(String, CriterionBuilder)>) -> Result<Vec<(String, CriterionBuilder)>, StudyError> {
+    let mut ordered = Vec::with_capacity(left.len());
+    while !left.is_empty() {
+        let waits = |(name, criterion): &(String, CriterionBuilder)| {
+            criterion.criterion.names().iter().any(|other| other == name || left.iter().any(|(left, _)| left == other))
+        };
+        let Some(next) = left.iter().position(|criterion| !waits(criterion)) else {
+            let names: Vec<String> = left.iter().map(|(name, _)| format!("`{name}`")).collect();
+            let fact = format!("circular reference between the criteria {}", names.join(", "));
+            return Err(StudyError::new(&left[0].0, fact).within("criteria").with_help("remove one reference"));
+        };
+        ordered.push(left.remove(next));
+    }
+    Ok(ordered)
 }
 
 /// Returns warnings for undriven inputs on a temperature scale: they stay at the zero of the scale, which is rarely

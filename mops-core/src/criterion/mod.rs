@@ -1,5 +1,10 @@
 //! Criteria: a number for every analysis, with its unit, sense and range.
 
+mod in_unit;
+mod window;
+
+use std::sync::Arc;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -9,11 +14,19 @@ use crate::samples::Samples;
 use crate::study_error::StudyError;
 use crate::unit::Unit;
 
+pub(crate) use in_unit::InUnit;
+pub(crate) use window::Window;
+
 /// Options of a criterion as written in the study; names and quantities are not yet checked against a model.
 pub trait CriterionSpec: Send + Sync {
     /// Returns the kind of analysis that the criterion reads. A study rejects models with another kind of analysis.
     fn reads(&self) -> AnalysisKind {
         AnalysisKind::Time
+    }
+
+    /// Returns true if the criterion reads both kinds of analysis.
+    fn reads_any(&self) -> bool {
+        false
     }
 
     /// Checks names and units against the interface of the model.
@@ -27,7 +40,24 @@ pub trait CriterionSpec: Send + Sync {
     fn needs_measurement(&self) -> Option<&str> {
         None
     }
+
+    /// Returns the names in the criterion that may be those of other criteria of the study.
+    fn names(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Checks names and units as [`CriterionSpec::bind`] does, with the criteria of the same model that [`CriterionSpec::names`]
+    /// refers to.
+    ///
+    /// # Errors
+    /// Returns an error as [`CriterionSpec::bind`] does.
+    fn bind_with(&self, model: &Interface, _others: &[Other]) -> Result<Box<dyn Criterion>, StudyError> {
+        self.bind(model)
+    }
 }
+
+/// Another criterion of the study, by its name.
+pub type Other = (String, Arc<dyn Criterion>);
 
 /// A criterion with checked names and units: a number for every analysis.
 pub trait Criterion: Send + Sync {
@@ -50,6 +80,15 @@ pub trait Criterion: Send + Sync {
     /// # Errors
     /// Returns one sentence if the criterion is not defined for the response.
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String>;
+
+    /// Computes the value for one case, with the parameters of the model in the order of [`Interface::parameters`]. By default,
+    /// they do not matter.
+    ///
+    /// # Errors
+    /// Returns an error as [`Criterion::value`] does.
+    fn value_with(&self, case: &Case, analysis: &Analysis, _parameters: &[f64]) -> Result<Value, String> {
+        self.value(case, analysis)
+    }
 
     /// Returns which values are better; [`Sense::Open`] if the study decides.
     fn sense(&self) -> Sense {
@@ -78,8 +117,11 @@ pub trait Criterion: Send + Sync {
     /// # Errors
     /// Returns one sentence if the criterion has no derivative for the response.
     fn slope(&self, case: &Case, tangent: &Tangent<'_>) -> Result<Value, String> {
-        let Tangent { analysis, along, reach, .. } = *tangent;
-        let [high, low] = [reach, -reach].map(|distance| self.value(case, &analysis.moved(along, distance)));
+        let Tangent { analysis, along, parameters, seed, reach, .. } = *tangent;
+        let [high, low] = [reach, -reach].map(|distance| {
+            let there: Vec<f64> = parameters.iter().zip(seed).map(|(value, slope)| value + distance * slope).collect();
+            self.value_with(case, &analysis.moved(along, distance), &there)
+        });
         let (high, low) = (high?, low?);
         let slope = |(high, low): (&f64, &f64)| (high - low) / (2.0 * reach);
         Ok(Value {
@@ -125,6 +167,10 @@ pub struct Tangent<'a> {
     pub value: &'a Value,
     /// Derivative of the analysis.
     pub along: &'a Analysis,
+    /// Parameters of the model.
+    pub parameters: &'a [f64],
+    /// Derivatives of the parameters.
+    pub seed: &'a [f64],
     /// Distance along the derivative within which the derivative is to describe the criterion.
     pub reach: f64,
 }
