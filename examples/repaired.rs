@@ -77,6 +77,11 @@ impl Files for Data {
     fn show(&self, path: &str) -> String {
         Path::new(FOLDER).join(path).display().to_string()
     }
+
+    fn list(&self, folder: &str) -> std::io::Result<Vec<String>> {
+        let entries = std::fs::read_dir(Path::new(FOLDER).join(folder))?;
+        entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned())).collect()
+    }
 }
 
 /// Builds the recalibrated study.
@@ -94,7 +99,7 @@ pub fn study() -> Result<Study, Box<dyn Error>> {
             ("ca".into(), TunerBuilder::new(0.0005, 0.0, 0.006)),
             ("cp".into(), TunerBuilder::new(0.0001, 0.0, 0.001)),
         ],
-        cases: vec![
+        cases: [
             file::experiments("horizontal", EXPERIMENT_HORIZONTAL, &Data)?,
             file::experiments("upright", EXPERIMENT_UPRIGHT, &Data)?,
         ]

@@ -293,7 +293,7 @@ fn values_of_the_wrong_type() {
             design("a word for a quantity", "demand = 0.10", "demand = \"small\""),
             design("an unknown unit in a quantity", "\"15 s\"", "\"15 sec\""),
             design("an unknown unit of a tuner", "max = 20.0, unit = \"s\"", "max = 20.0, unit = \"seconds\""),
-            design("an input that is a number", "{ p = 0.0 }", "{ p = 0.0, inputs = { d = 1.0 } }"),
+            design("an input that is a truth value", "{ p = 0.0 }", "{ p = 0.0, inputs = { d = true } }"),
             design(
                 "an input that moves in no known way",
                 "{ p = 0.0 }",
@@ -596,7 +596,7 @@ fn damaged_recordings() {
             recording("no column that is called time", "t[s]", "clock[s]"),
             recording("a gap in the time", "0.10,0.003", "nan,0.003"),
             recording("a time that does not increase", "0.10,0.003", "0.05,0.003"),
-            recording("a gap in an input", "2.96,0.1", "2.96,"),
+            recording("a gap at the start of an input", "3.00,0.0", "3.00,"),
             recording(
                 "a column of gaps",
                 "3.00,0.0\n0.05,0.001,2.99,0.1\n0.10,0.003,2.96,0.1\n0.15,0.006,2.91",

@@ -46,9 +46,17 @@ fn the_angle_of_a_decelerating_motor_is_the_integral_of_its_speed_in_any_unit() 
              [tuners]\nk = {{ start = 1, min = 0.5, max = 2 }}\n[criteria]\nf = {{ {criterion} }}\n"
         )
     };
-    let found = values(&text("final-value = { signal = 'x' }, demand = '10 rad'"), "");
-    assert!((found[0].1 - 600.0 * (1.0 - math::exp(-1.0))).abs() < 1e-5, "{found:?}");
-    assert_eq!(found[0].2, "deg");
+    // The answer is in the unit of the question.
+    let degrees = 600.0 * (1.0 - math::exp(-1.0));
+    for (demand, unit, per_degree) in [
+        ("demand = 600", "deg", 1.0),
+        ("demand = '10 rad'", "rad", 1f64.to_radians()),
+        ("demand = 10, unit = 'rad'", "rad", 1f64.to_radians()),
+    ] {
+        let found = values(&text(&format!("final-value = {{ signal = 'x' }}, {demand}")), "");
+        assert!((found[0].1 - degrees * per_degree).abs() < 1e-5, "{found:?}");
+        assert_eq!(found[0].2, unit);
+    }
 }
 
 const ROOM: &str = "
@@ -79,12 +87,12 @@ fn a_room_in_equilibrium_stays_there_on_every_temperature_scale() {
             let found = values(&text, "");
             let (end, top) = (&found[0], &found[1]);
             assert!(end.1.abs() < 1e-9, "{state} {input} {base}: {found:?}");
-            let (level, difference) = match state {
-                "K" => (293.15, "K"),
-                "degC" => (20.0, "K"),
-                _ => (68.0, "degR"),
+            let level = match state {
+                "K" => 293.15,
+                "degC" => 20.0,
+                _ => 68.0,
             };
-            assert!((top.1 - level).abs() < 1e-9 && top.2 == state && end.2 == difference, "{found:?}");
+            assert!((top.1 - level).abs() < 1e-9 && top.2 == state && end.2 == "K", "{found:?}");
         }
     }
 }
@@ -300,7 +308,8 @@ fn unity_feedback_requires_equal_dimensions_and_converts_units() {
 fn common_notations_of_units_are_read() {
     let text = "[study]\nname = 'm'\n[models.m.equations]\nstates = { x = 'J' }\nparameters = { E = 'J' }\nder = { x = 'E/1[s]' }\nhorizon = '1 s'\n\
                 [tuners]\nE = { start = '2 Wh', min = '1 Wh', max = '1 kWh' }\n[criteria]\ny = { final-value = { signal = 'x' }, demand = 'DEMAND' }\n";
-    assert!((values(&text.replace("DEMAND", "1 Wh"), "")[0].1 - 7200.0).abs() < 1e-6);
+    let found = &values(&text.replace("DEMAND", "1 Wh"), "")[0];
+    assert!((found.1 - 2.0).abs() < 1e-9 && found.2 == "Wh", "{found:?}");
     let refused = |demand: &str| {
         let folder = study(&text.replace("DEMAND", demand), "");
         mops(folder.path(), &["check", "study.toml"])

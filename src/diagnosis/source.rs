@@ -32,6 +32,8 @@ pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String 
     let mut cases = list("cases", &|name, text| format!("file::cases({name:?}, {text}, &models, &Data)?"));
     cases.extend(list("experiments", &|name, text| format!("file::experiments({name:?}, {text}, &Data)?")));
     let cases = items(cases, 8);
+    let cases = cases.trim_start_matches("vec!");
+    let concatenated = if cases.contains('\n') { "\n        .concat()" } else { ".concat()" };
     let criteria = list("criteria", &|name, text| entry(name, &format!("file::criterion(&catalogue, {text})?")));
     let criteria = items(criteria, 8);
     let noise = |(signal, sensor): (&str, &Value)| sensor.get("noise").map(|noise| entry(signal, &quantity(noise)));
@@ -83,7 +85,7 @@ pub fn study() -> Result<Study, Box<dyn Error>> {{
         name: {name:?}.into(),
         task: Task::Calibration,
 {seed}        tuners: {tuners},
-        cases: {cases}.concat(),
+        cases: {cases}{concatenated},
 {sensors}        criteria: {criteria},
         models,
         ..StudyBuilder::default()

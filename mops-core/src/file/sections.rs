@@ -346,7 +346,8 @@ pub(super) struct CriterionCommon {
     pub from: Option<Quantity>,
     /// End of the part of the simulation that the criterion reads; default is the end of the simulation.
     pub until: Option<Quantity>,
-    /// Unit of the values in all outputs; default is the unit of `demand`, `bad` or `good`, or else that of the kind.
+    /// Unit of the values in all outputs, and of demands without a unit. By default, outputs are in the unit of `demand`, `bad` or
+    /// `good`, or else in that of the kind.
     pub unit: Option<String>,
 }
 

@@ -34,10 +34,12 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -
     check_sort(reads, interface.analysis, &study.models, model)?;
     let others = others(study, model, draft.criterion.as_ref());
     let criterion = draft.criterion.bind_with(interface, &others)?;
+    // Bare numbers are in the unit that the study states for the criterion, or else in that of its kind.
+    let bare = draft.unit.clone().unwrap_or_else(|| criterion.unit());
     let criterion = in_unit(windowed(criterion, &draft, reads)?, &draft)?;
     let criterion: Arc<dyn Criterion> = Arc::from(criterion);
     let unit = criterion.unit();
-    let demand = demand(&draft, &unit, criterion.as_ref())?;
+    let demand = demand(&draft, &bare, &unit, criterion.as_ref())?;
     if let Some(assumption) = criterion.assumption() {
         study.notes.push(format!("`{name}`: {assumption}"));
     }
@@ -223,11 +225,16 @@ fn named(study: &Study, name: &str) -> Result<Vec<usize>, StudyError> {
     Err(StudyError::new(name, fact).with_help(suggestion(name, all)))
 }
 
-/// Returns the demand of a criterion in its unit, checked against the sense and the range of its kind.
-fn demand(draft: &CriterionBuilder, unit: &Unit, criterion: &dyn Criterion) -> Result<Demand, StudyError> {
+/// Returns the demand of a criterion in its unit, checked against the sense and the range of its kind. Numbers without a unit are in
+/// `bare`.
+fn demand(draft: &CriterionBuilder, bare: &Unit, unit: &Unit, criterion: &dyn Criterion) -> Result<Demand, StudyError> {
     let value = |key: &str, given: &Option<Quantity>| {
         given.as_ref().map_or(Ok(()), |q| refuse_mixed_angles(key, q, unit))?;
-        let value = given.as_ref().map(|q| converted(q, unit).map_err(|m| m.within(key))).transpose()?;
+        let in_unit = |q: &Quantity| match q.unit {
+            None if bare != unit => Quantity { unit: Some(bare.clone()), ..q.clone() },
+            _ => q.clone(),
+        };
+        let value = given.as_ref().map(|q| converted(&in_unit(q), unit).map_err(|m| m.within(key))).transpose()?;
         let is_bare = given.as_ref().is_some_and(|q| q.unit.is_none());
         value.map(|value| in_range(key, value, is_bare, unit, criterion.range())).transpose()
     };
