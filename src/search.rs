@@ -110,6 +110,12 @@ impl std::error::Error for SolveError {}
 /// # Errors
 /// If the solver does not accept the problem.
 pub fn suits(study: &Study, solver: &SolverChoice) -> Result<(), SolveError> {
+    // Excitation needs no criterion, and in a diagnosis every channel counts with its noise.
+    if study.rows().is_empty() && !matches!(study.task(), Task::Excitation | Task::Diagnosis) {
+        let help =
+            "add one, such as [criteria] followed by overshoot = { overshoot = { signal = \"y\" }, demand = 0.1 }";
+        return Err(SolveError(StudyError::new("criteria", "the study has no criterion").with_help(help)));
+    }
     if solves(study) { accepts(solver, solver.make().as_ref(), &Problem::outline(study)) } else { Ok(()) }
 }
 

@@ -216,3 +216,92 @@ fn a_delay_in_the_loop_is_a_delay_of_the_cut_loop() {
     let undefined = String::from_utf8_lossy(&undefined);
     assert!(undefined.contains("a delay lies in a feedback loop"), "{undefined}");
 }
+
+#[test]
+fn a_transfer_function_and_its_matrices_answer_over_time_too() {
+    // 2/(0.5 s + 1) from rest: a step response, and the response to a sine.
+    let text = "
+        [study]
+        name = 'lag'
+        [models.lag]
+        transfer-function = { numerator = [2], denominator = ['T', 1], units = { T = 's' } }
+        [models.step]
+        like = 'lag'
+        transfer-function.horizon = '3 s'
+        [models.matrices]
+        state-space = { a = [['-1/T']], b = [['1/T']], c = [[2], [0]], d = [[0], [1]], outputs = ['y', 'u_out'], units = { T = 's' }, horizon = '3 s' }
+        [cases]
+        step = { T = '500 ms', inputs.u = 1 }
+        sine = { T = 0.5, inputs.u.sine = { amplitude = 1, frequency = '1 rad/s' } }
+        [criteria]
+        margin = { model = 'lag', crossover-frequency = {}, usage = 'monitor' }
+        end = { model = 'step', final-value = { signal = 'y' }, usage = 'monitor' }
+        same = { model = 'matrices', final-value = { signal = 'y' }, usage = 'monitor' }
+        through = { model = 'matrices', final-value = { signal = 'u_out' }, usage = 'monitor' }\n";
+    let folder = tempfile::tempdir().unwrap();
+    let result = run(folder.path(), text);
+    let step = 2.0 * (1.0 - math::exp(-6.0));
+    // Particular solution 2/(1 + T^2) (sin t - T cos t) and the decaying part.
+    let sine = 2.0 / 1.25 * (math::sin(3.0) - 0.5 * math::cos(3.0) + 0.5 * math::exp(-6.0));
+    for (case, expected, input) in [("step", step, 1.0), ("sine", sine, math::sin(3.0))] {
+        for name in ["end", "same"] {
+            let found = value(&result, case, name);
+            assert!((found - expected).abs() < 1e-7, "{name} in {case}: {found} {expected}");
+        }
+        assert!((value(&result, case, "through") - input).abs() < 1e-12);
+        assert!((value(&result, case, "margin") - 2.0 * 3.0f64.sqrt()).abs() < 1e-9);
+    }
+    let delayed = refused(&text.replace("['T', 1], units", "['T', 1], delay = 1, units"));
+    assert!(delayed.contains("a linear system with a delay is not simulated"), "{delayed}");
+}
+
+#[test]
+fn a_study_without_criteria_is_linearised_and_simulated_but_not_solved() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study.toml");
+    let text = "[study]\nname = 'plant'\n[models.plant.equations]\nstates = { x = '1', v = '1/s' }\ninputs = { u = '1/s2' }\n\
+                parameters = { w = '1/s' }\nder = { x = 'v', v = 'u - w^2*x' }\n[cases]\nslow = { w = 2, horizon = '1 s', inputs.u = 1 }\n";
+    std::fs::write(&study, text).unwrap();
+    let mops = |arguments: &[&str]| {
+        let output = cargo_bin_cmd!("mops").args(arguments).arg(study.to_str().unwrap()).output().unwrap();
+        let all = [&output.stdout[..], &output.stderr].concat();
+        (output.status.code(), String::from_utf8(all).unwrap())
+    };
+    let (code, text) = mops(&["linearise", "--place=-1+1i,-1-1i"]);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("-4") && text.contains("0 + 2i"), "{text}");
+    let (code, text) = mops(&["simulate"]);
+    assert_eq!(code, Some(0), "{text}");
+    let (code, text) = mops(&["check"]);
+    assert!(code == Some(0) && text.contains("the study has no criterion"), "{text}");
+    for command in ["run", "sensitivity"] {
+        let (code, text) = mops(&[command]);
+        assert!(code == Some(2) && text.contains("the study has no criterion"), "{command}: {text}");
+    }
+}
+
+#[test]
+fn every_task_has_a_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study.toml");
+    let text = "[study]\nname = 'lag'\n[models.lag.equations]\nstates = { x = '1' }\nparameters = { k = '1/s', d = '1/s' }\n\
+                der = { x = 'k - d*x' }\nhorizon = '2 s'\n[models.lag.parameters]\nd = 1\n[tuners]\nk = { start = 3, min = 1, max = 4 }\n\
+                [uncertain]\nd = { min = 0.5, max = 1.5 }\n[sweep]\nx = 'k'\n[monte-carlo]\nsamples = 20\n\
+                [criteria]\nend = { final-value = { signal = 'x' }, demand = 2 }\n";
+    std::fs::write(&study, text).unwrap();
+    for (command, task) in [
+        ("sensitivity", "sensitivity"),
+        ("sweep", "sweep"),
+        ("worst-case", "worst-case"),
+        ("monte-carlo", "monte-carlo"),
+    ] {
+        let out = folder.path().join(command);
+        let output = cargo_bin_cmd!("mops")
+            .args([command, study.to_str().unwrap(), "--json", "--out", out.to_str().unwrap()])
+            .output()
+            .unwrap();
+        let result: Value = serde_json::from_slice(&output.stdout)
+            .unwrap_or_else(|e| panic!("{command}: {e}: {}", String::from_utf8_lossy(&output.stderr)));
+        assert_eq!(result["task"], task);
+    }
+}

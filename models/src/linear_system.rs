@@ -5,13 +5,15 @@ use std::fmt;
 
 use mops_core::expression::units::{Conflict, Dimensions, Measure, Named};
 use mops_core::{
-    Analysis, DIRECTIONS, Dual, Dual7, Expression, Failure, Job, Parameter, Scalar, StateSpace, StudyError, Unit,
-    WithTangents,
+    Analysis, AnalysisKind, DIRECTIONS, Dual, Dual7, Expression, Failure, Instant, Interface, Job, Parameter, Plant,
+    Quantity, Scalar, StateSpace, StudyError, Unit, Variable, WithTangents,
 };
 use nalgebra::DMatrix;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
+
+use crate::kernel::{PlantModel, Simulated};
 
 /// Matrix, row by row.
 pub(crate) type Rows<S> = Vec<Vec<S>>;
@@ -34,6 +36,66 @@ pub(crate) trait LinearSystem {
 
     /// Returns the names of the inputs and of the outputs.
     fn channels(&self) -> [Vec<String>; 2];
+}
+
+/// A linear system as a plant that is simulated from rest.
+pub(crate) struct InTime<G> {
+    of: G,
+    interface: Interface,
+    states: Vec<Variable>,
+}
+
+impl<G: LinearSystem + Send + Sync> InTime<G> {
+    /// Returns the model of a linear system with this interface and these states, simulated over time until the horizon (s).
+    pub fn model(of: G, interface: &Interface, states: &[String], horizon: f64) -> Simulated<Self> {
+        let interface = Interface { analysis: AnalysisKind::Time, horizon: Some(horizon), ..interface.clone() };
+        let states = states.iter().map(|name| Variable::new(name, "1", "state of the system")).collect();
+        Simulated::new(Self { of, interface, states })
+    }
+}
+
+impl<G: LinearSystem + Send + Sync> PlantModel for InTime<G> {
+    fn interface(&self) -> &Interface {
+        &self.interface
+    }
+
+    fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
+        self.of.matrices(parameters)
+    }
+
+    fn states(&self) -> Vec<Variable> {
+        self.states.clone()
+    }
+}
+
+impl<S: Scalar> Plant<S> for Matrices<S> {
+    fn start(&self) -> Vec<S> {
+        vec![S::from(0.0); self.a.len()]
+    }
+
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        for (dx, (a, b)) in dx.iter_mut().zip(self.a.iter().zip(&self.b)) {
+            *dx = product(a, at.x) + product(b, at.u);
+        }
+    }
+
+    fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
+        product(&self.c[signal], at.x) + product(&self.d[signal], at.u)
+    }
+}
+
+fn product<S: Scalar>(row: &[S], column: &[S]) -> S {
+    row.iter().zip(column).fold(S::from(0.0), |sum, (a, b)| sum + *a * *b)
+}
+
+/// Returns the end of the simulation of a linear system, if it is to be simulated over time.
+pub(crate) fn horizon(given: Option<&Quantity>, has_delay: bool) -> Result<Option<f64>, StudyError> {
+    let Some(given) = given else { return Ok(None) };
+    if has_delay {
+        let help = "write it as `equations`, with `delay(u, T)`, or omit `horizon` for criteria of linear systems";
+        return Err(StudyError::new("delay", "a linear system with a delay is not simulated").with_help(help));
+    }
+    given.to(&Unit::known("s")).map(Some).map_err(|why| StudyError::new("horizon", why))
 }
 
 /// Analyses a linear system; implements [`mops_core::Model::analyse`].

@@ -3,14 +3,15 @@
 use std::collections::BTreeMap;
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, Scalar, StudyError, Variable, WithTangents,
+    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, Quantity, Scalar, StudyError, Variable,
+    WithTangents,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::linear_system::{self, Bound, Entry, LinearSystem, Matrices, Rows, Units, coherent};
+use crate::linear_system::{self, Bound, Entry, InTime, LinearSystem, Matrices, Rows, Units, coherent};
 
-/// Linear system given by its matrices, for criteria of linear systems: `dx/dt = A x + B u(t - delay)`,
+/// Linear system given by its matrices, for criteria of linear systems, or over time: `dx/dt = A x + B u(t - delay)`,
 /// `y = C x + D u(t - delay)`.
 ///
 /// An entry is a number, or an expression whose names are parameters that tuners, cases and the study can set. Example:
@@ -39,6 +40,9 @@ pub struct StateSpaceOptions {
     inputs: Option<Vec<String>>,
     /// Names of the outputs; default `y`, or `y1`, `y2`, ...
     outputs: Option<Vec<String>>,
+    /// End of a simulation. With it, the system is simulated over time, from rest, for criteria over time; without it, criteria of
+    /// linear systems read it. `like` makes one of the other.
+    horizon: Option<Quantity>,
     /// Units of parameters, inputs and outputs, such as `{ k = "N/m" }`.
     #[serde(default)]
     units: BTreeMap<String, String>,
@@ -96,7 +100,12 @@ impl ModelOptions for StateSpaceOptions {
             analysis: AnalysisKind::Linear,
             ..Interface::default()
         };
-        Ok(Box::new(Given { interface, matrices, delay, states }))
+        let horizon = linear_system::horizon(self.horizon.as_ref(), delay.is_some())?;
+        let given = Given { interface: interface.clone(), matrices, delay, states: states.clone() };
+        Ok(match horizon {
+            Some(horizon) => Box::new(InTime::model(given, &interface, &states, horizon)),
+            None => Box::new(given),
+        })
     }
 }
 

@@ -3,15 +3,16 @@
 use std::collections::BTreeMap;
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, Scalar, StudyError, Variable, WithTangents,
+    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, Quantity, Scalar, StudyError, Variable,
+    WithTangents,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::linear_system::{self, Bound, Entry, LinearSystem, Matrices, Units, canonical, coherent};
+use crate::linear_system::{self, Bound, Entry, InTime, LinearSystem, Matrices, Units, canonical, coherent};
 use crate::rational::from_roots;
 
-/// Linear system given by its transfer function, for criteria of linear systems:
+/// Linear system given by its transfer function, for criteria of linear systems, or over time:
 /// `G(s) = numerator(s)/denominator(s) exp(-s delay)`, or
 /// `gain (s - z1)(s - z2).../((s - p1)(s - p2)...) exp(-s delay)`.
 ///
@@ -42,6 +43,9 @@ pub struct TransferFunctionOptions {
     input: Option<String>,
     /// Name of the output; default `y`.
     output: Option<String>,
+    /// End of a simulation. With it, the system is simulated over time, from rest, for criteria over time; without it, criteria of
+    /// linear systems read it. `like` makes one of the other.
+    horizon: Option<Quantity>,
     /// Units of parameters, input and output, such as `{ T = "s" }`.
     units: BTreeMap<String, String>,
 }
@@ -114,8 +118,17 @@ impl ModelOptions for TransferFunctionOptions {
             analysis: AnalysisKind::Linear,
             ..Interface::default()
         };
-        Ok(Box::new(Given { interface, form, delay }))
+        let horizon = linear_system::horizon(self.horizon.as_ref(), delay.is_some())?;
+        let given = Given { interface: interface.clone(), form, delay };
+        Ok(match horizon {
+            Some(horizon) => Box::new(InTime::model(given, &interface, &states(below - 1), horizon)),
+            None => Box::new(given),
+        })
     }
+}
+
+fn states(order: usize) -> Vec<String> {
+    (1..=order).map(|i| format!("x{i}")).collect()
 }
 
 impl LinearSystem for Given {
@@ -139,9 +152,8 @@ impl LinearSystem for Given {
             return Err(Failure::Undefined("the leading coefficient of the denominator is 0".into()));
         }
         numerator.iter_mut().chain(&mut denominator).for_each(|c| *c = *c / leading);
-        let states = (1..=denominator.len()).map(|i| format!("x{i}")).collect();
         let delay = self.delay.as_ref().map_or(S::from(0.0), |delay| delay.value(parameters));
-        Ok(canonical(&numerator, &denominator, states, delay))
+        Ok(canonical(&numerator, &denominator, states(denominator.len()), delay))
     }
 
     fn channels(&self) -> [Vec<String>; 2] {

@@ -11,8 +11,8 @@ use std::sync::Arc;
 use clap::Args;
 use mops_core::linear::{Complex, TransferFunction, zeros};
 use mops_core::{
-    Analysis, AnalysisKind, Catalogue, Diagnostic, Failure, Job, Linearise, Linearised, Quantity, Resting, StateSpace,
-    Study, StudyError, suggestion,
+    Analysis, AnalysisKind, Catalogue, Diagnostic, Failure, Job, JobPlan, Linearise, Linearised, Quantity, Resting,
+    StateSpace, Study, StudyError, suggestion,
 };
 use serde_json::{Value, json};
 
@@ -64,10 +64,11 @@ pub(super) struct Arguments {
 pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     exit_after(arguments.limit);
     let study = open(catalogue, &arguments.study)?.study;
-    let (job, model) = chosen(&study, arguments)?;
-    let (name, case) = (&study.models()[model].0, &study.cases()[study.jobs()[job].case]);
-    let (parameters, at) = values(&study, job, &arguments.at)?;
-    let found = found(&study, job, &parameters, at, arguments)?;
+    let plan = chosen(&study, arguments)?;
+    let model = plan.model;
+    let (name, case) = (&study.models()[model].0, &study.cases()[plan.case]);
+    let (parameters, at) = values(&study, &plan, &arguments.at)?;
+    let found = found(&study, &plan, &parameters, at, arguments)?;
     let interface = study.models()[model].1.interface();
     let system = narrowed(&found.system, arguments)?;
 
@@ -157,41 +158,37 @@ fn channels(system: &StateSpace, poles: &[Complex], all: bool) -> Result<Vec<Val
 /// File that contains the parts that are not printed.
 const WHERE: &str = "linearised.json (--out DIR)";
 
-/// Returns the requested job (model-case pair) and its model, as indices.
-fn chosen(study: &Study, arguments: &Arguments) -> Result<(usize, usize), Diagnostic> {
+/// Returns the requested model in the requested case. Unless a case is given, it is the first one in which a criterion reads the
+/// model, or else the first of all.
+fn chosen(study: &Study, arguments: &Arguments) -> Result<JobPlan, Diagnostic> {
+    let find = |what: &str, wanted: &str, names: Vec<&str>| {
+        names.iter().position(|name| *name == wanted).ok_or_else(|| {
+            let help = suggestion(wanted, names.iter().copied());
+            Diagnostic::new(format!("the study has no {what} `{wanted}`")).with_help(help)
+        })
+    };
     let models: Vec<&str> = study.models().iter().map(|(name, _)| name.as_str()).collect();
     let model = match &arguments.model {
-        Some(name) => models.iter().position(|m| m == name).ok_or_else(|| {
-            let help = suggestion(name, models.iter().copied());
-            Diagnostic::new(format!("the study has no model `{name}`")).with_help(help)
-        })?,
+        Some(name) => find("model", name, models)?,
         None if models.len() == 1 => 0,
         None => {
             let help = format!("add --model with one of {}", models.join(", "));
             return Err(Diagnostic::new("the study has several models").with_help(help));
         }
     };
-    let jobs: Vec<usize> = (0..study.jobs().len()).filter(|&job| study.jobs()[job].model == model).collect();
-    let cases: Vec<&str> = jobs.iter().map(|&job| study.cases()[study.jobs()[job].case].name.as_str()).collect();
-    let place = match &arguments.case {
-        None if !jobs.is_empty() => 0,
-        None => {
-            return Err(Diagnostic::new(format!("no criterion of the study reads `{}`", models[model]))
-                .with_help("add a criterion with usage = \"monitor\"; it determines the parameters"));
-        }
-        Some(name) => cases.iter().position(|case| case == name).ok_or_else(|| {
-            Diagnostic::new(format!("no criterion of the study reads `{}` in a case `{name}`", models[model]))
-                .with_help(suggestion(name, cases.iter().copied()))
-        })?,
+    let case = match &arguments.case {
+        Some(name) => find("case", name, study.cases().iter().map(|case| case.name.as_str()).collect())?,
+        None => study.jobs().iter().find(|job| job.model == model).map_or(0, |job| job.case),
     };
-    Ok((jobs[place], model))
+    let diagnostic = |StudyError { message, help, .. }: StudyError| Diagnostic { help, ..Diagnostic::new(message) };
+    let parameters = study.parameter_sources(model, case).map_err(diagnostic)?;
+    Ok(JobPlan { model, case, parameters, signals: Vec::new(), horizon: 0.0 })
 }
 
 type Named = Vec<(String, Quantity)>;
 
 /// Returns the parameters of the job, and the remaining values of `--at`: states and inputs.
-fn values(study: &Study, job: usize, given: &[String]) -> Result<(Vec<f64>, Named), Diagnostic> {
-    let plan = &study.jobs()[job];
+fn values(study: &Study, plan: &JobPlan, given: &[String]) -> Result<(Vec<f64>, Named), Diagnostic> {
     let interface = study.models()[plan.model].1.interface();
     let mut tuners = study.start();
     let (mut direct, mut rest) = (Vec::new(), Vec::new());
@@ -218,12 +215,11 @@ fn values(study: &Study, job: usize, given: &[String]) -> Result<(Vec<f64>, Name
 /// Linearises the model between the requested inputs and outputs.
 fn found(
     study: &Study,
-    job: usize,
+    plan: &JobPlan,
     parameters: &[f64],
     at: Named,
     arguments: &Arguments,
 ) -> Result<Resting, CommandError> {
-    let plan = &study.jobs()[job];
     let (model, case) = (&study.models()[plan.model].1, &study.cases()[plan.case]);
     let undefined = |failure: Failure| CommandError::Failure(format!("the model cannot be linearised here: {failure}"));
     if model.interface().analysis == AnalysisKind::Linear {

@@ -35,7 +35,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use mops_core::Catalogue;
+use mops_core::{Catalogue, Task};
 
 use crate::terminal::{CommandError, print, show_each_panic_once};
 
@@ -72,6 +72,16 @@ enum Command {
     Run(run::Arguments),
     /// Compute the Pareto front (the non-dominated designs) of a design study.
     Pareto(pareto::Arguments),
+    /// Estimate the tuners of a study from its experiments, whatever its task.
+    Calibrate(run::Arguments),
+    /// Compute sensitivities of the criteria to the tuners of a study, at its optimum.
+    Sensitivity(run::Arguments),
+    /// Vary one or two tuners of a study over a grid, as its table [sweep] says.
+    Sweep(run::Arguments),
+    /// Search the uncertain parameters of a study for the worst cases of its criteria.
+    WorstCase(run::Arguments),
+    /// Sample the uncertain parameters of a study: shares that meet the demands, distributions.
+    MonteCarlo(run::Arguments),
     /// Select the point of a Pareto front for new demands, and write a study that starts there.
     Pick(pick::Arguments),
     /// Find the physical effect missing from a calibrated model, add it, and report the errors before and after.
@@ -136,6 +146,11 @@ fn perform(catalogue: &Catalogue, command: Command, mut program: clap::Command) 
     let outcome = match command {
         Command::Run(arguments) => run::run(catalogue, &arguments),
         Command::Pareto(arguments) => pareto::pareto(catalogue, &arguments),
+        Command::Calibrate(arguments) => run::run_as(catalogue, Task::Calibration, &arguments),
+        Command::Sensitivity(arguments) => run::run_as(catalogue, Task::Sensitivity, &arguments),
+        Command::Sweep(arguments) => run::run_as(catalogue, Task::Sweep, &arguments),
+        Command::WorstCase(arguments) => run::run_as(catalogue, Task::WorstCase, &arguments),
+        Command::MonteCarlo(arguments) => run::run_as(catalogue, Task::MonteCarlo, &arguments),
         Command::Pick(arguments) => pick::pick(catalogue, &arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(catalogue, &arguments),
         Command::Bench(arguments) => bench::bench(catalogue, &arguments),

@@ -1,5 +1,6 @@
 //! `mops run`: solves a study and writes the result.
 
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -91,6 +92,8 @@ pub(super) struct SolverOptions {
 pub(super) enum Search<'a> {
     /// Task of the study, with the solver and the budget of the command line, if given.
     Task(&'a SolverOptions),
+    /// A task other than that of the study.
+    Other(Task, &'a SolverOptions),
     /// A diagnosis.
     Diagnosis,
     /// The Pareto front, with the given number of points, of the criteria in their worst case or in every case.
@@ -102,6 +105,10 @@ impl Search<'_> {
     fn settings(&self) -> Vec<String> {
         match self {
             Self::Task(_) => Vec::new(),
+            Self::Other(task, _) => {
+                let name = serde_json::to_value(task).expect("a task has a name");
+                vec![format!("study.task={name}")]
+            }
             Self::Diagnosis => vec![DIAGNOSIS.to_owned()],
             Self::Pareto { points, per_case, .. } => {
                 let points = points.map(|points| format!("pareto.points={points}"));
@@ -113,7 +120,9 @@ impl Search<'_> {
 
     fn solver_options(&self) -> Option<&SolverOptions> {
         match self {
-            Self::Task(solver_options) | Self::Pareto { solver_options, .. } => Some(solver_options),
+            Self::Task(solver_options) | Self::Other(_, solver_options) | Self::Pareto { solver_options, .. } => {
+                Some(solver_options)
+            }
             Self::Diagnosis => None,
         }
     }
@@ -121,6 +130,11 @@ impl Search<'_> {
 
 pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     execute(catalogue, &arguments.common, &Search::Task(&arguments.solver_options))
+}
+
+/// Runs the study with another task than its own.
+pub(super) fn run_as(catalogue: &Catalogue, task: Task, arguments: &Arguments) -> Result<ExitCode, CommandError> {
+    execute(catalogue, &arguments.common, &Search::Other(task, &arguments.solver_options))
 }
 
 /// Returns the solver of the study if it has this name, or the one of the catalogue with its default options.
@@ -177,7 +191,9 @@ pub(super) fn execute(
     // N.B.: the name of a study is never used as a path.
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(file_name(file.study.name())));
     let mut progress = Progress::new(talks, options.max_evaluations, &options.cancellation);
-    if arguments.dashboard {
+    if arguments.dashboard && !std::io::stderr().is_terminal() {
+        eprint_line("note: --dashboard needs a terminal: progress is printed as lines");
+    } else if arguments.dashboard {
         progress = progress.with_criteria_of(&file.study);
     }
     if talks {

@@ -123,8 +123,16 @@ impl Watch for Progress {
             dashboard.add(state.evaluations, state.best.objective);
             lines = format!("\n  {}{}", sparkline(&dashboard.curve, state.evaluations, SPARKS), dashboard.criteria);
         }
-        let best = format!("best {:.6}{violation}{failed}{lines}", state.best.objective);
-        self.bar.set_message(plain(&best).into_owned());
+        let best = format!("best {:.6}{violation}{failed}", state.best.objective);
+        if let Some(printed) = self.printed.as_ref().filter(|_| !self.staged.load(Ordering::Relaxed)) {
+            let now = self.bar.elapsed().as_secs_f64();
+            let mut printed = printed.lock().unwrap_or_else(PoisonError::into_inner);
+            if now - printed.1 >= (RARER * now).max(FIRST) {
+                eprint_line(&format!("{now:>7.1} s  {} evaluations, {best}", state.evaluations));
+                printed.1 = now;
+            }
+        }
+        self.bar.set_message(plain(&(best + &lines)).into_owned());
     }
 
     fn improved(&self, best: &Evaluation) {
@@ -149,7 +157,7 @@ impl Watch for Progress {
             let mut printed = printed.lock().unwrap_or_else(PoisonError::into_inner);
             let now = self.bar.elapsed().as_secs_f64();
             let kind = what.split([';', '0', '1', '2', '3', '4', '5', '6', '7', '8', '9']).next().unwrap_or(what);
-            if printed.0 != kind || now - printed.1 >= (0.05 * now).max(1.0) {
+            if printed.0 != kind || now - printed.1 >= (RARER * now).max(1.0) {
                 eprint_line(&format!("{now:>7.1} s  {what}"));
                 *printed = (kind.to_owned(), now);
             }
@@ -166,6 +174,12 @@ impl Watch for Progress {
         self.bar.suspend(|| eprint_line(&text));
     }
 }
+
+/// Time between two lines of a log, as a share of the time so far: a long run has few lines.
+const RARER: f64 = 0.05;
+
+/// Shortest time between two lines on evaluations, s. A run that is shorter has none.
+const FIRST: f64 = 2.0;
 
 /// Largest number of criteria shown.
 const LINES: usize = 20;

@@ -73,6 +73,8 @@ pub struct Study {
     pub(crate) objective: Objective,
     pub(crate) seed: u64,
     pub(crate) models: Vec<(String, Arc<dyn Model>)>,
+    /// Values of parameters in the tables of the models.
+    pub(crate) fixed: Vec<Vec<(String, f64)>>,
     pub(crate) cases: Vec<Case>,
     pub(crate) tuners: Vec<Tuner>,
     pub(crate) rows: Vec<Row>,
@@ -189,16 +191,30 @@ impl Study {
     /// Assembles a study from parts that nobody has checked, for tests.
     #[doc(hidden)]
     pub fn from_parts(parts: StudyParts) -> Self {
-        let StudyParts { name, task, objective, seed, models, cases, tuners, rows, jobs, tasks, warnings, notes } =
-            parts;
-        Self { name, task, objective, seed, models, cases, tuners, rows, jobs, tasks, warnings, notes }
+        let StudyParts {
+            name,
+            task,
+            objective,
+            seed,
+            models,
+            fixed,
+            cases,
+            tuners,
+            rows,
+            jobs,
+            tasks,
+            warnings,
+            notes,
+        } = parts;
+        Self { name, task, objective, seed, models, fixed, cases, tuners, rows, jobs, tasks, warnings, notes }
     }
 
     /// Returns the parts, to change what has no method, for tests.
     #[doc(hidden)]
     pub fn into_parts(self) -> StudyParts {
-        let Self { name, task, objective, seed, models, cases, tuners, rows, jobs, tasks, warnings, notes } = self;
-        StudyParts { name, task, objective, seed, models, cases, tuners, rows, jobs, tasks, warnings, notes }
+        let Self { name, task, objective, seed, models, fixed, cases, tuners, rows, jobs, tasks, warnings, notes } =
+            self;
+        StudyParts { name, task, objective, seed, models, fixed, cases, tuners, rows, jobs, tasks, warnings, notes }
     }
 }
 
@@ -212,6 +228,7 @@ pub struct StudyParts {
     pub objective: Objective,
     pub seed: u64,
     pub models: Vec<(String, Arc<dyn Model>)>,
+    pub fixed: Vec<Vec<(String, f64)>>,
     pub cases: Vec<Case>,
     pub tuners: Vec<Tuner>,
     pub rows: Vec<Row>,

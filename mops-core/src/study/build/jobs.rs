@@ -23,9 +23,28 @@ pub(super) fn job(study: &mut Study, model: usize, case: usize, wanted: &[String
     Ok(index)
 }
 
-/// Sets the horizon and the parameters of a job.
-pub(super) fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)]) -> Result<(), StudyError> {
-    let JobPlan { model, case, .. } = study.jobs[index];
+impl Study {
+    /// Returns the job of a model in a case, with all its signals, whether a criterion reads it or not.
+    ///
+    /// # Errors
+    /// Returns an error if a parameter has no value in the case, or if a simulation has no end.
+    pub fn plan(&self, model: usize, case: usize) -> Result<JobPlan, StudyError> {
+        let (horizon, parameters) = complete(self, model, case)?;
+        let signals = (0..self.models[model].1.interface().signals.len()).collect();
+        Ok(JobPlan { model, case, parameters, signals, horizon })
+    }
+
+    /// Returns the sources of the parameters of a model in a case.
+    ///
+    /// # Errors
+    /// Returns an error if a parameter has no value in the case.
+    pub fn parameter_sources(&self, model: usize, case: usize) -> Result<Vec<ParameterSource>, StudyError> {
+        sources(self, self.models[model].1.interface(), &self.fixed[model], case)
+    }
+}
+
+/// Returns the horizon and the parameters of a job.
+pub(super) fn complete(study: &Study, model: usize, case: usize) -> Result<(f64, Vec<ParameterSource>), StudyError> {
     let interface = study.models[model].1.interface();
     let horizon = match (study.cases[case].horizon.or(interface.horizon), interface.analysis) {
         (Some(horizon), _) => horizon,
@@ -35,10 +54,7 @@ pub(super) fn complete(study: &mut Study, index: usize, fixed: &[(String, f64)])
             return Err(StudyError::here(fact).with_help("set `horizon` in the case or in the model"));
         }
     };
-    let parameters = sources(study, interface, fixed, case)?;
-    let job = &mut study.jobs[index];
-    (job.horizon, job.parameters) = (horizon, parameters);
-    Ok(())
+    Ok((horizon, study.parameter_sources(model, case)?))
 }
 
 /// Returns the error for a parameter with incompatible units in two models.

@@ -92,6 +92,7 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
         objective,
         seed: draft.seed,
         models,
+        fixed,
         cases,
         tuners,
         rows: Vec::new(),
@@ -100,12 +101,7 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
         notes,
         warnings,
     };
-    // Excitation needs no criterion, and in a diagnosis every channel counts with its noise.
-    if draft.criteria.is_empty() && !matches!(study.task, Task::Excitation | Task::Diagnosis) {
-        return Err(StudyError::new("criteria", "the study has no criterion").with_help(
-            "add one, such as [criteria] followed by overshoot = { overshoot = { signal = \"y\" }, demand = 0.1 }",
-        ));
-    }
+    let without = draft.criteria.is_empty();
     let order: Vec<String> = draft.criteria.iter().map(|(name, _)| name.clone()).collect();
     for (name, criterion) in in_order(draft.criteria)? {
         add_rows(&mut study, &name, criterion).map_err(|m| m.within(&name).within("criteria"))?;
@@ -118,8 +114,21 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
     }
     for index in 0..study.jobs.len() {
         let JobPlan { model, case, .. } = study.jobs[index];
-        complete(&mut study, index, &fixed[model])
-            .map_err(|m| m.within(&drafts[case].name).within(section(&drafts[case])))?;
+        let completed =
+            complete(&study, model, case).map_err(|m| m.within(&drafts[case].name).within(section(&drafts[case])))?;
+        let job = &mut study.jobs[index];
+        (job.horizon, job.parameters) = completed;
+    }
+    // Without a criterion, every model is simulated in every case, where it can be.
+    if without && !matches!(study.task, Task::Excitation | Task::Diagnosis) {
+        study
+            .warnings
+            .push("the study has no criterion: it can be simulated and linearised, but not solved".to_owned());
+        for model in 0..study.models.len() {
+            study
+                .jobs
+                .extend((0..study.cases.len()).filter_map(|case| study.plan(model, case).ok()).collect::<Vec<_>>());
+        }
     }
     let cold = temperatures_of_nothing(&study);
     study.warnings.extend(cold);
