@@ -1,15 +1,17 @@
 //! `mops data`: summary of a data file.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use mops_core::Diagnostic;
 use mops_core::data::DataFile;
 use mops_core::identification::{excitation_report, spacing};
-use mops_core::math;
 
 use super::findings;
+use crate::files;
+use crate::numbers::file_name;
+use crate::report::{Color, Curve, Plot};
 use crate::terminal::{CommandError, number, print, table};
 
 /// Arguments of `mops data`.
@@ -20,6 +22,12 @@ pub(super) struct Arguments {
     /// Print the order of persistent excitation of this column as an input.
     #[arg(long, value_name = "COLUMN")]
     excitation: Option<String>,
+    /// Print mean and standard deviation of every column between two times at which the plant is at rest: the noise of the sensors.
+    #[arg(long, num_args = 2, value_names = ["FROM", "TO"], allow_negative_numbers = true, conflicts_with = "excitation")]
+    rest: Option<Vec<f64>>,
+    /// Write a plot of every column over time, as SVG or PNG by the extension: columns.svg gives columns-NAME.svg for each of several.
+    #[arg(long, value_name = "FILE", conflicts_with = "excitation")]
+    plot: Option<PathBuf>,
 }
 
 pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
@@ -29,10 +37,19 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
         print(&excitation(&file, column, &arguments.file.display().to_string())?)?;
         return Ok(ExitCode::SUCCESS);
     }
+    if let Some(rest) = &arguments.rest {
+        print(&at_rest(&file, [rest[0], rest[1]])?)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if let Some(path) = &arguments.plot {
+        plot(&file, path)?;
+        print(&format!("wrote {}\n", path.display()))?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let time = file.time_column();
     let times = time.as_ref().map(|name| file.column(name)).transpose()?.map(|column| column.values);
     let mut rows = Vec::new();
-    let (mut sampling, mut unknown) = (String::new(), Vec::new());
+    let (mut sampling, mut unknown, mut advice) = (String::new(), Vec::new(), Vec::new());
     for name in &names {
         let column = file.column(name)?;
         // N.B.: values are not collected, as a second copy of a large file may not fit in memory.
@@ -42,7 +59,10 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
         if time.as_ref() == Some(name) {
             sampling = sample_time(name, &finite().collect::<Vec<f64>>());
         }
-        let noise = noise(column.values, times);
+        let noise = noise_of(column.values, times);
+        if let (Some(times), Some(noise), false) = (times, noise, time.as_ref() == Some(name)) {
+            advice.extend(suspicious_start(name, times, column.values, noise));
+        }
         if noise.is_none() {
             unknown.push(format!("`{name}`"));
         }
@@ -67,6 +87,9 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
     if !unknown.is_empty() {
         let names = unknown.join(", ");
         text += &format!("no noise estimate for {names}: needs {MIN_DIFFERENCES} groups of four consecutive samples\n");
+    }
+    for line in advice {
+        text += &line;
     }
     for skipped in &file.skipped {
         text += &format!("skipped: {skipped}\n");
@@ -95,16 +118,127 @@ fn excitation(file: &DataFile, name: &str, shown: &str) -> Result<String, Diagno
     Ok(findings::excitation(&[report]))
 }
 
+/// Largest deviation of a sample from the line through the next two that noise explains, in standard deviations of the noise: with
+/// weights 1, -2 and 1 that is `5 sqrt 6`, where 5 is rare for a normal distribution.
+const STARTS: f64 = 12.2;
+
+/// Returns advice on the first samples of a column: how many to skip, and from when on it moves.
+fn suspicious_start(name: &str, times: &[f64], values: &[f64], noise: f64) -> Option<String> {
+    let samples: Vec<(f64, f64)> =
+        times.iter().zip(values).filter(|(t, v)| t.is_finite() && v.is_finite()).map(|(&t, &v)| (t, v)).collect();
+    let off = |k: usize| (samples[k].1 - 2.0 * samples[k + 1].1 + samples[k + 2].1).abs();
+    let typical = (3..samples.len().saturating_sub(2).min(13)).map(off).fold(STARTS * noise, f64::max);
+    // A wrong sample is far from the line through the next two, which themselves are not.
+    if samples.len() >= 8 && off(0) > 3.0 * typical && off(1) <= typical {
+        let (first, next) = (number(samples[0].1), number(samples[1].1));
+        return Some(format!("`{name}`: the first sample ({first}) lies far from the next one ({next}): skip = 1\n"));
+    }
+    // Rest at first: the mean of the first samples holds for a tenth of the record.
+    let rest = samples.iter().take(10).map(|(_, v)| v).sum::<f64>() / 10.0;
+    let moves = samples.iter().position(|(_, v)| (v - rest).abs() > 6.0 * noise)?;
+    (noise > 0.0 && moves > (samples.len() / 10).max(20)).then(|| {
+        format!(
+            "`{name}`: at rest until {} s; `from` can cut that off, and `--rest` measures its noise\n",
+            number(samples[moves].0)
+        )
+    })
+}
+
+/// Formats mean and standard deviation of every column between two times.
+#[allow(clippy::cast_precision_loss)]
+fn at_rest(file: &DataFile, [from, to]: [f64; 2]) -> Result<String, Diagnostic> {
+    let time = file.time_column().ok_or_else(|| {
+        Diagnostic::new("no column of the file is the time").with_help("call it `t` or `time` in the header")
+    })?;
+    let times = file.column(&time)?.values;
+    let mut rows = Vec::new();
+    for name in file.column_names().iter().filter(|name| **name != time) {
+        let column = file.column(name)?;
+        let samples = times.iter().zip(column.values).filter(|(t, v)| (from..=to).contains(*t) && v.is_finite());
+        let values: Vec<f64> = samples.map(|(_, &v)| v).collect();
+        if values.len() < 2 {
+            let fact = format!("`{name}` has {} samples between {} and {}", values.len(), number(from), number(to));
+            let all = format!("`{time}` is from {} to {}", number(times[0]), number(times[times.len() - 1]));
+            return Err(Diagnostic::new(fact).with_help(all));
+        }
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let deviation = (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0)).sqrt();
+        // The difference of the means of both halves, in standard deviations, shows a drift.
+        let half = values.len() / 2;
+        let of = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+        let drift = of(&values[half..]) - of(&values[..half]);
+        let unit = column.unit.unwrap_or("").to_owned();
+        rows.push(vec![name.clone(), unit, values.len().to_string(), number(mean), number(deviation), number(drift)]);
+    }
+    let header = ["column", "unit", "samples", "mean", "standard deviation", "second half - first"];
+    Ok(table(&header, &[2, 3, 4, 5], rows))
+}
+
+/// Plots every column over time, one below the other.
+fn plot(file: &DataFile, path: &Path) -> Result<(), CommandError> {
+    let time = file.time_column();
+    let names = file.column_names();
+    let mut plots = Vec::new();
+    for name in names.iter().filter(|name| time.as_ref() != Some(name)) {
+        let column = file.column(name)?;
+        let times = match &time {
+            Some(time) => file.column(time)?.values.to_vec(),
+            None => (0..column.values.len()).map(|row| row as f64).collect(),
+        };
+        let of_time = time.as_ref().and_then(|time| file.column(time).ok()?.unit.map(str::to_owned));
+        let x_label = match (&time, of_time) {
+            (Some(time), Some(unit)) => format!("{time} ({unit})"),
+            (Some(time), None) => time.clone(),
+            (None, _) => "row".to_owned(),
+        };
+        let points = times.iter().copied().zip(column.values.iter().copied()).collect();
+        plots.push(Plot {
+            title: name.clone(),
+            x_label,
+            y_label: column.unit.map_or_else(|| name.clone(), |unit| format!("{name} ({unit})")),
+            curves: vec![Curve { points, color: Color::Measured, ..Curve::default() }],
+            ..Plot::default()
+        });
+    }
+    let wrong = || {
+        Diagnostic::new(format!("`{}` is neither .svg nor .png", path.display()))
+            .with_help("name a file such as columns.svg")
+    };
+    let end = path.extension().and_then(|end| end.to_str()).unwrap_or_default();
+    let several = plots.len() > 1;
+    for (plot, name) in plots.iter().zip(names.iter().filter(|name| time.as_ref() != Some(name))) {
+        let place = match several {
+            true => path.with_file_name(format!(
+                "{}-{}.{end}",
+                path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
+                file_name(name)
+            )),
+            false => path.to_owned(),
+        };
+        match end {
+            "svg" => files::write(&place, plot.svg()).map_err(CommandError::cannot_write(&place))?,
+            "png" => plot.write_png(&place).map_err(CommandError::cannot_write(&place))?,
+            _ => return Err(wrong().into()),
+        }
+    }
+    Ok(())
+}
+
 fn sample_time(name: &str, times: &[f64]) -> String {
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
     let (Some(least), Some(most)) = (steps.first(), steps.last()) else { return String::new() };
     let median = steps[steps.len() / 2];
     let order = if *least > 0.0 { "" } else { "; not strictly increasing" };
+    // Seconds since 1970 differ in digits that a rounded number lacks.
+    let (first, last) = (times[0], times[times.len() - 1]);
+    let ends = match number(first) == number(last) {
+        true => format!("{first} on, for {}", number(last - first)),
+        false => format!("{} to {}", number(first), number(last)),
+    };
     format!(
-        "`{name}` from {} to {}, step {} (median), {} (min), {} (max){order}",
-        number(times[0]),
-        number(times[times.len() - 1]),
+        "`{name}` from {ends}, step {} (median), {} (min), {} (max){order}",
         number(median),
         number(*least),
         number(*most)
@@ -112,15 +246,18 @@ fn sample_time(name: &str, times: &[f64]) -> String {
 }
 
 /// Smallest number of third differences for a noise estimate; its relative error is then about 20 %.
-const MIN_DIFFERENCES: u32 = 20;
+const MIN_DIFFERENCES: usize = 20;
 
 /// Estimates the standard deviation of white noise on a smooth signal from third differences, whose variance is 20 times that
-/// of the noise.
+/// of the noise: from their median absolute value, so that single wrong samples and jumps do not count, or from their root mean square
+/// where coarse quantisation makes most of them 0.
 ///
 /// Empty cells of the column are skipped. A distance of more than 1.5 times the median distance between samples is a gap, and
 /// no difference is taken across a gap. Returns `None` with fewer than [`MIN_DIFFERENCES`] differences.
+///
+/// Source of the factor 1.4826: P. Rousseeuw, A. Leroy, Robust Regression and Outlier Detection (1987), section 4.4.
 #[allow(clippy::cast_precision_loss)]
-fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
+pub(super) fn noise_of(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
     let times = times.filter(|times| times.len() == values.len());
     let samples = || {
         let at = |row: usize| times.map_or(row as f64, |times| times[row]);
@@ -129,23 +266,32 @@ fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
     let mut steps: Vec<f64> = samples().zip(samples().skip(1)).map(|(a, b)| b.0 - a.0).collect();
     steps.sort_unstable_by(f64::total_cmp);
     let longest = 1.5 * steps.get(steps.len() / 2)?;
-    let (mut run, mut last, mut count, mut sum) = ([0.0; 4], f64::NEG_INFINITY, 0_u32, 0.0);
+    let (mut run, mut last, mut differences) = ([0.0; 4], f64::NEG_INFINITY, Vec::new());
     let mut length = 0;
     for (time, value) in samples() {
         length = if time - last <= longest { length + 1 } else { 1 };
         run.rotate_left(1);
         (run[3], last) = (value, time);
         if length >= run.len() {
-            count += 1;
-            sum += math::powi(run[3] - 3.0 * run[2] + 3.0 * run[1] - run[0], 2);
+            differences.push((run[3] - 3.0 * run[2] + 3.0 * run[1] - run[0]).abs());
         }
     }
-    (count >= MIN_DIFFERENCES).then(|| (sum / f64::from(count) / 20.0).sqrt())
+    if differences.len() < MIN_DIFFERENCES {
+        return None;
+    }
+    differences.sort_unstable_by(f64::total_cmp);
+    let robust = 1.4826 * differences[differences.len() / 2];
+    let square = differences.iter().map(|d| d * d).sum::<f64>() / differences.len() as f64;
+    let of_differences = if robust > ZEROS * square.sqrt() { robust } else { square.sqrt() };
+    Some(of_differences / 20f64.sqrt())
 }
+
+/// Ratio of the robust to the plain estimate below which most differences are 0.
+const ZEROS: f64 = 0.1;
 
 #[cfg(test)]
 mod tests {
-    use super::noise;
+    use super::noise_of as noise;
 
     /// Steep ramp with an alternating error of 0.1, whose third differences are 0.8.
     fn ramp(n: i32) -> (Vec<f64>, Vec<f64>) {
@@ -155,7 +301,8 @@ mod tests {
 
     #[test]
     fn noise_is_not_estimated_across_gaps() {
-        let expected = (0.64f64 / 20.0).sqrt();
+        // All differences are equal, so that their median is their root mean square.
+        let expected = 1.4826 * (0.64f64 / 20.0).sqrt();
         let near =
             |found: Option<f64>| assert!((found.unwrap() - expected).abs() < 1e-9, "{found:?} is not {expected}");
         let (times, values) = ramp(100);
@@ -176,5 +323,10 @@ mod tests {
         let slow: Vec<f64> = sparse(&|i| if (30..45).contains(&i) { f64::NAN } else { values[i] });
         near(noise(&slow, Some(&rows)));
         near(noise(&slow, None));
+        // A wrong first sample and a jump do not count.
+        let mut wrong = values;
+        wrong[0] = 1e6;
+        wrong[50..].iter_mut().for_each(|value| *value += 1e3);
+        near(noise(&wrong, None));
     }
 }
