@@ -325,3 +325,128 @@ fn a_grid_is_a_case_for_every_combination_and_patterns_choose_among_them() {
     let double = check(folder.path(), &text.replace("k = [1, 2], m", "k = [], m"));
     assert!(double.contains("`k` has no values"), "{double}");
 }
+
+#[test]
+fn a_robust_loss_keeps_a_gain_that_single_wrong_samples_would_bend() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    // x = 2 t, with an alternating error of 0.01 and three samples that stand alone.
+    let wrong = |k: u32| if k % 13 == 7 { 5.0 } else { 0.01 * if k % 2 == 0 { 1.0 } else { -1.0 } };
+    let rows: String =
+        (0..=40).map(|k| format!("{},{},1\n", f64::from(k) * 0.1, 0.2 * f64::from(k) + wrong(k))).collect();
+    std::fs::write(folder.join("wrong.csv"), format!("t[s],x[rad],u[rad/s]\n{rows}")).unwrap();
+    let experiment = "[experiments.e]\nfile = 'wrong.csv'\nchannels = { x = { column = 'x', noise = 0.01 } }\ninputs = { u = 'u' }\n";
+    let of = |loss: &str| {
+        let text = gain(experiment).replace(
+            "fit = { signal = 'x' }, demand = 1e-3",
+            &format!("normalised-error = {{ signal = 'x', loss = '{loss}' }}"),
+        );
+        run(folder, &text)["tuners"][0]["value"].as_f64().unwrap()
+    };
+    assert!((of("squares") - 2.0).abs() > 0.1);
+    assert!((of("huber") - 2.0).abs() < 0.01, "{}", of("huber"));
+    assert!((of("student") - 2.0).abs() < 0.002, "{}", of("student"));
+    let told = check(folder, &gain(experiment));
+    assert!(told.contains("3 samples of `x` in `e` (the first at 0.7000000000000001 s) stand alone"), "{told}");
+}
+
+#[test]
+fn a_tuner_has_a_separate_value_in_named_experiments_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (name, slope) in [("a_1", 2.0), ("a_2", 2.0), ("b", 3.0)] {
+        record(folder, &format!("{name}.csv"), "t[s],x[rad],u[rad/s]", |t| format!("{t},{},1", slope * t));
+    }
+    let experiment = |name: &str| {
+        format!("[experiments.{name}]\nfile = '{name}.csv'\nchannels = {{ x = 'x' }}\ninputs = {{ u = 'u' }}\n")
+    };
+    let experiments = ["a_1", "a_2", "b"].map(experiment).concat();
+    let text = gain(&experiments).replace("max = 10 }", "max = 10, per-case = ['b*'] }");
+    let result = run(folder, &text);
+    let tuners: Vec<(String, f64)> = result["tuners"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|t| (t["name"].as_str().unwrap().to_owned(), t["value"].as_f64().unwrap()))
+        .collect();
+    assert_eq!(tuners.len(), 2, "{tuners:?}");
+    assert!(tuners[0].0 == "k" && (tuners[0].1 - 2.0).abs() < 1e-6, "{tuners:?}");
+    assert!(tuners[1].0 == "b/k" && (tuners[1].1 - 3.0).abs() < 1e-6, "{tuners:?}");
+    let wrong = check(folder, &text.replace("['b*']", "['c']"));
+    assert!(wrong.contains("there is no case or experiment `c`"), "{wrong}");
+}
+
+#[test]
+fn a_study_written_for_a_data_file_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    // A lag of order 2, w = 3, z = 0.4, with noise from a fixed sequence; columns with awkward names.
+    let (mut x, mut v, h) = (0.0, 0.0, 0.001);
+    let mut rows = String::new();
+    for k in 0..8000 {
+        let t = f64::from(k) * h;
+        let u = if (t / 1.7) as u64 % 2 == 0 { 1.0 } else { -0.5 };
+        if k % 20 == 0 {
+            rows += &format!("{t:.2};{u};{:.5}\n", x + 1e-3 * math::sin(1e3 * t * t));
+        }
+        let a = 9.0 * (2.0 * u - x) - 2.4 * v;
+        v += h * a;
+        x += h * v;
+    }
+    std::fs::write(folder.join("log.csv"), format!("t [s];motor voltage (V);speed (left) [rpm]\n{rows}")).unwrap();
+    let study = folder.join("first");
+    let mops = |arguments: &[&str]| {
+        let output = cargo_bin_cmd!("mops").args(arguments).current_dir(folder).output().unwrap();
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        output
+    };
+    mops(&["new", "first", "--from-data", "log.csv"]);
+    assert!(study.join("log.csv").is_file());
+    let output = mops(&["run", "first/study.toml", "--json"]);
+    let result: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let value = |name: &str| {
+        let all = result["tuners"].as_array().unwrap();
+        all.iter().find(|t| t["name"] == name).unwrap_or_else(|| panic!("{result}"))["value"].as_f64().unwrap()
+    };
+    assert!((value("w_speed__left") - 3.0).abs() < 0.01 && (value("z_speed__left") - 0.4).abs() < 0.01);
+    assert!((value("k_speed__left_motor_voltage") - 2.0).abs() < 0.01, "{result}");
+    for template in ["pid", "equations", "state-feedback"] {
+        mops(&["new", template, "--template", template]);
+        mops(&["check", &format!("{template}/study.toml")]);
+    }
+    let refused = cargo_bin_cmd!("mops")
+        .args(["new", "x", "--from-data", "log.csv", "--inputs", "u"])
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("no column `u`"));
+    assert!(!folder.join("x").exists());
+}
+
+#[test]
+fn data_are_summarised_at_rest_and_plotted() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    // At rest with errors of 0.01 and -0.01 until 5 s, then a ramp; the first sample is wrong.
+    let rows: String = (0..200)
+        .map(|k| {
+            let t = 0.05 * f64::from(k);
+            let x = if k == 0 { 9.0 } else { (t - 5.0).max(0.0) + if k % 2 == 0 { 0.01 } else { -0.01 } };
+            format!("{},{x}\n", 1_763_990_000.0 + t)
+        })
+        .collect();
+    std::fs::write(folder.join("log.csv"), format!("t[s],x[V]\n{rows}")).unwrap();
+    let mops = |arguments: &[&str]| {
+        let output = cargo_bin_cmd!("mops").args(arguments).current_dir(folder).output().unwrap();
+        String::from_utf8([&output.stdout[..], &output.stderr].concat()).unwrap()
+    };
+    let summary = mops(&["data", "log.csv"]);
+    assert!(summary.contains("`x`: the first sample (9) lies far from the next one (-0.01): skip = 1"), "{summary}");
+    assert!(summary.contains("for 9.95"), "{summary}");
+    let rest = mops(&["data", "log.csv", "--rest", "1763990001", "1763990004"]);
+    assert!(rest.contains("0.0100") || rest.contains("0.01008"), "{rest}");
+    assert!(mops(&["data", "log.csv", "--rest", "1", "2"]).contains("has 0 samples"));
+    assert!(mops(&["data", "log.csv", "--plot", "x.svg"]).contains("wrote x.svg"));
+    assert!(std::fs::read_to_string(folder.join("x.svg")).unwrap().contains("<svg"));
+    assert!(mops(&["data", "log.csv", "--plot", "x.gif"]).contains("neither .svg nor .png"));
+}

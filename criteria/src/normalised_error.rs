@@ -7,7 +7,7 @@ use mops_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{NOT_NEGATIVE, compare, compared_slopes, positive};
+use crate::common::{Loss, NOT_NEGATIVE, compare, compared_slopes, positive};
 
 /// Normalised error `mean_i ((y_simulated - y_measured)(t_i)/noise)^2`, dimensionless: 1 if the residual is pure noise.
 ///
@@ -15,12 +15,16 @@ use crate::common::{NOT_NEGATIVE, compare, compared_slopes, positive};
 /// experiment. The value is the sum of squares of the residuals
 /// `r_i = (y_simulated - y_measured)(t_i)/(noise sqrt(N))`, N samples, that least-squares solvers use.
 ///
+/// With a robust `loss`, the squares are replaced by Huber's loss or that of Student's distribution with 4 degrees of freedom; pure
+/// normal noise then has the value 0.93 or 0.97. Standard errors of a calibration then assume residuals of equal variance.
+///
 /// The criterion is evaluated in the experiments that measure the signal. Less is better. Range: from 0 up. A value
 /// well below 1 means that the noise level is too high or that the model fits the noise. A value well above 1 means
 /// that the model lacks an effect. The default demand is 1.
 ///
 /// Source: P. R. Bevington, D. K. Robinson, Data Reduction and Error Analysis for the Physical Sciences (3rd ed.,
-/// 2003), chapter 11 (reduced chi-square, here without the number of estimated parameters).
+/// 2003), chapter 11 (reduced chi-square, here without the number of estimated parameters). Robust losses: P. J. Huber, E. M.
+/// Ronchetti, Robust Statistics (2nd ed., 2009), sections 4.5, 7.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct NormalisedError {
@@ -28,6 +32,10 @@ pub struct NormalisedError {
     pub signal: String,
     /// Noise level (standard deviation), in the unit of the signal; by default that of the channel.
     pub noise: Option<Quantity>,
+    /// How much a deviation counts. `squares` (default) is right for normal noise. `huber` grows linearly beyond 1.345 standard
+    /// deviations and `student` with the logarithm, so that samples that stand alone have little or no influence.
+    #[serde(default)]
+    pub loss: Loss,
 }
 
 impl CriterionOptions for NormalisedError {
@@ -38,7 +46,7 @@ impl CriterionSpec for NormalisedError {
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let signal = model.signal(&self.signal)?;
         let noise = positive("noise", self.noise.as_ref(), &signal.unit)?;
-        Ok(Box::new(Bound { signal: signal.name.clone(), noise }))
+        Ok(Box::new(Bound { signal: signal.name.clone(), noise, loss: self.loss }))
     }
 
     fn needs_measurement(&self) -> Option<&str> {
@@ -55,6 +63,7 @@ const SAMPLES: usize = 20;
 struct Bound {
     signal: String,
     noise: Option<f64>,
+    loss: Loss,
 }
 
 impl Criterion for Bound {
@@ -95,8 +104,9 @@ impl Criterion for Bound {
 
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
         let comparison = compare(case, analysis, &self.signal)?;
-        let scale = self.scale(comparison.channel)?;
-        let value = Value::sum_of_squares(comparison.differences.iter().map(|d| scale * d).collect());
+        let [noise, share] = self.noise_and_share(comparison.channel)?;
+        let residual = |d: &f64| self.loss.residual(d / noise)[0] * share;
+        let value = Value::sum_of_squares(comparison.differences.iter().map(residual).collect());
         let is_far_below = value.number < FAR_BELOW && value.residuals.len() >= SAMPLES;
         let note = is_far_below.then_some("far below the noise: check the unit of `noise`");
         Ok(Value { note, ..value })
@@ -104,24 +114,36 @@ impl Criterion for Bound {
 
     fn slope(&self, case: &Case, tangent: &Tangent<'_>) -> Result<Value, String> {
         let (channel, slopes) = compared_slopes(case, tangent.along, &self.signal)?;
-        let scale = self.scale(channel)?;
-        Ok(Value::slope_of_squares(&tangent.value.residuals, slopes.iter().map(|d| scale * d).collect()))
+        let [noise, share] = self.noise_and_share(channel)?;
+        let slopes = if self.loss == Loss::Squares {
+            slopes.iter().map(|d| d / noise * share).collect()
+        } else {
+            let differences = compare(case, tangent.analysis, &self.signal)?.differences;
+            let slope = |(d, slope): (&f64, &f64)| self.loss.residual(d / noise)[1] * slope / noise * share;
+            differences.iter().zip(&slopes).map(slope).collect()
+        };
+        Ok(Value::slope_of_squares(&tangent.value.residuals, slopes))
     }
 
     fn samples(&self, case: &Case) -> Option<Samples> {
+        // With a robust loss, residuals are not proportional to deviations.
+        if self.loss != Loss::Squares {
+            return None;
+        }
         let channel = case.experiment.as_ref()?.channel(&self.signal)?;
-        let weights = vec![self.scale(channel).ok()?; channel.times.len()];
+        let [noise, share] = self.noise_and_share(channel).ok()?;
+        let weights = vec![share / noise; channel.times.len()];
         Some(Samples { signal: self.signal.clone(), first: 0, weights, noise: self.noise.or(channel.noise) })
     }
 }
 
 impl Bound {
-    /// Returns `1/(noise sqrt(N))`.
+    /// Returns the noise level and `1/sqrt(N)`.
     #[allow(clippy::cast_precision_loss)]
-    fn scale(&self, channel: &Channel) -> Result<f64, String> {
+    fn noise_and_share(&self, channel: &Channel) -> Result<[f64; 2], String> {
         let noise =
             self.noise.or(channel.noise).ok_or_else(|| format!("the noise level of `{}` is unknown", self.signal))?;
-        Ok(1.0 / (noise * (channel.times.len() as f64).sqrt()))
+        Ok([noise, 1.0 / (channel.times.len() as f64).sqrt()])
     }
 }
 
@@ -131,7 +153,7 @@ mod tests {
     use crate::common::testing::{assert_near, bound, measured, quantity, simulated, undefined_in, value_in};
 
     fn error(noise: Option<&str>) -> NormalisedError {
-        NormalisedError { signal: "y".into(), noise: noise.map(quantity) }
+        NormalisedError { signal: "y".into(), noise: noise.map(quantity), ..NormalisedError::default() }
     }
 
     #[test]
@@ -144,6 +166,14 @@ mod tests {
         assert_eq!((samples.weights, samples.noise), (vec![5.0; 4], Some(0.1)));
         let option = value_in(&case, &error(Some("20 cm")), &simulated(3.0, |t| t));
         assert_near(option.number, 0.25, 1e-12);
+    }
+
+    #[test]
+    fn a_sample_that_stands_alone_counts_less_with_a_robust_loss() {
+        let case = measured(&[0.0, 1.0, 2.0, 3.0], &[0.1, 0.9, 2.1, 103.0], Some(0.1));
+        let of = |loss: Loss| value_in(&case, &NormalisedError { loss, ..error(None) }, &simulated(3.0, |t| t)).number;
+        assert!(of(Loss::Squares) > 2e5 && of(Loss::Huber) < 700.0 && of(Loss::Student) < 20.0);
+        assert!(bound(&NormalisedError { loss: Loss::Huber, ..error(None) }).samples(&case).is_none());
     }
 
     #[test]

@@ -209,6 +209,11 @@ fn tuner(tuner: &Value) -> String {
                     starts.map(|(case, value)| format!("({case:?}.into(), {})", quantity(value))).collect();
                 format!("starts: vec![{}]", starts.join(", "))
             }
+            "per-case" if value.is_array() => {
+                let cases = value.as_array().into_iter().flatten().filter_map(Value::as_str);
+                let cases: Vec<String> = cases.map(|case| format!("{case:?}.into()")).collect();
+                format!("separate_in: vec![{}]", cases.join(", "))
+            }
             _ => format!("per_case: {value}"),
         });
     }

@@ -43,7 +43,9 @@ use crate::study_error::StudyError;
 use crate::unit::{Quantity, Unit};
 use experiment::entry;
 use inputs::Reader;
-use sections::{CaseOptions, CriterionCommon, ModelCommon, SensorSection, SolverCommon, StudySection, TunerSection};
+use sections::{
+    CaseOptions, CriterionCommon, ModelCommon, PerCase, SensorSection, SolverCommon, StudySection, TunerSection,
+};
 use tree::{Node, Text};
 
 /// Source of data files: a folder, or the program itself.
@@ -335,7 +337,11 @@ fn read_tuner(node: &Node<'_>) -> Result<TunerBuilder, Diagnostic> {
         values: section.values,
         inactive: section.active == Some(false),
         tie: section.tie,
-        per_case: section.per_case,
+        per_case: section.per_case == PerCase::All(true),
+        separate_in: match section.per_case {
+            PerCase::In(cases) => cases,
+            PerCase::All(_) => Vec::new(),
+        },
         starts: section.starts.0,
     })
 }

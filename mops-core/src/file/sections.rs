@@ -125,13 +125,27 @@ pub(super) struct TunerSection {
     pub active: Option<bool>,
     /// Expression of tuners defined before this one, such as `"4*Td"`; the tuner takes its value.
     pub tie: Option<String>,
-    /// `true` gives every case or experiment a separate value. In selection and validation experiments the value is
-    /// estimated from their own data, as initial states are.
+    /// `true` gives every case or experiment a separate value; a list of names or patterns gives one to each of these, and a common one
+    /// to all others. In selection and validation experiments the value is estimated from their own data, as initial states are.
     #[serde(default)]
-    pub per_case: bool,
+    pub per_case: PerCase,
     /// Initial guesses of single cases or experiments, by name; requires `per-case`.
     #[serde(default)]
     pub starts: Entries<Quantity>,
+}
+
+/// Cases in which a tuner has a separate value: all, none, or those of a list.
+#[derive(Debug, Clone, PartialEq, serde::Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum PerCase {
+    All(bool),
+    In(Vec<String>),
+}
+
+impl Default for PerCase {
+    fn default() -> Self {
+        Self::All(false)
+    }
 }
 
 /// Keys of a case in addition to parameter values.

@@ -82,6 +82,8 @@ pub struct TunerBuilder {
     pub tie: Option<String>,
     /// True for a separate tuner in every case.
     pub per_case: bool,
+    /// Cases with a separate tuner, by name or pattern, while all others share one.
+    pub separate_in: Vec<String>,
     /// Initial guesses of single cases, by name of the case.
     pub starts: Vec<(String, Quantity)>,
 }

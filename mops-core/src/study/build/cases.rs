@@ -148,6 +148,7 @@ fn build_experiment(
         same_unit(&channel.signal, &variable.unit, &known).map_err(|m| m.within("channels"))?;
         let built = build_channel(channel, &variable.unit).map_err(|m| m.within(&channel.signal).within("channels"))?;
         warnings.extend(suspicious_start(name, &built));
+        warnings.extend(standing_alone(name, &built));
         warnings.extend(channel.unwrap.is_none().then(|| wrapped(name, &built, &variable.unit)).flatten());
         channels.push(built);
     }
@@ -259,6 +260,40 @@ fn build_channel(draft: &ChannelBuilder, to: &Unit) -> Result<Channel, StudyErro
             .with_help("missing samples and samples cut off by `from`, `to` and `skip` do not count"));
     }
     Ok(Channel { signal: draft.signal.clone(), times, values, noise })
+}
+
+/// Smallest deviation of a sample from the mean of its neighbours that makes it stand alone, in robust standard deviations of such
+/// deviations.
+const ALONE: f64 = 12.0;
+
+/// Returns a warning about samples that stand alone: far from both neighbours, which agree with theirs.
+fn standing_alone(experiment: &str, channel: &Channel) -> Option<String> {
+    let v = &channel.values;
+    let off = |k: usize| (v[k] - 0.5 * (v[k - 1] + v[k + 1])).abs();
+    let mut sorted: Vec<f64> = (1..v.len().saturating_sub(1)).map(off).collect();
+    if sorted.len() < 20 {
+        return None;
+    }
+    sorted.sort_by(f64::total_cmp);
+    // Factor: P. Rousseeuw, A. Leroy, Robust Regression and Outlier Detection (1987), section 4.4.
+    let spread = 1.4826 * sorted[sorted.len() / 2];
+    // The neighbours of such a sample are off by half as much, because of it; those of a jump or a fast motion by as much.
+    let stands_alone = |&k: &usize| {
+        let around = [k - 1, k + 1].into_iter().filter(|&n| n > 0 && n + 1 < v.len()).map(off).fold(0.0, f64::max);
+        spread > 0.0 && off(k) > ALONE * spread && around < 0.6 * off(k)
+    };
+    let alone: Vec<usize> = (1..v.len() - 1).filter(stands_alone).collect();
+    let first = *alone.first()?;
+    let count = match alone.len() {
+        1 => format!("the sample at {} s of `{}` in `{experiment}` stands", channel.times[first], channel.signal),
+        n => {
+            format!(
+                "{n} samples of `{}` in `{experiment}` (the first at {} s) stand",
+                channel.signal, channel.times[first]
+            )
+        }
+    };
+    Some(format!("{count} alone: loss = \"huber\" or \"student\" of `normalised-error` limits their influence"))
 }
 
 /// Returns a whole turn in a unit; `None` for units other than of an angle.

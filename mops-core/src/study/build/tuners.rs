@@ -12,6 +12,7 @@ use crate::study::draft::{Free, TunerBuilder};
 use crate::study_error::StudyError;
 use crate::tuner::{Grid, Scale, Tuner};
 use crate::unit::{Quantity, Unit};
+use crate::wildcard;
 
 /// Adds the tuner, or one for every case.
 pub(super) fn build_tuner(
@@ -162,15 +163,36 @@ pub(super) fn build_tuner(
         tie: None,
         guessed: [false; 2],
     };
-    if draft.per_case {
-        for (index, case) in cases.iter().enumerate() {
+    let separate = separate_in(draft, cases)?;
+    if separate.is_empty() || separate.len() < cases.len() {
+        tuners.push(tuner.clone());
+    }
+    if !separate.is_empty() {
+        for (index, case) in cases.iter().enumerate().filter(|(index, _)| separate.contains(index)) {
             let start = elsewhere.iter().find(|(known, _)| *known == index).map_or(start, |&(_, start)| start);
             tuners.push(Tuner { name: format!("{}/{name}", case.name), case: Some(index), start, ..tuner.clone() });
         }
-    } else {
-        tuners.push(tuner);
     }
     Ok(())
+}
+
+/// Returns the cases with a separate tuner, by index.
+fn separate_in(draft: &TunerBuilder, cases: &[Case]) -> Result<Vec<usize>, StudyError> {
+    if draft.per_case {
+        return Ok((0..cases.len()).collect());
+    }
+    let mut found = Vec::new();
+    for pattern in &draft.separate_in {
+        let matching: Vec<usize> =
+            (0..cases.len()).filter(|&case| wildcard::matches(pattern, &cases[case].name)).collect();
+        if matching.is_empty() {
+            let fact = format!("there is no case or experiment `{pattern}`");
+            return Err(StudyError::new("per-case", fact)
+                .with_help(suggestion(pattern, cases.iter().map(|case| case.name.as_str()))));
+        }
+        found.extend(matching);
+    }
+    Ok(found)
 }
 
 /// Returns the initial guesses of single cases, by index of the case.
@@ -179,7 +201,8 @@ fn own_starts(
     cases: &[Case],
     value: impl Fn(&str, &Quantity) -> Result<f64, StudyError>,
 ) -> Result<Vec<(usize, f64)>, StudyError> {
-    if !draft.starts.is_empty() && !draft.per_case {
+    let separate = separate_in(draft, cases)?;
+    if !draft.starts.is_empty() && separate.is_empty() {
         return Err(StudyError::new("starts", "the tuner has one value for all cases")
             .with_help("set `per-case = true` too, or omit `starts`"));
     }
@@ -188,6 +211,10 @@ fn own_starts(
             StudyError::new(name, format!("there is no case or experiment `{name}`"))
                 .with_help(suggestion(name, cases.iter().map(|case| case.name.as_str())))
         })?;
+        if !separate.contains(&index) {
+            return Err(StudyError::new(name, format!("the tuner has no separate value in `{name}`"))
+                .with_help("list it in `per-case`, or omit it here"));
+        }
         Ok((index, value(name, quantity)?))
     };
     draft.starts.iter().map(|entry| one(entry).map_err(|mistake: StudyError| mistake.within("starts"))).collect()
