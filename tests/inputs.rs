@@ -331,7 +331,7 @@ fn a_robust_loss_keeps_a_gain_that_single_wrong_samples_would_bend() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     // x = 2 t, with an alternating error of 0.01 and three samples that stand alone.
-    let wrong = |k: u32| if k % 13 == 7 { 5.0 } else { 0.01 * if k % 2 == 0 { 1.0 } else { -1.0 } };
+    let wrong = |k: u32| if k % 13 == 7 { 5.0 } else { 0.01 * if k.is_multiple_of(2) { 1.0 } else { -1.0 } };
     let rows: String =
         (0..=40).map(|k| format!("{},{},1\n", f64::from(k) * 0.1, 0.2 * f64::from(k) + wrong(k))).collect();
     std::fs::write(folder.join("wrong.csv"), format!("t[s],x[rad],u[rad/s]\n{rows}")).unwrap();
@@ -385,7 +385,7 @@ fn a_study_written_for_a_data_file_runs() {
     let mut rows = String::new();
     for k in 0..8000 {
         let t = f64::from(k) * h;
-        let u = if (t / 1.7) as u64 % 2 == 0 { 1.0 } else { -0.5 };
+        let u = if ((t / 1.7) as u64).is_multiple_of(2) { 1.0 } else { -0.5 };
         if k % 20 == 0 {
             rows += &format!("{t:.2};{u};{:.5}\n", x + 1e-3 * math::sin(1e3 * t * t));
         }

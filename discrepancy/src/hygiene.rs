@@ -30,8 +30,11 @@ fn noise_of_record(times: &[f64], values: &[f64]) -> Option<f64> {
     let mut left: Vec<f64> = (3..values.len().saturating_sub(3)).filter_map(of).collect();
     left.sort_by(f64::total_cmp);
     let median = left.get(left.len() / 2)?;
-    // Coarse quantisation leaves many exact zeros: then the root mean square says more.
-    let rms = (left.iter().map(|r| r * r).sum::<f64>() / left.len() as f64).sqrt();
+    // Coarse quantisation leaves many exact zeros: then the root mean square says more, without the largest twentieth, where samples
+    // that stand alone are; with it only if nothing else is left.
+    let rms = |of: &[f64]| (of.iter().map(|r| r * r).sum::<f64>() / of.len() as f64).sqrt();
+    let trimmed = rms(&left[..left.len() - left.len() / 20]);
+    let rms = if trimmed > 0.0 { trimmed } else { rms(&left) };
     let robust = 1.4826 * median;
     let noise = if robust > 0.1 * rms { robust } else { rms };
     let largest = values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
@@ -149,6 +152,14 @@ mod tests {
         let stairs: Vec<f64> = (0..400).map(|k| 0.3 * f64::from(k / 10)).collect();
         let noise = noise_of(&[(&times, &stairs)]).unwrap();
         assert!(noise > 0.999 * 0.3 / 12.0_f64.sqrt(), "{noise}");
+    }
+
+    #[test]
+    fn one_wrong_sample_does_not_count_however_wrong() {
+        let (times, mut values) = samples(0.02);
+        values[0] = 1e9;
+        let noise = noise_of(&[(&times, &values)]).unwrap();
+        assert!((noise - 0.02).abs() < 0.005, "{noise}");
     }
 
     #[test]

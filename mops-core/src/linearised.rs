@@ -92,7 +92,7 @@ const NEWTON: usize = 50;
 /// Difference of a tied variable from its computed value that counts as rounding, relative to the variable, or to 1 if it is less.
 const ROUNDING: f64 = 1e-12;
 
-/// Such a difference that counts as rounding if a step does not halve it.
+/// Difference of a tied variable from its computed value that counts as rounding if a step does not halve it.
 const CLOSE: f64 = 1e-6;
 
 /// Returns the derivatives of tied variables minus their computed values.
@@ -331,8 +331,8 @@ impl Linearised {
         let find = |point: &[f64]| local(point).map(|local| values(&local));
         let found = at.rough(find, &rows.collect::<Vec<_>>(), &columns.collect::<Vec<_>>());
         let name = |index: usize, others: &[Variable]| {
-            let all = self.states.iter().chain(others).map(|v| v.name.clone());
-            all.skip(index).next().unwrap_or_else(|| "a delayed quantity".to_owned())
+            let mut all = self.states.iter().chain(others).map(|v| v.name.clone());
+            all.nth(index).unwrap_or_else(|| "a delayed quantity".to_owned())
         };
         let rough = |(row, column)| Rough {
             of: name(row, &of.signals),

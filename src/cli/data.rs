@@ -7,6 +7,7 @@ use clap::Args;
 use mops_core::Diagnostic;
 use mops_core::data::DataFile;
 use mops_core::identification::{excitation_report, spacing};
+use mops_discrepancy::noise_of;
 
 use super::findings;
 use crate::files;
@@ -59,11 +60,12 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
         if time.as_ref() == Some(name) {
             sampling = sample_time(name, &finite().collect::<Vec<f64>>());
         }
-        let noise = noise_of(column.values, times);
-        if let (Some(times), Some(noise), false) = (times, noise, time.as_ref() == Some(name)) {
+        let is_time = time.as_ref() == Some(name);
+        let noise = if is_time { None } else { noise(column.values, times) };
+        if let (Some(times), Some(noise)) = (times, noise) {
             advice.extend(suspicious_start(name, times, column.values, noise));
         }
-        if noise.is_none() {
+        if noise.is_none() && !is_time {
             unknown.push(format!("`{name}`"));
         }
         rows.push(vec![
@@ -86,7 +88,7 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
     }
     if !unknown.is_empty() {
         let names = unknown.join(", ");
-        text += &format!("no noise estimate for {names}: needs {MIN_DIFFERENCES} groups of four consecutive samples\n");
+        text += &format!("no noise estimate for {names}: needs seven consecutive samples that are not all equal\n");
     }
     for line in advice {
         text += &line;
@@ -245,88 +247,56 @@ fn sample_time(name: &str, times: &[f64]) -> String {
     )
 }
 
-/// Smallest number of third differences for a noise estimate; its relative error is then about 20 %.
-const MIN_DIFFERENCES: usize = 20;
-
-/// Estimates the standard deviation of white noise on a smooth signal from third differences, whose variance is 20 times that
-/// of the noise: from their median absolute value, so that single wrong samples and jumps do not count, or from their root mean square
-/// where coarse quantisation makes most of them 0.
-///
-/// Empty cells of the column are skipped. A distance of more than 1.5 times the median distance between samples is a gap, and
-/// no difference is taken across a gap. Returns `None` with fewer than [`MIN_DIFFERENCES`] differences.
-///
-/// Source of the factor 1.4826: P. Rousseeuw, A. Leroy, Robust Regression and Outlier Detection (1987), section 4.4.
-#[allow(clippy::cast_precision_loss)]
-pub(super) fn noise_of(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
+/// Estimates the standard deviation of white noise on a smooth signal, in each part of the record between two gaps. Empty cells are
+/// skipped; a distance of more than 1.5 times the median distance between samples is a gap. `None` if no part has enough samples.
+pub(super) fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
     let times = times.filter(|times| times.len() == values.len());
-    let samples = || {
-        let at = |row: usize| times.map_or(row as f64, |times| times[row]);
-        values.iter().enumerate().filter(|(_, value)| value.is_finite()).map(move |(row, value)| (at(row), *value))
-    };
-    let mut steps: Vec<f64> = samples().zip(samples().skip(1)).map(|(a, b)| b.0 - a.0).collect();
+    #[allow(clippy::cast_precision_loss)]
+    let at = |row: usize| times.map_or(row as f64, |times| times[row]);
+    let rows: Vec<usize> = (0..values.len()).filter(|&row| values[row].is_finite() && at(row).is_finite()).collect();
+    let (times, values): (Vec<f64>, Vec<f64>) = rows.iter().map(|&row| (at(row), values[row])).unzip();
+    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_unstable_by(f64::total_cmp);
     let longest = 1.5 * steps.get(steps.len() / 2)?;
-    let (mut run, mut last, mut differences) = ([0.0; 4], f64::NEG_INFINITY, Vec::new());
-    let mut length = 0;
-    for (time, value) in samples() {
-        length = if time - last <= longest { length + 1 } else { 1 };
-        run.rotate_left(1);
-        (run[3], last) = (value, time);
-        if length >= run.len() {
-            differences.push((run[3] - 3.0 * run[2] + 3.0 * run[1] - run[0]).abs());
-        }
-    }
-    if differences.len() < MIN_DIFFERENCES {
-        return None;
-    }
-    differences.sort_unstable_by(f64::total_cmp);
-    let robust = 1.4826 * differences[differences.len() / 2];
-    let square = differences.iter().map(|d| d * d).sum::<f64>() / differences.len() as f64;
-    let of_differences = if robust > ZEROS * square.sqrt() { robust } else { square.sqrt() };
-    Some(of_differences / 20f64.sqrt())
+    let ends = (1..=times.len()).filter(|&k| k == times.len() || times[k] - times[k - 1] > longest);
+    let mut start = 0;
+    let parts: Vec<(&[f64], &[f64])> = ends
+        .map(|end| {
+            let part = start..end;
+            start = end;
+            (&times[part.clone()], &values[part])
+        })
+        .collect();
+    noise_of(&parts)
 }
-
-/// Ratio of the robust to the plain estimate below which most differences are 0.
-const ZEROS: f64 = 0.1;
 
 #[cfg(test)]
 mod tests {
-    use super::noise_of as noise;
-
-    /// Steep ramp with an alternating error of 0.1, whose third differences are 0.8.
-    fn ramp(n: i32) -> (Vec<f64>, Vec<f64>) {
-        let values = (0..n).map(|i| 5.0 * f64::from(i) + if i % 2 == 0 { 0.1 } else { -0.1 });
-        ((0..n).map(f64::from).collect(), values.collect())
-    }
+    use super::*;
 
     #[test]
-    fn noise_is_not_estimated_across_gaps() {
-        // All differences are equal, so that their median is their root mean square.
-        let expected = 1.4826 * (0.64f64 / 20.0).sqrt();
-        let near =
-            |found: Option<f64>| assert!((found.unwrap() - expected).abs() < 1e-9, "{found:?} is not {expected}");
-        let (times, values) = ramp(100);
+    fn noise_is_not_estimated_across_gaps_and_wrong_samples_do_not_count() {
+        // A fixed sequence that is as good as white, of standard deviation 0.1, on a steep ramp.
+        let white = |k: u32| ((f64::from(k * k + 7 * k) * 0.618_033_988_749_894_9).fract() - 0.5) * 0.12f64.sqrt();
+        let values: Vec<f64> = (0..400).map(|k| 5.0 * f64::from(k) + white(k)).collect();
+        let times: Vec<f64> = (0..400).map(f64::from).collect();
+        let near = |found: Option<f64>| assert!((found.unwrap() - 0.1).abs() < 0.03, "{found:?}");
         near(noise(&values, None));
         let mut holed = values.clone();
-        holed[40..51].fill(f64::NAN);
+        holed[140..161].fill(f64::NAN);
         near(noise(&holed, Some(&times)));
         // The rows themselves are missing.
-        let without = |all: &[f64]| [&all[..40], &all[51..]].concat();
+        let without = |all: &[f64]| [&all[..140], &all[161..]].concat();
         near(noise(&without(&values), Some(&without(&times))));
-        assert!(noise(&without(&values), None).unwrap() > 2.0 * expected);
-        assert_eq!(noise(&values[..22], None), None);
-        assert!(noise(&values[..23], None).is_some());
-        // A logger at one fifth of the rate of the file, with an additional gap, with and without times.
-        let sparse =
-            |of: &dyn Fn(usize) -> f64| (0..500).map(|i| if i % 5 == 2 { of(i / 5) } else { f64::NAN }).collect();
-        let rows: Vec<f64> = (0..500).map(|i| 0.01 * f64::from(i)).collect();
-        let slow: Vec<f64> = sparse(&|i| if (30..45).contains(&i) { f64::NAN } else { values[i] });
+        // A logger at one fifth of the rate of the file, with and without times.
+        let slow: Vec<f64> = (0..2000).map(|i| if i % 5 == 2 { values[i / 5] } else { f64::NAN }).collect();
+        let rows: Vec<f64> = (0..2000).map(|i| 0.01 * f64::from(i)).collect();
         near(noise(&slow, Some(&rows)));
         near(noise(&slow, None));
-        // A wrong first sample and a jump do not count.
         let mut wrong = values;
         wrong[0] = 1e6;
-        wrong[50..].iter_mut().for_each(|value| *value += 1e3);
+        wrong[250..].iter_mut().for_each(|value| *value += 1e3);
         near(noise(&wrong, None));
+        assert_eq!(noise(&wrong[..6], None), None);
     }
 }

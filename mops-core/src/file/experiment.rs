@@ -103,7 +103,7 @@ fn experiment(
         let (values, unit, missing) = other.as_ref().unwrap_or(table).input(&place, column)?;
         if missing > 0 {
             warnings.push(format!(
-                "input `{input}` of `{name}` has {missing} missing samples: the value before each is held"
+                "input `{input}` of `{name}` has {missing} missing samples: the value before each is kept"
             ));
         }
         if column.hold.is_none() && values.looks_smooth() {
@@ -393,7 +393,7 @@ impl Table {
             let next = self.clock.times[..self.rows.end].partition_point(|&t| t < start + length - CLOSE);
             let end = (next + 1).min(self.rows.end);
             let covers = self.clock.times[end - 1] - start;
-            if end < first + 2 || !(length > 0.0) {
+            if end < first + 2 || length <= 0.0 || length.is_nan() {
                 let fact = format!("a window of {length} s at {} s has less than two samples", start + self.zero);
                 return Err(place.diagnostic(fact).with_help("choose a longer time"));
             }

@@ -174,7 +174,7 @@ mod tests {
     fn responses(experiment: &str, data: &'static str) -> Result<Vec<ResponseData>, String> {
         let text = Text::new("study.toml", &format!("[e]\nfile = 'sweep.csv'\n{experiment}\n"), &[]);
         let root = text.parse().unwrap();
-        let read = super::super::experiment::read("e".into(), &root.child("e").unwrap(), &Data(data));
+        let read = super::super::experiment::read("e", &root.child("e").unwrap(), &Data(data));
         read.map(|mut cases| cases.remove(0).measured.unwrap().responses).map_err(|diagnostic| diagnostic.to_string())
     }
 

@@ -39,7 +39,7 @@ fn too_many() -> String {
     format!("it has more than {MOST} changes until the end of the simulation")
 }
 
-/// Returns the number of whole or begun intervals of this length from `start` to `until`.
+/// Returns the number of whole or started intervals of this length from `start` to `until`.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn intervals(start: f64, length: f64, until: f64) -> Result<usize, String> {
     let count = ((until - start) / length).ceil().max(1.0);

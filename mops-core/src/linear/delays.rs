@@ -27,7 +27,7 @@ struct Graph {
 impl StateSpace {
     /// Returns the system whose last inputs are its last outputs, `delays` later (s), as a system with one delay.
     ///
-    /// That is exact if every path from an input to an output has the same delay: each variable is then counted in a time of its
+    /// The conversion is exact if every path from an input to an output has the same delay: each variable is then counted in a time of its
     /// own, which is shifted by the delay of the path that leads to it.
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use mops_core::data::{DataFile, read_regular};
 use mops_core::math;
 use mops_core::{Diagnostic, Hold, Input, Unit, suggestion};
 
-use super::super::data::noise_of;
+use super::super::data;
 use crate::terminal::CommandError;
 use crate::toml_text::{key, number, quoted};
 
@@ -260,7 +260,7 @@ fn tuners(times: &[f64], inputs: &[Signal], outputs: &[Signal]) -> String {
         number(text.parse().expect("it was printed as a number"))
     };
     let finite_times = || times.iter().copied().filter(|t| t.is_finite());
-    let duration = finite_times().last().unwrap_or(1.0) - finite_times().next().unwrap_or(0.0);
+    let duration = finite_times().next_back().unwrap_or(1.0) - finite_times().next().unwrap_or(0.0);
     for Signal { name: y, values, .. } in outputs {
         let [mean, deviation] = moments(values);
         let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
@@ -314,7 +314,7 @@ fn experiments(copy: &str, time: &str, file: &DataFile, times: &[f64], [inputs, 
     };
     let channel = |signal: &Signal| {
         let deviation = moments(&signal.values)[1];
-        let noise = noise_of(&signal.values, Some(times)).filter(|noise| *noise > 1e-6 * deviation);
+        let noise = data::noise(&signal.values, Some(times)).filter(|noise| *noise > 1e-6 * deviation);
         let noise = noise.unwrap_or(0.01 * deviation);
         let noise = format!("{noise:.2e}").parse().expect("it was printed as a number");
         column(signal, &format!(", noise = {}", number(noise)))

@@ -316,7 +316,7 @@ fn unwrap(values: &mut [f64], turn: f64) {
 /// Steps that look like a sensor that starts a new turn, in turns, if the median step is at most [`SLOW`].
 const WRAPS: std::ops::Range<f64> = 0.75..1.25;
 
-/// Largest median step of an angle that is sampled fast enough to tell a new turn from a motion, in turns.
+/// Largest median step of an angle that is sampled fast enough to distinguish a new turn from a motion, in turns.
 const SLOW: f64 = 0.1;
 
 /// Returns a warning if an angle steps by a whole turn.
