@@ -76,7 +76,7 @@ mod tests {
             let step = 1e-3;
             let term = |k: i32| {
                 let e = step * f64::from(k);
-                loss.residual(e)[0].powi(2) * math::exp(-0.5 * e * e)
+                math::powi(loss.residual(e)[0], 2) * math::exp(-0.5 * e * e)
             };
             (-12_000..=12_000).map(term).sum::<f64>() * step / std::f64::consts::TAU.sqrt()
         };

@@ -142,7 +142,7 @@ pub fn under(path: &[String], mistake: StudyError) -> StudyError {
     path.iter().rev().fold(mistake, |mistake, key| mistake.within(key))
 }
 
-fn path(keys: &[&str]) -> Vec<String> {
+pub fn path(keys: &[&str]) -> Vec<String> {
     keys.iter().map(|key| (*key).to_owned()).collect()
 }
 

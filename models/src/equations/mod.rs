@@ -8,6 +8,7 @@ mod clocks;
 mod compiled;
 mod definition;
 mod dimensions;
+mod filters;
 mod graph;
 mod happenings;
 mod interface;
@@ -68,7 +69,8 @@ impl Equations {
         options.tolerance.check()?;
         let horizon = options.horizon.as_ref().map(|q| q.to(&Unit::known("s"))).transpose();
         let horizon = horizon.map_err(|why| StudyError::new("horizon", why))?;
-        Self::compile(Definition::read(options)?, horizon, options.tolerance)
+        let expanded = filters::expanded(options.clone())?;
+        Self::compile(Definition::read(&expanded)?, horizon, options.tolerance)
     }
 
     fn compile(mut definition: Definition, horizon: Option<f64>, tolerance: Tolerance) -> Result<Self, StudyError> {

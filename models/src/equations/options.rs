@@ -54,7 +54,9 @@ use crate::kernel::Tolerance;
 ///
 /// At the instants `offset + k every`, the values `next` are computed from the states and memory just before, and the inputs
 /// then; the memory takes them after `delay`, and is constant in between. Clocks that are due at the same instant read the same values.
-/// A memory is a signal and has an initial value, like a state. `next = { y_k = "y" }` holds a sample of `y`.
+/// A memory is a signal and has an initial value, like a state. `next = { y_k = "y" }` keeps a sample of `y`. A controller may also
+/// be given by its transfer function, in z or in s: `filter = { u = { of = "r - y", continuous = { numerator = ["k*Ti", "k"],
+/// denominator = ["Ti", 0] }, method = "tustin", prewarp = "5 Hz" } }`; its memory is added.
 ///
 /// A state whose derivative is another state, such as `th` above, is a joint. Its friction is given as
 /// `friction.th = { coulomb = "c" }`; a stuck joint is exactly at rest. The places of possible missing effects are
@@ -231,7 +233,48 @@ pub(super) struct Clock {
     /// Values that are constant between the instants, and their units: `u = "V"`, or a table with `unit`, `about`.
     pub memory: Entries<Short<Described>>,
     /// New values of the memory, computed from the states and memory just before the instant and the inputs then.
+    #[serde(default)]
     pub next: Entries<Formula>,
+    /// Memory that is the output of a filter: `u = { of = "r - y", continuous = { numerator = ["k*Ti", "k"], denominator =
+    /// ["Ti", 0] } }`.
+    #[serde(default)]
+    pub filter: Entries<Filter>,
+}
+
+/// Filter of a sampled quantity, given by its transfer function.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct Filter {
+    /// Expression that is filtered.
+    pub of: Formula,
+    /// Transfer function in z.
+    pub z: Option<Polynomials>,
+    /// Transfer function in s, which `method` makes discrete.
+    pub continuous: Option<Polynomials>,
+    /// `tustin` (default): bilinear transform. `zero-order-hold`: exact for an input that is constant between the instants.
+    pub method: Option<Method>,
+    /// Frequency at which the bilinear transform keeps the frequency response; a number without a unit is in Hz.
+    pub prewarp: Option<Quantity>,
+}
+
+/// Numerator and denominator of a transfer function.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct Polynomials {
+    /// Coefficients in descending powers: numbers, or expressions of parameters and constants. A number before `s^n` is in `s^n`.
+    pub numerator: Vec<Formula>,
+    /// Coefficients in descending powers, at least as many as in the numerator.
+    pub denominator: Vec<Formula>,
+}
+
+/// Conversion of a continuous filter to a discrete one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Method {
+    /// Bilinear transform.
+    Tustin,
+    /// Step-invariant transform.
+    ZeroOrderHold,
 }
 
 /// Name of a place.

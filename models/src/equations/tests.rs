@@ -14,6 +14,7 @@ mod clocks;
 mod delays;
 mod dry_friction;
 mod events;
+mod filters;
 mod linear;
 mod order;
 mod scales;
