@@ -87,7 +87,7 @@ impl Files for Data {
 /// Builds the recalibrated study.
 pub fn study() -> Result<Study, Box<dyn Error>> {
     let catalogue = mops::catalogue();
-    let models = vec![("rig".into(), file::model(&catalogue, MODEL_RIG)?)];
+    let models = vec![("rig".into(), file::model(&catalogue, MODEL_RIG, &Data)?)];
     let draft = StudyBuilder {
         name: "furuta-swing-repaired".into(),
         task: Task::Calibration,

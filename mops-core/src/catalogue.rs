@@ -9,6 +9,7 @@ use toml::de::ValueDeserializer;
 
 use crate::catalogue_study::CatalogueStudy;
 use crate::criterion::CriterionSpec;
+use crate::data::{Files, Folder};
 use crate::diagnostic::Diagnostic;
 use crate::effect::{Effect, Placement};
 use crate::model::Model;
@@ -28,6 +29,14 @@ pub trait ModelOptions: DeserializeOwned + JsonSchema {
     /// # Errors
     /// Returns an error if options contradict each other; it names the key.
     fn build(self) -> Result<Box<dyn Model>, StudyError>;
+
+    /// Builds the model as [`ModelOptions::build`] does, with data files that the options may name.
+    ///
+    /// # Errors
+    /// Returns an error as [`ModelOptions::build`] does, or if a file cannot be read.
+    fn build_with(self, _files: &dyn Files) -> Result<Box<dyn Model>, StudyError> {
+        self.build()
+    }
 }
 
 /// Options of a kind of criterion, as written in a study file; their documentation is the manual page of the kind.
@@ -54,20 +63,28 @@ pub struct ModelKind {
     pub name: &'static str,
     /// Returns the schema of the options, with their documentation.
     pub schema: fn() -> Schema,
-    pub(crate) read: Reader<Result<Box<dyn Model>, StudyError>>,
+    pub(crate) read: ModelReader,
 }
 
 impl ModelKind {
     /// Creates the kind with options `O`.
     pub fn of<O: ModelOptions>() -> Self {
-        Self { name: O::KIND, schema: schema_of::<O>, read: |value| O::deserialize(value).map(O::build) }
+        Self {
+            name: O::KIND,
+            schema: schema_of::<O>,
+            read: |value, files| O::deserialize(value).map(|o| o.build_with(files)),
+        }
     }
 
     /// Returns a model of this kind with default options, if every option has a default.
     pub fn default_model(&self) -> Option<Box<dyn Model>> {
-        (self.read)(ValueDeserializer::parse("{}").expect("an empty table is TOML")).ok()?.ok()
+        let empty = ValueDeserializer::parse("{}").expect("an empty table is TOML");
+        (self.read)(empty, &Folder::default()).ok()?.ok()
     }
 }
+
+/// Reader of the options of a model, with the data files that they may name.
+type ModelReader = fn(ValueDeserializer<'_>, &dyn Files) -> Result<Result<Box<dyn Model>, StudyError>, toml::de::Error>;
 
 /// A kind of criterion.
 #[derive(Clone, Copy)]

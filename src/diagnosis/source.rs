@@ -28,7 +28,8 @@ pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String 
         }
         items
     };
-    let models = items(list("models", &|name, text| entry(name, &format!("file::model(&catalogue, {text})?"))), 4);
+    let models =
+        items(list("models", &|name, text| entry(name, &format!("file::model(&catalogue, {text}, &Data)?"))), 4);
     let mut cases = list("cases", &|name, text| format!("file::cases({name:?}, {text}, &models, &Data)?"));
     cases.extend(list("experiments", &|name, text| format!("file::experiments({name:?}, {text}, &Data)?")));
     let cases = items(cases, 8);

@@ -90,6 +90,7 @@ pub(crate) fn settled(text: &str, settings: &[String], locate: &dyn Fn(&str) -> 
             ["experiments", _, key] => key == "file" || key == "files",
             ["experiments", _, "channels" | "inputs", _, "file"] => true,
             ["cases", _, "inputs", _, "file", "path"] => true,
+            ["models", _, "equations", "tables", _, "file"] => true,
             _ => false,
         };
         if let (true, Some(file)) = (is_data, text.words(&path)) {

@@ -269,6 +269,26 @@ impl Definition {
         Ok(d)
     }
 
+    /// Returns all expressions and equations.
+    pub fn texts_mut(&mut self) -> Vec<&mut Text> {
+        let mut all: Vec<&mut Text> = self.lets.iter_mut().map(|(_, text)| text).collect();
+        all.extend(self.der.values_mut());
+        all.extend(self.mass.iter_mut().map(|(.., text)| text));
+        all.extend(self.outputs.iter_mut().map(|(_, text)| text));
+        all.extend(self.start.values_mut());
+        for Friction { coulomb, viscous, peak, .. } in &mut self.friction {
+            all.extend([coulomb, viscous, peak].into_iter().flatten());
+        }
+        for When { guard, resets, at_rest, .. } in &mut self.when {
+            all.push(guard);
+            all.extend(resets.iter_mut().chain(at_rest).map(|(_, text)| text));
+        }
+        for Clock { times, next, .. } in &mut self.clocks {
+            all.extend(times.iter_mut().flatten().chain(next));
+        }
+        all
+    }
+
     fn state_names(&self) -> Vec<String> {
         self.states.iter().map(|state| state.name.clone()).collect()
     }

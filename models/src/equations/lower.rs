@@ -382,6 +382,7 @@ impl<'d> Lowering<'d> {
                 unreachable!("the parser accepts conditions in `if` only")
             }
             Form::Reduced(..) => unreachable!("the parser accepts reductions in criteria only"),
+            Form::Lookup(..) => unreachable!("lookups are replaced when the definition is read"),
         })
     }
 

@@ -20,11 +20,13 @@ mod options;
 mod program;
 mod running;
 mod system;
+mod tables;
 mod tape;
 
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
+use mops_core::data::{Files, Folder};
 use mops_core::{
     AnalysisKind, Cut, Failure, Interface, Model, ModelOptions, Plant, Port, Scalar, State, StudyError, Unit, Variable,
 };
@@ -43,7 +45,11 @@ impl ModelOptions for EquationsOptions {
     const KIND: &'static str = "equations";
 
     fn build(self) -> Result<Box<dyn Model>, StudyError> {
-        Ok(Box::new(Simulated::new(Equations::new(&self)?)))
+        self.build_with(&Folder::default())
+    }
+
+    fn build_with(self, files: &dyn Files) -> Result<Box<dyn Model>, StudyError> {
+        Ok(Box::new(Simulated::new(Equations::with_files(&self, files)?)))
     }
 }
 
@@ -66,11 +72,21 @@ impl Equations {
     /// # Errors
     /// The first mistake, with its key and its position in the expression.
     pub fn new(options: &EquationsOptions) -> Result<Self, StudyError> {
+        Self::with_files(options, &Folder::default())
+    }
+
+    /// Parses, checks and compiles the equations, with the files of their lookup tables.
+    ///
+    /// # Errors
+    /// The first mistake, with its key and its position in the expression.
+    pub fn with_files(options: &EquationsOptions, files: &dyn Files) -> Result<Self, StudyError> {
         options.tolerance.check()?;
         let horizon = options.horizon.as_ref().map(|q| q.to(&Unit::known("s"))).transpose();
         let horizon = horizon.map_err(|why| StudyError::new("horizon", why))?;
         let expanded = filters::expanded(options.clone())?;
-        Self::compile(Definition::read(&expanded)?, horizon, options.tolerance)
+        let mut definition = Definition::read(&expanded)?;
+        tables::replace(&mut definition, options, files)?;
+        Self::compile(definition, horizon, options.tolerance)
     }
 
     fn compile(mut definition: Definition, horizon: Option<f64>, tolerance: Tolerance) -> Result<Self, StudyError> {

@@ -29,6 +29,9 @@ use crate::kernel::Tolerance;
 /// `> >= < <=`, `and`, `or`, `not`. A step of the integrator ends where a function with kinks or jumps, a table or an
 /// `if` changes its branch. So no step crosses a kink or a jump.
 ///
+/// `tables.torque = { file = "motor.csv", x = "speed", y = "torque" }` makes `torque(w)` a lookup table, linear or a monotone spline
+/// between its points; `eta(w, T)` has two arguments.
+///
 /// `delay(x, "50 ms")` is the value of `x` at an earlier time; `x` is any expression, and before the start it is constant. The
 /// time is a quantity, or an expression of parameters and constants. A step ends where a jump of `x` or of its
 /// derivatives arrives.
@@ -108,6 +111,9 @@ pub struct EquationsOptions {
     /// "-k*x" } }`.
     #[serde(default)]
     pub(super) clocks: Entries<Clock>,
+    /// Lookup tables, used as functions in expressions: `torque = { file = "motor.csv", x = "speed", y = "torque" }`.
+    #[serde(default)]
+    pub(super) tables: Entries<Table>,
     /// Names of joints as places of effects: `arm = { joint = "phi" }`. Default: the name of the position.
     #[serde(default)]
     pub(super) ports: Entries<PortName>,
@@ -239,6 +245,69 @@ pub(super) struct Clock {
     /// ["Ti", 0] } }`.
     #[serde(default)]
     pub filter: Entries<Filter>,
+}
+
+/// Lookup table with one or two arguments.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct Table {
+    /// Data file: CSV, or MATLAB level 4 or 5; `x`, `y` and `z` are then names of columns. Units are those of its header.
+    pub file: Option<String>,
+    /// Values of the argument, increasing; numbers without a unit are in SI units.
+    pub x: Points,
+    /// Values of the table, or with `z` those of the second argument.
+    pub y: Points,
+    /// Values of a table with two arguments: one row for every `y`, with one value for every `x`; in a file, one value per row of the
+    /// file, for every pair of `x` and `y`.
+    pub z: Option<Grid>,
+    /// `linear` (default), or `monotone`: a cubic spline that has no extrema between the points; with one argument.
+    #[serde(default)]
+    pub between: Between,
+    /// Beyond the first and the last point: `extend` (default) as a straight line, or `constant`.
+    #[serde(default)]
+    pub outside: Outside,
+}
+
+/// Points of a lookup table: a column of its file, or a list.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum Points {
+    /// Name of a column.
+    Column(String),
+    /// Values.
+    Values(Vec<Quantity>),
+}
+
+/// Values of a lookup table with two arguments.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum Grid {
+    /// Name of a column.
+    Column(String),
+    /// Rows of values.
+    Rows(Vec<Vec<Quantity>>),
+}
+
+/// Interpolation between the points of a lookup table.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Between {
+    /// Straight lines.
+    #[default]
+    Linear,
+    /// Monotone cubic spline.
+    Monotone,
+}
+
+/// Value of a lookup table beyond its points.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Outside {
+    /// Straight line.
+    #[default]
+    Extend,
+    /// Value at the nearer end.
+    Constant,
 }
 
 /// Filter of a sampled quantity, given by its transfer function.

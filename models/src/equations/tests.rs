@@ -18,6 +18,7 @@ mod filters;
 mod linear;
 mod order;
 mod scales;
+mod tables;
 mod units;
 
 const TIGHT: &str = "\n[tolerance]\nrelative = 1e-10\nabsolute = 1e-12\n";

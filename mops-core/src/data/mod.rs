@@ -1,6 +1,7 @@
 //! Measured data: readers that convert a file to named columns of numbers.
 
 mod csv;
+mod files;
 mod mat4;
 mod mat5;
 mod matlab;
@@ -20,6 +21,7 @@ use std::sync::Arc;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::unit::Unit;
 
+pub use files::{Files, Folder};
 pub(crate) use sources::{FILE as SOURCES, source_of};
 
 /// File format.

@@ -6,7 +6,7 @@ mod tree;
 pub mod units;
 
 pub use functions::{FUNCTIONS, Function};
-pub use parse::{DEEPEST, Equation, SyntaxError, equation};
+pub use parse::{DEEPEST, Equation, SyntaxError, equation, unknown_function};
 pub use tree::{Comparison, Form, Node, Operator, REDUCTIONS, Reduction};
 
 use std::collections::HashSet;
@@ -35,7 +35,7 @@ impl Expression {
 
     fn of(root: Node) -> Result<Self, SyntaxError> {
         let (mut names, mut seen): (Vec<String>, HashSet<&str>) = Default::default();
-        let mut foreign = None;
+        let (mut foreign, mut unknown) = (None, None);
         root.walk(&mut |node| match &node.form {
             Form::Name(name) if seen.insert(name) => names.push(name.clone()),
             Form::Rate(_) | Form::Member(..) | Form::Call(Function::Delay, _) => {
@@ -45,8 +45,12 @@ impl Expression {
             Form::Reduced(..) => {
                 foreign = foreign.take().or(Some((node.span.clone(), IN_CRITERIA)));
             }
+            Form::Lookup(name, _) => unknown = unknown.take().or(Some((node.span.clone(), name.clone()))),
             _ => {}
         });
+        if let Some((span, name)) = unknown {
+            return Err(SyntaxError { span: span.start..span.start + name.len(), message: unknown_function(&name) });
+        }
         match foreign {
             Some((span, message)) => Err(SyntaxError { span, message: message.to_owned() }),
             None => Ok(Self { root, names }),

@@ -231,6 +231,12 @@ fn checked(Spanned { raw, span }: Spanned) -> Result<Node, SyntaxError> {
     Ok(Node { form, span })
 }
 
+/// Returns the message for a function that does not exist.
+pub fn unknown_function(name: &str) -> String {
+    let names: Vec<&str> = FUNCTIONS.iter().map(|(name, ..)| *name).collect();
+    format!("unknown function `{name}`; known: {}", names.join(", "))
+}
+
 fn call(name: &str, place: Range<usize>, span: &Range<usize>, arguments: Vec<Spanned>) -> Result<Form, SyntaxError> {
     let wrong = |span: Range<usize>, message: String| Err(SyntaxError { span, message });
     if name == "der" {
@@ -248,8 +254,11 @@ fn call(name: &str, place: Range<usize>, span: &Range<usize>, arguments: Vec<Spa
         return Ok(Form::Reduced(*reduction, Box::new(number_of(of)?)));
     }
     let Some(&(_, function, least, most)) = FUNCTIONS.iter().find(|(known, ..)| *known == name) else {
-        let names: Vec<&str> = FUNCTIONS.iter().map(|(name, ..)| *name).collect();
-        return wrong(place, format!("unknown function `{name}`; known: {}", names.join(", ")));
+        // A lookup table, if the model has one of this name.
+        return match arguments.len() {
+            1 | 2 => Ok(Form::Lookup(name.to_owned(), arguments.into_iter().map(number_of).collect::<Result<_, _>>()?)),
+            _ => wrong(place, unknown_function(name)),
+        };
     };
     let count = arguments.len();
     let fits = match function {

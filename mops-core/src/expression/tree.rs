@@ -37,6 +37,8 @@ pub enum Form {
     Power(Box<Node>, Box<Node>),
     /// Function call `f(a, b, ..)`.
     Call(Function, Vec<Node>),
+    /// Value of a lookup table of the model: `map(x)` or `map(x, y)`.
+    Lookup(String, Vec<Node>),
     /// Number to which a course over time is reduced: `integral(u^2)`.
     Reduced(Reduction, Box<Node>),
     /// Condition `a > b`.
@@ -144,12 +146,14 @@ impl Node {
                 std::iter::once(first.as_ref()).chain(rest.iter().map(|(_, node)| node)).collect()
             }
             Form::Power(a, b) | Form::Compare(_, a, b) => vec![a, b],
-            Form::Call(_, nodes) | Form::All(nodes) | Form::Any(nodes) => nodes.iter().collect(),
+            Form::Call(_, nodes) | Form::Lookup(_, nodes) | Form::All(nodes) | Form::Any(nodes) => {
+                nodes.iter().collect()
+            }
         }
     }
 
     /// Replaces the form of every node for which `with` returns one; nodes below these are not visited.
-    pub(super) fn replace(&mut self, with: &mut impl FnMut(&Self) -> Option<Form>) {
+    pub fn replace(&mut self, with: &mut impl FnMut(&Self) -> Option<Form>) {
         if let Some(form) = with(self) {
             self.form = form;
             return;
@@ -164,7 +168,7 @@ impl Node {
                 rest.iter_mut().for_each(|(_, node)| node.replace(with));
             }
             Form::Power(a, b) | Form::Compare(_, a, b) => [a, b].into_iter().for_each(|node| node.replace(with)),
-            Form::Call(_, nodes) | Form::All(nodes) | Form::Any(nodes) => {
+            Form::Call(_, nodes) | Form::Lookup(_, nodes) | Form::All(nodes) | Form::Any(nodes) => {
                 nodes.iter_mut().for_each(|node| node.replace(with));
             }
         }

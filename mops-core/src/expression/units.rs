@@ -315,7 +315,7 @@ impl Dimensions {
                 Measure::pure()
             }
             Form::Not(condition) => self.measure(quantities, condition)?,
-            Form::Reduced(..) => unreachable!("reductions are measured by themselves"),
+            Form::Reduced(..) | Form::Lookup(..) => unreachable!("they are replaced before"),
         })
     }
 

@@ -22,6 +22,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+pub use crate::data::{Files, Folder};
 pub use built::built;
 pub use content::digest;
 pub use entries::{Entries, Short};
@@ -47,46 +48,6 @@ use sections::{
     CaseOptions, CriterionCommon, ModelCommon, PerCase, SensorSection, SolverCommon, StudySection, TunerSection,
 };
 use tree::{Node, Text};
-
-/// Source of data files: a folder, or the program itself.
-pub trait Files {
-    /// Reads a file, by its path in the study.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be read.
-    fn read(&self, path: &str) -> io::Result<Vec<u8>>;
-
-    /// Returns the path as shown to the user.
-    fn show(&self, path: &str) -> String;
-
-    /// Returns the names of the files in a folder, in any order.
-    ///
-    /// # Errors
-    /// Returns an error if the folder cannot be read, or if files are known by their paths only.
-    fn list(&self, _folder: &str) -> io::Result<Vec<String>> {
-        Err(io::ErrorKind::Unsupported.into())
-    }
-}
-
-/// Data files in a folder, usually that of the study file. Devices and pipes are refused: they may have no end.
-#[derive(Debug, Clone)]
-pub struct Folder(pub PathBuf);
-
-impl Files for Folder {
-    fn read(&self, path: &str) -> io::Result<Vec<u8>> {
-        read_regular(&self.0.join(path))
-    }
-
-    fn show(&self, path: &str) -> String {
-        self.0.join(path).display().to_string()
-    }
-
-    fn list(&self, folder: &str) -> io::Result<Vec<String>> {
-        let entries = std::fs::read_dir(self.0.join(folder))?;
-        let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
-        names.collect()
-    }
-}
 
 impl Files for Shipped {
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
@@ -197,7 +158,7 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
     let models = root.table("models")?;
     for (name, node) in &models {
         let node = with_base(&models, node, &mut vec![name.clone()])?;
-        draft.models.push((name.clone(), read_model(catalogue, &node)?));
+        draft.models.push((name.clone(), read_model(catalogue, &node, files)?));
     }
     for (name, node) in root.table("tuners")? {
         draft.tuners.push((name, read_tuner(&node)?));
@@ -295,7 +256,7 @@ fn with_base<'t>(all: &[(String, Node<'t>)], node: &Node<'t>, path: &mut Vec<Str
     with_base(all, base, path)?.overlaid(node, "like")
 }
 
-fn read_model(catalogue: &Catalogue, node: &Node<'_>) -> Result<ModelBuilder, Diagnostic> {
+fn read_model(catalogue: &Catalogue, node: &Node<'_>, files: &dyn Files) -> Result<ModelBuilder, Diagnostic> {
     let (kind, options) = kind(node, ModelCommon::KEYS, &catalogue.models, |k| k.name, "model")?;
     let common: ModelCommon = node.only(ModelCommon::KEYS).read()?;
     if let Some(like) = &common.like {
@@ -303,7 +264,8 @@ fn read_model(catalogue: &Catalogue, node: &Node<'_>) -> Result<ModelBuilder, Di
             .locate(&StudyError::new("like", format!("`{like}` is a model of a study, and this is a single model")))
             .with_help("give all keys of the model"));
     }
-    let mut model = options.read_with(&(kind.schema)(), kind.read)?.map_err(|mistake| options.locate(&mistake))?;
+    let model = options.read_with(&(kind.schema)(), |value| (kind.read)(value, files))?;
+    let mut model = model.map_err(|mistake| options.locate(&mistake))?;
     if let Some(place) = node.child("effects") {
         model = effects::add(catalogue, model, common.effects, &place)?;
     }

@@ -11,9 +11,9 @@ use crate::study::{CaseBuilder, CriterionBuilder, ModelBuilder};
 ///
 /// # Errors
 /// Returns the first error, with its location in `text`.
-pub fn model(catalogue: &Catalogue, text: &str) -> Result<ModelBuilder, Diagnostic> {
+pub fn model(catalogue: &Catalogue, text: &str, files: &dyn Files) -> Result<ModelBuilder, Diagnostic> {
     let text = Text::new("model", text, &[]);
-    read_model(catalogue, &text.parse()?)
+    read_model(catalogue, &text.parse()?, files)
 }
 
 /// Reads cases from a table under `[cases]`: one, or all of its `grid`. `models` provide the units of the inputs.
