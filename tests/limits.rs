@@ -356,7 +356,9 @@ fn an_empty_table_on_the_command_line_replaces_the_table_of_the_study() {
     {
         for table in ["criteria={}", "tuners={}", "models={}"] {
             let output = mops(&[command, study, "--set", table], root.path());
-            assert_eq!(output.status.code(), Some(2), "{command} {study} {table}: {}", said(&output));
+            // A study without criteria is right, but there is nothing to solve.
+            let expected = if command == "check" && table == "criteria={}" { 0 } else { 2 };
+            assert_eq!(output.status.code(), Some(expected), "{command} {study} {table}: {}", said(&output));
             assert!(!said(&output).contains("panicked"), "{}", said(&output));
         }
     }
