@@ -79,7 +79,7 @@ impl Files for Data {
     }
 
     fn list(&self, folder: &str) -> std::io::Result<Vec<String>> {
-        let entries = std::fs::read_dir(Path::new(FOLDER).join(folder))?;
+        let entries = std::fs::read_dir(Path::new(".").join(FOLDER).join(folder))?;
         entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned())).collect()
     }
 }

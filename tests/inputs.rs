@@ -107,6 +107,13 @@ fn every_waveform_has_its_integral() {
         let found = value(&found, name, "end");
         assert!((found - expected).abs() < 1e-7 * (1.0 + expected.abs()), "{name}: {found}, not {expected}");
     }
+    // Breaks of the parts of a sum that agree up to rounding are one: these pulses cover each other's pauses.
+    let whole = " = [{ pulse = { period = '0.3 s', width = '0.1 s', value = 1 } }, \
+                 { pulse = { time = '0.1 s', period = '0.3 s', width = '0.2 s', value = 1 } }]";
+    let text = integrators(&[("whole", whole)], 3.0)
+        + "most = { peak = { signal = 'u' }, usage = 'monitor' }\nleast = { expression = { value = 'minimum(u)' }, usage = 'monitor' }\n";
+    let found = run(folder.path(), &text);
+    assert_eq!((value(&found, "whole", "most"), value(&found, "whole", "least")), (1.0, 1.0));
     // Sines of 1, 2, .., 5 Hz have no mean over whole periods; what remains is the offset.
     let multisine = ".multisine = { amplitude = 1, from = 1, to = 5, count = 5, offset = 0.2 }";
     let found = run(folder.path(), &integrators(&[("many", multisine)], 3.0));
@@ -330,7 +337,7 @@ fn a_grid_is_a_case_for_every_combination_and_patterns_choose_among_them() {
 fn a_robust_loss_keeps_a_gain_that_single_wrong_samples_would_bend() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    // x = 2 t, with an alternating error of 0.01 and three samples that stand alone.
+    // x = 2 t, with an alternating error of 0.01 and three outliers.
     let wrong = |k: u32| if k % 13 == 7 { 5.0 } else { 0.01 * if k.is_multiple_of(2) { 1.0 } else { -1.0 } };
     let rows: String =
         (0..=40).map(|k| format!("{},{},1\n", f64::from(k) * 0.1, 0.2 * f64::from(k) + wrong(k))).collect();
@@ -347,7 +354,7 @@ fn a_robust_loss_keeps_a_gain_that_single_wrong_samples_would_bend() {
     assert!((of("huber") - 2.0).abs() < 0.01, "{}", of("huber"));
     assert!((of("student") - 2.0).abs() < 0.002, "{}", of("student"));
     let told = check(folder, &gain(experiment));
-    assert!(told.contains("3 samples of `x` in `e` (the first at 0.7000000000000001 s) stand alone"), "{told}");
+    assert!(told.contains("3 samples of `x` in `e` (the first at 0.7000000000000001 s) are outliers"), "{told}");
 }
 
 #[test]
@@ -449,4 +456,84 @@ fn data_are_summarised_at_rest_and_plotted() {
     assert!(mops(&["data", "log.csv", "--plot", "x.svg"]).contains("wrote x.svg"));
     assert!(std::fs::read_to_string(folder.join("x.svg")).unwrap().contains("<svg"));
     assert!(mops(&["data", "log.csv", "--plot", "x.gif"]).contains("neither .svg nor .png"));
+}
+
+#[test]
+fn the_second_part_of_a_sum_is_a_difference_on_every_scale() {
+    let text = "[study]\nname = 'room'\n[models.room.equations]\nstates = { T = 'degC' }\ninputs = { To = 'degC' }\n\
+                der = { T = '(To - T)/1 [s]' }\nstart = { T = '20 degC' }\nhorizon = '40 s'\n\
+                [cases]\nc = { inputs.To = ['20 degC', { step = { time = '1 s', after = '5 K' } }] }\n\
+                [criteria]\nend = { final-value = { signal = 'T' }, usage = 'monitor' }\n";
+    let folder = tempfile::tempdir().unwrap();
+    assert!((value(&run(folder.path(), text), "c", "end") - 25.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_formula_in_a_window_leaves_other_criteria_their_own() {
+    // x = t: the peak of its own window from 5 to 8 s is 8, the maximum from 1 s on 10, the kink of the absolute value no extremum.
+    let text = integrators(&[("one", " = 1")], 10.0)
+        + "ph = { peak = { signal = 'x' }, from = 5, until = 8, usage = 'monitor' }\n\
+           late = { expression = { value = 'ph + maximum(x)' }, from = 1, usage = 'monitor' }\n\
+           kink = { expression = { value = 'minimum(abs(x - 3.3))' }, usage = 'monitor' }\n\
+           jump = { expression = { value = 'integral(sign(x - 3.3))/1 [s]' }, usage = 'monitor' }\n";
+    let folder = tempfile::tempdir().unwrap();
+    let result = run(folder.path(), &text);
+    assert!((value(&result, "one", "late") - 18.0).abs() < 1e-9);
+    assert!(value(&result, "one", "kink").abs() < 1e-8, "{}", value(&result, "one", "kink"));
+    assert!((value(&result, "one", "jump") - 3.4).abs() < 1e-9, "{}", value(&result, "one", "jump"));
+}
+
+#[test]
+fn an_input_is_interpolated_to_the_end_of_an_experiment() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    // y = u = t; the logger of the input is ten times slower.
+    let rows =
+        |step: f64, count: u32| (0..=count).map(|k| format!("{0},{0}\n", step * f64::from(k))).collect::<String>();
+    std::fs::write(folder.join("fast.csv"), format!("t[s],y[V]\n{}", rows(0.1, 100))).unwrap();
+    std::fs::write(folder.join("slow.csv"), format!("t[s],u[V]\n{}", rows(1.0, 10))).unwrap();
+    std::fs::write(folder.join("late.csv"), "t[s],y[V]\n1000,0\n1001,1\n1002,2\n").unwrap();
+    let study = |experiment: &str| {
+        format!(
+            "[study]\nname = 'line'\ntask = 'calibration'\n[models.plant.equations]\nstates = {{ x = 'V' }}\n\
+             inputs = {{ u = 'V' }}\nparameters = {{ k = '1' }}\nder = {{ x = '0 [V/s]' }}\noutputs = {{ y = {{ value = 'k*u', unit = 'V' }} }}\n\
+             [tuners]\nk = {{ start = 0.5, min = 0.1, max = 10 }}\n[experiments.e]\n{experiment}\n\
+             [criteria]\ny = {{ rmse = {{ signal = 'y' }}, demand = 1 }}\n"
+        )
+    };
+    let error = |experiment: &str| {
+        let result = run(folder, &study(experiment));
+        let rows = result["criteria"].as_array().unwrap();
+        rows.iter().map(|row| row["value"].as_f64().unwrap()).fold(0.0, f64::max)
+    };
+    let slow = "channels = { y = 'y' }\ninputs = { u = { column = 'u', file = 'slow.csv', hold = 'first' } }\n";
+    for experiment in [
+        format!("file = 'fast.csv'\nto = '4.5 s'\n{slow}"),
+        format!("file = 'fast.csv'\nfrom = '0.7 s'\n{slow}"),
+        format!("file = 'fast.csv'\nwindows = '1.9 s'\n{slow}"),
+    ] {
+        let error = error(&experiment);
+        assert!(error < 1e-6, "{experiment}: {error}");
+    }
+    let none = check(folder, &study(&format!("file = 'late.csv'\n{slow}")));
+    assert!(none.contains("`u` ends 990 s before the experiment starts"), "{none}");
+    let early = check(folder, &study(&format!("file = 'fast.csv'\n{}", slow.replace("hold", "shift = '-5 s', hold"))));
+    assert!(early.contains("input `u` of `e` ends at 5 s, and the experiment at 10 s"), "{early}");
+}
+
+#[test]
+fn a_window_ends_at_a_pause_of_the_record() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let rows: String = (0..=40)
+        .map(|k| 0.1 * f64::from(k) + if k > 20 { 98.0 } else { 0.0 })
+        .map(|t| format!("{t},{},1\n", 2.0 * t))
+        .collect();
+    std::fs::write(folder.join("pause.csv"), format!("t[s],x[rad],u[rad/s]\n{rows}")).unwrap();
+    let experiment = "[experiments.e]\nfile = 'pause.csv'\nwindows = '0.5 s'\nchannels = { x = 'x' }\ninputs = { u = 'u' }\nfree = ['x']\n";
+    let told = check(folder, &gain(experiment));
+    assert!(told.contains("e-8") && !told.contains("98.") && !told.contains("98 s"), "{told}");
+    assert!((found_gain(folder, experiment) - 2.0).abs() < 1e-6);
+    let short = check(folder, &gain(&experiment.replace("0.5 s", "0.05 s")));
+    assert!(short.contains("less than two samples"), "{short}");
 }

@@ -1,5 +1,6 @@
 //! Value of a formula.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use mops_core::expression::units::{Dimensions, Measure, Named};
@@ -53,6 +54,16 @@ impl CriterionSpec for Expression {
     }
 
     fn bind_with(&self, model: &Interface, others: &[Other]) -> Result<Box<dyn Criterion>, StudyError> {
+        self.bind_within(model, others, [0.0, f64::INFINITY])
+    }
+
+    /// The window restricts the reductions; other criteria have windows of their own.
+    fn bind_within(
+        &self,
+        model: &Interface,
+        others: &[Other],
+        window: [f64; 2],
+    ) -> Result<Box<dyn Criterion>, StudyError> {
         let at = |SyntaxError { span, message }: SyntaxError| StudyError::new("value", message).at(span);
         let (formula, reduced) = Formula::with_reductions(&self.value).map_err(at)?;
         let mut dimensions = Dimensions::default();
@@ -102,7 +113,11 @@ impl CriterionSpec for Expression {
             let fact = format!("the value of the formula is in `{found}`, not in `{unit}`");
             return Err(StudyError::new("unit", fact).with_help("give a unit of the same dimension"));
         }
-        Ok(Box::new(Bound { formula, sources, courses, unit }))
+        if unit.zero() != 0.0 {
+            let fact = format!("`{unit}` has a zero of its own, but the formula may be a difference");
+            return Err(StudyError::new("unit", fact).with_help(format!("give {found}")));
+        }
+        Ok(Box::new(Bound { formula, sources, courses, unit, window }))
     }
 }
 
@@ -190,9 +205,29 @@ struct Bound {
     /// Reductions, what they reduce, and the names in it.
     courses: Vec<(Reduction, Formula, Vec<Course>)>,
     unit: Unit,
+    /// Part of the simulation that is reduced, s.
+    window: [f64; 2],
 }
 
+/// Error of a quartic, relative to the largest value of a formula over time, above which its segment is halved.
+const ACCURACY: f64 = 1e-9;
+
+/// Length of a segment, relative to the whole, that is not halved: a kink or a jump of the formula is within it.
+const SHORTEST: f64 = 1e-12;
+
 impl Bound {
+    /// Returns the part of a trace within the window.
+    fn part<'t>(&self, whole: &'t Trace) -> Result<Cow<'t, Trace>, String> {
+        let [from, until] = self.window;
+        if from <= whole.start() && until >= whole.end() {
+            return Ok(Cow::Borrowed(whole));
+        }
+        if from >= whole.end() {
+            return Err(format!("`from` at {from} s is not before the end of the simulation at {} s", whole.end()));
+        }
+        Ok(Cow::Owned(whole.between(from, until)))
+    }
+
     /// Returns a course, in coherent units.
     fn course(
         &self,
@@ -200,10 +235,10 @@ impl Bound {
         analysis: &Analysis,
         parameters: &[f64],
     ) -> Result<Trace, String> {
-        let mut traces: Vec<Option<&Trace>> = Vec::new();
+        let mut traces: Vec<Option<Cow<'_, Trace>>> = Vec::new();
         for name in names {
             traces.push(match name {
-                Course::Signal(signal, _) => Some(trace(analysis, signal)?),
+                Course::Signal(signal, _) => Some(self.part(trace(analysis, signal)?)?),
                 Course::Parameter(..) => None,
             });
         }
@@ -230,12 +265,26 @@ impl Bound {
                 .collect();
             formula.evaluate(&values)
         };
-        let mut found = Trace::starting_at(knots[0], knots.len());
-        for pair in knots.windows(2) {
-            let nodes = Trace::NODES.map(|s| if s == 1.0 { pair[1] } else { pair[0] + s * (pair[1] - pair[0]) });
-            found.push(pair[1], nodes.map(|t| value(t, t == pair[1])));
+        let [start, end] = [knots[0], knots[knots.len() - 1]];
+        let largest = knots.iter().map(|&t| value(t, false).abs()).fold(0.0, f64::max);
+        let mut found = Trace::starting_at(start, knots.len());
+        let mut open: Vec<[f64; 2]> = knots.windows(2).rev().map(|pair| [pair[0], pair[1]]).collect();
+        while let Some([from, to]) = open.pop() {
+            let at = |s: f64| if s == 1.0 { value(to, true) } else { value(from + s * (to - from), false) };
+            let nodes = Trace::NODES.map(at);
+            let size = nodes.iter().fold(largest, |size, y| size.max(y.abs()));
+            let off = Trace::deviation(nodes, Trace::CHECKS.map(at));
+            if off > ACCURACY * size && to - from > SHORTEST * (end - start) {
+                let middle = 0.5 * (from + to);
+                open.extend([[middle, to], [from, middle]]);
+            } else if off > ACCURACY * size {
+                // Across a jump a quartic would overshoot.
+                found.push(to, Trace::NODES.map(|s| nodes[0] + s * (nodes[4] - nodes[0])));
+            } else {
+                found.push(to, nodes);
+            }
         }
-        found.jump_at_end(value(found.end(), false));
+        found.jump_at_end(value(end, false));
         Ok(found)
     }
 }
@@ -349,6 +398,12 @@ mod tests {
             ("2*m*maximum(y)", 1.0, "kg m"),
             ("maximum(m*y) + 0.5 [kg m]", 1.0, "kg m"),
             ("sqrt(integral(abs(y)*abs(y))/1 [s])", squares.sqrt(), "m"),
+            // Kinks and jumps of the formula.
+            ("maximum(sign(y))", 1.0, "1"),
+            ("minimum(abs(y))", 0.0, "m"),
+            ("integral(abs(y))", 7.0 + cos, "m s"),
+            ("integral(sign(y))", 4.0 * std::f64::consts::PI - 10.0, "s"),
+            ("maximum(if(y > 0.5 [m], 1, 0))", 1.0, "1"),
         ] {
             let (found, of) = value(text);
             assert_near(found, expected, 1e-7);

@@ -33,7 +33,7 @@ pub struct NormalisedError {
     /// Noise level (standard deviation), in the unit of the signal; by default that of the channel.
     pub noise: Option<Quantity>,
     /// How much a deviation counts. `squares` (default) is right for normal noise. `huber` grows linearly beyond 1.345 standard
-    /// deviations and `student` with the logarithm, so that samples that stand alone have little or no influence.
+    /// deviations and `student` with the logarithm, so that outliers have little or no influence.
     #[serde(default)]
     pub loss: Loss,
 }
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_that_stands_alone_counts_less_with_a_robust_loss() {
+    fn an_outlier_counts_less_with_a_robust_loss() {
         let case = measured(&[0.0, 1.0, 2.0, 3.0], &[0.1, 0.9, 2.1, 103.0], Some(0.1));
         let of = |loss: Loss| value_in(&case, &NormalisedError { loss, ..error(None) }, &simulated(3.0, |t| t)).number;
         assert!(of(Loss::Squares) > 2e5 && of(Loss::Huber) < 700.0 && of(Loss::Student) < 20.0);

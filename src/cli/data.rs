@@ -11,8 +11,8 @@ use mops_discrepancy::noise_of;
 
 use super::findings;
 use crate::files;
-use crate::numbers::file_name;
-use crate::report::{Color, Curve, Plot};
+use crate::numbers::FileNames;
+use crate::report::{Color, Curve, Plot, thinned};
 use crate::terminal::{CommandError, number, print, table};
 
 /// Arguments of `mops data`.
@@ -23,7 +23,8 @@ pub(super) struct Arguments {
     /// Print the order of persistent excitation of this column as an input.
     #[arg(long, value_name = "COLUMN")]
     excitation: Option<String>,
-    /// Print mean and standard deviation of every column between two times at which the plant is at rest: the noise of the sensors.
+    /// Print mean and standard deviation of every column between two times, in the unit of the time column, at which the plant is at
+    /// rest: the noise of the sensors.
     #[arg(long, num_args = 2, value_names = ["FROM", "TO"], allow_negative_numbers = true, conflicts_with = "excitation")]
     rest: Option<Vec<f64>>,
     /// Write a plot of every column over time, as SVG or PNG by the extension: columns.svg gives columns-NAME.svg for each of several.
@@ -43,8 +44,9 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(path) = &arguments.plot {
-        plot(&file, path)?;
-        print(&format!("wrote {}\n", path.display()))?;
+        for written in plot(&file, path)? {
+            print(&format!("wrote {}\n", written.display()))?;
+        }
         return Ok(ExitCode::SUCCESS);
     }
     let time = file.time_column();
@@ -177,8 +179,8 @@ fn at_rest(file: &DataFile, [from, to]: [f64; 2]) -> Result<String, Diagnostic> 
     Ok(table(&header, &[2, 3, 4, 5], rows))
 }
 
-/// Plots every column over time, one below the other.
-fn plot(file: &DataFile, path: &Path) -> Result<(), CommandError> {
+/// Plots every column over time, each in a file of its own if there are several, and returns the files.
+fn plot(file: &DataFile, path: &Path) -> Result<Vec<PathBuf>, CommandError> {
     let time = file.time_column();
     let names = file.column_names();
     let mut plots = Vec::new();
@@ -194,7 +196,7 @@ fn plot(file: &DataFile, path: &Path) -> Result<(), CommandError> {
             (Some(time), None) => time.clone(),
             (None, _) => "row".to_owned(),
         };
-        let points = times.iter().copied().zip(column.values.iter().copied()).collect();
+        let points = thinned(times.iter().copied().zip(column.values.iter().copied()).collect());
         plots.push(Plot {
             title: name.clone(),
             x_label,
@@ -209,12 +211,13 @@ fn plot(file: &DataFile, path: &Path) -> Result<(), CommandError> {
     };
     let end = path.extension().and_then(|end| end.to_str()).unwrap_or_default();
     let several = plots.len() > 1;
+    let (mut names_of_files, mut written) = (FileNames::default(), Vec::new());
     for (plot, name) in plots.iter().zip(names.iter().filter(|name| time.as_ref() != Some(name))) {
         let place = match several {
             true => path.with_file_name(format!(
                 "{}-{}.{end}",
                 path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
-                file_name(name)
+                names_of_files.unique(name)
             )),
             false => path.to_owned(),
         };
@@ -223,8 +226,9 @@ fn plot(file: &DataFile, path: &Path) -> Result<(), CommandError> {
             "png" => plot.write_png(&place).map_err(CommandError::cannot_write(&place))?,
             _ => return Err(wrong().into()),
         }
+        written.push(place);
     }
-    Ok(())
+    Ok(written)
 }
 
 fn sample_time(name: &str, times: &[f64]) -> String {

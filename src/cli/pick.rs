@@ -79,8 +79,9 @@ pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     for (name, _) in &arguments.demands {
         check_criterion(&before, name)?;
     }
+    let demands = in_units(&before, &arguments.demands);
     let setting = |(name, value): &(String, String)| format!("criteria.{}.demand={}", key(name), written(value));
-    let mut file = open(arguments.demands.iter().map(setting).collect())?;
+    let mut file = open(demands.iter().map(setting).collect())?;
     file.study.cancelled_by(&cancel_after(arguments.limit));
     let problem = Problem::new(Arc::new(file.study.clone()));
     let (index, at) = nearest(&problem, &front, &path)?;
@@ -89,7 +90,7 @@ pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     let chosen = refined.as_ref().unwrap_or(&at);
     let text =
         fs::read_to_string(&path).map_err(|error| CommandError::Failure(format!("{}: {error}", path.display())))?;
-    files::write(&out, picked(&text, &file, chosen, &arguments.demands)).map_err(CommandError::cannot_write(&out))?;
+    files::write(&out, picked(&text, &file, chosen, &demands)).map_err(CommandError::cannot_write(&out))?;
     print(&format!("\na study that starts there is in {}\n", out.display()))?;
     Ok(if chosen.merit.is_feasible() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
@@ -219,6 +220,20 @@ fn comparison(study: &Study, (index, of): (usize, usize), at: &Evaluation, refin
         "point {} of {of} is nearest to these demands: worst scaled value {worst}{then}\n\n{criteria}\n{tuners}",
         index + 1
     )
+}
+
+/// Adds to numbers the unit in which the front lists the criterion.
+fn in_units(study: &Study, demands: &[(String, String)]) -> Vec<(String, String)> {
+    let unit = |name: &str| study.rows().iter().find(|row| row.name == name).map(|row| row.unit.to_string());
+    let with_unit = |(name, value): &(String, String)| {
+        let bare = value.trim().parse::<f64>().is_ok();
+        let value = match unit(name).filter(|unit| bare && unit != "1") {
+            Some(unit) => format!("{} {unit}", value.trim()),
+            None => value.clone(),
+        };
+        (name.clone(), value)
+    };
+    demands.iter().map(with_unit).collect()
 }
 
 /// Returns the text of a study that starts at the point, with the new demands.

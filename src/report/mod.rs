@@ -49,7 +49,7 @@ pub(crate) use bode::{FrequencyCurve, bode, frequencies};
 pub use page::page;
 pub use plot::{Band, Color, Curve, CurveStyle, Level, ParallelAxis, Plot, Surface, ZAxis};
 use plot_files::PlotFiles;
-pub(crate) use sampling::points;
+pub(crate) use sampling::{points, thinned};
 pub(crate) use sensitivity::combination;
 pub(crate) use side_by_side::{Responses, Rows, comparison_page};
 

@@ -27,7 +27,7 @@ pub(crate) fn points(trace: &Trace) -> Vec<(f64, f64)> {
 }
 
 /// Reduces points with increasing x to the visible ones.
-pub(super) fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+pub(crate) fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     within_columns(points, COLUMNS)
 }
 

@@ -124,7 +124,7 @@ impl Difference {
             }
             ["data", ..] => return "a data file has changed".to_owned(),
             ["tuners", ..] => return "the tuners have changed".to_owned(),
-            ["rows", ..] => return "the criteria have changed".to_owned(),
+            ["rows", ..] => return "the criteria or their units have changed".to_owned(),
             ["uncertain", ..] => return "the uncertain parameters have changed".to_owned(),
             ["mops"] => "the version of mops".to_owned(),
             _ => path.join("."),

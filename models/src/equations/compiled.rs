@@ -216,7 +216,8 @@ impl Compiled {
                 let tape = next();
                 match graph.op(id) {
                     Op::State(state) => Signal::State(state),
-                    Op::Input(input) => Signal::Input(input),
+                    // Forces and delayed quantities come after the declared inputs.
+                    Op::Input(input) if input < inputs => Signal::Input(input),
                     _ => Signal::Tape(tape),
                 }
             })

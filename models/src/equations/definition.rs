@@ -185,7 +185,8 @@ impl Text {
     }
 }
 
-const HELP: &str = "see `mops describe equations` for the syntax of expressions";
+/// Way out of a mistake in an expression.
+pub const HELP: &str = "see `mops describe equations` for the syntax of expressions";
 
 impl Definition {
     /// Reads the tables.

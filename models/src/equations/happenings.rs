@@ -24,6 +24,9 @@ pub(super) enum Phase {
 /// remains after accumulated events (see [`crate::kernel`]), so that a wrong rest state is detected.
 const NEAR: f64 = 1e-6;
 
+/// Size of a guard after an event, relative to the largest state, that counts as 0: above the rounding of a zero crossing.
+const AT_ZERO: f64 = 1e-9;
+
 impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
     /// Returns the guard of an event in its current phase: not negative while the event waits.
     pub(super) fn happening_guard(&self, k: usize, at: &Instant<'_, S>) -> S {
@@ -87,13 +90,17 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
     }
 
     /// Arms an event if its guard is positive or increases. After a reset that reverses the guard, rounding may leave
-    /// the guard negative; if nothing moves any more, the guard is 0.
+    /// the guard negative; if nothing moves any more, the guard is 0. A guard that stays negative, as after a jump of an input, arms the
+    /// event when it is positive again.
     fn arm(&mut self, k: usize, event: &EventInstant<'_, S>, x: &[S]) {
         self.phases[k] = Phase::Armed(0.0);
         let at = Instant { x, ..event.at };
         let guard = self.happening_guard(k, &at).value();
         if guard <= 0.0 {
-            let rises = self.guard_rate(self.guard_of(k), &at, event.du).is_some_and(|rate| rate >= 0.0);
+            let rounding = AT_ZERO * self.sizes.iter().fold(0.0, |largest: f64, &size| largest.max(size));
+            let rises = self
+                .guard_rate(self.guard_of(k), &at, event.du)
+                .is_some_and(|rate| rate > 0.0 || (rate == 0.0 && guard >= -rounding));
             self.phases[k] = if rises { Phase::Armed(guard) } else { Phase::Passed };
         }
     }

@@ -6,7 +6,7 @@ use mops_core::data::{DataFile, Files};
 use mops_core::expression::{Comparison, Equation, Form, Function, Node, Operator, unknown_function};
 use mops_core::{Quantity, StudyError, Unit};
 
-use super::definition::{Definition, path, under};
+use super::definition::{Definition, HELP, path, under};
 use super::options::{Between, EquationsOptions, Grid, Outside, Points, Table};
 
 /// Values in coherent units, with their unit.
@@ -76,7 +76,7 @@ fn replace_in(node: &mut Node, lookups: &[Lookup]) -> Result<(), StudyError> {
         let Some(lookup) = lookups.iter().find(|lookup| lookup.name == *name) else {
             let tables: Vec<&str> = lookups.iter().map(|lookup| lookup.name.as_str()).collect();
             let known = if tables.is_empty() { String::new() } else { format!("; tables: {}", tables.join(", ")) };
-            result = Err(wrong(unknown_function(name) + &known));
+            result = Err(wrong(unknown_function(name) + &known).with_help(HELP));
             return None;
         };
         let wanted = if lookup.z.is_some() { 2 } else { 1 };

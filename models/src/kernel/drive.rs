@@ -5,6 +5,8 @@ use mops_core::enclosure::Enclosure;
 use mops_core::math;
 use mops_core::{Chirp, Hold, Input, Scalar};
 
+use super::next_of;
+
 /// Input with its current value and rate.
 ///
 /// A step of the integrator ends where the input jumps, and evaluates the input there from the left. Only
@@ -139,7 +141,8 @@ impl<'a, S: Scalar> Drive<'a, S> {
     /// the previous one are skipped.
     pub fn next_break(&self, t: f64) -> f64 {
         if let Some(Curve::Sum(parts)) = &self.curve {
-            return parts.iter().map(|part| part.next_break(t)).fold(f64::INFINITY, f64::min);
+            // Breaks at one instant up to rounding are one, as between different inputs.
+            return next_of(parts.iter().map(|part| part.next_break(t)));
         }
         let Some(Input::Sampled { times, values, hold: Hold::Zero }) = self.input else { return self.next_sample(t) };
         let after = self.first_after(times, t);

@@ -15,7 +15,7 @@ use crate::study_error::StudyError;
 use crate::unit::Unit;
 
 pub(crate) use in_unit::InUnit;
-pub(crate) use window::Window;
+use window::Window;
 
 /// Options of a criterion as written in the study; names and quantities are not yet checked against a model.
 pub trait CriterionSpec: Send + Sync {
@@ -53,6 +53,20 @@ pub trait CriterionSpec: Send + Sync {
     /// Returns an error as [`CriterionSpec::bind`] does.
     fn bind_with(&self, model: &Interface, _others: &[Other]) -> Result<Box<dyn Criterion>, StudyError> {
         self.bind(model)
+    }
+
+    /// Binds the criterion as [`CriterionSpec::bind_with`] does, restricted to a part of the simulation from one time to another, s.
+    /// All its times then count from the first.
+    ///
+    /// # Errors
+    /// Returns an error as [`CriterionSpec::bind`] does.
+    fn bind_within(
+        &self,
+        model: &Interface,
+        others: &[Other],
+        [from, until]: [f64; 2],
+    ) -> Result<Box<dyn Criterion>, StudyError> {
+        Ok(Box::new(Window::new(self.bind_with(model, others)?, from, until)))
     }
 }
 

@@ -146,7 +146,8 @@ fn separator(text: &str, start: usize) -> u8 {
     let by_blanks = count(start, BLANK);
     let is_table = next.is_some_and(|next| {
         let mut row = cells(text, next, BLANK);
-        count(next, BLANK) == by_blanks && row.all(|cell| number(text[cell].as_bytes(), BLANK).is_some())
+        let is_value = |cell: &str| number(cell.as_bytes(), BLANK).is_some() || nanoseconds(cell).is_some();
+        count(next, BLANK) == by_blanks && row.all(|cell| is_value(&text[cell]))
     });
     if by_blanks > 1 && is_table { BLANK } else { b',' }
 }

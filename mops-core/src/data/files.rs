@@ -39,7 +39,9 @@ impl Files for Folder {
     }
 
     fn list(&self, folder: &str) -> io::Result<Vec<String>> {
-        let entries = std::fs::read_dir(self.0.join(folder))?;
+        let path = self.0.join(folder);
+        let path = if path.as_os_str().is_empty() { PathBuf::from(".") } else { path };
+        let entries = std::fs::read_dir(path)?;
         let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
         names.collect()
     }

@@ -26,6 +26,12 @@ pub(super) fn read(name: &str, node: &Node<'_>, files: &dyn Files) -> Result<Vec
         let key = if section.file.is_some() { "file" } else { "files" };
         let file = opened.open(node, key, &path)?;
         if section.frequency.is_some() || !section.responses.0.is_empty() {
+            if let Some((key, place)) =
+                ["windows", "sample-time"].iter().find_map(|key| node.child(key).map(|place| (key, place)))
+            {
+                let fact = format!("`{key}` is for signals over time, not for frequency responses");
+                return Err(place.key_diagnostic(fact).with_help("remove it"));
+            }
             found.push(frequency::read(own, node, &section, &file)?);
             continue;
         }
@@ -100,7 +106,13 @@ fn experiment(
         let place = entry(node, "inputs", input);
         let keys = Elsewhere::of(&column.file, &column.time, &column.time_unit, &column.sample_time);
         let other = keys.table(&place, &column.column, table, opened)?;
-        let (values, unit, missing) = other.as_ref().unwrap_or(table).input(&place, column)?;
+        let source = other.as_ref().unwrap_or(table);
+        let (values, unit, missing) = source.input(&place, column)?;
+        warnings.extend(source.ends_early(&values).map(|(last, end)| {
+            format!(
+                "input `{input}` of `{name}` ends at {last} s, and the experiment at {end} s: its last value is kept"
+            )
+        }));
         if missing > 0 {
             warnings.push(format!(
                 "input `{input}` of `{name}` has {missing} missing samples: the value before each is kept"
@@ -144,8 +156,13 @@ pub(super) fn recorded(
     let clock = Clock::new(place, &file, keys.time, keys.unit, keys.sample_time, &column.column)?;
     check_times(&file, &clock.column, &clock.times, 0)?;
     let rows = 0..clock.times.len();
-    let table = Table { file, driving: rows.clone(), rows, clock, zero: 0.0, until: f64::INFINITY };
+    let table = Table { file, driving: rows.clone(), rows, clock, end: f64::INFINITY, is_other: true };
     let shift = read_seconds(place, "shift", column.shift.as_ref())?.unwrap_or(0.0);
+    let last = table.clock.at(table.rows.end - 1) + shift;
+    if last < 0.0 {
+        let fact = format!("`{}` ends {} s before the simulation starts at 0 s", column.column, -last);
+        return Err(place.diagnostic(fact).with_help("correct `shift`, or the time column"));
+    }
     let (input, own, _) = table.sampled(place, column, shift, table.rows.clone())?;
     let Some(own) = own.filter(|own| own != unit) else { return Ok(input) };
     let Some(factor) = own.factor_to(unit) else {
@@ -206,11 +223,16 @@ fn open(node: &Node<'_>, key: &str, path: &str, files: &dyn Files) -> Result<Dat
 struct Clock {
     /// Name of the time column; empty if the samples are counted.
     column: String,
-    /// Times of all rows, s.
-    times: Vec<f64>,
-    /// Time stamp of time 0, ns since 1970, if the file has time stamps.
+    /// Times of all rows in the file, s.
+    times: Arc<Vec<f64>>,
+    /// Time in the file that is time 0 of the study, s.
+    zero: f64,
+    /// Time stamp of time 0 in the file, ns since 1970, if the file has time stamps.
     origin: Option<i64>,
 }
+
+/// Time stamps below one day have no date.
+const DAY: i64 = 86_400_000_000_000;
 
 impl Clock {
     /// Reads the time column, or counts samples. `column` is one of the columns that were sampled then.
@@ -233,8 +255,8 @@ impl Clock {
                 return Err(place.diagnostic(format!("`sample-time` must be above 0 s, and is {step} s")));
             }
             let rows = file.column(column).map_or(file.variables[0].rows, |column| column.values.len());
-            let times = (0..rows).map(|row| row as f64 * step).collect();
-            return Ok(Self { column: String::new(), times, origin: None });
+            let times = Arc::new((0..rows).map(|row| row as f64 * step).collect());
+            return Ok(Self { column: String::new(), times, zero: 0.0, origin: None });
         }
         let at = ["time", "file", "files", "path"].iter().find_map(|key| node.child(key));
         let place = at.unwrap_or_else(|| node.clone());
@@ -259,12 +281,18 @@ impl Clock {
                 .diagnostic(format!("the time column `{time}` is in `{unit}`, which is not a unit of time"))
                 .with_help("set time-unit = \"s\"")
         })?;
-        Ok(Self { times: column.values.iter().map(|t| t * factor).collect(), origin: column.origin, column: time })
+        let times = Arc::new(column.values.iter().map(|t| t * factor).collect());
+        Ok(Self { times, zero: 0.0, origin: column.origin, column: time })
     }
 
-    /// Moves time 0 to a later time.
-    fn start_at(&mut self, start: f64) {
-        self.times.iter_mut().for_each(|t| *t -= start);
+    /// Returns the time of a row in the study, s.
+    fn at(&self, row: usize) -> f64 {
+        self.times[row] - self.zero
+    }
+
+    /// Returns the first row of a range whose time, in the study, is not below `t`.
+    fn first_from(&self, rows: Range<usize>, t: f64) -> usize {
+        rows.start + self.times[rows].partition_point(|time| time - self.zero < t)
     }
 }
 
@@ -303,22 +331,53 @@ impl<'a> Elsewhere<'a> {
         };
         let mut clock = Clock::new(place, &file, self.time, self.unit, self.sample_time, column)?;
         check_times(&file, &clock.column, &clock.times, 0)?;
+        let apart = |fact: String| place.diagnostic(fact).with_help("give both the same kind of time");
         let between = match (clock.origin, main.clock.origin) {
+            (Some(own), Some(of_main)) if (own.abs() < DAY) != (of_main.abs() < DAY) => {
+                let fact =
+                    "only one of this file and the file of the experiment has dates, so that they have no common clock";
+                return Err(apart(fact.to_owned()));
+            }
             #[allow(clippy::cast_precision_loss)]
-            (Some(own), Some(main)) => (own - main) as f64 * 1e-9,
+            (Some(own), Some(of_main)) => (own - of_main) as f64 * 1e-9,
             (None, None) => 0.0,
             (own, _) => {
-                let (with, without) = if own.is_some() { ("this file", "that") } else { ("that", "this file") };
-                let fact = format!("{with} has time stamps and {without} has not, so that they have no common clock");
-                let fact = fact.replace("that", "the file of the experiment");
-                return Err(place.diagnostic(fact).with_help("give both the same kind of time"));
+                let files = ["this file", "the file of the experiment"];
+                let [with, without] = if own.is_some() { files } else { [files[1], files[0]] };
+                let fact = format!("{with} has time stamps, but {without} has not, so that they have no common clock");
+                return Err(apart(fact));
             }
         };
-        clock.start_at(main.zero - between);
-        let first = clock.times.partition_point(|&t| t < main.clock.times[main.rows.start]);
-        let last = clock.times.partition_point(|&t| t <= main.until).max(first);
-        Ok(Some(Table { file, rows: first..last, driving: 0..last, clock, zero: main.zero, until: main.until }))
+        // Rounding must not part samples of both files that belong to one instant.
+        let count = main.rows.len().max(2) - 1;
+        #[allow(clippy::cast_precision_loss)]
+        let close = SAME * (main.clock.at(main.rows.end - 1) - main.clock.at(main.rows.start)) / count as f64;
+        let own = clock.times.iter().map(|t| {
+            let t = t - (main.clock.zero - between);
+            let after = main.clock.first_from(main.driving.clone(), t);
+            let near = [after.wrapping_sub(1), after].into_iter().filter(|row| main.driving.contains(row));
+            near.map(|row| main.clock.at(row)).find(|known| (known - t).abs() <= close).unwrap_or(t)
+        });
+        let own: Vec<f64> = own.collect();
+        clock = Clock { times: Arc::new(own), zero: 0.0, ..clock };
+        let all = 0..clock.times.len();
+        let first = clock.first_from(all.clone(), main.clock.at(main.rows.start));
+        let last = clock.times.partition_point(|&t| t <= main.clock.at(main.rows.end - 1)).max(first);
+        Ok(Some(Table { file, rows: first..last, driving: all, clock, end: main.end, is_other: true }))
     }
+}
+
+/// Distance of two samples of different files, relative to the mean time between samples, up to which they belong to one instant.
+const SAME: f64 = 1e-6;
+
+/// Returns the largest time by which channels are moved to later times, s.
+fn ahead(node: &Node<'_>, section: &ExperimentSection) -> Result<f64, Diagnostic> {
+    let mut most = 0.0f64;
+    for (signal, Short(channel)) in &section.channels.0 {
+        let place = entry(node, "channels", signal);
+        most = most.max(read_seconds(&place, "shift", channel.shift.as_ref())?.unwrap_or(0.0));
+    }
+    Ok(most)
 }
 
 /// The part of a data file that an experiment uses, with its time.
@@ -330,10 +389,10 @@ struct Table {
     rows: Range<usize>,
     /// Rows that inputs may be taken from.
     driving: Range<usize>,
-    /// Time 0 of the study on the clock of the file, s.
-    zero: f64,
-    /// End of the used part in the time of the study, s.
-    until: f64,
+    /// Time of the last measurement in the study, s: inputs are needed until then.
+    end: f64,
+    /// True if the file or its time axis is not that of the experiment.
+    is_other: bool,
 }
 
 impl Table {
@@ -343,9 +402,9 @@ impl Table {
         let (time, unit) = (section.time.as_deref(), section.time_unit.as_deref());
         let column = column.map_or("", String::as_str);
         let mut clock = Clock::new(node, &file, time, unit, section.sample_time.as_ref(), column)?;
-        let times = &clock.times;
+        let times = Arc::clone(&clock.times);
         let skip = section.skip.min(times.len());
-        check_times(&file, &clock.column, times, skip)?;
+        check_times(&file, &clock.column, &times, skip)?;
 
         let from = read_seconds(node, "from", section.from.as_ref())?;
         let to = read_seconds(node, "to", section.to.as_ref())?;
@@ -368,10 +427,9 @@ impl Table {
             )
             .with_help(format!("the file has {all}")));
         }
-        let zero = if section.reset_time == Some(false) { 0.0 } else { times[first] };
-        clock.start_at(zero);
-        let until = to.map_or(f64::INFINITY, |to| to - zero);
-        Ok(Self { file, clock, rows: first..last, driving: skip..last, zero, until })
+        clock.zero = if section.reset_time == Some(false) { 0.0 } else { times[first] };
+        let end = clock.at(last - 1) + ahead(node, section)?;
+        Ok(Self { file, clock, rows: first..last, driving: skip..times.len(), end, is_other: false })
     }
 
     /// Returns the windows into which an experiment is divided, each from its own time 0 on; the whole table without windows.
@@ -381,38 +439,46 @@ impl Table {
         if section.reset_time == Some(false) {
             let place = node.child("reset-time").expect("it was just read");
             return Err(place
-                .key_diagnostic("each of several windows starts at its own time 0".to_owned())
-                .with_help("remove `reset-time`"));
+                .key_diagnostic("`reset-time = false` excludes `windows`, which start at their own time 0".to_owned())
+                .with_help("remove one of them"));
+        }
+        let ahead = ahead(node, section)?;
+        let mut steps: Vec<f64> =
+            self.clock.times[self.rows.clone()].windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        let step = steps[steps.len() / 2];
+        if length.is_nan() || length < step {
+            let fact = format!("a window of {length} s has less than two samples, which are {step} s apart");
+            return Err(place.diagnostic(fact).with_help("choose a longer time"));
         }
         let mut windows = Vec::new();
         let mut first = self.rows.start;
         // Half a nanosecond covers the rounding of sample times.
         const CLOSE: f64 = 5e-10;
-        while first < self.rows.end {
-            let start = self.clock.times[first];
-            let next = self.clock.times[..self.rows.end].partition_point(|&t| t < start + length - CLOSE);
+        while first + 1 < self.rows.end {
+            let start = self.clock.at(first);
+            let next = self.clock.first_from(first..self.rows.end, start + length - CLOSE);
+            // A pause that is longer than a window ends one.
+            let pause = (first + 1..self.rows.end).find(|&row| self.clock.at(row) - self.clock.at(row - 1) > length);
             let end = (next + 1).min(self.rows.end);
-            let covers = self.clock.times[end - 1] - start;
-            if end < first + 2 || length <= 0.0 || length.is_nan() {
-                let fact = format!("a window of {length} s at {} s has less than two samples", start + self.zero);
+            let is_paused = pause.is_some_and(|pause| pause < end);
+            let end = pause.map_or(end, |pause| pause.min(end));
+            let covers = self.clock.at(end - 1) - start;
+            if end < first + 2 && !is_paused {
+                let fact = format!("a window of {length} s at {} s has less than two samples", self.clock.times[first]);
                 return Err(place.diagnostic(fact).with_help("choose a longer time"));
             }
-            if covers < 0.5 * length {
-                break;
+            if covers >= 0.5 * length && end >= first + 2 {
+                let clock = Clock { zero: self.clock.times[first], ..self.clock.clone() };
+                let (file, driving) = (Arc::clone(&self.file), self.driving.clone());
+                let end_time = covers + ahead;
+                windows.push(Self { file, clock, rows: first..end, driving, end: end_time, is_other: false });
             }
-            let mut clock = self.clock.clone();
-            clock.start_at(start);
-            let driving = self.driving.start..end;
-            let file = Arc::clone(&self.file);
-            windows.push(Self { file, clock, rows: first..end, driving, zero: self.zero + start, until: covers });
-            // The last sample of a window is the first of the next one.
-            first = next;
-            if next + 1 >= self.rows.end {
-                break;
-            }
+            // The last sample of a window is the first of the next one, but for a pause.
+            first = if is_paused { end } else { next };
         }
         if windows.is_empty() {
-            let all = self.clock.times[self.rows.end - 1] - self.clock.times[self.rows.start];
+            let all = self.clock.at(self.rows.end - 1) - self.clock.at(self.rows.start);
             let fact = format!("a window of {length} s is more than twice as long as the record of {all} s");
             return Err(place.diagnostic(fact).with_help("choose a shorter time"));
         }
@@ -420,11 +486,13 @@ impl Table {
     }
 
     /// Returns the rows used for an input whose time stamps are shifted: from the last one before the start of the simulation at 0 s,
-    /// which may precede the first measurement. `None` if the file starts after that.
+    /// which may precede the first measurement, to those after its end that interpolation needs. `None` if the file starts later.
     fn driven(&self, shift: f64) -> Option<Range<usize>> {
-        let Range { start, end } = self.driving;
-        let before = self.clock.times[start..end].partition_point(|&t| t + shift <= 0.0);
-        before.checked_sub(1).map(|row| start + row..end)
+        let before = self.clock.times[self.driving.clone()].partition_point(|t| t - self.clock.zero + shift <= 0.0);
+        let start = self.driving.start + before.checked_sub(1)?;
+        let end = self.clock.first_from(self.driving.clone(), self.end - shift);
+        // Band-limited interpolation uses three samples on either side.
+        Some(start..(end + 3).min(self.driving.end).max(start + 1))
     }
 
     fn channel(&self, place: &Node<'_>, signal: &str, table: &ChannelTable) -> Result<ChannelBuilder, Diagnostic> {
@@ -432,8 +500,8 @@ impl Table {
             self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
         let shift = read_seconds(place, "shift", table.shift.as_ref())?.unwrap_or(0.0);
         // A shifted sample before the start of the simulation has no counterpart in it.
-        let rows = self.rows.clone().filter(|&row| shift == 0.0 || self.clock.times[row] + shift >= 0.0);
-        let (times, values) = rows.map(|row| (self.clock.times[row] + shift, values[row])).unzip();
+        let rows = self.rows.clone().filter(|&row| shift == 0.0 || self.clock.at(row) + shift >= 0.0);
+        let (times, values) = rows.map(|row| (self.clock.at(row) + shift, values[row])).unzip();
         Ok(ChannelBuilder {
             signal: signal.to_owned(),
             times,
@@ -448,13 +516,33 @@ impl Table {
     fn input(&self, place: &Node<'_>, table: &InputTable) -> Result<(Input, Option<Unit>, usize), Diagnostic> {
         let shift = read_seconds(place, "shift", table.shift.as_ref())?.unwrap_or(0.0);
         let Some(rows) = self.driven(shift) else {
-            let first = self.clock.times.get(self.driving.start).map_or(f64::INFINITY, |first| first + shift);
+            let first = self.clock.at(self.driving.start) + shift;
             let fact = format!("the simulation starts at 0 s, but `{}` is unknown before {first} s", table.column);
-            return Err(place
-                .diagnostic(fact)
-                .with_help("omit `reset-time = false` to start at the first sample, or record the input from 0 s on"));
+            let help = match self.is_other || shift != 0.0 {
+                true => {
+                    "the times of all files are on one clock: correct `shift`, or start the experiment later with `from`"
+                }
+                false => "omit `reset-time = false` to start at the first sample, or record the input from 0 s on",
+            };
+            return Err(place.diagnostic(fact).with_help(help));
         };
+        let last = self.clock.at(self.driving.end - 1) + shift;
+        if last < 0.0 {
+            let fact = format!("`{}` ends {} s before the experiment starts", table.column, -last);
+            let help = "the times of all files are on one clock: correct `shift`, or the time column";
+            return Err(place.diagnostic(fact).with_help(help));
+        }
         self.sampled(place, table, shift, rows)
+    }
+
+    /// Returns the last time of an input from another file and the end of the experiment, if the input ends before by more than its
+    /// mean time between samples.
+    fn ends_early(&self, input: &Input) -> Option<(f64, f64)> {
+        let Input::Sampled { times, .. } = input else { return None };
+        let last = *times.last()?;
+        #[allow(clippy::cast_precision_loss)]
+        let step = (last - times[0]) / (times.len().max(2) - 1) as f64;
+        (self.is_other && last + 1.5 * step < self.end).then_some((last, self.end))
     }
 
     /// Returns an input from these rows; under zero-order hold, missing samples are left out.
@@ -476,8 +564,7 @@ impl Table {
         }
         let is_missing = |&row: &usize| !values[row].is_finite();
         if let Some(row) = rows.clone().find(is_missing).filter(|&row| hold != Hold::Zero || row == rows.start) {
-            let fact =
-                format!("the input column `{}` has a missing sample at {} s", table.column, self.clock.times[row]);
+            let fact = format!("the input column `{}` has a missing sample at {} s", table.column, self.clock.at(row));
             let help = match hold {
                 Hold::Zero => "the first sample is needed: cut the record with `from`, or drop samples with `skip`",
                 _ => "add the sample, cut it off with `from` and `to`, or use hold = \"zero\", which keeps the value",
@@ -485,7 +572,7 @@ impl Table {
             return Err(self.at(&table.column, row, &fact).unwrap_or_else(|| place.diagnostic(fact)).with_help(help));
         }
         let kept = rows.clone().filter(|row| !is_missing(row));
-        let (times, kept): (Vec<f64>, Vec<f64>) = kept.map(|row| (self.clock.times[row] + shift, values[row])).unzip();
+        let (times, kept): (Vec<f64>, Vec<f64>) = kept.map(|row| (self.clock.at(row) + shift, values[row])).unzip();
         let missing = rows.len() - times.len();
         Ok((Input::Sampled { times, values: kept, hold }, unit, missing))
     }

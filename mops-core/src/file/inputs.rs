@@ -310,8 +310,13 @@ impl Reader<'_> {
                 })
             }
             InputEntry::Sum(parts) => {
-                let parts = parts.iter().zip(node.elements()).map(|(part, node)| self.read(part, &node));
-                parts.collect::<Result<_, _>>().map(Input::Sum)
+                // The first part has the zero of the unit, the others are differences.
+                let difference = self.unit.difference();
+                let rest = Reader { unit: &difference, ..*self };
+                let parts = parts.iter().zip(node.elements()).enumerate();
+                let read =
+                    parts.map(|(k, (part, node))| if k == 0 { self.read(part, &node) } else { rest.read(part, &node) });
+                read.collect::<Result<_, _>>().map(Input::Sum)
             }
             InputEntry::Function(section) => match &**section {
                 InputSection::File(file) => {

@@ -429,6 +429,15 @@ impl crate::criterion::CriterionSpec for Located {
         self.inner.names()
     }
 
+    fn bind_within(
+        &self,
+        model: &Interface,
+        others: &[Other],
+        window: [f64; 2],
+    ) -> Result<Box<dyn crate::criterion::Criterion>, StudyError> {
+        self.inner.bind_within(model, others, window).map_err(|mistake| mistake.within(self.kind))
+    }
+
     fn reads_any(&self) -> bool {
         self.inner.reads_any()
     }

@@ -1,5 +1,7 @@
 //! Records: the measured samples behind the entries of a residual vector.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use crate::problem::Problem;
@@ -15,8 +17,8 @@ pub struct Record {
     pub signal: Option<String>,
     /// Declared noise level of one sample, in the unit of the signal.
     pub noise: Option<f64>,
-    /// Index of the first sample among those of the channel.
-    first: usize,
+    /// Samples of the record among those of its channel.
+    samples: Range<usize>,
     /// Blocks of consecutive residuals, one residual per sample.
     blocks: Vec<Block>,
 }
@@ -26,6 +28,8 @@ pub struct Record {
 struct Block {
     /// Index of the first residual in the residual vector.
     first: usize,
+    /// Index of its sample among those of the channel.
+    sample: usize,
     /// Residual divided by (simulated - measured), per sample.
     weights: Vec<f64>,
 }
@@ -33,12 +37,22 @@ struct Block {
 impl Record {
     /// Creates a record of one block of residuals that starts at index `first`.
     pub fn new(case: usize, signal: Option<String>, noise: Option<f64>, first: usize, weights: Vec<f64>) -> Self {
-        Self { case, signal, noise, first: 0, blocks: vec![Block { first, weights }] }
+        let samples = 0..weights.len();
+        Self { case, signal, noise, samples, blocks: vec![Block { first, sample: 0, weights }] }
     }
 
     /// Returns the number of samples.
     pub fn len(&self) -> usize {
-        self.blocks[0].weights.len()
+        self.samples.len()
+    }
+
+    /// Returns the weights of the residuals that a sample enters, with their indices in the residual vector.
+    fn of_sample(&self, sample: usize) -> impl Iterator<Item = (usize, f64)> {
+        let sample = self.samples.start + sample;
+        self.blocks.iter().filter_map(move |block| {
+            let index = sample.checked_sub(block.sample)?;
+            block.weights.get(index).map(|&weight| (block.first + index, weight))
+        })
     }
 
     /// Returns the mean weight of squared deviations in the sum of squared residuals.
@@ -57,21 +71,28 @@ impl Record {
     /// signal. Shape: samples x columns.
     #[allow(clippy::cast_precision_loss)]
     pub fn per_deviation(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
-        let share = 1.0 / self.blocks.len() as f64;
-        self.summed(rows, |weight| if weight > 0.0 { share / weight } else { 0.0 })
+        DMatrix::from_fn(self.len(), rows.ncols(), |s, k| {
+            let share = 1.0 / self.of_sample(s).count().max(1) as f64;
+            let deviation =
+                |(index, weight): (usize, f64)| if weight > 0.0 { share / weight * rows[(index, k)] } else { 0.0 };
+            self.of_sample(s).map(deviation).sum()
+        })
     }
 
     /// Returns rows of the residual vector times their weights, summed over the residuals of every sample.
     ///
     /// The result is the effect of a sample's noise on `rows' * residuals`. Shape: samples x columns.
     pub fn collected(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
-        self.summed(rows, |weight| weight)
+        DMatrix::from_fn(self.len(), rows.ncols(), |s, k| {
+            self.of_sample(s).map(|(index, weight)| weight * rows[(index, k)]).sum()
+        })
     }
 
-    fn summed(&self, rows: &DMatrix<f64>, factor: impl Fn(f64) -> f64) -> DMatrix<f64> {
-        DMatrix::from_fn(self.len(), rows.ncols(), |s, k| {
-            self.blocks.iter().map(|block| factor(block.weights[s]) * rows[(block.first + s, k)]).sum()
-        })
+    /// Adds the residuals of another criterion of the channel; samples that both read are one.
+    fn add(&mut self, other: Self) {
+        self.noise = self.noise.or(other.noise);
+        self.samples = self.samples.start.min(other.samples.start)..self.samples.end.max(other.samples.end);
+        self.blocks.extend(other.blocks);
     }
 }
 
@@ -87,8 +108,10 @@ pub fn records(problem: &Problem, tuners: &[f64]) -> Option<Vec<Record>> {
         let record = match row.criterion.samples(&study.cases[case]) {
             Some(samples) => {
                 let weights = samples.weights.iter().map(|weight| factor * weight).collect();
-                let record = Record::new(case, Some(samples.signal), samples.noise, first, weights);
-                Record { first: samples.first, ..record }
+                let mut record = Record::new(case, Some(samples.signal), samples.noise, first, weights);
+                record.samples = samples.first..samples.first + record.len();
+                record.blocks[0].sample = samples.first;
+                record
             }
             None => {
                 let analysis = problem.analyse_all(row.job, tuners, None).ok()?;
@@ -101,15 +124,16 @@ pub fn records(problem: &Problem, tuners: &[f64]) -> Option<Vec<Record>> {
             }
         };
         first += record.len();
-        let same = |other: &&mut Record| {
-            let samples = |of: &Record| (of.case, of.signal.clone(), of.first, of.len());
-            record.signal.is_some() && samples(other) == samples(&record)
+        // Samples without a gap between them are one record.
+        let meets = |other: &&mut Record| {
+            let [a, b] = [&other.samples, &record.samples];
+            record.signal.is_some()
+                && (other.case, &other.signal) == (case, &record.signal)
+                && a.start < b.end
+                && b.start < a.end
         };
-        match records.iter_mut().find(same) {
-            Some(known) => {
-                known.noise = known.noise.or(record.noise);
-                known.blocks.extend(record.blocks);
-            }
+        match records.iter_mut().find(meets) {
+            Some(known) => known.add(record),
             None => records.push(record),
         }
     }
@@ -123,10 +147,22 @@ mod tests {
     #[test]
     fn two_criteria_on_one_channel_share_the_noise_of_its_samples() {
         let mut record = Record::new(0, Some("y".into()), None, 0, vec![2.0, 2.0]);
-        record.blocks.push(Block { first: 2, weights: vec![1.0, 3.0] });
+        record.blocks.push(Block { first: 2, sample: 0, weights: vec![1.0, 3.0] });
         let residuals = [2.0, -4.0, 1.0, -6.0];
         assert_eq!(record.deviations(&residuals), [1.0, -2.0]);
         let rows = DMatrix::from_column_slice(4, 1, &[1.0, 1.0, 10.0, 10.0]);
         assert_eq!(record.collected(&rows).as_slice(), [12.0, 32.0]);
+    }
+
+    #[test]
+    fn windows_that_overlap_share_the_samples_in_both() {
+        // Samples 0..3 in the first criterion, 2..5 in the second.
+        let mut record = Record::new(0, Some("y".into()), None, 0, vec![1.0; 3]);
+        let mut other = Record::new(0, Some("y".into()), None, 3, vec![2.0; 3]);
+        (other.samples, other.blocks[0].sample) = (2..5, 2);
+        record.add(other);
+        assert_eq!(record.len(), 5);
+        let residuals = [1.0, 2.0, 3.0, 10.0, 8.0, 6.0];
+        assert_eq!(record.deviations(&residuals), [1.0, 2.0, 4.0, 4.0, 3.0]);
     }
 }

@@ -186,6 +186,9 @@ impl Input {
     /// Returns the first time (s) at which the step between samples differs from the mean step by more than 1 %. `None` for
     /// even sampling, and for inputs that need not be evenly sampled.
     pub fn uneven(&self) -> Option<f64> {
+        if let Self::Sum(parts) = self {
+            return parts.iter().find_map(Self::uneven);
+        }
         let Self::Sampled { times, hold: Hold::BandLimited, .. } = self else { return None };
         #[allow(clippy::cast_precision_loss)]
         let mean = (times[times.len() - 1] - times[0]) / (times.len() - 1).max(1) as f64;

@@ -39,10 +39,10 @@ fn too_many() -> String {
     format!("it has more than {MOST} changes until the end of the simulation")
 }
 
-/// Returns the number of whole or started intervals of this length from `start` to `until`.
+/// Returns the number of intervals of this length that start from `start` to `until`, both included.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn intervals(start: f64, length: f64, until: f64) -> Result<usize, String> {
-    let count = ((until - start) / length).ceil().max(1.0);
+    let count = ((until - start) / length * (1.0 + 1e-12)).floor().max(0.0) + 1.0;
     if count > MOST as f64 { Err(too_many()) } else { Ok(count as usize) }
 }
 

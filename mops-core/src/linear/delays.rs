@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::StateSpace;
 
-/// Relative difference up to which two sums of delays are equal: above the rounding of a few additions.
+/// Difference, relative to the sum of all delays, up to which two sums of delays are equal: above the rounding of a few additions.
 const EQUAL: f64 = 1e-12;
 
 /// An entry of a matrix that is not 0, as an edge from a variable to one that depends on it, with the delay in between.
@@ -127,6 +127,7 @@ impl Graph {
         let ties = [chain(&self.inputs), chain(&self.outputs)];
         let edges = self.edges.iter().chain(ties.iter().flatten());
         let edges: Vec<&Edge> = edges.filter(|edge| counts(edge.from) && counts(edge.to)).collect();
+        let close = EQUAL * self.edges.iter().map(|edge| edge.delay).sum::<f64>();
         let mut times: Vec<Option<f64>> = vec![None; self.size];
         times[first] = Some(0.0);
         let mut open = vec![first];
@@ -143,7 +144,7 @@ impl Graph {
                         times[next] = Some(after);
                         open.push(next);
                     }
-                    Some(known) if (known - after).abs() <= EQUAL * (known.abs() + after.abs()) => {}
+                    Some(known) if (known - after).abs() <= close => {}
                     Some(_) => {
                         return Err("paths from its inputs to its outputs have different delays; \
                                     choose one input and one output, or cut a loop with `open`"
@@ -184,6 +185,20 @@ mod tests {
         let mut poles = system.poles().unwrap();
         poles.sort_by(|a, b| a.re.total_cmp(&b.re));
         assert_eq!(poles, [c(-2.0, 0.0), c(-1.0, 0.0)]);
+    }
+
+    #[test]
+    fn paths_of_equal_sums_of_delays_have_one_delay() {
+        // u through 0.1 and 0.2 s, and through 0.3 s: 0.1 + 0.2 differs from 0.3 by rounding.
+        let none = DMatrix::zeros(0, 0);
+        let d = DMatrix::from_row_slice(
+            4,
+            4,
+            &[0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+        );
+        let system = StateSpace::new(none.clone(), DMatrix::zeros(0, 4), DMatrix::zeros(4, 0), d);
+        let found = system.with_delays(&[0.1, 0.2, 0.3]).unwrap();
+        assert!((found.delay - 0.3).abs() < 1e-15 && found.d[(0, 0)] == 2.0);
     }
 
     #[test]

@@ -50,6 +50,9 @@ const WORDS: [&str; 16] = [
     "throttle",
 ];
 
+/// Largest value whose squares can be summed over any file.
+const LARGEST: f64 = 1e140;
+
 /// Units of quantities that drive a plant rather than being measured at it.
 const DRIVING: [&str; 6] = ["N", "N m", "V", "A", "W", "%"];
 
@@ -74,11 +77,17 @@ pub(super) fn study(name: &str, path: &Path, copy: &str, chosen: &Chosen<'_>) ->
             .with_help("correct the header of the file")
     })?;
     let times: Vec<f64> = column.values.iter().map(|t| t * to_seconds).collect();
+    if let Some(pair) = times.windows(2).find(|pair| pair[1] <= pair[0]) {
+        let fact = format!("the time `{time}` does not increase: {} s follows {} s", pair[1], pair[0]);
+        return Err(Diagnostic::new(fact).with_help("sort the rows and delete duplicates"));
+    }
     let (inputs, outputs) = signals(&file, &time, &times, chosen)?;
+    // An input is needed from the first sample on.
+    let skip = inputs.iter().filter_map(|u| u.values.iter().position(|v| v.is_finite())).max().unwrap_or(0);
     let mut text = head(name, copy, &inputs, &outputs);
     text += &model(&inputs, &outputs);
     text += &tuners(&times, &inputs, &outputs);
-    text += &experiments(copy, &time, &file, &times, [&inputs, &outputs]);
+    text += &experiments(copy, &time, &file, (&times, skip), [&inputs, &outputs]);
     text += "\n[criteria]\n";
     for output in &outputs {
         let _ = writeln!(text, "{} = {{ normalised-error = {{ signal = {} }} }}", output.name, quoted(&output.name));
@@ -119,6 +128,10 @@ fn signals(
             continue;
         }
         let finite: Vec<f64> = column.values.iter().copied().filter(|v| v.is_finite()).collect();
+        if finite.iter().any(|v| v.abs() > LARGEST) {
+            return Err(Diagnostic::new(format!("column `{name}` has values above {LARGEST:e}"))
+                .with_help("scale the column, or choose others with --inputs and --outputs"));
+        }
         let changes = finite.windows(2).any(|pair| pair[0] != pair[1]);
         if column.values.len() != times.len() || finite.len() < 4 || !(changes || is_listed(chosen.inputs)) {
             continue;
@@ -172,11 +185,16 @@ fn is_driving(name: &str, unit: Option<&Unit>) -> bool {
 fn identifier(column: &str, taken: &[String]) -> String {
     let mut name: String = column.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     name = name.trim_matches('_').to_owned();
-    if !name.starts_with(|c: char| c.is_ascii_alphabetic()) || matches!(name.as_str(), "t" | "time" | "pi" | "der") {
+    const RESERVED: [&str; 9] = ["t", "time", "pi", "der", "and", "or", "not", "if", "delay"];
+    if !name.starts_with(|c: char| c.is_ascii_alphabetic()) || RESERVED.contains(&name.as_str()) {
         name = format!("c_{name}");
     }
-    while taken.contains(&name) {
-        name.push('_');
+    // Names that the study derives from those of the columns must differ, too.
+    let derived = |known: &String| {
+        *known == name || name.starts_with(&format!("{known}_")) || known.starts_with(&format!("{name}_"))
+    };
+    if taken.iter().any(derived) || ["w_", "z_", "rest_", "k_"].iter().any(|prefix| name.starts_with(prefix)) {
+        name = format!("c{}_{name}", taken.len() + 1);
     }
     name
 }
@@ -303,7 +321,13 @@ fn tuners(times: &[f64], inputs: &[Signal], outputs: &[Signal]) -> String {
     text + "\n"
 }
 
-fn experiments(copy: &str, time: &str, file: &DataFile, times: &[f64], [inputs, outputs]: [&[Signal]; 2]) -> String {
+fn experiments(
+    copy: &str,
+    time: &str,
+    file: &DataFile,
+    (times, skip): (&[f64], usize),
+    [inputs, outputs]: [&[Signal]; 2],
+) -> String {
     let column = |signal: &Signal, more: &str| {
         let unit = if signal.is_assumed { ", unit = \"1\"" } else { "" };
         if unit.is_empty() && more.is_empty() {
@@ -321,7 +345,9 @@ fn experiments(copy: &str, time: &str, file: &DataFile, times: &[f64], [inputs, 
     };
     let input = |signal: &Signal| {
         let sampled = Input::Sampled { times: times.to_vec(), values: signal.values.clone(), hold: Hold::Zero };
-        column(signal, if sampled.looks_smooth() { ", hold = \"first\"" } else { ", hold = \"zero\"" })
+        // Missing samples keep the value under zero-order hold only.
+        let has_gaps = signal.values.iter().any(|v| !v.is_finite());
+        column(signal, if sampled.looks_smooth() && !has_gaps { ", hold = \"first\"" } else { ", hold = \"zero\"" })
     };
     let channels: Vec<String> = outputs.iter().map(channel).collect();
     let driven: Vec<String> = inputs.iter().map(input).collect();
@@ -329,12 +355,13 @@ fn experiments(copy: &str, time: &str, file: &DataFile, times: &[f64], [inputs, 
         outputs.iter().flat_map(|y| [quoted(&y.name), quoted(&format!("{}_rate", y.name))]).collect();
     let names = file.time_column();
     let time_key = if names.as_deref() == Some(time) { String::new() } else { format!("time = {}\n", quoted(time)) };
-    let finite: Vec<f64> = times.iter().copied().filter(|t| t.is_finite()).collect();
+    let skipped = if skip > 0 { format!("skip     = {skip}\n") } else { String::new() };
+    let finite: Vec<f64> = times[skip..].iter().copied().filter(|t| t.is_finite()).collect();
     #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, clippy::cast_sign_loss)]
     let split = finite[((finite.len() - 1) as f64 * SHARE) as usize];
     let split = quoted(&format!("{} s", number(split)));
     let common = format!(
-        "file     = {}\n{time_key}channels = {{ {} }}\ninputs   = {{ {} }}\nfree     = [{}]\n",
+        "file     = {}\n{time_key}channels = {{ {} }}\ninputs   = {{ {} }}\nfree     = [{}]\n{skipped}",
         quoted(copy),
         channels.join(", "),
         driven.join(", "),
@@ -380,8 +407,8 @@ mod tests {
     fn a_name_of_any_column_fits_into_an_equation() {
         let taken = ["T".to_owned()];
         assert_eq!(
-            ["T", "T (left)", "1", "t", "w'"].map(|c| identifier(c, &taken)),
-            ["T_", "T__left", "c_1", "c_t", "w"]
+            ["T", "T (left)", "1", "t", "w'", "and", "k_y"].map(|c| identifier(c, &taken)),
+            ["c2_T", "c2_T__left", "c_1", "c_t", "w", "c_and", "c2_k_y"]
         );
     }
 }

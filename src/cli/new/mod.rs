@@ -67,7 +67,9 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
     let called = called.replace(['"', '\\'], "-");
     let files: Vec<(&Path, Vec<u8>)> = match (from, from_data) {
         (_, Some(data)) => {
-            let (copy, bytes) = (data.file_name().map_or(data.as_path(), Path::new), from_data::bytes(data)?);
+            let copy = data.file_name().map_or(data.as_path(), Path::new);
+            let copy = if copy == Path::new("study.toml") { Path::new("data.csv") } else { copy };
+            let bytes = from_data::bytes(data)?;
             let chosen = from_data::Chosen { inputs: inputs.as_deref(), outputs: outputs.as_deref() };
             let text = from_data::study(&called, data, &copy.to_string_lossy(), &chosen)?;
             vec![(Path::new("study.toml"), text.into_bytes()), (copy, bytes)]

@@ -199,3 +199,15 @@ fn a_fast_clock_beside_a_delay_takes_few_steps() {
     assert!(response.work.steps < 30_000, "{:?}", response.work);
     assert!(response.events.is_empty(), "{:?}", response.events.len());
 }
+
+#[test]
+fn an_output_may_be_a_delayed_quantity_alone() {
+    let text = "states = { x = '1' }\nder = { x = '1/1 [s]' }\noutputs = { y = \"delay(x, '0.1 s')\", z = \"1*delay(x, '0.1 s')\" }";
+    let model = model(text);
+    let index = |name: &str| model.interface().signals.iter().position(|s| s.name == name).unwrap();
+    let job = Job { case: &Case::default(), parameters: &[0.0], signals: &[index("y"), index("z")], horizon: 1.0 };
+    let analysis = model.analyse(&job).unwrap();
+    for name in ["y", "z"] {
+        assert!((analysis.trace(name).last() - 0.9).abs() < 1e-9);
+    }
+}

@@ -272,3 +272,15 @@ fn conditions_that_jump_or_have_poles_are_found_in_long_steps() {
         }
     }
 }
+
+#[test]
+fn an_event_whose_guard_jumps_with_an_input_happens_at_every_jump() {
+    // The counter counts pulses of u, which jump and stay.
+    let text = "states = { n = '1' }\ninputs = { u = '1' }\nder = { n = '0/1 [s]' }\nwhen.pulse = { guard = '0.9 - u', reset = { n = 'n + 1' } }";
+    let model = model(text);
+    let input = Input::pulse(1.0, 0.5, [0.0, 1.0], Some(1.0), 19.9).unwrap();
+    let case = Case { inputs: vec![("u".to_owned(), input)], ..Case::default() };
+    let job = Job { case: &case, parameters: &[0.0], signals: &[0], horizon: 20.0 };
+    let analysis = model.analyse(&job).unwrap();
+    assert_eq!(analysis.trace("n").last(), 19.0);
+}

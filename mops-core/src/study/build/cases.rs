@@ -148,7 +148,16 @@ fn build_experiment(
         same_unit(&channel.signal, &variable.unit, &known).map_err(|m| m.within("channels"))?;
         let built = build_channel(channel, &variable.unit).map_err(|m| m.within(&channel.signal).within("channels"))?;
         warnings.extend(suspicious_start(name, &built));
-        warnings.extend(standing_alone(name, &built));
+        warnings.extend(outliers(name, &built));
+        if channel.unwrap == Some(true) {
+            warnings.extend(gap_of(&built).map(|t| {
+                format!(
+                    "`{}` in `{name}` has a gap at {t} s: turns within it are not counted by `unwrap`, so that the angle after it may \
+                     be off by whole turns; give each part an experiment with `from` and `to`",
+                    built.signal
+                )
+            }));
+        }
         warnings.extend(channel.unwrap.is_none().then(|| wrapped(name, &built, &variable.unit)).flatten());
         channels.push(built);
     }
@@ -262,12 +271,12 @@ fn build_channel(draft: &ChannelBuilder, to: &Unit) -> Result<Channel, StudyErro
     Ok(Channel { signal: draft.signal.clone(), times, values, noise })
 }
 
-/// Smallest deviation of a sample from the mean of its neighbours that makes it stand alone, in robust standard deviations of such
+/// Smallest deviation of a sample from the mean of its neighbours that makes it an outlier, in robust standard deviations of such
 /// deviations.
-const ALONE: f64 = 12.0;
+const OUTLYING: f64 = 12.0;
 
-/// Returns a warning about samples that stand alone: far from both neighbours, which agree with theirs.
-fn standing_alone(experiment: &str, channel: &Channel) -> Option<String> {
+/// Returns a warning about outliers: far from both neighbours, which agree with theirs.
+fn outliers(experiment: &str, channel: &Channel) -> Option<String> {
     let v = &channel.values;
     let off = |k: usize| (v[k] - 0.5 * (v[k - 1] + v[k + 1])).abs();
     let mut sorted: Vec<f64> = (1..v.len().saturating_sub(1)).map(off).collect();
@@ -278,22 +287,24 @@ fn standing_alone(experiment: &str, channel: &Channel) -> Option<String> {
     // Factor: P. Rousseeuw, A. Leroy, Robust Regression and Outlier Detection (1987), section 4.4.
     let spread = 1.4826 * sorted[sorted.len() / 2];
     // The neighbours of such a sample are off by half as much, because of it; those of a jump or a fast motion by as much.
-    let stands_alone = |&k: &usize| {
+    let is_outlier = |&k: &usize| {
         let around = [k - 1, k + 1].into_iter().filter(|&n| n > 0 && n + 1 < v.len()).map(off).fold(0.0, f64::max);
-        spread > 0.0 && off(k) > ALONE * spread && around < 0.6 * off(k)
+        spread > 0.0 && off(k) > OUTLYING * spread && around < 0.6 * off(k)
     };
-    let alone: Vec<usize> = (1..v.len() - 1).filter(stands_alone).collect();
+    let alone: Vec<usize> = (1..v.len() - 1).filter(is_outlier).collect();
     let first = *alone.first()?;
     let count = match alone.len() {
-        1 => format!("the sample at {} s of `{}` in `{experiment}` stands", channel.times[first], channel.signal),
+        1 => {
+            format!("the sample at {} s of `{}` in `{experiment}` is an outlier", channel.times[first], channel.signal)
+        }
         n => {
             format!(
-                "{n} samples of `{}` in `{experiment}` (the first at {} s) stand",
+                "{n} samples of `{}` in `{experiment}` (the first at {} s) are outliers",
                 channel.signal, channel.times[first]
             )
         }
     };
-    Some(format!("{count} alone: loss = \"huber\" or \"student\" of `normalised-error` limits their influence"))
+    Some(format!("{count}: loss = \"huber\" or \"student\" of `normalised-error` limits the influence of outliers"))
 }
 
 /// Returns a whole turn in a unit; `None` for units other than of an angle.
@@ -311,6 +322,14 @@ fn unwrap(values: &mut [f64], turn: f64) {
         added -= turn * (step / turn).round();
         values[k] += added;
     }
+}
+
+/// Returns the time before the first step that is more than three times as long as the median one, s.
+fn gap_of(channel: &Channel) -> Option<f64> {
+    let mut steps: Vec<f64> = channel.times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let longest = 3.0 * steps.get(steps.len() / 2)?;
+    channel.times.windows(2).find(|pair| pair[1] - pair[0] > longest).map(|pair| pair[0])
 }
 
 /// Steps that look like a sensor that starts a new turn, in turns, if the median step is at most [`SLOW`].

@@ -6,7 +6,7 @@ use super::Models;
 use super::jobs::job;
 use super::values::converted;
 use crate::case::Case;
-use crate::criterion::{Criterion, CriterionSpec, InUnit, Other, Sense, Usage, Window};
+use crate::criterion::{Criterion, CriterionSpec, InUnit, Other, Sense, Usage};
 use crate::demand::Demand;
 use crate::diagnostic::suggestion;
 use crate::model::AnalysisKind;
@@ -33,10 +33,13 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -
     let reads = if draft.criterion.reads_any() { interface.analysis } else { draft.criterion.reads() };
     check_sort(reads, interface.analysis, &study.models, model)?;
     let others = others(study, model, draft.criterion.as_ref());
-    let criterion = draft.criterion.bind_with(interface, &others)?;
+    let criterion = match window(&draft, reads)? {
+        Some(window) => draft.criterion.bind_within(interface, &others, window)?,
+        None => draft.criterion.bind_with(interface, &others)?,
+    };
     // Bare numbers are in the unit that the study states for the criterion, or else in that of its kind.
     let bare = draft.unit.clone().unwrap_or_else(|| criterion.unit());
-    let criterion = in_unit(windowed(criterion, &draft, reads)?, &draft)?;
+    let criterion = in_unit(criterion, &draft)?;
     let criterion: Arc<dyn Criterion> = Arc::from(criterion);
     let unit = criterion.unit();
     let demand = demand(&draft, &bare, &unit, criterion.as_ref())?;
@@ -85,19 +88,15 @@ fn others(study: &Study, model: usize, of: &dyn CriterionSpec) -> Vec<Other> {
     of.names().into_iter().filter_map(find).collect()
 }
 
-/// Restricts a criterion to a part of the simulation, if the study wants that.
-fn windowed(
-    criterion: Box<dyn Criterion>,
-    draft: &CriterionBuilder,
-    reads: AnalysisKind,
-) -> Result<Box<dyn Criterion>, StudyError> {
+/// Returns start and end of the part of the simulation that a criterion reads, s, if the study restricts it.
+fn window(draft: &CriterionBuilder, reads: AnalysisKind) -> Result<Option<[f64; 2]>, StudyError> {
     let second = Unit::known("s");
     let time = |key: &str, given: &Option<Quantity>| {
         given.as_ref().map(|given| converted(given, &second).map_err(|m| m.within(key))).transpose()
     };
     let (from, until) = (time("from", &draft.from)?, time("until", &draft.until)?);
     if from.is_none() && until.is_none() {
-        return Ok(criterion);
+        return Ok(None);
     }
     if reads == AnalysisKind::Linear {
         let key = if from.is_some() { "from" } else { "until" };
@@ -112,7 +111,7 @@ fn windowed(
         let fact = format!("`until` at {until} s is not after `from` at {from} s");
         return Err(StudyError::new("until", fact).with_help("give a later time"));
     }
-    Ok(Box::new(Window::new(criterion, from, until)))
+    Ok(Some([from, until]))
 }
 
 /// Converts a criterion to the unit in which the study asks.

@@ -4,7 +4,7 @@ use super::Models;
 use super::values::{check_range, converted, names, parameter};
 use crate::case::Case;
 use crate::diagnostic::suggestion;
-use crate::experiment::{Channel, Experiment};
+use crate::experiment::{Channel, Experiment, Role};
 use crate::expression::Expression;
 use crate::math;
 use crate::model::Parameter;
@@ -163,7 +163,12 @@ pub(super) fn build_tuner(
         tie: None,
         guessed: [false; 2],
     };
-    let separate = separate_in(draft, cases)?;
+    let mut separate = separate_in(draft, cases)?;
+    // A common value of experiments that estimate nothing would be free: each has its own, from its own data.
+    let others = || (0..cases.len()).filter(|case| !separate.contains(case));
+    if !separate.is_empty() && others().all(|case| cases[case].role() != Role::Calibration) {
+        separate.extend(others().collect::<Vec<_>>());
+    }
     if separate.is_empty() || separate.len() < cases.len() {
         tuners.push(tuner.clone());
     }
