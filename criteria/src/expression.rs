@@ -22,8 +22,9 @@ use crate::common::trace;
 /// formula over signals and parameters. Operators and functions are those of equations. All quantities count in coherent SI units,
 /// and dimensions are checked; a number may have a unit, `5 [N m]`.
 ///
-/// Range: any number. Whether less or more is better depends on the study: a demand is an upper limit, `good` and `bad` set either direction. If
-/// another criterion in the formula has no value, because its condition was not reached, the formula has none.
+/// Range: any number. Whether less or more is better depends on the study: a demand is an upper limit, `good` and `bad` set either
+/// direction. If another criterion in the formula has no value, because its condition was not reached, the formula has none.
+/// `from` and `until` restrict the reductions; other criteria keep the parts of the simulation that they read.
 ///
 /// Source: extrema and integrals are those of the piecewise quartic of each signal; a formula over several signals is
 /// interpolated by such a quartic within the steps of all of them.
@@ -77,6 +78,10 @@ impl CriterionSpec for Expression {
         for Reduced { name, reduction, of } in reduced {
             let sources = of.names().iter().map(|name| course(name, model, others, &self.value));
             let sources: Vec<Course> = sources.collect::<Result<_, _>>()?;
+            if !sources.iter().any(|source| matches!(source, Course::Signal(..))) {
+                let fact = format!("`{name}` contains no signal, so that it has no time response");
+                return Err(unknown(&name, &self.value, &fact, "write the value itself".to_owned()));
+            }
             let units = of.names().iter().zip(&sources).map(|(name, source)| declared(name, source.unit()));
             let unit = measure(units.collect(), &of)?;
             let unit = match reduction {
@@ -85,7 +90,7 @@ impl CriterionSpec for Expression {
             };
             if model.analysis == AnalysisKind::Linear {
                 let place = self.value.find(&name).unwrap_or(0);
-                return Err(StudyError::new("value", "a linear system has no course over time")
+                return Err(StudyError::new("value", "a linear system has no time response")
                     .at(place..place + name.len())
                     .with_help("use a model that is simulated"));
             }
@@ -243,7 +248,7 @@ impl Bound {
             });
         }
         let [first, rest @ ..] = &traces.iter().flatten().collect::<Vec<_>>()[..] else {
-            return Err("the formula within a reduction has no signal".to_owned());
+            unreachable!("checked when the study is built");
         };
         let mut knots = first.knots().to_vec();
         for trace in rest {
@@ -421,9 +426,10 @@ mod tests {
             ("maximum(z)", "no signal and no parameter `z`"),
             ("q + 1", "neither another criterion"),
             ("maximum(y) + maximum(u)", "same dimension"),
+            ("maximum(2*m)", "contains no signal"),
             ("maximum(y", "expected"),
             ("maximum(y, u)", "takes one argument"),
-            ("maximum(maximum(y))", "has no course over time"),
+            ("maximum(maximum(y))", "is no time response"),
         ] {
             assert!(mistake(text).contains(fact), "{text}: {}", mistake(text));
         }

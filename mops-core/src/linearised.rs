@@ -266,8 +266,8 @@ impl Linearised {
     fn balance(&self, parameters: &[f64], point: &[f64], ties: &[Tie], delays: usize) -> Result<Balance, String> {
         let n = self.states.len();
         let mut point = [point, &vec![0.0; delays]].concat();
-        let told = |failure: Failure| failure.to_string();
-        let Local { rates, slopes, .. } = self.local(parameters, &mut point, ties).map_err(told)?;
+        let reason = |failure: Failure| failure.to_string();
+        let Local { rates, slopes, .. } = self.local(parameters, &mut point, ties).map_err(reason)?;
         let mut closed = slopes.rows(0, n).into_owned();
         if !ties.is_empty() {
             let [columns, rows] =
@@ -276,7 +276,7 @@ impl Linearised {
             computed.row_iter_mut().zip(ties).for_each(|(mut row, tie)| row *= tie.sign);
             // A tied variable has no value of its own.
             columns.iter().for_each(|&column| computed.column_mut(column).fill(0.0));
-            let moved = tied(&slopes, ties).lu().solve(&computed).ok_or_else(|| told(singular()))?;
+            let moved = tied(&slopes, ties).lu().solve(&computed).ok_or_else(|| reason(singular()))?;
             closed += closed.select_columns(&columns) * moved;
         }
         Ok(Balance { rates, slopes: closed.columns(0, point.len() - delays).into_owned() })

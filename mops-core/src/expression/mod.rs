@@ -57,7 +57,7 @@ impl Expression {
         }
     }
 
-    /// Parses an expression with reductions of courses over time. In the expression that it returns each reduction is a name, its
+    /// Parses an expression with reductions of time responses. In the expression that it returns each reduction is a name, its
     /// own text; the reductions and what they reduce are returned with it.
     ///
     /// # Errors
@@ -72,7 +72,7 @@ impl Expression {
             match Self::of(of.as_ref().clone()) {
                 Ok(of) => reduced.push(Reduced { name: name.clone(), reduction: *reduction, of }),
                 Err(SyntaxError { span, message }) if message == IN_CRITERIA => {
-                    let message = "a reduction gives one number, which has no course over time".to_owned();
+                    let message = "a reduction gives one number, which is no time response".to_owned();
                     within = Err(SyntaxError { span, message });
                 }
                 Err(mistake) => within = Err(mistake),
@@ -103,9 +103,9 @@ impl Expression {
 }
 
 /// Message for a reduction in an expression that has none.
-pub const IN_CRITERIA: &str = "a course over time is reduced to a number in criteria only";
+pub const IN_CRITERIA: &str = "a time response is reduced to a number in criteria only";
 
-/// Reduction of a course over time in an expression.
+/// Reduction of a time response in an expression.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reduced {
     /// Text of the reduction, by which the expression names it.

@@ -39,7 +39,7 @@ pub enum Form {
     Call(Function, Vec<Node>),
     /// Value of a lookup table of the model: `map(x)` or `map(x, y)`.
     Lookup(String, Vec<Node>),
-    /// Number to which a course over time is reduced: `integral(u^2)`.
+    /// Number to which a time response is reduced: `integral(u^2)`.
     Reduced(Reduction, Box<Node>),
     /// Condition `a > b`.
     Compare(Comparison, Box<Node>, Box<Node>),
@@ -51,7 +51,7 @@ pub enum Form {
     Not(Box<Node>),
 }
 
-/// Reduction of a course over time to a number.
+/// Reduction of a time response to a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reduction {
     /// Value at the start.

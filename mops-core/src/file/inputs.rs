@@ -124,7 +124,7 @@ pub(super) struct RampSection {
     pub after: Quantity,
 }
 
-/// Value that differs for a time, once or periodically.
+/// Rectangular pulse, once or periodically.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct PulseSection {

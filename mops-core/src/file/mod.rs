@@ -361,7 +361,7 @@ fn read_cases(
             return Err(place.diagnostic(format!("`{parameter}` has no values")).with_help("list at least one"));
         }
         if cases[0].parameters.iter().any(|(known, _)| known == parameter) {
-            let fact = format!("`{parameter}` has a value beside those of the grid");
+            let fact = format!("`{parameter}` is given twice, in the case and in its `grid`");
             return Err(place.key_diagnostic(fact).with_help("remove one of them"));
         }
         if cases.len() * values.len() > MOST_CASES {

@@ -181,7 +181,7 @@ pub(super) struct ExperimentSection {
     /// of a file. Each file is an experiment of its own, called `NAME-FILE`.
     pub files: Option<String>,
     /// Length of windows: `windows = "2 s"` divides the used part of each file into experiments of this length, called `NAME-1`,
-    /// `NAME-2`, .. Each has initial states of its own. A rest of less than half the length is left out.
+    /// `NAME-2`, .. Each has initial states of its own. A remainder of less than half the length is left out.
     pub windows: Option<Quantity>,
     /// Time column, of numbers or of time stamps such as `2024-05-17T10:30:00.5`, which count from the first one on. The unit of
     /// numbers is taken from the header, by default s.

@@ -259,7 +259,7 @@ impl Input {
         }
     }
 
-    /// Returns the input on a clock that starts at `from`, s; what was before then has a time below 0.
+    /// Returns the input on a clock that starts at `from`, s; earlier values have times below 0.
     #[must_use]
     pub fn since(&self, from: f64) -> Self {
         match self {

@@ -36,7 +36,7 @@ const TAPS: [&[usize]; 17] = [
 const MOST: usize = 1_000_000;
 
 fn too_many() -> String {
-    format!("it has more than {MOST} changes until the end of the simulation")
+    format!("the input has more than {MOST} changes until the end of the simulation")
 }
 
 /// Returns the number of intervals of this length that start from `start` to `until`, both included.
