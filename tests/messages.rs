@@ -859,7 +859,7 @@ fn invalid_uncertain_parameters() {
             uncertain("a tolerance of no tuner", "[uncertain]\np = { tolerance = 0.1 }"),
             uncertain("a box without an end", "[uncertain]\np = { normal = { mean = 0, deviation = 0.1 } }")
                 .called(worst),
-            uncertain("a tuner to choose and to guard against", "[uncertain]\nk = { tolerance = 0.1 }\n[robust]"),
+            uncertain("a tuner to choose and to guard against", "[uncertain]\nk = { min = 1, max = 2 }\n[robust]"),
             uncertain(
                 "an unknown criterion",
                 "[uncertain]\np = { min = -0.1, max = 0.1 }\n[worst-case]\ncriteria = [\"setling\"]",

@@ -515,3 +515,28 @@ fn the_robust_pid_design_satisfies_its_worst_case_on_an_independent_grid() {
     );
     assert!(latest <= 15.0 * 1.001 && worst < 0.417, "{latest} {worst}");
 }
+
+#[test]
+fn a_design_keeps_its_demands_within_the_tolerance_of_its_own_values() {
+    // One criterion grows with R, the other with 1/R: without tolerance both are 1 at R = 1. With 10 % the worst cases are R(1 + e)
+    // and 1/(R(1 - e))^2: equal at R^3 = 1/((1 + e)(1 - e)^2).
+    let text = "[study]\nname = 'tolerance'\n[models.rc.equations]\nstates = { x = '1' }\nparameters = { R = '1' }\nder = { x = 'R/1 [s]' }\n\
+                horizon = '1 s'\n[tuners]\nR = { start = 2, min = 0.1, max = 10 }\n[uncertain]\nR = { tolerance = 0.1 }\n[robust]\n\
+                [criteria]\nup = { final-value = { signal = 'x' }, demand = 1 }\n\
+                down = { expression = { value = '1/R^2' }, demand = 1 }\n";
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("study.toml"), text).unwrap();
+    let output = assert_cmd::cargo::cargo_bin_cmd!("mops")
+        .args(["run", "study.toml", "--json", "--out", "out"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let result: serde_json::Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)));
+    let found = result["tuners"][0]["value"].as_f64().unwrap();
+    let exact = math::cbrt(1.0 / (1.1 * 0.81));
+    assert!((found - exact).abs() < 2e-3, "{found} {exact}");
+    let worst = result["worst_scaled"].as_f64().unwrap();
+    assert!((worst - 1.1 * exact).abs() < 3e-3, "{worst}");
+    assert!(result["robust"]["settled"] == true, "{}", result["robust"]);
+}

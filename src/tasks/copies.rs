@@ -14,8 +14,10 @@ use crate::search::Options;
 #[derive(Clone)]
 pub(super) struct Copies {
     store: Arc<dyn Store>,
-    /// Values of the uncertain parameters of each part; empty for the cases of the study itself.
+    /// Values of the uncertain parameters of each part, see [`Scenario::values`]; empty for the cases of the study itself.
     parts: Vec<Vec<f64>>,
+    /// Tuner to whose value that of an uncertain parameter is relative, if any.
+    relative_to: Vec<Option<usize>>,
     /// Part and index in the study of each job of the problem.
     jobs: Vec<(usize, usize)>,
     /// Part and index in the study of each row of the problem.
@@ -48,7 +50,8 @@ impl Copies {
         });
         let rows = rows.collect::<Option<_>>()?;
         let same_coordinates = made.tuners().len() == study.tuners().len();
-        Some(Self { store: Arc::clone(&keeping.store), parts, jobs, rows, same_coordinates })
+        let relative_to = study.tasks().uncertain.iter().map(|uncertain| uncertain.tuner).collect();
+        Some(Self { store: Arc::clone(&keeping.store), parts, relative_to, jobs, rows, same_coordinates })
     }
 
     /// Returns the store for a problem with only one of the rows.
@@ -57,7 +60,9 @@ impl Copies {
     }
 
     fn key(&self, tuners: &[f64], part: usize) -> Vec<f64> {
-        [tuners, &self.parts[part]].concat()
+        let value = |(value, relative): (&f64, &Option<usize>)| relative.map_or(*value, |tuner| value * tuners[tuner]);
+        let values = self.parts[part].iter().zip(&self.relative_to).map(value);
+        tuners.iter().copied().chain(values).collect()
     }
 
     /// Returns the row of the problem that corresponds to a row of the study in a part.

@@ -99,6 +99,9 @@ const LEAST_PATIENCE: usize = 30;
 /// Patience with the last design, relative to that with the design of a round.
 const THOROUGH: usize = 5;
 
+/// Relative difference of two values of an uncertain parameter up to which they are one: the rounding of a ratio.
+const SAME: f64 = 1e-12;
+
 /// Observer of the design search of one round; reports it as a stage, and counts its points in the whole run.
 struct Designing<'a> {
     watch: &'a dyn Watch,
@@ -198,9 +201,13 @@ impl Rounds {
                 None => continue,
             };
             let at = region.coordinates(&values);
+            let values = self.relative(values, &solved.best.tuners);
             let scenario = Scenario { name: self.name(&worst.subject.criterion), case: worst.case, values };
-            let known =
-                self.scenarios.iter().any(|known| (known.case, &known.values) == (scenario.case, &scenario.values));
+            let is_same = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * a.abs();
+            let known = self
+                .scenarios
+                .iter()
+                .any(|known| known.case == scenario.case && known.values.iter().zip(&scenario.values).all(is_same));
             if !known {
                 added.push(AddedReport {
                     name: scenario.name.clone(),
@@ -225,6 +232,16 @@ impl Rounds {
         });
         self.worst.push(worst);
         any
+    }
+
+    /// Returns the values of a scenario: those of tuners with a tolerance relative to the design.
+    fn relative(&self, mut values: Vec<f64>, tuners: &[f64]) -> Vec<f64> {
+        for (value, uncertain) in values.iter_mut().zip(&self.study.tasks().uncertain) {
+            if let Some(tuner) = uncertain.tuner {
+                *value = if tuners[tuner] == 0.0 { 1.0 } else { *value / tuners[tuner] };
+            }
+        }
+        values
     }
 
     /// Returns an unused case name.

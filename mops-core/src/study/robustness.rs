@@ -160,10 +160,12 @@ pub(super) fn check(tasks: &Tasks, study: &Study) -> Result<(), StudyError> {
             let fact = format!("a box needs two finite bounds, but `{}` has a missing one", uncertain.name);
             return Err(within(StudyError::new(&uncertain.name, fact).with_help("set `min` and `max`")));
         }
-        if robust && uncertain.tuner.is_some() {
-            let fact =
-                format!("`{}` is a tuner and cannot be uncertain in a design against worst cases", uncertain.name);
-            let help = "remove it from [uncertain]; task = \"worst-case\" reports the effect of its tolerance";
+        if robust && uncertain.tuner.is_some() && uncertain.tolerance.is_none() {
+            let fact = format!(
+                "`{}` is a tuner, so that a design against worst cases cannot have a fixed range of it",
+                uncertain.name
+            );
+            let help = "give its deviation from the design value: tolerance = 0.05";
             return Err(within(StudyError::new(&uncertain.name, fact).with_help(help)));
         }
     }

@@ -86,7 +86,7 @@ impl Study {
         }
     }
 
-    /// Returns the study with additional cases: values of the uncertain parameters, in their units, in a case.
+    /// Returns the study with additional cases: values of the uncertain parameters in a case, see [`Scenario::values`].
     pub fn with_scenarios(&self, scenarios: &[Scenario]) -> Self {
         let mut study = self.clone();
         for scenario in scenarios {
@@ -97,7 +97,11 @@ impl Study {
             for (index, job) in self.jobs.iter().enumerate().filter(|(_, job)| job.case == scenario.case) {
                 let mut plan = JobPlan { case, ..job.clone() };
                 for (parameter, uncertain, factor) in self.touched(job) {
-                    plan.parameters[parameter] = ParameterSource::Constant(scenario.values[uncertain] * factor);
+                    let value = scenario.values[uncertain] * factor;
+                    plan.parameters[parameter] = match self.tasks.uncertain[uncertain].tuner {
+                        Some(tuner) => ParameterSource::Tuner { tuner, factor: value },
+                        None => ParameterSource::Constant(value),
+                    };
                 }
                 let moved = study.jobs.len();
                 study.jobs.push(plan);
@@ -116,6 +120,6 @@ pub struct Scenario {
     pub name: String,
     /// Index of the case from which all other settings are copied.
     pub case: usize,
-    /// Values of the uncertain parameters, in their units.
+    /// Values of the uncertain parameters, in their units; of a tuner with a tolerance, its ratio to the design value.
     pub values: Vec<f64>,
 }
