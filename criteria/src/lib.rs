@@ -23,6 +23,7 @@ pub mod fit_percent;
 pub mod frequency_fit;
 mod from_fn;
 pub mod gain_margin;
+pub mod gain_mask;
 pub mod h2_norm;
 pub mod hinf_norm;
 pub mod iae;
@@ -85,6 +86,7 @@ pub fn kinds() -> Vec<CriterionKind> {
         CriterionKind::of::<crossover_frequency::CrossoverFrequency>(),
         CriterionKind::of::<damping_ratio::DampingRatio>(),
         CriterionKind::of::<slowest_pole::SlowestPole>(),
+        CriterionKind::of::<gain_mask::GainMask>(),
         CriterionKind::of::<h2_norm::H2Norm>(),
         CriterionKind::of::<hinf_norm::HinfNorm>(),
         CriterionKind::of::<frequency_fit::FrequencyFit>(),

@@ -15,7 +15,7 @@ use serde::Deserialize;
 use crate::kinds;
 
 /// Every kind, with options as written in a study file.
-const EXAMPLES: [(&str, &str); 33] = [
+const EXAMPLES: [(&str, &str); 34] = [
     ("overshoot", "{ signal = 'y', target = 1, from = 0, step-time = '0 s', absolute = false }"),
     ("undershoot", "{ signal = 'y', target = '100 cm' }"),
     ("peak", "{ signal = 'y', of = 'absolute' }"),
@@ -46,6 +46,7 @@ const EXAMPLES: [(&str, &str); 33] = [
     ("crossover-frequency", "{}"),
     ("damping-ratio", "{ of = 'closed-loop' }"),
     ("slowest-pole", "{ of = 'system' }"),
+    ("gain-mask", "{ upper = [['1 Hz', 10], [100, 5]], lower = [[1, 1e-6], [2, 1e-6]] }"),
     ("h2-norm", "{}"),
     ("hinf-norm", "{}"),
     ("frequency-fit", "{ signal = 'y', input = 'u', absolute = false }"),

@@ -113,17 +113,23 @@ pub struct Values {
     unit: Unit,
     sense: Sense,
     range: [f64; 2],
+    demand: Option<f64>,
 }
 
 impl Values {
     /// Creates values that may be any number.
     pub fn of(unit: Unit, sense: Sense) -> Self {
-        Self { unit, sense, range: [f64::NEG_INFINITY, f64::INFINITY] }
+        Self { unit, sense, range: [f64::NEG_INFINITY, f64::INFINITY], demand: None }
     }
 
     /// Limits the values to the range from `low` to `high`.
     pub fn within(self, low: f64, high: f64) -> Self {
         Self { range: [low, high], ..self }
+    }
+
+    /// Sets the default demand.
+    pub fn demanding(self, demand: f64) -> Self {
+        Self { demand: Some(demand), ..self }
     }
 }
 
@@ -157,6 +163,10 @@ impl<F: Fn(StateSpace) -> Result<Value, String> + Send + Sync> Criterion for Lin
 
     fn range(&self) -> [f64; 2] {
         self.values.range
+    }
+
+    fn natural_demand(&self) -> Option<f64> {
+        self.values.demand
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {

@@ -66,7 +66,7 @@ pub fn peak_gain(system: &StateSpace) -> Result<Peak, String> {
     let system = StateSpace { delay: 0.0, ..system.clone() };
     let end = Peak { gain: largest_singular_value(&system.d.map(|d| Complex::new(d, 0.0))), frequency: f64::INFINITY };
     if system.b.ncols() == 1 && system.c.nrows() == 1 {
-        let (gain, frequency) = highest(&BoundedResponse::new(&system)?, complex::norm, Span::gain)?;
+        let (gain, frequency) = highest(&BoundedResponse::new(&system)?, |_, l| complex::norm(l), Span::gain)?;
         return Ok(if end.gain > gain { end } else { Peak { gain, frequency } });
     }
     let response = system.response()?;

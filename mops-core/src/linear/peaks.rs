@@ -29,7 +29,7 @@ impl Loop {
         // At infinite frequency L equals D; with a delay it turns on a circle.
         let end = self.system.d[(0, 0)];
         let end = if self.system.delay > 0.0 { -end.abs() } else { end };
-        let (peak, _) = highest(&self.response, |l| what.gain(l), |span| span.closed(what))?;
+        let (peak, _) = highest(&self.response, |_, l| what.gain(l), |span| span.closed(what))?;
         Ok(peak.max(what.gain(Complex::new(end, 0.0))))
     }
 

@@ -68,7 +68,8 @@ pub(super) fn passes(
     Ok(())
 }
 
-/// Returns the highest value of the response from frequency 0 to the highest relevant one, and its frequency.
+/// Returns the highest value of the response from frequency 0 to the highest relevant one, and its frequency. The value may depend on
+/// the frequency, rad/s, too.
 ///
 /// `bounds` encloses the logarithm of the value over a range of frequencies. The remaining ranges exceed the best value
 /// by at most 1e-6 (relative) and are refined.
@@ -77,11 +78,11 @@ pub(super) fn passes(
 /// If the search exceeds its number of ranges.
 pub(super) fn highest(
     of: &BoundedResponse,
-    value: impl Fn(Complex) -> f64,
+    value: impl Fn(f64, Complex) -> f64,
     bounds: impl Fn(&Span) -> [f64; 2],
 ) -> Result<(f64, f64), String> {
     let lowest = 1e-12 * of.corners()[0];
-    let at = |omega: f64| value(of.at(omega));
+    let at = |omega: f64| value(omega, of.at(omega));
     let start = at(0.0);
     let mut best = (if start.is_nan() { 0.0 } else { start }, 0.0);
     let better = |best: &mut (f64, f64), here: f64, omega: f64| {
@@ -97,7 +98,7 @@ pub(super) fn highest(
         if looked > MOST {
             return Err(too_many());
         }
-        open.iter().for_each(|span| better(&mut best, value(span.response), span.center()));
+        open.iter().for_each(|span| better(&mut best, value(span.center(), span.response), span.center()));
         let mut next = Vec::new();
         for span in open {
             let most = math::exp(bounds(&span)[1]);
@@ -114,7 +115,8 @@ pub(super) fn highest(
     }
     // Refinement of the ranges whose bounds exceed the best value.
     tops.retain(|(most, _)| *most > best.0);
-    tops.sort_by(|a, b| value(b.1.response).total_cmp(&value(a.1.response)));
+    let of_center = |span: &Span| value(span.center(), span.response);
+    tops.sort_by(|a, b| of_center(&b.1).total_cmp(&of_center(&a.1)));
     for (_, span) in tops.iter().take(16) {
         let width = span.high - span.low;
         let top = maximise(at, (span.low - width).max(0.0), span.high + width);

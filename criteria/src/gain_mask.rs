@@ -1,0 +1,132 @@
+//! Gain within a mask over frequency.
+
+use mops_core::linear::{Mask, Masked};
+use mops_core::{
+    AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StateSpace, StudyError, Unit,
+    Value, math,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Channel, LinearCriterion, Values, number};
+
+/// Largest ratio `max_w max(|G(j w)|/upper(w), lower(w)/|G(j w)|)`, dimensionless: 1 if the gain touches its mask.
+///
+/// Each bound is given by points `[frequency, gain]` and is a straight line between them in the Bode plot; beyond its ends there is
+/// none. Frequencies without a unit are in rad/s. Gains are in the unit of the output divided by that of the input, or in dB with
+/// `decibel = true`. At least one bound is needed. Example: `of = "sensitivity"`, `upper = [["0.1 Hz", -40], ["1 Hz", -20], ["10 Hz", 6],
+/// ["100 Hz", 6]]`, `decibel = true`.
+///
+/// The ratio is located by bounds of the response over all frequencies of the mask, with or without delay, not on a grid.
+///
+/// Less is better. Range: from 0 up. The default demand is 1. There is no value if a loop is unstable.
+///
+/// Source: S. Skogestad, I. Postlethwaite, Multivariable Feedback Control, 2nd edition (2005), sections 2.7 and 2.8.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct GainMask {
+    /// Input; may be omitted if there is only one.
+    pub input: Option<String>,
+    /// Output; may be omitted if there is only one.
+    pub output: Option<String>,
+    /// Transfer function that is bounded.
+    pub of: Bounded,
+    /// Points `[frequency, gain]` of the upper bound, by increasing frequency.
+    pub upper: Vec<[Quantity; 2]>,
+    /// Points `[frequency, gain]` of the lower bound, by increasing frequency.
+    pub lower: Vec<[Quantity; 2]>,
+    /// `true` for gains in dB.
+    pub decibel: bool,
+}
+
+/// Transfer function that is bounded.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Bounded {
+    /// The system itself.
+    #[default]
+    System,
+    /// Sensitivity of the loop whose transfer function is the system.
+    Sensitivity,
+    /// Complementary sensitivity of the loop whose transfer function is the system.
+    ComplementarySensitivity,
+}
+
+impl CriterionOptions for GainMask {
+    const KIND: &'static str = "gain-mask";
+}
+
+impl CriterionSpec for GainMask {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?;
+        let (channel, of, unit) = match self.of {
+            Bounded::System => {
+                let unit = channel.unit.clone();
+                (channel, Masked::System, unit)
+            }
+            Bounded::Sensitivity => (channel.in_loop()?, Masked::Sensitivity, Unit::one()),
+            Bounded::ComplementarySensitivity => (channel.in_loop()?, Masked::Complementary, Unit::one()),
+        };
+        let mut masks = Vec::new();
+        for (key, points, is_upper) in [("upper", &self.upper, true), ("lower", &self.lower, false)] {
+            if points.is_empty() {
+                continue;
+            }
+            let point = |[frequency, gain]: &[Quantity; 2]| {
+                let frequency = number(key, frequency, &Unit::known("rad/s"))?;
+                let gain = match self.decibel {
+                    true => math::powf(10.0, number(key, gain, &Unit::one())? / 20.0),
+                    false => number(key, gain, &unit)?,
+                };
+                Ok::<_, StudyError>([frequency, gain])
+            };
+            let points = points.iter().map(point).collect::<Result<Vec<_>, _>>()?;
+            masks.push(Mask::new(&points, is_upper).map_err(|why| StudyError::new(key, why))?);
+        }
+        if masks.is_empty() {
+            return Err(StudyError::here("a mask needs at least one bound")
+                .with_help("add `upper = [[frequency, gain], ...]` or `lower = [[frequency, gain], ...]`"));
+        }
+        let value = move |system: StateSpace| {
+            let ratios = masks.iter().map(|mask| mask.largest_ratio(&system, of).map(|(ratio, _)| ratio));
+            let ratios = ratios.collect::<Result<Vec<f64>, String>>()?;
+            Ok(Value::from(ratios.into_iter().fold(0.0, f64::max)))
+        };
+        let values = Values::of(Unit::one(), Sense::Less).within(0.0, f64::INFINITY).demanding(1.0);
+        Ok(LinearCriterion::boxed(channel, values, value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, bound, linear, mistake, quantity, value};
+
+    fn mask(upper: &[(&str, &str)], lower: &[(&str, &str)], decibel: bool) -> GainMask {
+        let points = |list: &[(&str, &str)]| list.iter().map(|(w, gain)| [quantity(w), quantity(gain)]).collect();
+        GainMask { upper: points(upper), lower: points(lower), decibel, ..GainMask::default() }
+    }
+
+    #[test]
+    fn the_nearer_bound_counts_in_any_unit() {
+        // |G| = 2/sqrt(1 + w^2): 2/sqrt 2 at 1 rad/s over 1 is sqrt 2, and 0.1/|G| at 10 rad/s is 0.5.
+        let lag = linear(&[2.0], &[1.0, 1.0]);
+        let plain = mask(&[("1", "1"), ("10", "1")], &[("1", "0.1"), ("10", "0.1")], false);
+        assert_near(value(&plain, &lag).number, 2f64.sqrt(), 1e-9);
+        let decibel = mask(&[("0.159154943091895 Hz", "20"), ("10 rad/s", "20")], &[("1", "0"), ("10", "-20")], true);
+        // The lower bound is 1/w: sqrt(1 + w^2)/(2 w) is largest at 1 rad/s.
+        assert_near(value(&decibel, &lag).number, 0.5f64.sqrt(), 1e-6);
+        assert_eq!(bound(&plain).natural_demand(), Some(1.0));
+    }
+
+    #[test]
+    fn masks_without_points_and_in_wrong_units_are_refused() {
+        assert!(mistake(&mask(&[], &[], false)).contains("at least one bound"));
+        assert!(mistake(&mask(&[("1", "1")], &[], false)).starts_with("upper: a mask needs at least two points"));
+        assert!(mistake(&mask(&[("1 s", "1"), ("2", "1")], &[], false)).starts_with("upper: "));
+    }
+}
