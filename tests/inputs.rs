@@ -7,33 +7,18 @@ use assert_cmd::cargo::cargo_bin_cmd;
 use mops_core::math;
 use serde_json::Value;
 
-#[path = "common/result.rs"]
-mod result;
+#[path = "common/studies.rs"]
+mod studies;
 
-fn run(folder: &Path, text: &str) -> Value {
-    let study = folder.join("study.toml");
-    std::fs::write(&study, text).unwrap();
-    let out = folder.join("out");
-    let output = cargo_bin_cmd!("mops")
-        .args(["run", study.to_str().unwrap(), "--json", "--out", out.to_str().unwrap()])
-        .output()
-        .unwrap();
-    result::read(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}\n{text}", String::from_utf8_lossy(&output.stderr)))
-}
+use studies::{run, value};
 
-/// Returns standard error of `mops check`.
+/// Returns standard output and standard error of `mops check`.
 fn check(folder: &Path, text: &str) -> String {
     let study = folder.join("study.toml");
     std::fs::write(&study, text).unwrap();
     let output = cargo_bin_cmd!("mops").args(["check", study.to_str().unwrap()]).output().unwrap();
     let all = [&output.stdout[..], &output.stderr].concat();
     String::from_utf8(all).unwrap()
-}
-
-fn value(result: &Value, case: &str, criterion: &str) -> f64 {
-    let all = result["criteria"].as_array().unwrap();
-    let found = all.iter().find(|c| c["case"] == case && c["name"] == criterion);
-    found.unwrap_or_else(|| panic!("no {case}/{criterion}: {result}"))["value"].as_f64().unwrap()
 }
 
 /// A study of an integrator `x' = u` with a case for each input.
@@ -46,31 +31,22 @@ fn integrators(cases: &[(&str, &str)], horizon: f64) -> String {
     )
 }
 
+/// Integral of a function from 0 to `end` by Simpson's rule over many intervals.
+fn integral(f: impl Fn(f64) -> f64, end: f64) -> f64 {
+    let n = 20_000;
+    let h = end / f64::from(n);
+    (0..n).map(|k| h / 6.0 * (f(h * f64::from(k)) + 4.0 * f(h * (f64::from(k) + 0.5)) + f(h * f64::from(k + 1)))).sum()
+}
+
 #[test]
 fn every_waveform_has_its_integral() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("u.csv"), "t[s],u[1/min]\n0,60\n1,120\n3,0\n").unwrap();
-    let chirp = |from: f64, to: f64, t: f64| {
-        // Simpson's rule over many intervals, of the phase as the integral of the frequency.
-        let sine = |s: f64| math::sin(TAU * (from + 0.5 * (to - from) * s / t) * s);
-        let n = 20_000;
-        let h = t / f64::from(n);
-        (0..n)
-            .map(|k| {
-                h / 6.0 * (sine(h * f64::from(k)) + 4.0 * sine(h * (f64::from(k) + 0.5)) + sine(h * f64::from(k + 1)))
-            })
-            .sum::<f64>()
-    };
+    // The phase is the integral of the frequency.
+    let chirp = |from: f64, to: f64, t: f64| integral(|s| math::sin(TAU * (from + 0.5 * (to - from) * s / t) * s), t);
     let logarithmic = |from: f64, to: f64, t: f64| {
         let rate = math::ln(to / from) / t;
-        let sine = |s: f64| math::sin(TAU * from / rate * (math::exp(rate * s) - 1.0));
-        let n = 20_000;
-        let h = t / f64::from(n);
-        (0..n)
-            .map(|k| {
-                h / 6.0 * (sine(h * f64::from(k)) + 4.0 * sine(h * (f64::from(k) + 0.5)) + sine(h * f64::from(k + 1)))
-            })
-            .sum::<f64>()
+        integral(|s| math::sin(TAU * from / rate * (math::exp(rate * s) - 1.0)), t)
     };
     let sine = |w: f64, phase: f64| (math::cos(phase) - math::cos(w * 10.0 + phase)) / w;
     let expected: Vec<(&str, &str, f64)> = vec![
@@ -279,12 +255,12 @@ fn what_a_recording_suggests_is_a_note_and_what_it_lacks_is_refused() {
         format!("{t},{},{}", 2.0 * t, if (t - 1.05).abs() < 0.5 { String::new() } else { "1".into() })
     });
     record(folder, "stamps.csv", "when,x[rad]", |t| format!("2024-05-17T10:00:{:04.1},{}", t, 2.0 * t));
-    let told = |experiment: &str| check(folder, &gain(&format!("[experiments.e]\n{experiment}")));
+    let checked = |experiment: &str| check(folder, &gain(&format!("[experiments.e]\n{experiment}")));
     let plain = "channels = { x = 'x' }\ninputs = { u = 'u' }\n";
-    assert!(told(&format!("file = 'wrapped.csv'\n{plain}")).contains("steps by about a turn at 3.2 s"));
+    assert!(checked(&format!("file = 'wrapped.csv'\n{plain}")).contains("steps by about a turn at 3.2 s"));
     let confirmed = "file = 'wrapped.csv'\nchannels = { x = { column = 'x', unwrap = false } }\ninputs = { u = 'u' }\n";
-    assert!(!told(confirmed).contains("turn"));
-    assert!(told(&format!("file = 'gaps.csv'\n{plain}")).contains("has 10 missing samples"));
+    assert!(!checked(confirmed).contains("turn"));
+    assert!(checked(&format!("file = 'gaps.csv'\n{plain}")).contains("has 10 missing samples"));
     for (experiment, fact) in [
         (plain.to_owned(), "`file` is missing"),
         (format!("files = 'none_*.csv'\n{plain}"), "no data file matches"),
@@ -302,7 +278,7 @@ fn what_a_recording_suggests_is_a_note_and_what_it_lacks_is_refused() {
             "no common clock",
         ),
     ] {
-        let message = told(&experiment).replace('\n', " ");
+        let message = checked(&experiment).replace('\n', " ");
         assert!(message.contains(fact), "{experiment}: {message}");
     }
 }
@@ -353,8 +329,8 @@ fn a_robust_loss_keeps_a_gain_that_single_wrong_samples_would_bend() {
     assert!((of("squares") - 2.0).abs() > 0.1);
     assert!((of("huber") - 2.0).abs() < 0.01, "{}", of("huber"));
     assert!((of("student") - 2.0).abs() < 0.002, "{}", of("student"));
-    let told = check(folder, &gain(experiment));
-    assert!(told.contains("3 samples of `x` in `e` (the first at 0.7000000000000001 s) are outliers"), "{told}");
+    let printed = check(folder, &gain(experiment));
+    assert!(printed.contains("3 samples of `x` in `e` (the first at 0.7000000000000001 s) are outliers"), "{printed}");
 }
 
 #[test]
@@ -531,8 +507,8 @@ fn a_window_ends_at_a_pause_of_the_record() {
         .collect();
     std::fs::write(folder.join("pause.csv"), format!("t[s],x[rad],u[rad/s]\n{rows}")).unwrap();
     let experiment = "[experiments.e]\nfile = 'pause.csv'\nwindows = '0.5 s'\nchannels = { x = 'x' }\ninputs = { u = 'u' }\nfree = ['x']\n";
-    let told = check(folder, &gain(experiment));
-    assert!(told.contains("e-8") && !told.contains("98.") && !told.contains("98 s"), "{told}");
+    let printed = check(folder, &gain(experiment));
+    assert!(printed.contains("e-8") && !printed.contains("98.") && !printed.contains("98 s"), "{printed}");
     assert!((found_gain(folder, experiment) - 2.0).abs() < 1e-6);
     let short = check(folder, &gain(&experiment.replace("0.5 s", "0.05 s")));
     assert!(short.contains("less than two samples"), "{short}");

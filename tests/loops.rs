@@ -1,24 +1,13 @@
 //! Models that take another one as their base, and loops cut at a variable, compared with loops written by hand.
 
-use std::path::Path;
-
 use assert_cmd::cargo::cargo_bin_cmd;
 use mops_core::math;
 use serde_json::Value;
 
-#[path = "common/result.rs"]
-mod result;
+#[path = "common/studies.rs"]
+mod studies;
 
-fn run(folder: &Path, text: &str) -> Value {
-    let study = folder.join("study.toml");
-    std::fs::write(&study, text).unwrap();
-    let out = folder.join("out");
-    let output = cargo_bin_cmd!("mops")
-        .args(["run", study.to_str().unwrap(), "--json", "--out", out.to_str().unwrap()])
-        .output()
-        .unwrap();
-    result::read(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}\n{text}", String::from_utf8_lossy(&output.stderr)))
-}
+use studies::{run, value};
 
 fn refused(text: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
@@ -27,12 +16,6 @@ fn refused(text: &str) -> String {
     let output = cargo_bin_cmd!("mops").args(["check", study.to_str().unwrap()]).output().unwrap();
     assert_eq!(output.status.code(), Some(2), "{text}");
     String::from_utf8(output.stderr).unwrap()
-}
-
-fn value(result: &Value, case: &str, criterion: &str) -> f64 {
-    let all = result["criteria"].as_array().unwrap();
-    let found = all.iter().find(|c| c["case"] == case && c["name"] == criterion);
-    found.unwrap_or_else(|| panic!("no {case}/{criterion}: {result}"))["value"].as_f64().unwrap()
 }
 
 /// Criteria of an open loop in the model `name`.

@@ -55,14 +55,13 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let (mut sampling, mut unknown, mut advice) = (String::new(), Vec::new(), Vec::new());
     for name in &names {
         let column = file.column(name)?;
-        // N.B.: values are not collected, as a second copy of a large file may not fit in memory.
         let finite = || column.values.iter().copied().filter(|v| v.is_finite());
         let (mut count, mut low, mut high) = (0, f64::INFINITY, f64::NEG_INFINITY);
         finite().for_each(|value| (count, low, high) = (count + 1, low.min(value), high.max(value)));
-        if time.as_ref() == Some(name) {
+        let is_time = time.as_ref() == Some(name);
+        if is_time {
             sampling = sample_time(name, &finite().collect::<Vec<f64>>());
         }
-        let is_time = time.as_ref() == Some(name);
         let noise = if is_time { None } else { noise(column.values, times) };
         if let (Some(times), Some(noise)) = (times, noise) {
             advice.extend(suspicious_start(name, times, column.values, noise));
@@ -168,7 +167,7 @@ fn at_rest(file: &DataFile, [from, to]: [f64; 2]) -> Result<String, Diagnostic> 
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let deviation = (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0)).sqrt();
-        // The difference of the means of both halves, in standard deviations, shows a drift.
+        // The difference of the means of both halves shows a drift.
         let half = values.len() / 2;
         let of = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
         let drift = of(&values[half..]) - of(&values[..half]);
@@ -181,10 +180,15 @@ fn at_rest(file: &DataFile, [from, to]: [f64; 2]) -> Result<String, Diagnostic> 
 
 /// Plots every column over time, each in a file of its own if there are several, and returns the files.
 fn plot(file: &DataFile, path: &Path) -> Result<Vec<PathBuf>, CommandError> {
+    let end = path.extension().and_then(|end| end.to_str()).unwrap_or_default();
+    if !["svg", "png"].contains(&end) {
+        return Err(Diagnostic::new(format!("`{}` is neither .svg nor .png", path.display()))
+            .with_help("name a file such as columns.svg")
+            .into());
+    }
     let time = file.time_column();
-    let names = file.column_names();
     let mut plots = Vec::new();
-    for name in names.iter().filter(|name| time.as_ref() != Some(name)) {
+    for name in file.column_names().iter().filter(|name| time.as_ref() != Some(name)) {
         let column = file.column(name)?;
         let times = match &time {
             Some(time) => file.column(time)?.values.to_vec(),
@@ -205,27 +209,22 @@ fn plot(file: &DataFile, path: &Path) -> Result<Vec<PathBuf>, CommandError> {
             ..Plot::default()
         });
     }
-    let wrong = || {
-        Diagnostic::new(format!("`{}` is neither .svg nor .png", path.display()))
-            .with_help("name a file such as columns.svg")
-    };
-    let end = path.extension().and_then(|end| end.to_str()).unwrap_or_default();
     let several = plots.len() > 1;
     let (mut names_of_files, mut written) = (FileNames::default(), Vec::new());
-    for (plot, name) in plots.iter().zip(names.iter().filter(|name| time.as_ref() != Some(name))) {
+    for plot in &plots {
         let place = match several {
             true => path.with_file_name(format!(
                 "{}-{}.{end}",
                 path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
-                names_of_files.unique(name)
+                names_of_files.unique(&plot.title)
             )),
             false => path.to_owned(),
         };
         match end {
-            "svg" => files::write(&place, plot.svg()).map_err(CommandError::cannot_write(&place))?,
-            "png" => plot.write_png(&place).map_err(CommandError::cannot_write(&place))?,
-            _ => return Err(wrong().into()),
+            "svg" => files::write(&place, plot.svg()),
+            _ => plot.write_png(&place),
         }
+        .map_err(CommandError::cannot_write(&place))?;
         written.push(place);
     }
     Ok(written)
