@@ -1,6 +1,8 @@
-//! Reports in a browser: linked selection of front points, rotation, sorting of tables, by pointer and by keyboard, without
-//! errors on the console.
+//! Reports in a browser: linked selection of front points, rotation, sorting of tables, zoom and values of plots, by pointer and
+//! by keyboard, without errors on the console.
 
+#[path = "common/devtools.rs"]
+mod devtools;
 #[path = "common/headless.rs"]
 mod headless;
 
@@ -166,4 +168,139 @@ fn a_three_dimensional_front_rotates_by_keys_and_by_dragging_and_other_tables_so
     assert_eq!(told["focused"], true);
     assert_eq!(told["names"], serde_json::json!(["error", "overshoot", "settling"]));
     assert_eq!(told["problems"], serde_json::json!([]));
+}
+
+/// Writes the report of a shipped study; returns its page.
+fn report(folder: &Path, arguments: &[&str]) -> std::path::PathBuf {
+    let out = folder.join("out");
+    cargo_bin_cmd!("mops").args(arguments).args(["--quiet", "--out", out.to_str().unwrap()]).assert().success();
+    out.join("report.html")
+}
+
+/// Functions of the page: the plots of the section on responses, the text below a plot, and its range of x.
+const PLOTS: &str = r#"
+const section = document.querySelector("section[aria-labelledby='responses']");
+const plots = [...section.querySelectorAll(".chart")];
+const text = (i) => plots[i].querySelector(".readout")?.textContent ?? "";
+const range = (i) => text(i).match(/^time ([^ ]+) to ([^ ]+)/)?.slice(1).map(Number) ?? null;
+const frame = (i) => { const box = plots[i].querySelector(".u-over").getBoundingClientRect();
+  return [box.left, box.top, box.width, box.height]; };
+const chip = (name) => [...section.querySelectorAll(".chip")].find((button) => button.textContent === name);
+"#;
+
+/// Opens a report at its responses.
+fn opened(browser: &Path, folder: &Path, page: &Path) -> devtools::Page {
+    let mut page = devtools::Page::open(browser, folder, &format!("file://{}", page.display()));
+    page.view(1200, 900, "light");
+    page.once("document.querySelector(\"section[aria-labelledby='responses']\")?.scrollIntoView() ?? (document.readyState === 'complete' ? 1 : null)");
+    page.evaluate(&format!("(0, eval)({})", serde_json::json!(PLOTS.replace("const ", "var "))));
+    page.once("range(0)");
+    page
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap_or(&Vec::new()).iter().filter_map(Value::as_f64).collect()
+}
+
+#[test]
+fn a_plot_zooms_and_shows_values_by_pointer_and_by_keyboard() {
+    let Some(browser) = headless::browser() else {
+        eprintln!("{}", headless::SKIPPED);
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let file = report(folder.path(), &["run", "pid-design-multi-case", "--max-evaluations", "40"]);
+    let mut page = opened(&browser, folder.path(), &file);
+    // The first range is the transient, with the demanded settling time of 15 s; the simulation ends at 60 s.
+    let first = numbers(&page.evaluate("range(0)"));
+    assert!(first[0] == 0.0 && first[1] > 15.0 && first[1] < 40.0, "{first:?}");
+    // By pointer: a drag from a quarter to the half of the width shows that part, a double click the whole.
+    let frame = numbers(&page.evaluate("frame(0)"));
+    let at = |share: f64| [frame[0] + share * frame[2], frame[1] + 0.5 * frame[3]];
+    page.drag(at(0.25), at(0.5), 1);
+    page.evaluate("plots[0].querySelector('.u-over').dispatchEvent(new MouseEvent('mouseleave'))");
+    let zoomed = numbers(&page.once("range(0)"));
+    assert!((zoomed[0] - 0.25 * first[1]).abs() < 0.1 && (zoomed[1] - 0.5 * first[1]).abs() < 0.1, "{zoomed:?}");
+    page.drag(at(0.5), at(0.5), 1);
+    page.drag(at(0.5), at(0.5), 2);
+    page.evaluate("plots[0].querySelector('.u-over').dispatchEvent(new MouseEvent('mouseleave'))");
+    assert_eq!(numbers(&page.once("range(0)")), [0.0, 60.0]);
+    // By keyboard: + halves the range, the arrows move the cursor, Escape removes it, 0 shows the whole.
+    page.evaluate("plots[0].querySelector('.canvas').focus()");
+    page.press("+");
+    assert_eq!(numbers(&page.once("range(0)")), [15.0, 45.0]);
+    page.press("Home");
+    let values = page.once("/time 15 s/.test(text(0)) ? text(0) : null");
+    for case in ["nominal", "worst-settling", "worst-overshoot"] {
+        assert!(values.as_str().unwrap().contains(case), "{values}");
+    }
+    page.press("ArrowRight");
+    page.once("/time 15.3 s/.test(text(0)) || null");
+    page.press("Escape");
+    page.press("0");
+    page.once("range(0)?.[1] === 60 || null");
+    // The value at the cursor is that of the curve: at the end of 60 s, the loop has settled at 1 with integral action.
+    page.press("End");
+    let last = page.once("text(0).match(/nominal ([0-9.]+)/)?.[1] ?? null");
+    assert!((last.as_str().unwrap().parse::<f64>().unwrap() - 1.0).abs() < 1e-3, "{last}");
+    assert_eq!(page.problems(), [""; 0]);
+}
+
+#[test]
+fn curves_of_cases_are_switched_off_and_other_signals_on_and_plots_share_their_range() {
+    let Some(browser) = headless::browser() else {
+        eprintln!("{}", headless::SKIPPED);
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let file = report(folder.path(), &["run", "pid-design-multi-case", "--max-evaluations", "40"]);
+    let mut page = opened(&browser, folder.path(), &file);
+    page.evaluate("plots[0].querySelector('.canvas').focus()");
+    page.evaluate("chip('nominal').click(); chip('initial guess').click()");
+    assert_eq!(page.evaluate("chip('nominal').getAttribute('aria-pressed')"), "false");
+    page.press("ArrowRight");
+    let values = page.once("/worst/.test(text(0)) ? text(0) : null");
+    assert!(!values.as_str().unwrap().contains("nominal") && !values.as_str().unwrap().contains("initial"), "{values}");
+    page.evaluate("chip('nominal').click()");
+    page.once("/nominal/.test(text(0)) || null");
+    page.press("Escape");
+    // Another signal of the model.
+    assert_eq!(page.evaluate("plots.filter((plot) => plot.closest('figure').hidden).length > 0"), true);
+    page.evaluate(
+        "var list = section.querySelector('select'); list.value = 'u'; list.dispatchEvent(new Event('change'))",
+    );
+    page.once("section.querySelector(\"figure[data-signal='u'] .uplot\") ? 1 : null");
+    page.evaluate("var other = plots.findIndex((plot) => plot.closest('figure').dataset.signal === 'u')");
+    page.evaluate("plots[0].querySelector('.canvas').focus()");
+    page.press("+");
+    page.once("range(0)[1] - range(0)[0] < 20 ? 1 : null");
+    assert_eq!(page.evaluate("range(other)"), page.evaluate("range(0)"), "both plots show the same range");
+    page.press("ArrowRight");
+    page.once("/nominal/.test(text(other)) ? 1 : null");
+    assert_eq!(page.problems(), [""; 0]);
+}
+
+#[test]
+fn a_report_fits_a_phone_and_a_dark_screen() {
+    let Some(browser) = headless::browser() else {
+        eprintln!("{}", headless::SKIPPED);
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let file = report(folder.path(), &["run", "step-identification", "--max-evaluations", "40"]);
+    let mut page = opened(&browser, folder.path(), &file);
+    page.view(390, 844, "dark");
+    page.once("document.documentElement.scrollWidth <= 390 ? 1 : null");
+    page.once("plots[0].querySelector('.uplot').getBoundingClientRect().width <= 390 ? 1 : null");
+    // Rows of a wide table are cards whose cells have labels.
+    let label = "getComputedStyle(document.querySelector('.cards td'), '::before').content";
+    assert_ne!(page.evaluate(label), "none");
+    assert_eq!(page.evaluate("getComputedStyle(document.querySelector('.cards tr')).display"), "grid");
+    // The measurement is beside the simulation, and the SVG is kept for printing and for browsers without scripts.
+    assert!(
+        page.evaluate("chip('measured') !== undefined && plots.every((plot) => plot.querySelector('svg'))")
+            .as_bool()
+            .unwrap()
+    );
+    assert_eq!(page.problems(), [""; 0]);
 }

@@ -1,8 +1,8 @@
 //! Overshoot of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Quantity, Sense, StudyError, Unit,
-    Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Mark, Quantity, Sense, Side,
+    StudyError, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -85,10 +85,11 @@ impl Criterion for Bound {
         Ok(answer.note(overshoot.max(0.0).into()))
     }
 
-    fn marks(&self, limit: Option<f64>, analysis: &Analysis) -> Vec<Mark> {
-        let (Some(limit), Ok(answer)) = (limit, self.step.answer(analysis)) else { return Vec::new() };
+    fn marks(&self, demand: &Demand, analysis: &Analysis) -> Vec<Mark> {
+        let (Some(limit), Ok(answer)) = (demand.limit(), self.step.answer(analysis)) else { return Vec::new() };
         let beyond = if self.absolute { answer.upwards(limit) } else { limit * (answer.target - answer.from) };
-        self.step.mark("overshoot", answer.target + beyond)
+        let excluded = if answer.target > answer.from { Side::Above } else { Side::Below };
+        vec![self.step.mark("overshoot", answer.time, answer.target + beyond, Some(excluded))]
     }
 }
 

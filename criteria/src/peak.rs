@@ -1,8 +1,8 @@
 //! Largest or smallest value of a signal.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Sense, StudyError, Unit, Value,
-    Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Mark, Sense, Side, StudyError, Unit,
+    Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -87,12 +87,21 @@ impl Criterion for Bound {
         Ok(peak.into())
     }
 
-    fn marks(&self, limit: Option<f64>, _: &Analysis) -> Vec<Mark> {
-        let mark = |level| Mark { signal: self.signal.name.clone(), label: "peak".into(), level };
-        match (limit, self.of) {
+    fn marks(&self, demand: &Demand, _: &Analysis) -> Vec<Mark> {
+        let mark = |level, excluded| Mark {
+            signal: self.signal.name.clone(),
+            label: "peak".into(),
+            times: [f64::NEG_INFINITY, f64::INFINITY],
+            values: [level; 2],
+            excluded,
+        };
+        let side = if demand.asks_for_more() { Side::Below } else { Side::Above };
+        match (demand.limit(), self.of) {
             (None, _) => Vec::new(),
-            (Some(limit), Extremum::Absolute) => vec![mark(limit), mark(-limit)],
-            (Some(limit), _) => vec![mark(limit)],
+            (Some(limit), Extremum::Absolute) => {
+                vec![mark(limit, Some(Side::Above)), mark(-limit, Some(Side::Below))]
+            }
+            (Some(limit), _) => vec![mark(limit, Some(side))],
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Settling time of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Quantity, Sense, StudyError, Unit,
-    Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Mark, Quantity, Sense, Side,
+    StudyError, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -125,14 +125,17 @@ impl Criterion for Bound {
         Ok((left - answer.time).into())
     }
 
-    fn marks(&self, _: Option<f64>, analysis: &Analysis) -> Vec<Mark> {
+    fn marks(&self, demand: &Demand, analysis: &Analysis) -> Vec<Mark> {
         let Ok(answer) = self.step.answer(analysis) else { return Vec::new() };
         let band = match self.band {
             Band::Absolute(band) => band,
             Band::Relative(fraction) => fraction * (answer.target - answer.from).abs(),
         };
-        let edges = [("band", answer.target + band), ("", answer.target - band)];
-        edges.into_iter().flat_map(|(label, level)| self.step.mark(label, level)).collect()
+        let limit = demand.limit();
+        // The demand excludes values outside of the band from the demanded settling time on.
+        let from = answer.time + limit.unwrap_or(0.0);
+        let edge = |label, level, side| self.step.mark(label, from, level, limit.map(|_| side));
+        vec![edge("band", answer.target + band, Side::Above), edge("", answer.target - band, Side::Below)]
     }
 }
 
@@ -142,7 +145,20 @@ mod tests {
     use mops_core::{Missed, Trace};
 
     use super::*;
-    use crate::common::testing::{analysis, assert_near, mistake, quantity, second_order, simulated, value};
+    use crate::common::testing::{analysis, assert_near, bound, mistake, quantity, second_order, simulated, value};
+
+    #[test]
+    fn the_demand_excludes_values_outside_of_the_band_after_the_demanded_time() {
+        let criterion = bound(&settling(0.1));
+        let marks = criterion.marks(&Demand::AtMost(3.0), &simulated(10.0, |t| 1.0 - math::exp(-t)));
+        let of = |i: usize| (marks[i].times[0], marks[i].values[0], marks[i].excluded);
+        assert_eq!((of(0), of(1)), ((3.0, 1.1, Some(Side::Above)), (3.0, 0.9, Some(Side::Below))));
+        let reported = criterion.marks(&Demand::None, &simulated(10.0, |t| 1.0 - math::exp(-t)));
+        assert!(reported.iter().all(|mark| mark.times[0] == 0.0 && mark.excluded.is_none()));
+        let within = marks[0].clone().within(0.0, 5.0).unwrap();
+        assert_eq!(within.times, [3.0, 5.0]);
+        assert_eq!(marks[0].clone().within(0.0, 2.0), None);
+    }
 
     fn settling(band: f64) -> SettlingTime {
         SettlingTime {

@@ -1,8 +1,8 @@
 //! Distance of a response from an envelope.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StudyError, Trace, Unit,
-    Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Mark, Quantity, Sense, Side,
+    StudyError, Trace, Unit, Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -122,6 +122,18 @@ impl Criterion for Bound {
         worst
             .map(Value::from)
             .ok_or_else(|| format!("the envelope starts after the end of the simulation at {} s", trace.end()))
+    }
+
+    fn marks(&self, _: &Demand, _: &Analysis) -> Vec<Mark> {
+        let mark = |stretch: &Stretch, excluded| Mark {
+            signal: self.signal.name.clone(),
+            label: "envelope".into(),
+            times: stretch.time,
+            values: stretch.value,
+            excluded: Some(excluded),
+        };
+        let upper = self.upper.iter().map(|stretch| mark(stretch, Side::Above));
+        upper.chain(self.lower.iter().map(|stretch| mark(stretch, Side::Below))).collect()
     }
 }
 

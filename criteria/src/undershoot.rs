@@ -1,8 +1,8 @@
 //! Undershoot of a step response: its largest excursion in the wrong direction.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Mark, Quantity, Sense, StudyError, Unit,
-    Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Mark, Quantity, Sense, Side,
+    StudyError, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -84,10 +84,11 @@ impl Criterion for Bound {
         Ok(answer.note(undershoot.max(0.0).into()))
     }
 
-    fn marks(&self, limit: Option<f64>, analysis: &Analysis) -> Vec<Mark> {
-        let (Some(limit), Ok(answer)) = (limit, self.step.answer(analysis)) else { return Vec::new() };
+    fn marks(&self, demand: &Demand, analysis: &Analysis) -> Vec<Mark> {
+        let (Some(limit), Ok(answer)) = (demand.limit(), self.step.answer(analysis)) else { return Vec::new() };
         let behind = if self.absolute { answer.upwards(limit) } else { limit * (answer.target - answer.from) };
-        self.step.mark("undershoot", answer.from - behind)
+        let excluded = if answer.target > answer.from { Side::Below } else { Side::Above };
+        vec![self.step.mark("undershoot", answer.time, answer.from - behind, Some(excluded))]
     }
 }
 

@@ -12,7 +12,6 @@ mod catalogue_study;
 mod conclude;
 mod criterion;
 pub mod data;
-mod demand;
 pub mod diagnosis;
 mod diagnostic;
 mod differences;
@@ -68,8 +67,10 @@ pub use catalogue::{
 };
 pub use catalogue_study::{BuiltStudy, CatalogueStudy, Shipped, StudyFolder};
 pub use conclude::{Ending, conclude};
-pub use criterion::{Criterion, CriterionSpec, Mark, Missed, Other, Sense, Tangent, Usage, Value};
-pub use demand::{Demand, Scaled};
+pub use criterion::{
+    Criterion, CriterionSpec, Demand, Mark, Missed, Other, Scaled, Sense, Side, Tangent, Usage, Value,
+};
+
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use differences::Differences;
 pub use effect::{

@@ -8,8 +8,8 @@ use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
+use crate::criterion::Demand;
 use crate::criterion::Usage;
-use crate::demand::Demand;
 use crate::diagnosis::Diagnosis;
 use crate::end::End;
 use crate::evaluation::{Evaluation, Objective};

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use rand::Rng;
 use rayon::prelude::*;
 
+use crate::criterion::Demand;
 use crate::criterion::{Tangent, Usage, Value};
-use crate::demand::Demand;
 use crate::evaluation::{Evaluation, Merit, Objective, Reading};
 use crate::experiment::Role;
 use crate::failure::Failure;

@@ -1,10 +1,10 @@
 //! Plots of a linear system: Bode, Nyquist, root locus.
 
 use mops_core::StateSpace;
-use mops_core::linear::{Complex, FrequencyResponse, eigenvalues, zeros};
-use mops_core::math::{self, complex};
+use mops_core::linear::{Complex, eigenvalues, zeros};
+use mops_core::math::complex;
 
-use crate::report::{Color, Curve, CurveStyle, FrequencyCurve, Plot, bode, frequencies};
+use crate::report::{Color, Curve, CurveStyle, FrequencyCurve, Level, Plot, bode, nyquist};
 
 /// Draws the plots of a single-input, single-output system; returns the kind of each, and the plot or the reason why it is
 /// missing.
@@ -20,38 +20,10 @@ pub(super) fn plots(system: &StateSpace, name: &str) -> Vec<(&'static str, Resul
 }
 
 fn of_frequencies(system: &StateSpace, name: &str) -> Result<[Plot; 3], String> {
-    let response = system.response()?;
-    let omegas = frequencies(system)?;
-    let values: Vec<Complex> = omegas.iter().map(|&omega| response.scalar(omega)).collect();
-    let of_result = FrequencyCurve { name: String::new(), values: &values, ..FrequencyCurve::default() };
-    let [magnitude, phase] = bode(&omegas, &[of_result], name);
-    Ok([magnitude, phase, nyquist(&response, &values, name)])
-}
-
-fn nyquist(response: &FrequencyResponse, values: &[Complex], name: &str) -> Plot {
-    // The picture is limited to the neighbourhood of -1, and of the static gain if that is moderate.
-    let limit = complex::norm(response.scalar(0.0)).clamp(1.5, 8.0) * 1.1;
-    let limit = if limit.is_finite() { limit } else { 3.0 };
-    let shown = |sign: f64| -> Vec<(f64, f64)> {
-        let inside = |z: &Complex| complex::norm(*z) <= limit;
-        values.iter().map(|z| if inside(z) { (z.re, sign * z.im) } else { (f64::NAN, f64::NAN) }).collect()
-    };
-    let circle = (0..=200).map(|i| math::sin_cos(std::f64::consts::TAU * f64::from(i) / 200.0));
-    let curve =
-        |name: &str, points, style, color| Curve { name: name.into(), points, style, color, ..Curve::default() };
-    Plot {
-        title: format!("Nyquist curve of {name}"),
-        x_label: "real part".into(),
-        y_label: "imaginary part".into(),
-        curves: vec![
-            curve("unit circle", circle.map(|(sin, cos)| (cos, sin)).collect(), CurveStyle::Line, Color::Grid),
-            curve("negative frequencies", shown(-1.0), CurveStyle::Dashed, Color::Start),
-            curve("positive frequencies", shown(1.0), CurveStyle::Line, Color::Result),
-            curve("-1", vec![(-1.0, 0.0)], CurveStyle::Crosses, Color::Demand),
-        ],
-        equal: true,
-        ..Plot::default()
-    }
+    let response = FrequencyCurve::of(system)?;
+    let [magnitude, phase] = bode(name, &[(Curve::default(), &response)]);
+    let static_gain = complex::norm(system.response()?.scalar(0.0));
+    Ok([magnitude, phase, nyquist(&response.values, static_gain, None, name)])
 }
 
 /// Draws the poles of the closed loop `k G/(1 + k G)` for gains k from 0 upwards, with negative feedback. A delay is ignored.
@@ -120,7 +92,7 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
             .collect(),
         equal: true,
         x_range: Some([0.0, 0.0]),
-        vertical: Some(0.0),
+        verticals: vec![Level::default()],
         ..Plot::default()
     })
 }

@@ -1,27 +1,47 @@
 //! Bode plots of linear systems.
 
+use mops_core::StateSpace;
 use mops_core::linear::{Complex, zeros};
 use mops_core::math::{self, complex};
-use mops_core::{Analysis, Failure, StateSpace};
 
-use super::plot::{Color, Curve, CurveStyle, Plot};
+use super::plot::{Curve, Plot};
 
-/// Frequency response at the frequencies of a plot.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct FrequencyCurve<'a> {
-    /// Name in the legend.
-    pub(crate) name: String,
+/// Response of a system with one input and one output at the frequencies of a plot.
+#[derive(Debug, Clone)]
+pub(crate) struct FrequencyCurve {
+    /// Angular frequencies, rad/s, increasing.
+    pub(crate) omegas: Vec<f64>,
     /// Complex values of the response.
-    pub(crate) values: &'a [Complex],
-    /// Style of its curves.
-    pub(crate) style: CurveStyle,
-    /// Color of its curves.
-    pub(crate) color: Color,
+    pub(crate) values: Vec<Complex>,
+}
+
+impl FrequencyCurve {
+    /// Returns the response at [`frequencies`].
+    ///
+    /// # Errors
+    /// If the response, the poles or the zeros cannot be computed.
+    pub(crate) fn of(system: &StateSpace) -> Result<Self, String> {
+        let response = system.response()?;
+        let omegas = frequencies(system)?;
+        let values = omegas.iter().map(|&omega| response.scalar(omega)).collect();
+        Ok(Self { omegas, values })
+    }
+
+    /// Returns the points of the magnitude, dB.
+    pub(crate) fn magnitude(&self) -> Vec<(f64, f64)> {
+        let decibel = |g: &Complex| 20.0 * math::log10(complex::norm(*g));
+        self.omegas.iter().copied().zip(self.values.iter().map(decibel)).collect()
+    }
+
+    /// Returns the points of the unwrapped phase, deg.
+    pub(crate) fn phase(&self) -> Vec<(f64, f64)> {
+        self.omegas.iter().copied().zip(unwrapped(&self.values)).collect()
+    }
 }
 
 /// Returns angular frequencies, rad/s, from two decades below the lowest corner frequency to two decades above the highest.
 /// They are dense around sharp resonances. A delay limits the highest frequency.
-pub(crate) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
+pub(super) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
     let corners = [system.poles()?, zeros(system)?].concat();
     let largest = corners.iter().map(|z| complex::norm(*z)).fold(0.0, f64::max);
     let sizes = corners.iter().map(|z| complex::norm(*z)).filter(|size| *size > 1e-9 * largest);
@@ -44,33 +64,22 @@ pub(crate) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
     Ok(omegas)
 }
 
-/// Returns the plots of magnitude and phase of responses at the same frequencies.
-pub(crate) fn bode(omegas: &[f64], responses: &[FrequencyCurve<'_>], name: &str) -> [Plot; 2] {
-    let of = |title: &str, y_label: &str, y: &dyn Fn(&[Complex]) -> Vec<f64>| Plot {
+/// Returns the plots of magnitude and phase of responses, each with a curve that has its name and style.
+pub(crate) fn bode(name: &str, responses: &[(Curve, &FrequencyCurve)]) -> [Plot; 2] {
+    let of = |title: &str, y_label: &str, points: &dyn Fn(&FrequencyCurve) -> Vec<(f64, f64)>| Plot {
         title: format!("{title} of {name}"),
         x_label: "frequency (rad/s)".into(),
         y_label: y_label.into(),
-        curves: responses
-            .iter()
-            .map(|response| Curve {
-                name: response.name.clone(),
-                points: omegas.iter().copied().zip(y(response.values)).collect(),
-                style: response.style,
-                color: response.color,
-                may_leave: response.color == Color::Start,
-                ..Curve::default()
-            })
-            .collect(),
+        curves: responses.iter().map(|(curve, response)| Curve { points: points(response), ..curve.clone() }).collect(),
         log_x: true,
         degrees: title == "phase",
         ..Plot::default()
     };
-    let decibel = |values: &[Complex]| values.iter().map(|g| 20.0 * math::log10(complex::norm(*g))).collect();
-    [of("magnitude", "magnitude (dB)", &decibel), of("phase", "phase (deg)", &unwrapped)]
+    [of("magnitude", "magnitude (dB)", &FrequencyCurve::magnitude), of("phase", "phase (deg)", &FrequencyCurve::phase)]
 }
 
 /// Returns the unwrapped phase, deg.
-fn unwrapped(values: &[Complex]) -> Vec<f64> {
+pub(super) fn unwrapped(values: &[Complex]) -> Vec<f64> {
     let mut last = values.first().map_or(0.0, |g| complex::arg(*g));
     let mut phase = Vec::with_capacity(values.len());
     for (i, value) in values.iter().enumerate() {
@@ -78,42 +87,6 @@ fn unwrapped(values: &[Complex]) -> Vec<f64> {
         phase.push(last.to_degrees());
     }
     phase
-}
-
-/// Returns the Bode plots from every input to one output, at the initial guess and at the reported point.
-pub(super) fn compared(
-    start: &Result<Analysis, Failure>,
-    best: (&Result<Analysis, Failure>, &str),
-    output: &str,
-    case: &str,
-) -> Vec<(String, Plot)> {
-    let system = |analysis: &Result<Analysis, Failure>| analysis.as_ref().ok()?.linear().cloned();
-    let (start, found) = (system(start), system(best.0));
-    let Some(shown) = found.as_ref().or(start.as_ref()) else { return Vec::new() };
-    let Some(place) = shown.outputs.iter().position(|name| name == output) else { return Vec::new() };
-    let mut plots = Vec::new();
-    for (input, name) in shown.inputs.iter().enumerate() {
-        let Ok(omegas) = frequencies(&shown.channel(input, place)) else { continue };
-        let values = |system: &Option<StateSpace>| -> Vec<Complex> {
-            let response = system.as_ref().and_then(|system| system.channel(input, place).response().ok());
-            response.map_or_else(Vec::new, |response| omegas.iter().map(|&omega| response.scalar(omega)).collect())
-        };
-        let (first, last) = (values(&start), values(&found));
-        let responses = [
-            FrequencyCurve {
-                name: "initial guess".into(),
-                values: &first,
-                style: CurveStyle::Dashed,
-                color: Color::Start,
-            },
-            FrequencyCurve { name: best.1.into(), values: &last, style: CurveStyle::Line, color: Color::Result },
-        ];
-        let drawn: Vec<FrequencyCurve<'_>> =
-            responses.into_iter().filter(|response| !response.values.is_empty()).collect();
-        let [magnitude, phase] = bode(&omegas, &drawn, &format!("{output}/{name} in case {case}"));
-        plots.extend([(format!("magnitude-{output}-{name}"), magnitude), (format!("phase-{output}-{name}"), phase)]);
-    }
-    plots
 }
 
 #[cfg(test)]

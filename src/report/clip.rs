@@ -61,7 +61,7 @@ pub(super) fn visible(points: &[Option<Point>], frame: Frame, tolerance: f64) ->
 }
 
 /// Simplifies a line to within `tolerance`. Source: D. H. Douglas, T. K. Peucker, Cartographica 10 (1973) 112-122.
-fn simplified(points: &[Point], tolerance: f64) -> Vec<Point> {
+pub(super) fn simplified(points: &[Point], tolerance: f64) -> Vec<Point> {
     let mut keep = vec![false; points.len()];
     let mut spans = vec![(0, points.len() - 1)];
     keep[0] = true;

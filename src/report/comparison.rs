@@ -1,8 +1,8 @@
 //! Plots of a signal at the initial guess and at the reported point, with measurements if there are any.
 
-use mops_core::{Analysis, Channel, Failure, Row, Trace, Variable};
+use mops_core::{Analysis, Channel, Failure, Mark, Row, Trace, Variable};
 
-use super::plot::{Band, Color, Curve, CurveStyle, Level, Plot};
+use super::plot::{Band, Bound, Color, Curve, CurveStyle, Plot};
 use super::sampling;
 use crate::numbers::{labelled, with_unit};
 
@@ -50,17 +50,9 @@ impl Comparison {
         Plot {
             title: format!("{} in case {case}", signal.name),
             curves: self.curves(&signal.name),
-            levels: self.levels(&signal.name, rows),
+            bounds: self.best.iter().flat_map(|analysis| bounds(&signal.name, rows, analysis)).collect(),
             ..over_time(signal)
         }
-    }
-
-    /// Returns the levels of criteria on a signal: limits of demands, edges of bands.
-    fn levels(&self, signal: &str, rows: &[&Row]) -> Vec<Level> {
-        let Ok(analysis) = &self.best else { return Vec::new() };
-        let marks = rows.iter().flat_map(|row| row.criterion.marks(row.demand.limit(), analysis));
-        let of_signal = marks.filter(|mark| mark.signal == signal && mark.level.is_finite());
-        of_signal.map(|mark| Level { name: mark.label, value: mark.level }).collect()
     }
 
     /// Returns the plot of a measured signal: the measurement, and the simulation at both points.
@@ -100,15 +92,24 @@ impl Comparison {
             // The range of the plot above.
             x_range: Some(ends),
             bands: channel.noise.map(band).into_iter().collect(),
+            supplement: true,
             ..over_time(signal)
         })
     }
 }
 
-fn trace<'a>(analysis: &'a Result<Analysis, Failure>, signal: &str) -> Option<&'a Trace> {
+/// Returns the bounds of criteria on a signal: limits of demands, edges of bands.
+pub(super) fn bounds(signal: &str, rows: &[&Row], analysis: &Analysis) -> Vec<Bound> {
+    let marks = rows.iter().flat_map(|row| row.criterion.marks(&row.demand, analysis));
+    let of_signal = marks.filter(|mark| mark.signal == signal && mark.values.iter().all(|value| value.is_finite()));
+    let bound = |Mark { label, times, values, excluded, .. }| Bound { name: label, x: times, y: values, excluded };
+    of_signal.map(bound).collect()
+}
+
+pub(super) fn trace<'a>(analysis: &'a Result<Analysis, Failure>, signal: &str) -> Option<&'a Trace> {
     analysis.as_ref().ok()?.response()?.trace(signal)
 }
 
-fn over_time(signal: &Variable) -> Plot {
+pub(super) fn over_time(signal: &Variable) -> Plot {
     Plot { x_label: "time (s)".into(), y_label: labelled(&signal.name, &signal.unit.to_string()), ..Plot::default() }
 }

@@ -32,8 +32,8 @@ pub(super) fn group(study: &Study, archive: &[Record]) -> Group {
     if best.iter().any(|(_, merit)| merit.violation.is_finite() && !feasible(merit)) {
         plots.push(("convergence-violation".to_owned(), violation(&best, archive.len())));
     }
-    let figures = plots.into_iter().map(|plot| Figure { plots: vec![plot], caption: Vec::new() }).collect();
-    Group { title: String::new(), about, figures }
+    let figures = plots.into_iter().map(|plot| Figure { plots: vec![plot], ..Figure::default() }).collect();
+    Group { about, figures, ..Group::default() }
 }
 
 /// Returns the evaluations, counted from 1, at which the best point improved, with its merit from then on.

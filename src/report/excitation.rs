@@ -109,7 +109,7 @@ pub(super) fn group(inputs: &[ExcitationReport]) -> Group {
             levels: vec![Level { name: "counts as zero".into(), value: input.zero }],
             ..Plot::default()
         };
-        Figure { plots: vec![(format!("excitation-{}-{}", input.case, input.input), plot)], caption: Vec::new() }
+        Figure { plots: vec![(format!("excitation-{}-{}", input.case, input.input), plot)], ..Figure::default() }
     };
     Group { figures: inputs.iter().map(figure).collect(), ..Group::default() }
 }

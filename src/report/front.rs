@@ -42,7 +42,7 @@ pub(super) fn group(report: &Report<'_>) -> Option<Group> {
     let (criteria, tuners) = (criteria(report, found), tuners(report));
     let mut figures = Vec::new();
     let mut add = |name: String, plot: Plot| {
-        figures.push(Figure { plots: vec![(name, plot)], caption: Vec::new() });
+        figures.push(Figure { plots: vec![(name, plot)], ..Figure::default() });
     };
     if criteria.len() <= MOST_PAIRED {
         for (k, x) in criteria.iter().enumerate() {
@@ -96,7 +96,7 @@ fn pair(found: &TradeOffs, x: &Quantity, y: &Quantity) -> Plot {
         log_x: x.log,
         log_y: y.log,
         levels: y.demand.map(|value| Level { name: "demand".to_owned(), value }).into_iter().collect(),
-        vertical: x.demand,
+        verticals: x.demand.map(|value| Level { value, ..Level::default() }).into_iter().collect(),
         curves: dots(found, x, y).into_iter().map(|(_, curve)| curve).collect(),
         ..Plot::default()
     }

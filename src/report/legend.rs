@@ -27,9 +27,14 @@ impl Scene {
     /// Draws the legend in rows, the first at `row`. Returns the position of its end.
     pub(super) fn legend(&mut self, plot: &Plot, mut row: f64) -> f64 {
         let bands = plot.bands.iter().map(|band| (band.name.as_str(), Color::Band, CurveStyle::Line));
-        let curves = plot.curves.iter().filter(|c| !c.points.is_empty()).map(|c| (c.name.as_str(), c.color, c.style));
+        let curves = plot.shown().filter(|c| !c.points.is_empty()).map(|c| (c.name.as_str(), c.color, c.style));
         let mut at = 10.0;
-        for (name, color, style) in curves.chain(bands).filter(|(name, _, _)| !name.is_empty()) {
+        let mut listed = HashSet::new();
+        for (name, color, style) in curves.chain(bands).filter(|(name, ..)| !name.is_empty()) {
+            // Curves of one case have one entry.
+            if !listed.insert(name) {
+                continue;
+            }
             let width = 46.0 + ADVANCE * name.chars().count() as f64;
             if at + width > SIZE[0] && at > 10.0 {
                 (at, row) = (10.0, row + 17.0);

@@ -3,6 +3,7 @@
 mod axis;
 mod bode;
 mod calibration;
+mod chart;
 mod clip;
 mod comparison;
 mod contour;
@@ -14,12 +15,14 @@ mod figures;
 mod front;
 mod legend;
 mod matrix;
+mod nyquist;
 mod page;
 mod parallel_axes;
 mod plot;
 mod plot_files;
 mod png;
 mod range;
+mod responses;
 mod robustness;
 mod sampling;
 mod scene;
@@ -45,7 +48,8 @@ use mops_core::{Evaluation, Outcome, Problem, Record, Stop, Task};
 use crate::files;
 use crate::numbers::FileNames;
 
-pub(crate) use bode::{FrequencyCurve, bode, frequencies};
+pub(crate) use bode::{FrequencyCurve, bode};
+pub(crate) use nyquist::nyquist;
 pub use page::page;
 pub use plot::{Band, Color, Curve, CurveStyle, Level, ParallelAxis, Plot, Surface, ZAxis};
 use plot_files::PlotFiles;
@@ -80,7 +84,7 @@ impl Report<'_> {
     pub fn write(&self, folder: &Path) -> io::Result<()> {
         let plots = folder.join("plots");
         fs::create_dir_all(&plots)?;
-        let (responses, omitted) = figures::responses(self);
+        let (responses, omitted) = responses::groups(self);
         let convergence = self.searched().then(|| convergence::group(self.problem.study(), self.archive));
         let front = front::group(self);
         let sweep = self.outcome.found.sweep.as_ref().map(|sweep| sweep::group(sweep, self.best_name()));
@@ -109,7 +113,8 @@ impl Report<'_> {
         let groups = groups.chain(sections.robustness.iter().map(|section| &section.group));
         let groups = groups.chain(sections.diagnosis.iter().flat_map(diagnosis::Plots::groups));
         let mut names = FileNames::default();
-        let figures = groups.flat_map(|group| &group.figures).flat_map(|figure| &figure.plots);
+        let figures = groups.flat_map(|group| &group.figures).filter(|figure| figure.on_request.is_none());
+        let figures = figures.flat_map(|figure| &figure.plots);
         let all: Vec<(String, &Plot)> = figures.map(|(name, plot)| (names.unique(name), plot)).collect();
         let earlier = PlotFiles::of(&plots);
         earlier.note(all.iter().map(|(name, _)| name.as_str()))?;

@@ -1,4 +1,5 @@
-//! Page of the report: one HTML file without external resources. Scripts only sort tables and select points of a front.
+//! Page of the report: one HTML file without external resources. Without scripts it has the same content: they make plots and
+//! tables interactive.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use mops_core::{CalibrationReport, Task};
@@ -7,7 +8,8 @@ use super::Report;
 use super::figures::{Figure, Group};
 use super::verdict::{self, Tone};
 use super::{
-    calibration, criteria, diagnosis, excitation, front, matrix, robustness, sensitivity, slopes, tuners, uncertainty,
+    calibration, chart, criteria, diagnosis, excitation, front, matrix, robustness, sensitivity, slopes, tuners,
+    uncertainty,
 };
 use crate::numbers::significant;
 
@@ -36,6 +38,7 @@ pub fn page(title: &str, body: &str) -> String {
 
 /// Returns a page with the common head: one file, light and dark scheme, sortable tables.
 pub(super) fn document(title: &str, body: Markup) -> Markup {
+    let charts = body.0.contains("class=\"chart\"");
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -46,8 +49,13 @@ pub(super) fn document(title: &str, body: Markup) -> Markup {
                 meta name="generator" content={ "mops " (env!("CARGO_PKG_VERSION")) };
                 title { (title) }
                 style { (PreEscaped(super::STYLE)) }
+                @if charts { style { (PreEscaped(chart::STYLE)) } }
             }
-            body { (body) script { (PreEscaped(TABLES)) } }
+            body {
+                (body)
+                script { (PreEscaped(TABLES)) }
+                @if charts { @for text in chart::SCRIPTS { script { (PreEscaped(text)) } } }
+            }
         }
     }
 }
@@ -201,14 +209,18 @@ pub(super) fn figures(group: &Group) -> Markup {
     html! {
         @if !group.title.is_empty() { h3 { (rich(&group.title)) } }
         @for sentence in &group.about { p { (rich(sentence)) } }
-        @if !group.figures.is_empty() { div class="figures" { @for one in &group.figures { (figure(one)) } } }
+        @if !group.figures.is_empty() {
+            div class=(if group.full_width { "figures full" } else { "figures" }) {
+                @for one in &group.figures { (figure(one)) }
+            }
+        }
     }
 }
 
 fn figure(figure: &Figure) -> Markup {
     html! {
-        figure {
-            @for (_, plot) in &figure.plots { div class="wide" { (PreEscaped(plot.svg())) } }
+        figure data-signal=[&figure.on_request] hidden[figure.on_request.is_some()] {
+            @for (_, plot) in &figure.plots { (chart::markup(plot)) }
             @if !figure.caption.is_empty() {
                 figcaption { @for (i, line) in figure.caption.iter().enumerate() { @if i > 0 { "; " } (rich(line)) } }
             }

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::Path;
 
+use mops_core::Side;
+
 use super::scene::Scene;
 use super::{png, svg};
 
@@ -26,6 +28,8 @@ pub enum Color {
     Demand,
     /// Expected range.
     Band,
+    /// Region excluded by a demand.
+    Excluded,
     /// Index of one of several curves of equal rank, from 0.
     Series(usize),
 }
@@ -59,16 +63,34 @@ pub struct Curve {
     pub front_point: Option<usize>,
     /// True if the curve may leave the frame: it widens the range at most to three times that of the other curves.
     pub may_leave: bool,
+    /// Point at which the curve was computed, such as `initial guess`, if the name is that of a case.
+    pub variant: String,
+    /// True if the curve is only shown on request, in a page.
+    pub hidden: bool,
 }
 
-/// Horizontal line, such as a demand. It widens the range at most to three times that of the curves; beyond that it is not
-/// shown.
+/// Horizontal or vertical line, such as a demand. A horizontal line widens the range at most to three times that of the
+/// curves; beyond that it is not shown.
 #[derive(Debug, Clone, Default)]
 pub struct Level {
+    /// Label at its right or upper end; may be empty.
+    pub name: String,
+    /// Value along y, or along x.
+    pub value: f64,
+}
+
+/// Bound of the curves, such as a part of an envelope: a straight line with the excluded region beyond. Its line widens the
+/// range as a [`Level`] does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bound {
     /// Label at its right end; may be empty.
     pub name: String,
-    /// Value along y.
-    pub value: f64,
+    /// Start and end along x; may be infinite.
+    pub x: [f64; 2],
+    /// Values at the start and the end.
+    pub y: [f64; 2],
+    /// Excluded side, drawn as a region.
+    pub excluded: Option<Side>,
 }
 
 /// Range of values behind the curves, such as the noise level.
@@ -126,6 +148,8 @@ pub struct Plot {
     pub curves: Vec<Curve>,
     /// Horizontal lines.
     pub levels: Vec<Level>,
+    /// Bounds with excluded regions.
+    pub bounds: Vec<Bound>,
     /// Ranges behind the curves.
     pub bands: Vec<Band>,
     /// Range of x to be included; the range of the curves if `None`.
@@ -134,12 +158,16 @@ pub struct Plot {
     pub log_x: bool,
     /// True if y is logarithmic; values that are not positive are then omitted.
     pub log_y: bool,
-    /// Value of x at which a vertical line is drawn.
-    pub vertical: Option<f64>,
+    /// Vertical lines.
+    pub verticals: Vec<Level>,
+    /// Range of x to be shown, if it is a part of the whole. A page can show the whole.
+    pub window: Option<[f64; 2]>,
     /// True for equal scales along x and y, so that a circle is round.
     pub equal: bool,
     /// True if y is an angle in degrees, with ticks at multiples of 45.
     pub degrees: bool,
+    /// True for a plot that supplements another, such as a residual; a page draws it lower.
+    pub supplement: bool,
     /// Surface behind the curves; its grid determines the ranges of x and y.
     pub surface: Option<Surface>,
     /// Vertical axis of a three-dimensional plot, in which all curves are dots.
@@ -163,10 +191,15 @@ impl Plot {
         png::write(&Scene::of(self), path)
     }
 
+    /// Returns the curves that are not hidden.
+    pub(super) fn shown(&self) -> impl Iterator<Item = &Curve> {
+        self.curves.iter().filter(|curve| !curve.hidden)
+    }
+
     /// Returns a description for screen readers: the range of every curve.
-    fn description(&self) -> String {
+    pub(super) fn description(&self) -> String {
         let mut text = format!("{} over {}.", self.y_label, self.x_label);
-        for curve in &self.curves {
+        for curve in self.shown() {
             let values = || curve.points.iter().map(|(_, y)| *y).filter(|y| y.is_finite());
             if let (Some(low), Some(high), Some(last)) =
                 (values().reduce(f64::min), values().reduce(f64::max), values().next_back())

@@ -70,6 +70,10 @@ fn draw(paper: &mut BitMapBackend<'_>, mark: &Mark) -> io::Result<()> {
             let pixel = |p: Point| ((SCALE * p[0]).round() as i32, (SCALE * p[1]).round() as i32);
             paper.draw_rect(pixel(frame.from), pixel(frame.to), &rgb_color(*color), true).map_err(failed)
         }
+        Mark::Area { points, color } => {
+            let pixel = |p: &Point| ((SCALE * p[0]).round() as i32, (SCALE * p[1]).round() as i32);
+            paper.fill_polygon(points.iter().map(pixel), &rgb_color(*color)).map_err(failed)
+        }
         Mark::Cell { frame, rgb: [r, g, b] } => {
             let pixel = |p: Point| ((SCALE * p[0]).round() as i32, (SCALE * p[1]).round() as i32);
             paper.draw_rect(pixel(frame.from), pixel(frame.to), &RGBColor(*r, *g, *b), true).map_err(failed)

@@ -21,12 +21,22 @@ pub(super) fn range_of(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     Some([low - margin, high + margin])
 }
 
-/// Returns the range of y. It contains the curves that may not leave the frame; other curves and levels widen it at most to
+/// Returns the range of x: the window, or that of the curves.
+pub(super) fn x_range(plot: &Plot) -> Option<[f64; 2]> {
+    if let Some(window) = plot.window {
+        return range_of(window.into_iter().filter_map(|x| drawable(x, plot.log_x)));
+    }
+    let xs = plot.shown().flat_map(|curve| &curve.points).map(|p| p.0).chain(plot.x_range.into_iter().flatten());
+    range_of(xs.filter_map(|x| drawable(x, plot.log_x)))
+}
+
+/// Returns the range of y in the window. It contains the curves that may not leave the frame; other curves and levels widen it at most to
 /// three times that range.
 pub(super) fn y_range(plot: &Plot) -> Option<[f64; 2]> {
     let values = |may_leave: bool| {
-        let curves = plot.curves.iter().filter(move |c| c.may_leave == may_leave).flat_map(|c| &c.points);
-        curves.filter(|p| p.0.is_finite()).filter_map(|p| drawable(p.1, plot.log_y))
+        let curves = plot.shown().filter(move |c| c.may_leave == may_leave).flat_map(|c| &c.points);
+        let inside = |x: f64| plot.window.map_or(x.is_finite(), |[from, to]| (from..=to).contains(&x));
+        curves.filter(move |p| inside(p.0)).filter_map(|p| drawable(p.1, plot.log_y))
     };
     let bands = plot.bands.iter().flat_map(|b| b.range).filter_map(|v| drawable(v, plot.log_y));
     let [low, high] = range_of(values(false).chain(bands)).or_else(|| range_of(values(true)))?;
@@ -35,7 +45,8 @@ pub(super) fn y_range(plot: &Plot) -> Option<[f64; 2]> {
     for value in values(true) {
         range = [range[0].min(value.max(low - room)), range[1].max(value.min(high + room))];
     }
-    for value in plot.levels.iter().filter_map(|level| drawable(level.value, plot.log_y)) {
+    let levels = plot.levels.iter().map(|level| level.value);
+    for value in levels.chain(plot.bounds.iter().flat_map(|bound| bound.y)).filter_map(|v| drawable(v, plot.log_y)) {
         if value >= low - room && value <= high + room {
             range = [range[0].min(value), range[1].max(value)];
         }

@@ -2,8 +2,10 @@
 
 use super::axis::Axis;
 use super::clip::{Frame, Point, visible};
-use super::plot::{Color, CurveStyle, Plot, Surface};
-use super::range::{drawable, equal, range_of, y_range};
+use mops_core::Side;
+
+use super::plot::{Bound, Color, CurveStyle, Plot, Surface};
+use super::range::{equal, x_range, y_range};
 use super::space::{Point3, View};
 use super::surface::SCALE_WIDTH;
 
@@ -30,6 +32,11 @@ pub(super) enum Mark {
     },
     Box {
         frame: Frame,
+        color: Color,
+    },
+    /// Filled polygon.
+    Area {
+        points: Vec<Point>,
         color: Color,
     },
     /// Box of a fixed colour, independent of the colour scheme.
@@ -81,10 +88,9 @@ impl Scene {
             return Self::space(plot);
         }
         let mut scene = Self::default();
-        let xs = plot.curves.iter().flat_map(|c| &c.points).map(|p| p.0).chain(plot.x_range.into_iter().flatten());
         let x_range = match &plot.surface {
             Some(surface) => Surface::range(&surface.x, plot.log_x),
-            None => range_of(xs.filter_map(|x| drawable(x, plot.log_x))),
+            None => x_range(plot),
         };
         let y_range = match &plot.surface {
             Some(surface) => Surface::range(&surface.y, plot.log_y),
@@ -97,24 +103,31 @@ impl Scene {
         let [x_shown, y_shown] = if plot.equal { equal(shown[0], shown[1], room[0] / room[1]) } else { shown };
         let x = x_axis(x_shown, plot.log_x);
         let y = if plot.degrees { Axis::degrees(y_shown, 7.0) } else { Axis::new(y_shown, plot.log_y, 7.0) };
-        let levels: Vec<(f64, &str)> = plot
-            .levels
-            .iter()
-            .filter_map(|level| Some((y.position(level.value)?, level.name.as_str())))
-            .filter(|(at, _)| (0.0..=1.0).contains(at))
-            .collect();
+        // Labels of levels, and of bounds that reach the right end.
+        let levels = plot.levels.iter().filter_map(|level| Some((y.position(level.value)?, level.name.as_str(), true)));
+        let at_end = plot.bounds.iter().filter(|bound| x.position(bound.x[1]).is_none_or(|at| at >= 1.0));
+        let bounds = at_end.filter_map(|bound| Some((y.position(bound.y[1])?, bound.name.as_str(), false)));
+        let levels: Vec<(f64, &str, bool)> = levels.chain(bounds).filter(|(at, ..)| (0.0..=1.0).contains(at)).collect();
 
         scene.text(&plot.title, [10.0, 16.0], Anchor::Start, Color::Text);
         let labels = longest(y.ticks.iter().map(|(_, label)| label.as_str()));
         let left = 38.0 + ADVANCE * if plot.equal { labels.max(5.0) } else { labels };
         let beside = if plot.surface.is_some() { SCALE_WIDTH } else { 0.0 };
-        let right = SIZE[0] - 16.0 - beside - ADVANCE * longest(levels.iter().map(|(_, name)| *name));
+        let right = SIZE[0] - 16.0 - beside - ADVANCE * longest(levels.iter().map(|(_, name, _)| *name));
         let frame = Frame { from: [left, top], to: [right.max(left + 100.0), SIZE[1] - 46.0] };
         let place = |p: &(f64, f64)| {
             let (px, py) = (x.position(p.0)?, y.position(p.1)?);
             Some([left + px * (frame.to[0] - left), frame.to[1] - py * (frame.to[1] - top)])
         };
         let height = |at: f64| frame.to[1] - at.clamp(0.0, 1.0) * (frame.to[1] - top);
+        let edges: Vec<Vec<Point>> = plot.bounds.iter().map(|bound| edge(bound, (&x, &y), frame)).collect();
+        for (bound, edge) in plot.bounds.iter().zip(&edges) {
+            if let (Some(side), [from, to]) = (bound.excluded, edge.as_slice()) {
+                let end = if side == Side::Above { frame.from[1] } else { frame.to[1] };
+                let points = vec![*from, *to, [to[0], end], [from[0], end]];
+                scene.marks.push(Mark::Area { points, color: Color::Excluded });
+            }
+        }
 
         for band in &plot.bands {
             if let [Some(low), Some(high)] = band.range.map(|v| y.position(v)) {
@@ -127,15 +140,18 @@ impl Scene {
         } else {
             scene.parallel_axes(&plot.parallel_axes, [&x, &y], frame);
         }
-        if let Some(at) = plot.vertical.and_then(|value| x.position(value)).filter(|at| (0.0..=1.0).contains(at)) {
-            let px = left + at * (frame.to[0] - left);
-            let points = vec![[px, top], [px, frame.to[1]]];
-            scene.marks.push(Mark::Line { points, color: Color::Start, width: 0.8, dashed: false });
+        for line in &plot.verticals {
+            if let Some(at) = x.position(line.value).filter(|at| (0.0..=1.0).contains(at)) {
+                let px = left + at * (frame.to[0] - left);
+                let points = vec![[px, top], [px, frame.to[1]]];
+                scene.marks.push(Mark::Line { points, color: Color::Start, width: 0.8, dashed: false });
+                scene.text(&line.name, [px + 4.0, top + 8.0], Anchor::Start, Color::Faint);
+            }
         }
         if let Some(surface) = &plot.surface {
             scene.surface(surface, &x, &y, frame);
         }
-        for curve in &plot.curves {
+        for curve in plot.shown() {
             let before = scene.marks.len();
             let points: Vec<Option<Point>> = curve.points.iter().map(place).collect();
             let inside = points.iter().copied().flatten().filter(|p| frame.contains(*p));
@@ -146,7 +162,7 @@ impl Scene {
                     let dashed = curve.style == CurveStyle::Dashed;
                     let width = match (curve.front_point, curve.color) {
                         (Some(_), _) => 0.8,
-                        (None, Color::Start) => 1.3,
+                        (None, Color::Start | Color::Grid) => 1.3,
                         _ => 1.8,
                     };
                     for points in visible(&points, frame, 0.1) {
@@ -159,10 +175,15 @@ impl Scene {
                 scene.marks.push(Mark::FrontPoint { point, marks });
             }
         }
+        for points in edges.into_iter().filter(|edge| !edge.is_empty()) {
+            scene.marks.push(Mark::Line { points, color: Color::Demand, width: 1.2, dashed: true });
+        }
         let mut lowest = f64::INFINITY;
-        for (at, name) in descending(levels) {
-            let line = vec![[left, height(at)], [frame.to[0], height(at)]];
-            scene.marks.push(Mark::Line { points: line, color: Color::Demand, width: 1.2, dashed: true });
+        for (at, name, is_level) in descending(levels) {
+            if is_level {
+                let line = vec![[left, height(at)], [frame.to[0], height(at)]];
+                scene.marks.push(Mark::Line { points: line, color: Color::Demand, width: 1.2, dashed: true });
+            }
             // Labels of neighbouring levels must not overlap.
             lowest = if lowest.is_finite() { height(at).max(lowest + 14.0) } else { height(at) };
             scene.text(name, [frame.to[0] + 6.0, lowest], Anchor::Start, Color::Demand);
@@ -233,7 +254,21 @@ fn longest<'a>(labels: impl Iterator<Item = &'a str>) -> f64 {
     labels.map(|label| label.chars().count()).max().unwrap_or(0) as f64
 }
 
-fn descending(mut levels: Vec<(f64, &str)>) -> Vec<(f64, &str)> {
+/// Returns the visible part of the line of a bound: its ends, with the values limited to the frame; empty outside.
+fn edge(bound: &Bound, (x, y): (&Axis, &Axis), frame: Frame) -> Vec<Point> {
+    let along = |value: f64, end: f64| x.position(value).unwrap_or(end).clamp(0.0, 1.0);
+    let [from, to] = [along(bound.x[0], 0.0), along(bound.x[1], 1.0)];
+    if from >= to {
+        return Vec::new();
+    }
+    let across =
+        |value: f64| y.position(value).map(|at| frame.to[1] - at.clamp(0.0, 1.0) * (frame.to[1] - frame.from[1]));
+    let [Some(start), Some(end)] = bound.y.map(across) else { return Vec::new() };
+    let at = |position: f64| frame.from[0] + position * (frame.to[0] - frame.from[0]);
+    vec![[at(from), start], [at(to), end]]
+}
+
+fn descending(mut levels: Vec<(f64, &str, bool)>) -> Vec<(f64, &str, bool)> {
     levels.sort_by(|a, b| b.0.total_cmp(&a.0));
     levels
 }

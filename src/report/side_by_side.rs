@@ -1,8 +1,9 @@
 //! Page of a comparison: tables and responses of several runs.
 
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 use mops_core::{Analysis, Problem};
 
+use super::chart;
 use super::page::{document, scrolling, section};
 use super::plot::{Color, Curve, Plot};
 use super::sampling;
@@ -49,7 +50,7 @@ pub(crate) fn comparison_page(
             (section("Responses", html! {
                 @for sentence in omitted { p { (sentence) } }
                 @if plots.is_empty() { p { "No signals over time." } }
-                div class="figures" { @for plot in &plots { figure { div class="wide" { (PreEscaped(plot.svg())) } } } }
+                div class="figures full" { @for plot in &plots { figure { (chart::markup(plot)) } } }
             }))
         }
         footer { "Written by mops " (env!("CARGO_PKG_VERSION")) "." }

@@ -50,6 +50,9 @@ fn element(mark: &Mark) -> Markup {
             };
             html! { g class=(kind) data-point=(point) { @for mark in marks { (element(mark)) } } }
         }
+        Mark::Area { points, color } => html! {
+            path class=(class(*color)) d={ (line(points)) "Z" } fill=(hex(*color)) stroke="none" {}
+        },
         // A zero-length line with round ends is the shortest dot.
         Mark::Dots { centres, color, radius } => html! {
             path class=(class(*color)) d=(dots(centres)) fill="none" stroke=(hex(*color)) stroke-width=(2.0 * radius) {}
@@ -104,7 +107,7 @@ fn short(value: f64) -> f64 {
 }
 
 /// Returns the class of a colour in the style sheet of a page.
-fn class(color: Color) -> String {
+pub(super) fn class(color: Color) -> String {
     match color {
         Color::Text => "text".to_owned(),
         Color::Faint => "faint".to_owned(),
@@ -114,6 +117,7 @@ fn class(color: Color) -> String {
         Color::Measured => "measured".to_owned(),
         Color::Demand => "demand".to_owned(),
         Color::Band => "band".to_owned(),
+        Color::Excluded => "excluded".to_owned(),
         Color::Series(i) => format!("series{}", i % SERIES.len()),
     }
 }
@@ -133,6 +137,7 @@ pub(super) fn rgb(color: Color) -> [u8; 3] {
         Color::Measured => [200, 90, 20],
         Color::Demand => [170, 25, 45],
         Color::Band => [226, 236, 246],
+        Color::Excluded => [250, 233, 235],
         Color::Series(i) => SERIES[i % SERIES.len()],
     }
 }

@@ -15,7 +15,7 @@ pub(super) fn group(sweep: &SweepReport, best_name: &str) -> Group {
     };
     Group {
         about: sweep.words.clone(),
-        figures: vec![Figure { plots: vec![("sweep".into(), plot)], caption: Vec::new() }],
+        figures: vec![Figure { plots: vec![("sweep".into(), plot)], ..Figure::default() }],
         ..Group::default()
     }
 }

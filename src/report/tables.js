@@ -1,4 +1,5 @@
-// Makes tables sortable by a click on a column header: numbers by value, text alphabetically.
+// Makes tables sortable by a click on a column header: numbers by value, text alphabetically. Labels the cells of wide tables,
+// which narrow screens show as cards.
 (() => {
   "use strict";
   const number = (text) => (/^\s*[-+]?\.?\d/.test(text) ? parseFloat(text) : null);
@@ -18,11 +19,26 @@
     table.tBodies[0].append(...(descending ? rows.reverse() : rows));
   }
 
+  /** Labels every cell with its header. Matrices and fronts stay tables, as their columns are compared. */
+  function label(table, heads) {
+    if (heads.length <= 4 || table.matches(".front") || table.querySelector(".shade")) return;
+    table.classList.add("cards");
+    for (const row of table.tBodies[0].rows) {
+      [...row.cells].forEach((cell, i) => {
+        if (cell.tagName === "TD") cell.dataset.label = heads[i].textContent;
+        // The value at the reported point and whether the demand is met come first.
+        if (cell.querySelector("strong") || heads[i].textContent === "met") cell.classList.add("key");
+      });
+    }
+  }
+
   for (const table of document.querySelectorAll("table")) {
     const body = table.tBodies[0];
-    if (table.tHead?.rows.length !== 1 || table.tBodies.length !== 1 || body.rows.length < 2) continue;
+    if (table.tHead?.rows.length !== 1 || table.tBodies.length !== 1) continue;
     const heads = [...table.tHead.rows[0].cells];
     if ([...body.rows].some((row) => row.cells.length !== heads.length)) continue;
+    label(table, heads);
+    if (body.rows.length < 2) continue;
     heads.forEach((head, column) => {
       if (!head.textContent) return;
       const button = document.createElement("button");

@@ -148,7 +148,7 @@ pub(super) fn group(found: &UncertaintyReport) -> Group {
             curves,
             ..Plot::default()
         };
-        Figure { plots: vec![(format!("bootstrap-{}", one.parameter), plot)], caption: Vec::new() }
+        Figure { plots: vec![(format!("bootstrap-{}", one.parameter), plot)], ..Figure::default() }
     });
     Group { figures: figures.chain(replicates).collect(), ..Group::default() }
 }
@@ -180,7 +180,7 @@ fn profile(one: &ProfileReport) -> Figure {
         curves,
         ..Plot::default()
     };
-    Figure { plots: vec![(format!("profile-{}", one.parameter), plot)], caption: Vec::new() }
+    Figure { plots: vec![(format!("profile-{}", one.parameter), plot)], ..Figure::default() }
 }
 
 /// Centre of a band.
@@ -204,7 +204,7 @@ pub(super) fn bands(found: &UncertaintyReport, experiment: &str, channel: &str, 
         color,
         style: CurveStyle::Dashed,
         may_leave: true,
-        front_point: None,
+        ..Curve::default()
     };
     let (response, measurement) = (Color::Series(2), Color::Series(3));
     vec![

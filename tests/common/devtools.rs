@@ -88,6 +88,28 @@ impl Page {
         }
     }
 
+    /// Presses the left button at the first place, moves to the second, and releases the button; places are `[x, y]` in the
+    /// viewport.
+    #[allow(dead_code)]
+    pub fn drag(&mut self, from: [f64; 2], to: [f64; 2], clicks: u32) {
+        let middle = [0, 1].map(|i| 0.5 * (from[i] + to[i]));
+        let steps = [("mouseMoved", from), ("mousePressed", from), ("mouseMoved", middle), ("mouseMoved", to)];
+        for (kind, [x, y]) in steps.into_iter().chain([("mouseReleased", to)]) {
+            let button = if kind == "mouseMoved" { "none" } else { "left" };
+            let event = json!({ "type": kind, "x": x, "y": y, "button": button, "clickCount": clicks });
+            self.ask("Input.dispatchMouseEvent", &event);
+        }
+    }
+
+    /// Sets the size of the viewport and the colour scheme.
+    #[allow(dead_code)]
+    pub fn view(&mut self, width: u32, height: u32, scheme: &str) {
+        let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
+        self.ask("Emulation.setDeviceMetricsOverride", &size);
+        let features = json!([{ "name": "prefers-color-scheme", "value": scheme }]);
+        self.ask("Emulation.setEmulatedMedia", &json!({ "features": features }));
+    }
+
     /// Returns the errors on the console so far.
     pub fn problems(&mut self) -> Vec<String> {
         self.evaluate("0");

@@ -30,6 +30,8 @@ pub struct Channel {
     ends: [Variable; 2],
     /// Factor of the output: 1 except for a loop whose ends have different units of one dimension.
     factor: f64,
+    /// True for a loop transfer function.
+    is_loop: bool,
 }
 
 impl Channel {
@@ -44,7 +46,7 @@ impl Channel {
             (to, from) => Unit::known(&format!("({to})/({from})")),
         };
         let ends = [model.inputs[input].clone(), model.signals[output].clone()];
-        Ok(Self { input, output, unit, ends, factor: 1.0 })
+        Ok(Self { input, output, unit, ends, factor: 1.0, is_loop: false })
     }
 
     /// Converts the channel to a loop transfer function: the output is fed back to the input, hence expressed in its
@@ -65,7 +67,7 @@ impl Channel {
             ));
         }
         let factor = to.unit.factor() / from.unit.factor();
-        Ok(Self { factor, ..self })
+        Ok(Self { factor, is_loop: true, ..self })
     }
 
     /// Returns the channel as a system, or as a loop transfer function.
@@ -167,6 +169,10 @@ impl<F: Fn(StateSpace) -> Result<Value, String> + Send + Sync> Criterion for Lin
 
     fn natural_demand(&self) -> Option<f64> {
         self.values.demand
+    }
+
+    fn feedback_channel(&self) -> Option<[String; 2]> {
+        self.channel.is_loop.then(|| self.channel.ends.clone().map(|end| end.name))
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use mops_core::{Analysis, Interface, Mark, Quantity, StudyError, Trace, Unit, Value};
+use mops_core::{Analysis, Interface, Mark, Quantity, Side, StudyError, Trace, Unit, Value};
 
 use super::{optional, part, step_time, trace};
 
@@ -89,9 +89,10 @@ impl Step {
         })
     }
 
-    /// Returns a level of the signal to be plotted.
-    pub fn mark(&self, label: &str, level: f64) -> Vec<Mark> {
-        vec![Mark { signal: self.signal.clone(), label: label.to_owned(), level }]
+    /// Returns a constant bound of the signal from a time on, to be plotted.
+    pub fn mark(&self, label: &str, from: f64, level: f64, excluded: Option<Side>) -> Mark {
+        let times = [from, f64::INFINITY];
+        Mark { signal: self.signal.clone(), label: label.to_owned(), times, values: [level; 2], excluded }
     }
 }
 

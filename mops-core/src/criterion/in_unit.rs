@@ -1,6 +1,6 @@
 //! Criterion in another unit.
 
-use super::{Criterion, Mark, Missed, Sense, Tangent, Value};
+use super::{Criterion, Demand, Mark, Missed, Sense, Tangent, Value};
 use crate::case::Case;
 use crate::model::Analysis;
 use crate::samples::Samples;
@@ -89,7 +89,11 @@ impl Criterion for InUnit {
         Some(Samples { weights: samples.weights.iter().map(|weight| weight * root).collect(), ..samples })
     }
 
-    fn marks(&self, limit: Option<f64>, analysis: &Analysis) -> Vec<Mark> {
-        self.inner.marks(limit.map(|limit| limit / self.factor), analysis)
+    fn feedback_channel(&self) -> Option<[String; 2]> {
+        self.inner.feedback_channel()
+    }
+
+    fn marks(&self, demand: &Demand, analysis: &Analysis) -> Vec<Mark> {
+        self.inner.marks(&demand.map(|value| value / self.factor), analysis)
     }
 }

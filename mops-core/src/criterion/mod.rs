@@ -1,5 +1,6 @@
 //! Criteria: a number for every analysis, with its unit, sense and range.
 
+mod demand;
 mod in_unit;
 mod window;
 
@@ -14,6 +15,7 @@ use crate::samples::Samples;
 use crate::study_error::StudyError;
 use crate::unit::Unit;
 
+pub use demand::{Demand, Scaled};
 pub(crate) use in_unit::InUnit;
 use window::Window;
 
@@ -151,8 +153,13 @@ pub trait Criterion: Send + Sync {
         None
     }
 
-    /// Returns levels to draw next to the signals, if any; `limit` is the value that scales to 1.
-    fn marks(&self, _limit: Option<f64>, _analysis: &Analysis) -> Vec<Mark> {
+    /// Returns input and output of the loop transfer function of a criterion that closes the loop by unity negative feedback.
+    fn feedback_channel(&self) -> Option<[String; 2]> {
+        None
+    }
+
+    /// Returns bounds to draw next to the signals, if any.
+    fn marks(&self, _demand: &Demand, _analysis: &Analysis) -> Vec<Mark> {
         Vec::new()
     }
 }
@@ -264,13 +271,37 @@ pub enum Usage {
     Monitor,
 }
 
-/// A level of a signal used by a criterion, to be drawn in plots.
+/// Bound of a signal used by a criterion, to be drawn in plots: a straight line over a range of times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mark {
     /// The signal.
     pub signal: String,
-    /// Short name of the level.
+    /// Short name of the bound.
     pub label: String,
-    /// Value of the level, in the signal's unit.
-    pub level: f64,
+    /// Start and end, s; the end may be infinite if both values are equal.
+    pub times: [f64; 2],
+    /// Values at the start and the end, in the signal's unit.
+    pub values: [f64; 2],
+    /// Side that the demand excludes; `None` if the bound excludes nothing by itself.
+    pub excluded: Option<Side>,
+}
+
+/// Side of a bound.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Larger values.
+    Above,
+    /// Smaller values.
+    Below,
+}
+
+impl Mark {
+    /// Returns the part of the bound within a range of times, if any.
+    #[must_use]
+    pub fn within(self, from: f64, until: f64) -> Option<Self> {
+        let ([t0, t1], [v0, v1]) = (self.times, self.values);
+        let at = |t: f64| if v0 == v1 { v0 } else { v0 + (v1 - v0) * (t - t0) / (t1 - t0) };
+        let times = [t0.max(from), t1.min(until)];
+        (times[0] < times[1]).then(|| Self { times, values: times.map(at), ..self })
+    }
 }

@@ -1,6 +1,6 @@
 //! Criterion of a part of a simulation.
 
-use super::{Criterion, Mark, Sense, Tangent, Value};
+use super::{Criterion, Demand, Mark, Sense, Tangent, Value};
 use crate::case::Case;
 use crate::experiment::{Channel, Experiment};
 use crate::model::{Analysis, Response};
@@ -114,7 +114,12 @@ impl Criterion for Window {
         Some(Samples { first: samples.first + before, ..samples })
     }
 
-    fn marks(&self, limit: Option<f64>, analysis: &Analysis) -> Vec<Mark> {
-        self.part(analysis).map(|part| self.inner.marks(limit, &part)).unwrap_or_default()
+    fn feedback_channel(&self) -> Option<[String; 2]> {
+        self.inner.feedback_channel()
+    }
+
+    fn marks(&self, demand: &Demand, analysis: &Analysis) -> Vec<Mark> {
+        let marks = self.part(analysis).map(|part| self.inner.marks(demand, &part)).unwrap_or_default();
+        marks.into_iter().filter_map(|mark| mark.within(self.from, self.until)).collect()
     }
 }

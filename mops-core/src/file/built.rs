@@ -10,7 +10,7 @@ use super::{StudyFile, content, digest, read_solver, tasks};
 use crate::case::Case;
 use crate::catalogue::Catalogue;
 use crate::catalogue_study::BuiltStudy;
-use crate::demand::Demand;
+use crate::criterion::Demand;
 use crate::diagnostic::{Diagnostic, suggestion};
 use crate::evaluation::Objective;
 use crate::panics::caught;

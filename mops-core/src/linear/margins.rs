@@ -185,6 +185,30 @@ impl Loop {
         Ok(if both { up.min(decibel(1.0 / above.get())) } else { up })
     }
 
+    /// Returns the gain crossover that determines the phase margin of a stable loop, and the phase crossover that determines
+    /// its gain margin; `None` for an infinite margin.
+    ///
+    /// # Errors
+    /// If the bounds of the response cannot be computed.
+    pub fn critical(&self) -> Result<[Option<Crossing>; 2], String> {
+        let turn = |crossing: &Crossing| complex::arg(-crossing.response).abs();
+        let of_phase = self.gain_crossovers.iter().copied().min_by(|a, b| turn(a).total_cmp(&turn(b)));
+        let largest = Cell::new(0.0f64);
+        let mut of_gain: Option<Crossing> = None;
+        let window = |span: &Span| {
+            let [low, high] = span.gain().map(math::exp);
+            low <= 1.0 && high > largest.get()
+        };
+        self.phase_crossovers_in(window, |crossing| {
+            let size = complex::norm(crossing.response);
+            if size <= 1.0 && size > largest.get() {
+                largest.set(size);
+                of_gain = Some(crossing);
+            }
+        })?;
+        Ok([of_phase, of_gain])
+    }
+
     /// Returns the delay margin, s: the smallest additional delay that makes the closed loop unstable, or infinity.
     ///
     /// For an unstable loop: minus the smallest change of the delay, of either sign, that makes it stable. A reduction

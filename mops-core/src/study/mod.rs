@@ -30,7 +30,7 @@ pub use uncertain::{DistributionBuilder, UncertainBuilder};
 use crate::cancellation::Cancellation;
 use crate::case::Case;
 use crate::criterion::{Criterion, Usage, Value};
-use crate::demand::{Demand, Scaled};
+use crate::criterion::{Demand, Scaled};
 use crate::evaluation::{FEASIBLE, Objective, Reading};
 use crate::failure::Failure;
 use crate::model::{Analysis, Job, Model};

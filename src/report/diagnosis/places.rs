@@ -95,8 +95,8 @@ pub(super) fn dependence(diagnosis: &Diagnosis) -> Option<Group> {
         curves,
         ..Plot::default()
     };
-    let figure = Figure { plots: vec![("missing".to_owned(), plot)], caption: Vec::new() };
-    Some(Group { title: String::new(), about: Vec::new(), figures: vec![figure] })
+    let figure = Figure { plots: vec![("missing".to_owned(), plot)], ..Figure::default() };
+    Some(Group { figures: vec![figure], ..Group::default() })
 }
 
 fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
@@ -114,7 +114,7 @@ fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
     };
     let figure = |key: &str, title: String, x_label: String, curves| {
         let plot = Plot { title, x_label, y_label: y_label.clone(), curves, ..Plot::default() };
-        Figure { plots: vec![(format!("missing-{}-{key}", evidence.place), plot)], caption: Vec::new() }
+        Figure { plots: vec![(format!("missing-{}-{key}", evidence.place), plot)], ..Figure::default() }
     };
     let mut figures = Vec::new();
     for (over, unit, points) in &evidence.over {
@@ -136,7 +136,7 @@ fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
     } else {
         Vec::new()
     };
-    Group { title, about, figures }
+    Group { title, about, figures, ..Group::default() }
 }
 
 fn dots(name: &str, x: &[f64], y: &[f64], color: Color) -> Curve {

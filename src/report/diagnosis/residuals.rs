@@ -43,6 +43,7 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> Vec<Group> {
         about: omitted.iter().filter(|_| i == 0).cloned().collect(),
         // Spectra and autocorrelations of other experiments are similar.
         figures: channels.iter().map(|channel| figure(channel, i == 0)).collect(),
+        full_width: true,
     };
     shown.iter().enumerate().map(group).collect()
 }
@@ -107,7 +108,7 @@ fn figure(prediction: &Prediction, with_spectrum: bool) -> Figure {
             },
         ));
     }
-    Figure { plots, caption: Vec::new() }
+    Figure { plots, ..Figure::default() }
 }
 
 /// Returns a group for every experiment with plots: the measurement and the predictions of both models.
@@ -129,12 +130,13 @@ pub(super) fn predictions(diagnosis: &Diagnosis) -> Vec<Group> {
             curves,
             ..Plot::default()
         };
-        Figure { plots: vec![(format!("predicted-{}-{}", p.experiment, p.signal), plot)], caption: Vec::new() }
+        Figure { plots: vec![(format!("predicted-{}-{}", p.experiment, p.signal), plot)], ..Figure::default() }
     };
     let group = |channels: &[Prediction]| Group {
         title: title(channels),
         about: Vec::new(),
         figures: channels.iter().map(plot).collect(),
+        full_width: true,
     };
     shown(diagnosis).into_iter().map(group).collect()
 }

@@ -95,7 +95,7 @@ fn figures(found: &MonteCarloReport, criterion: &DistributionReport, index: usiz
         (format!("histogram-{place}"), histogram(criterion, &values)),
         (format!("distribution-{place}"), ecdf(criterion, &values)),
     ];
-    let one = |plot| Figure { plots: vec![plot], caption: Vec::new() };
+    let one = |plot| Figure { plots: vec![plot], ..Figure::default() };
     let mut figures: Vec<Figure> = plots.into_iter().map(one).collect();
     for (j, parameter) in found.parameters.iter().enumerate() {
         let points = found.table.iter().take(4 * MOST_POINTS).map(|(x, y)| (x[j], y[index])).collect();
@@ -121,7 +121,7 @@ fn figures(found: &MonteCarloReport, criterion: &DistributionReport, index: usiz
             ..Plot::default()
         };
         figures
-            .push(Figure { plots: vec![(format!("samples-{place}-{}", parameter.name), plot)], caption: Vec::new() });
+            .push(Figure { plots: vec![(format!("samples-{place}-{}", parameter.name), plot)], ..Figure::default() });
     }
     figures
 }
@@ -162,7 +162,7 @@ fn vertical_lines(criterion: &DistributionReport, top: f64) -> Vec<Curve> {
         color,
         style,
         may_leave: true,
-        front_point: None,
+        ..Curve::default()
     };
     let demand = criterion.of.demand.map(|x| line("demand", x, Color::Demand, CurveStyle::Line));
     let nominal = Some(criterion.of.nominal)

@@ -105,7 +105,7 @@ fn plane(criterion: &EffectsReport) -> Figure {
     };
     Figure {
         plots: vec![(format!("morris-{}-{}", criterion.of.case, criterion.of.criterion), plot)],
-        caption: Vec::new(),
+        ..Figure::default()
     }
 }
 
@@ -142,6 +142,6 @@ fn shares(criterion: &EffectsReport) -> Figure {
     };
     Figure {
         plots: vec![(format!("sobol-{}-{}", criterion.of.case, criterion.of.criterion), plot)],
-        caption: Vec::new(),
+        ..Figure::default()
     }
 }

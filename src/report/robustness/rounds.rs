@@ -98,5 +98,5 @@ fn bounds(found: &RobustReport) -> Figure {
         curves,
         ..Plot::default()
     };
-    Figure { plots: vec![("rounds".into(), plot)], caption: Vec::new() }
+    Figure { plots: vec![("rounds".into(), plot)], ..Figure::default() }
 }

@@ -6,6 +6,7 @@ use maud::{Markup, html};
 use mops_core::{CoordinateReport, Problem, UncertainReport, WorstCaseReport, WorstReport};
 
 use super::super::Report;
+use super::super::comparison::bounds;
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;
 use super::super::plot::{Color, Curve, CurveStyle, Level, Plot};
@@ -113,18 +114,16 @@ fn responses(report: &Report<'_>, found: &WorstCaseReport) -> Vec<Figure> {
             let Some(variable) = signals.iter().find(|s| s.name == signal).filter(|_| !curves.is_empty()) else {
                 continue;
             };
-            let marks = analyses[1].3.iter().flat_map(|analysis| row.criterion.marks(row.demand.limit(), analysis));
-            let levels = marks.filter(|m| m.signal == signal && m.level.is_finite());
             let plot = Plot {
                 title: format!("{signal} in the worst case of {}", of.criterion),
                 x_label: "time (s)".into(),
                 y_label: labelled(&signal, &variable.unit.to_string()),
                 curves,
-                levels: levels.map(|m| Level { name: m.label, value: m.level }).collect(),
+                bounds: analyses[1].3.iter().flat_map(|analysis| bounds(&signal, &[row], analysis)).collect(),
                 ..Plot::default()
             };
             let name = format!("worst-{}-{}-{signal}", of.case, of.criterion);
-            figures.push(Figure { plots: vec![(name, plot)], caption: Vec::new() });
+            figures.push(Figure { plots: vec![(name, plot)], ..Figure::default() });
         }
     }
     figures
@@ -152,7 +151,7 @@ fn slices(worst: &WorstReport) -> Vec<Figure> {
         };
         Figure {
             plots: vec![(format!("slice-{}-{}-{}", of.case, of.criterion, slice.parameter), plot)],
-            caption: Vec::new(),
+            ..Figure::default()
         }
     };
     worst.slices.iter().zip(&worst.at).map(one).collect()

@@ -31,6 +31,21 @@ fn the_third_order_lag_has_its_closed_form() {
     assert_near(l.gain_margin(false).unwrap(), 20.0 * math::log10(2.0), 1e-11);
     assert_near(l.phase_margin().unwrap(), PI - 3.0 * math::atan(w), 1e-12);
     assert_near(l.delay_margin().unwrap(), (PI - 3.0 * math::atan(w)) / w, 1e-12);
+    let [of_phase, of_gain] = l.critical().unwrap().map(|crossing| crossing.unwrap().frequency);
+    assert_near(of_phase, w, 1e-12);
+    assert_near(of_gain, 3.0f64.sqrt(), 1e-12);
+}
+
+#[test]
+fn the_critical_crossovers_are_those_of_the_margins() {
+    // Several crossings of both kinds: a resonance and a delay.
+    let l = loop_of(&[0.6, 0.9], &[1.0, 0.3, 4.2, 0.1], 0.05);
+    assert!(l.is_stable() && l.gain_crossovers.len() > 2, "{l:?}");
+    let [of_phase, of_gain] = l.critical().unwrap().map(Option::unwrap);
+    assert_near(complex::arg(-of_phase.response).abs(), l.phase_margin().unwrap(), 1e-12);
+    assert_near(-20.0 * math::log10(complex::norm(of_gain.response)), l.gain_margin(false).unwrap(), 1e-9);
+    // A first-order lag never crosses the negative real axis.
+    assert_eq!(loop_of(&[0.5], &[1.0, 1.0], 0.0).critical().unwrap(), [None, None]);
 }
 
 #[test]

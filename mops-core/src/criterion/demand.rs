@@ -1,6 +1,6 @@
 //! Demands: scaling of criterion values, and validity of demands.
 
-use crate::criterion::{Missed, Sense, Value};
+use super::{Missed, Sense, Value};
 
 /// Scaling of a criterion value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +63,17 @@ impl Demand {
             (Some(Missed { horizon }), _) => horizon.unwrap_or(1.0),
         };
         Scaled { value: value.number / unit, slope: 1.0 / unit }
+    }
+
+    /// Returns the demand with its values mapped, such as to another unit.
+    #[must_use]
+    pub fn map(&self, value: impl Fn(f64) -> f64) -> Self {
+        match *self {
+            Self::AtMost(demand) => Self::AtMost(value(demand)),
+            Self::AtLeast(demand) => Self::AtLeast(value(demand)),
+            Self::Pair { good, bad } => Self::Pair { good: value(good), bad: value(bad) },
+            Self::None => Self::None,
+        }
     }
 
     /// Returns the value that scales to 1.

@@ -1,0 +1,648 @@
+// Draws plots of curves over x with uPlot, in place of their SVGs: zoom, values at the cursor, curves on and off by name.
+// Plots of one group share the names of their curves, and those with the same x axis also cursor and range.
+(() => {
+  "use strict";
+  const SMALL = 520; // width in pixels below which plots are lower
+  const NEAR = 24; // distance in pixels at which a curve is highlighted
+  const MOST_VALUES = 8; // number of values in the readout
+
+  const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+
+  /** Formats a number to `digits` significant digits, without trailing zeros. */
+  function number(value, digits = 5) {
+    if (value === 0 || (Math.abs(value) >= 1e-4 && Math.abs(value) < 1e6)) return String(Number(value.toPrecision(digits)));
+    return value.toExponential(digits - 1).replace(/\.?0+e/, "e").replace("e+", "e");
+  }
+
+  /** Creates an element with attributes and children; text is never parsed as markup. */
+  function element(name, attributes = {}, ...children) {
+    const node = document.createElement(name);
+    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+    node.append(...children);
+    return node;
+  }
+
+  /** Splits a label such as `time (s)` into name and unit. */
+  function parts(label) {
+    const [, name, unit] = label.match(/^(.*?)(?: \(([^()]*)\))?$/);
+    return { name, unit: unit ? ` ${unit}` : "" };
+  }
+
+  /** Returns the largest index with `xs[index] <= x`; -1 if there is none. */
+  function before(xs, x) {
+    let [low, high] = [-1, xs.length];
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (xs[middle] <= x) low = middle; else high = middle;
+    }
+    return low;
+  }
+
+  /** Prepares the curves: strictly increasing x, and each nameless curve with the name of the curve that it belongs to. */
+  function prepared(data) {
+    const finite = data.curves.flatMap((curve) => [curve.x[0], curve.x[curve.x.length - 1]]).filter(Number.isFinite);
+    const size = Math.max(...finite) - Math.min(...finite) || 1;
+    let owner = "";
+    return data.curves.map((curve) => {
+      owner = curve.name || owner;
+      const isLine = curve.style === "line" || curve.style === "dashed";
+      let order = curve.x.map((_, i) => i);
+      if (!isLine) order = order.sort((a, b) => curve.x[a] - curve.x[b]);
+      const [x, y] = [order.map((i) => curve.x[i]), order.map((i) => curve.y[i])];
+      // Both values of a jump have the same x.
+      for (let i = 1; i < x.length; i++) if (x[i] <= x[i - 1]) x[i] = x[i - 1] + 1e-9 * (data.logX ? x[i - 1] : size);
+      return { ...curve, owner, isLine, x, y };
+    });
+  }
+
+  /** Value of a curve at x: interpolated for a line, else the sample nearest to x within `reach`; null without one. */
+  function valueAt(curve, x, reach) {
+    const i = before(curve.x, x);
+    if (!curve.isLine) {
+      const near = [i, i + 1].filter((k) => k >= 0 && k < curve.x.length && Math.abs(curve.x[k] - x) <= reach);
+      near.sort((a, b) => Math.abs(curve.x[a] - x) - Math.abs(curve.x[b] - x));
+      return near.length ? curve.y[near[0]] : null;
+    }
+    if (i < 0 || x > curve.x[curve.x.length - 1]) return null;
+    if (i === curve.x.length - 1) return curve.y[i];
+    const [a, b] = [curve.y[i], curve.y[i + 1]];
+    return a === null || b === null ? null : a + ((b - a) * (x - curve.x[i])) / (curve.x[i + 1] - curve.x[i]);
+  }
+
+  /** Returns the grid of a logarithmic axis: multiples of powers of ten, or round numbers within less than a decade. */
+  function roundNumbers(low, high) {
+    const found = [];
+    for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
+      for (let k = 1; k < 10; k++) {
+        const value = Number(`${k}e${power}`);
+        if (value >= low * 0.999999 && value <= high * 1.000001) found.push(value);
+      }
+    }
+    if (found.length > 2) return found;
+    const step = 10 ** Math.floor(Math.log10((high - low) / 2));
+    return Array.from({ length: 60 }, (_, i) => Number(((Math.ceil(low / step) + i) * step).toPrecision(12))).filter((v) => v <= high);
+  }
+
+  /** Returns the labels of a logarithmic axis: powers of ten, with 2 and 5 for few decades; all of less than a decade. */
+  function decades(values) {
+    const span = Math.log10(values[values.length - 1] / values[0]);
+    const shown = span < 0.9 ? null : span < 3 ? [1, 2, 5] : [1];
+    const every = Math.ceil(span / 8);
+    return values.map((value) => {
+      const power = Math.floor(Math.log10(value) + 1e-9);
+      const digit = Math.round(value / 10 ** power);
+      return !shown || (shown.includes(digit) && power % every === 0) ? number(value, 6) : "";
+    });
+  }
+
+  class Chart {
+    constructor(node, group) {
+      this.node = node;
+      this.group = group;
+      this.plot = null;
+      this.load(JSON.parse(node.querySelector("script").textContent));
+      this.shown = this.whole;
+    }
+
+    /** Reads the data of the plot. */
+    load(data) {
+      this.data = data;
+      this.curves = prepared(data);
+      const ends = this.curves.flatMap((curve) => [curve.x[0], curve.x[curve.x.length - 1]]).concat(data.range ?? []);
+      this.whole = [Math.min(...ends), Math.max(...ends)];
+      if (this.whole[0] === this.whole[1]) this.whole = [this.whole[0] - 0.5, this.whole[1] + 0.5];
+    }
+
+    isShown(curve) {
+      return !this.group.off.has(curve.owner) && !this.group.offVariants.has(curve.variant);
+    }
+
+    /** Creates the plot when it comes into view. */
+    create() {
+      if (this.plot) return;
+      const { data, node } = this;
+      this.readout = element("p", { class: "readout" });
+      this.place = element("div", { class: "canvas", tabindex: "0", role: "group", "aria-roledescription": "interactive plot",
+        "aria-label": `${data.title}. ${data.about}` });
+      this.place.addEventListener("keydown", (event) => this.onKey(event));
+      node.append(element("p", { class: "title" }, data.title), this.place, this.readout);
+      node.classList.add("live");
+      this.plot = new uPlot(this.options(), this.joined(), this.place);
+      this.touch();
+      new ResizeObserver(() => this.resize()).observe(this.place);
+      this.show(this.group.ranges.get(data.x) ?? data.window ?? this.whole);
+    }
+
+    size() {
+      const width = Math.max(this.place.clientWidth, 200);
+      const height = width < SMALL ? 240 : this.node.closest(".full") ? 340 : 300;
+      return { width, height: this.data.supplement ? 0.6 * height : height };
+    }
+
+    resize() {
+      const { width, height } = this.size();
+      if (width !== this.plot.width || height !== this.plot.height) this.plot.setSize({ width, height });
+    }
+
+    /** Returns common x and the values of each curve there; undefined where a curve has no sample. Values far outside of the
+        frame are limited: a canvas cannot draw a path with a coordinate of 1e60. */
+    joined() {
+      const [low, high] = this.height();
+      const far = this.data.logY ? Infinity : 1e3 * (high - low);
+      const xs = [...new Set(this.curves.flatMap((curve) => curve.x))].sort((a, b) => a - b);
+      const at = new Map(xs.map((x, i) => [x, i]));
+      const columns = this.curves.map((curve) => {
+        const column = new Array(xs.length);
+        curve.index = curve.x.map((x) => at.get(x));
+        curve.index.forEach((k, i) => { column[k] = curve.y[i] === null ? null : clamp(curve.y[i], low - far, high + far); });
+        return column;
+      });
+      return [xs, ...columns];
+    }
+
+    options() {
+      const { data } = this;
+      const font = "12px system-ui, sans-serif";
+      const axis = (label, size, log, more) => ({
+        label, size, font, labelFont: font, labelSize: 20, stroke: () => color("faint"),
+        grid: { stroke: () => color("grid"), width: 1 }, ticks: { show: false },
+        values: (plot, splits) => (log ? decades(splits) : splits.map((v) => number(v, 6))), ...more,
+        ...(log ? { filter: (plot, splits) => splits, splits: (plot, i, low, high) => roundNumbers(low, high) } : {}),
+      });
+      const series = this.curves.map((curve) => {
+        const stroke = () => color(curve.color);
+        const common = { show: this.isShown(curve), stroke, label: curve.name, pxAlign: 0 };
+        return curve.isLine
+          ? { ...common, width: curve.color === "start" ? 1.3 : 2, dash: curve.style === "dashed" ? [6, 4] : undefined,
+              points: { show: curve.x.length === 1 } }
+          : { ...common, paths: () => null, points: { show: true, size: curve.x.length < 60 ? 6 : 4, stroke, fill: stroke, width: 0 } };
+      });
+      const lines = this.curves.filter((curve) => curve.isLine).length;
+      return {
+        ...this.size(), legend: { show: false }, padding: [8, 12, 0, 0],
+        scales: {
+          x: { time: false, distr: data.logX ? 3 : 1, range: (plot, low, high) => [low, high] },
+          y: { distr: data.logY ? 3 : 1, range: () => this.height() },
+        },
+        axes: [axis(data.x, 30, data.logX), axis(data.y, 64, data.logY, data.degrees ? { incrs: [1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720, 3600] } : {})],
+        series: [{}, ...series],
+        focus: { alpha: 0.35 },
+        cursor: {
+          y: false, drag: { x: true, y: false, setScale: false }, focus: { prox: lines > 2 ? NEAR : -1 },
+          dataIdx: (plot, s, at, x) => (s === 0 ? at : this.nearest(this.curves[s - 1], x)),
+          points: { size: 7 },
+          bind: { dblclick: () => () => { this.group.show(data.x, this.whole); return null; } },
+        },
+        hooks: {
+          drawClear: [(plot) => this.regions(plot)],
+          draw: [(plot) => this.lines(plot)],
+          setSelect: [(plot) => this.selected(plot)],
+          setCursor: [(plot) => this.pointed(plot)],
+        },
+      };
+    }
+
+    /** Returns the index in the common x of the sample of a curve nearest to x. */
+    nearest(curve, x) {
+      const i = before(curve.x, x);
+      const near = [i, i + 1].filter((k) => k >= 0 && k < curve.x.length);
+      near.sort((a, b) => Math.abs(curve.x[a] - x) - Math.abs(curve.x[b] - x));
+      return near.length ? curve.index[near[0]] : null;
+    }
+
+    /** Returns the range of y in the range of x. Curves that may leave, and levels, widen it at most to three times. */
+    height() {
+      const { data, shown: [from, to] } = this;
+      const f = data.logY ? Math.log10 : (v) => v;
+      const values = (mayLeave) => this.curves.filter((c) => c.mayLeave === mayLeave && this.isShown(c)).flatMap((curve) => {
+        const inside = curve.y.slice(before(curve.x, from) + 1, before(curve.x, to) + 1);
+        return curve.isLine ? inside.concat(valueAt(curve, from), valueAt(curve, to)) : inside;
+      }).filter((v) => v !== null).map(f).filter(Number.isFinite);
+      const ends = (all) => all.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]);
+      let [low, high] = ends(values(false).concat(data.bands.flatMap((band) => band[1]).map(f).filter(Number.isFinite)));
+      if (low > high) [low, high] = ends(values(true));
+      if (low > high) return data.logY ? [1, 10] : [0, 1];
+      const size = Math.max(Math.abs(low), Math.abs(high));
+      if (high - low <= 1e-9 * size) [low, high] = [low - (0.1 * size || 1), high + (0.1 * size || 1)];
+      const room = high - low;
+      let range = [low, high];
+      for (const v of values(true)) range = [Math.min(range[0], Math.max(v, low - room)), Math.max(range[1], Math.min(v, high + room))];
+      const bounds = data.bounds.filter(([, x]) => (x[0] ?? -Infinity) < to && (x[1] ?? Infinity) > from).flatMap((bound) => bound[2]);
+      for (const v of data.levels.map((level) => level[1]).concat(bounds).map(f)) {
+        if (v >= low - room && v <= high + room) range = [Math.min(range[0], v), Math.max(range[1], v)];
+      }
+      const margin = 0.05 * (range[1] - range[0]);
+      const back = data.logY ? (v) => 10 ** v : (v) => v;
+      return [back(range[0] - margin), back(range[1] + margin)];
+    }
+
+    /** Calls a function with the context, clipped to the frame, and the positions of values. */
+    painting(plot, paint) {
+      const { ctx, bbox } = plot;
+      ctx.save();
+      ctx.beginPath();
+      ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+      ctx.clip();
+      const x = (value, end) => (value === null ? end : clamp(plot.valToPos(value, "x", true), bbox.left - 1, bbox.left + bbox.width + 1));
+      const y = (value) => plot.valToPos(value, "y", true);
+      paint(ctx, x, y, bbox);
+      ctx.restore();
+    }
+
+    /** Draws bands and excluded regions behind the curves. */
+    regions(plot) {
+      this.painting(plot, (ctx, x, y, box) => {
+        const [left, right, top, bottom] = [box.left, box.left + box.width, box.top, box.top + box.height];
+        ctx.fillStyle = color("band");
+        for (const [, [low, high]] of this.data.bands) ctx.fillRect(left, y(high), box.width, y(low) - y(high));
+        ctx.fillStyle = color("excluded");
+        for (const [, [from, to], [start, end], side] of this.data.bounds) {
+          if (side === 0) continue;
+          const [a, b, far] = [x(from, left), x(to, right), side > 0 ? top : bottom];
+          ctx.beginPath();
+          for (const point of [[a, y(start)], [b, y(end)], [b, far], [a, far]]) ctx.lineTo(...point);
+          if (side > 0 ? Math.max(y(start), y(end)) > top : Math.min(y(start), y(end)) < bottom) ctx.fill();
+        }
+      });
+    }
+
+    /** Draws levels, bounds and vertical lines, with their names. */
+    lines(plot) {
+      this.painting(plot, (ctx, x, y, box) => {
+        const [left, right] = [box.left, box.left + box.width];
+        const scale = window.devicePixelRatio;
+        ctx.font = `${11 * scale}px system-ui, sans-serif`;
+        const line = (points, name, end, stroke) => {
+          ctx.strokeStyle = stroke;
+          ctx.beginPath();
+          for (const point of points) ctx.lineTo(...point);
+          ctx.stroke();
+          ctx.fillStyle = stroke;
+          ctx.textAlign = "right";
+          if (name) ctx.fillText(name, end[0] - 4 * scale, place(end[1]));
+        };
+        const taken = [];
+        const place = (end) => {
+          let at = clamp(end - 4 * scale, box.top + 12 * scale, box.top + box.height - 4 * scale);
+          while (taken.some((other) => Math.abs(other - at) < 12 * scale)) at += 12 * scale;
+          taken.push(at);
+          return at;
+        };
+        ctx.lineWidth = 1.2 * scale;
+        ctx.setLineDash([6 * scale, 4 * scale]);
+        for (const [name, value] of this.data.levels) line([[left, y(value)], [right, y(value)]], name, [right, y(value)], color("demand"));
+        const named = new Set();
+        for (const [name, [from, to], [start, end]] of this.data.bounds) {
+          const [a, b] = [[x(from, left), y(start)], [x(to, right), y(end)]];
+          const label = `${name} ${b[1].toFixed(0)}`;
+          line([a, b], named.has(label) ? "" : name, b, color("demand"));
+          named.add(label);
+        }
+        ctx.setLineDash([]);
+        for (const [name, value] of this.data.verticals) {
+          const at = x(value, left);
+          line([[at, box.top], [at, box.top + box.height]], "", [0, 0], color("start"));
+          ctx.fillStyle = color("faint");
+          ctx.textAlign = at > right - 120 * scale ? "right" : "left";
+          ctx.fillText(name, at + (ctx.textAlign === "left" ? 4 : -4) * scale, box.top + 14 * scale);
+        }
+      });
+    }
+
+    /** Shows a range of x in this plot. */
+    show(range) {
+      this.shown = range;
+      this.plot.setScale("x", { min: range[0], max: range[1] });
+      this.tell();
+    }
+
+    /** Zooms to a part selected by dragging. */
+    selected(plot) {
+      const { left, width } = plot.select;
+      if (width < 3) return;
+      const range = [left, left + width].map((at) => plot.posToVal(at, "x"));
+      plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+      this.range(range);
+    }
+
+    /** After a move of the cursor. */
+    pointed(plot) {
+      const { left } = plot.cursor;
+      if (!this.group.quiet) {
+        const x = left >= 0 ? plot.posToVal(left, "x") : null;
+        this.group.point(this.data.x, x, this);
+      }
+      this.tell();
+    }
+
+    /** Writes the values at the cursor, or the range. */
+    tell() {
+      if (!this.plot) return;
+      const { plot, data } = this;
+      const { left, top } = plot.cursor;
+      const [min, max] = this.shown;
+      const { name, unit } = parts(data.x);
+      if (left === null || left === undefined || left < 0) {
+        const whole = this.isWhole() ? "" : ` of ${number(this.whole[0], 4)} to ${number(this.whole[1], 4)}`;
+        this.readout.replaceChildren(`${name} ${number(min, 4)} to ${number(max, 4)}${whole}${unit}`);
+        return;
+      }
+      const x = plot.posToVal(left, "x");
+      const reach = Math.abs(plot.posToVal(left + 6, "x") - x);
+      let values = this.curves.filter((curve) => curve.name && this.isShown(curve))
+        .map((curve) => ({ curve, value: valueAt(curve, x, reach) })).filter(({ value }) => value !== null);
+      if (values.length > MOST_VALUES) {
+        const far = ({ value }) => Math.abs(plot.valToPos(value, "y") - top);
+        values = values.sort((a, b) => far(a) - far(b)).slice(0, MOST_VALUES);
+      }
+      const of = ({ curve, value }) => {
+        const swatch = element("span", { class: "swatch" });
+        swatch.style.background = color(curve.color);
+        const variant = curve.variant && curve.style === "dashed" ? `, ${curve.variant}` : "";
+        return element("span", { class: "value" }, swatch, ` ${curve.name}${variant} `, element("b", {}, number(value)));
+      };
+      const head = element("span", { class: "value" }, `${name} `, element("b", {}, `${number(x)}${unit}`));
+      this.readout.replaceChildren(head, ...values.map(of));
+    }
+
+    isWhole() {
+      const [min, max] = this.shown;
+      const slack = 1e-6 * (this.whole[1] - this.whole[0]);
+      return min <= this.whole[0] + slack && max >= this.whole[1] - slack;
+    }
+
+    /** Zooms by a factor about the cursor, or about the middle. */
+    zoom(factor) {
+      const [min, max] = this.shown;
+      const [f, back] = this.data.logX ? [Math.log, Math.exp] : [(v) => v, (v) => v];
+      const { left } = this.plot.cursor;
+      const [a, b] = [f(min), f(max)];
+      const about = left >= 0 ? f(this.plot.posToVal(left, "x")) : (a + b) / 2;
+      this.range([back(about - (about - a) * factor), back(about + (b - about) * factor)]);
+    }
+
+    /** Shows a range of x, at most the whole. */
+    range([from, to]) {
+      this.group.show(this.data.x, [Math.max(from, this.whole[0]), Math.min(to, this.whole[1])]);
+    }
+
+    /** Moves the cursor by a share of the width; beyond an end the range moves along. */
+    step(share) {
+      const { plot } = this;
+      const width = plot.over.clientWidth;
+      const { left } = plot.cursor;
+      let next = (left >= 0 ? left : width / 2) + share * width;
+      if (next < 0 || next > width) {
+        const [min, max] = this.shown;
+        const [f, back] = this.data.logX ? [Math.log, Math.exp] : [(v) => v, (v) => v];
+        const [low, high] = [f(this.whole[0]), f(this.whole[1])];
+        const move = clamp(Math.sign(share) * 0.25 * (f(max) - f(min)), low - f(min), high - f(max));
+        this.group.show(this.data.x, [back(f(min) + move), back(f(max) + move)]);
+        next = clamp(next, 0, width);
+      }
+      plot.setCursor({ left: next, top: plot.over.clientHeight / 2 });
+    }
+
+    onKey(event) {
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      const fast = event.shiftKey ? 10 : 1;
+      const act = {
+        ArrowLeft: () => this.step(-0.01 * fast), ArrowRight: () => this.step(0.01 * fast),
+        Home: () => this.plot.setCursor({ left: 0, top: 0 }), End: () => this.plot.setCursor({ left: this.plot.over.clientWidth, top: 0 }),
+        "+": () => this.zoom(0.5), "=": () => this.zoom(0.5), "-": () => this.zoom(2), _: () => this.zoom(2),
+        0: () => this.group.show(this.data.x, this.whole),
+        Escape: () => this.plot.setCursor({ left: -10, top: -10 }),
+      }[event.key];
+      if (!act) return;
+      // Values at a cursor moved by keys are announced.
+      this.readout.setAttribute("aria-live", "polite");
+      act();
+      event.preventDefault();
+    }
+
+    /** One finger moves the cursor, two fingers zoom and shift. */
+    touch() {
+      const { plot } = this;
+      const fingers = new Map();
+      const at = (event) => event.clientX - plot.over.getBoundingClientRect().left;
+      plot.over.addEventListener("pointerdown", (event) => {
+        if (event.pointerType === "touch") fingers.set(event.pointerId, { left: at(event), x: plot.posToVal(at(event), "x") });
+      });
+      plot.over.addEventListener("pointermove", (event) => {
+        const finger = fingers.get(event.pointerId);
+        if (!finger) return;
+        finger.left = at(event);
+        if (fingers.size === 1) plot.setCursor({ left: clamp(finger.left, 0, plot.over.clientWidth), top: 0 });
+        if (fingers.size !== 2) return;
+        // The values that were first under the fingers stay there.
+        const [f, back] = this.data.logX ? [Math.log, Math.exp] : [(v) => v, (v) => v];
+        const [p, q] = [...fingers.values()];
+        if (Math.abs(q.left - p.left) < 20) return;
+        const slope = (f(q.x) - f(p.x)) / (q.left - p.left);
+        if (slope > 0) this.range([back(f(p.x) - slope * p.left), back(f(p.x) + slope * (plot.over.clientWidth - p.left))]);
+      });
+      for (const kind of ["pointerup", "pointercancel", "pointerleave"]) {
+        plot.over.addEventListener(kind, (event) => fingers.delete(event.pointerId));
+      }
+    }
+
+    /** Replaces the data, with as many curves as before, such as during a run. The range stays unless it was the whole. */
+    update(data) {
+      const whole = !this.plot || this.isWhole();
+      this.load(data);
+      if (!this.plot) return;
+      this.plot.setData(this.joined(), false);
+      this.show(whole ? this.whole : this.shown);
+    }
+
+    refresh() {
+      if (!this.plot) return;
+      this.curves.forEach((curve, i) => {
+        const show = this.isShown(curve);
+        if (this.plot.series[i + 1].show !== show) this.plot.setSeries(i + 1, { show });
+      });
+      this.tell();
+    }
+  }
+
+  /** Plots of a group, with the names and ranges that they share. */
+  class Group {
+    constructor(node) {
+      this.node = node;
+      this.off = new Set();
+      this.offVariants = new Set();
+      this.ranges = new Map();
+      this.quiet = false;
+      this.charts = [...node.querySelectorAll(".chart")].map((one) => new Chart(one, this));
+      for (const curve of this.curves()) if (curve.hidden) this.offVariants.add(curve.variant);
+      this.node.prepend(this.toolbar());
+    }
+
+    curves() {
+      return this.charts.flatMap((chart) => chart.curves);
+    }
+
+    /** Calls a function without passing its changes on to the other plots. */
+    quietly(act) {
+      const before = this.quiet;
+      this.quiet = true;
+      act();
+      this.quiet = before;
+    }
+
+    /** Shows a range of x in all plots with this axis. */
+    show(label, range) {
+      if (!(range[1] > range[0])) return;
+      this.ranges.set(label, range);
+      for (const chart of this.charts) if (chart.plot && chart.data.x === label) chart.show(range);
+      this.name();
+    }
+
+    /** Moves the cursors of all plots with this axis to x. */
+    point(label, x, source) {
+      this.quietly(() => {
+        for (const chart of this.charts) {
+          if (chart === source || !chart.plot || chart.data.x !== label) continue;
+          chart.plot.setCursor({ left: x === null ? -10 : chart.plot.valToPos(x, "x"), top: -10 });
+        }
+      });
+    }
+
+    /** Writes on the button of the range what it shows next. */
+    name() {
+      const first = this.charts.find((chart) => chart.plot);
+      if (!first) return;
+      this.extent.textContent = first.isWhole() && first.data.window ? "show the transient" : "show all";
+      this.extent.disabled = first.isWhole() && !first.data.window;
+    }
+
+    /** Switches between the first range and the whole, in all plots. */
+    toggleRange() {
+      const first = this.charts.find((chart) => chart.plot);
+      if (!first) return;
+      const whole = first.isWhole();
+      for (const label of new Set(this.charts.map((chart) => chart.data.x))) {
+        const chart = this.charts.find((one) => one.data.x === label);
+        this.show(label, whole && chart.data.window ? chart.data.window : chart.whole);
+      }
+    }
+
+    zoom(factor) {
+      const seen = new Set();
+      for (const chart of this.charts) {
+        if (!chart.plot || seen.has(chart.data.x)) continue;
+        seen.add(chart.data.x);
+        chart.zoom(factor);
+      }
+    }
+
+    toolbar() {
+      const bar = element("div", { class: "toolbar", role: "toolbar", "aria-label": "Curves and range" });
+      const variants = new Set(this.curves().map((curve) => curve.variant).filter((name) => name));
+      const firsts = new Map();
+      for (const curve of this.curves()) {
+        const known = firsts.get(curve.owner);
+        // The swatch is that of a line at the reported point.
+        if (curve.owner && (!known || (known.style === "dashed" && curve.style !== "dashed" && curve.variant))) firsts.set(curve.owner, curve);
+      }
+      const chip = (name, set, curve) => {
+        const swatch = element("span", { class: `swatch ${curve.style}` });
+        swatch.style.setProperty("--tone", `var(--${curve.color})`);
+        const button = element("button", { type: "button", class: "chip", "aria-pressed": String(!set.has(name)) }, swatch, name);
+        button.addEventListener("click", (event) => {
+          if (event.shiftKey && set === this.off) this.only(name, bar);
+          else {
+            if (set.has(name)) set.delete(name); else set.add(name);
+            button.setAttribute("aria-pressed", String(!set.has(name)));
+          }
+          for (const chart of this.charts) chart.refresh();
+        });
+        button.dataset.name = name;
+        return button;
+      };
+      const names = [...firsts].map(([name, curve]) => chip(name, this.off, curve));
+      bar.append(...names);
+      if (names.length > 6) {
+        const all = element("button", { type: "button" }, "all or none");
+        all.addEventListener("click", () => {
+          const none = this.off.size === 0;
+          for (const button of names) {
+            if (none) this.off.add(button.dataset.name); else this.off.delete(button.dataset.name);
+            button.setAttribute("aria-pressed", String(!none));
+          }
+          for (const chart of this.charts) chart.refresh();
+        });
+        bar.append(all);
+      }
+      if (variants.size > 1) {
+        for (const name of variants) {
+          const curve = this.curves().find((one) => one.variant === name);
+          bar.append(chip(name, this.offVariants, { ...curve, color: "faint" }));
+        }
+      }
+      const request = [...this.node.querySelectorAll("figure[data-signal]")];
+      if (request.length) {
+        const select = element("select", { "aria-label": "Show another signal" }, element("option", { value: "" }, "other signals"));
+        for (const figure of request) select.append(element("option", { value: figure.dataset.signal }, figure.dataset.signal));
+        select.addEventListener("change", () => {
+          const figure = request.find((one) => one.dataset.signal === select.value);
+          if (figure) {
+            figure.hidden = false;
+            this.node.querySelector(".toolbar").after(figure);
+            for (const chart of this.charts) if (figure.contains(chart.node)) chart.create();
+            select.querySelector(`option[value="${CSS.escape(select.value)}"]`)?.remove();
+          }
+          select.value = "";
+        });
+        bar.append(select);
+      }
+      const action = (text, label, act) => {
+        const button = element("button", { type: "button", "aria-label": label }, text);
+        button.addEventListener("click", act);
+        return button;
+      };
+      this.extent = action("show all", "Switch between the transient and the whole range", () => this.toggleRange());
+      const range = element("span", { class: "range-buttons" }, action("\u2212", "Zoom out", () => this.zoom(2)), action("+", "Zoom in", () => this.zoom(0.5)), this.extent);
+      bar.append(range);
+      return bar;
+    }
+
+    /** Shows one curve only. */
+    only(name, bar) {
+      for (const button of bar.querySelectorAll(".chip")) {
+        if (!this.curves().some((curve) => curve.owner === button.dataset.name)) continue;
+        const on = button.dataset.name === name;
+        if (on) this.off.delete(name); else this.off.add(button.dataset.name);
+        button.setAttribute("aria-pressed", String(on));
+      }
+    }
+  }
+
+  const charts = [];
+  const seen = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      if (!entry.isIntersecting) continue;
+      const chart = charts.find((one) => one.node === entry.target);
+      chart.create();
+      chart.group.name();
+      seen.unobserve(entry.target);
+    }
+  }, { rootMargin: "600px" });
+
+  /** Starts the plots of an element; each is drawn when it comes into view. */
+  function start(node) {
+    const group = new Group(node);
+    for (const chart of group.charts) {
+      charts.push(chart);
+      seen.observe(chart.node);
+    }
+    return group;
+  }
+
+  for (const node of document.querySelectorAll(".figures")) if (node.querySelector(".chart")) start(node);
+  window.startPlots = start;
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    for (const chart of charts) chart.plot?.redraw(false);
+  });
+})();

@@ -1,0 +1,208 @@
+//! Plots of a model: each signal in all cases.
+
+use mops_core::{AnalysisKind, Case, CriterionReport, Row, Variable};
+
+use super::super::comparison::{bounds, over_time, trace};
+use super::super::figures::{Figure, Group};
+use super::super::plot::{Bound, Color, Curve, CurveStyle, Plot};
+use super::super::{Report, criteria, sampling};
+use super::{Simulated, active, inputs, linear, worst};
+use crate::numbers::{counted, with_unit};
+
+/// Number of cases with a colour of their own: those with the largest scaled values.
+const COLOURED: usize = 6;
+/// Largest number of cases whose responses at the initial guess are shown without request.
+const MOST_AT_START: usize = 3;
+/// Largest number of curves that a page shows on request.
+const MOST_ON_REQUEST: usize = 200;
+
+/// Cases of a model, with a colour for each.
+pub(super) struct Cases<'a> {
+    pub(super) report: &'a Report<'a>,
+    model: usize,
+    pub(super) ones: &'a [&'a Simulated],
+    colors: Vec<Color>,
+}
+
+/// Returns the plots of a model.
+pub(super) fn group(report: &Report<'_>, model: usize, ones: &[&Simulated]) -> Group {
+    let study = report.problem.study();
+    let (name, built) = &study.models()[model];
+    let cases = Cases { report, model, ones, colors: colors(report, ones) };
+    let title = if study.models().len() > 1 { format!("Model `{name}`") } else { String::new() };
+    let mut about: Vec<String> = Vec::new();
+    for one in ones {
+        let of_case = |sentence: String| {
+            if ones.len() > 1 { format!("Case `{}`: {sentence}", cases.name(one)) } else { sentence }
+        };
+        about.extend(one.both.failures().into_iter().map(of_case));
+    }
+    if ones.len() > COLOURED {
+        about.push(format!(
+            "Coloured: the {COLOURED} of {} with the largest scaled values.",
+            counted(ones.len(), "case")
+        ));
+    }
+    let mut group = Group { title, about, figures: Vec::new(), full_width: true };
+    if ones.iter().all(|one| one.both.start.is_err() && one.both.best.is_err()) {
+        return group;
+    }
+    let signals = &built.interface().signals;
+    let read = |index: &usize| ones.iter().any(|one| study.jobs()[one.job].signals.contains(index));
+    let place = cases.place();
+    if built.interface().analysis == AnalysisKind::Linear {
+        let outputs: Vec<&Variable> = (0..signals.len()).filter(read).map(|i| &signals[i]).collect();
+        group.figures = linear::figures(&cases, &outputs);
+        return group;
+    }
+    for signal in (0..signals.len()).filter(read).map(|i| &signals[i]) {
+        let plots = vec![(format!("response-{place}{}", signal.name), cases.response(signal))];
+        group.figures.push(Figure { plots, caption: cases.caption(&signal.name), ..Figure::default() });
+    }
+    let all: Vec<&Case> = ones.iter().map(|one| cases.case(one)).collect();
+    for input in inputs::driven(&built.interface().inputs, &all) {
+        let plots = vec![(format!("input-{place}{}", input.name), cases.input(input))];
+        group.figures.push(Figure { plots, ..Figure::default() });
+    }
+    let others = (0..signals.len()).filter(|i| !read(i)).take(MOST_ON_REQUEST / ones.len());
+    for signal in others.map(|i| &signals[i]) {
+        let plots = vec![(String::new(), cases.response(signal))];
+        group.figures.push(Figure { plots, on_request: Some(signal.name.clone()), ..Figure::default() });
+    }
+    active::narrow(&mut group);
+    group
+}
+
+/// Returns the colour of each case.
+fn colors(report: &Report<'_>, ones: &[&Simulated]) -> Vec<Color> {
+    if ones.len() == 1 {
+        return vec![Color::Result];
+    }
+    let mut order: Vec<usize> = (0..ones.len()).collect();
+    order.sort_by(|&a, &b| worst(report, ones[b].job).total_cmp(&worst(report, ones[a].job)));
+    let mut coloured = order[..order.len().min(COLOURED)].to_vec();
+    coloured.sort_unstable();
+    let color = |i: usize| coloured.iter().position(|&c| c == i).map_or(Color::Start, Color::Series);
+    (0..ones.len()).map(color).collect()
+}
+
+impl Cases<'_> {
+    pub(super) fn case(&self, one: &Simulated) -> &Case {
+        let study = self.report.problem.study();
+        &study.cases()[study.jobs()[one.job].case]
+    }
+
+    pub(super) fn name(&self, one: &Simulated) -> &str {
+        &self.case(one).name
+    }
+
+    /// Returns the start of the names of plot files: the case if there is only one, and the model if there are several.
+    pub(super) fn place(&self) -> String {
+        let models = self.report.problem.study().models();
+        let case = if let [one] = self.ones { format!("{}-", self.name(one)) } else { String::new() };
+        if models.len() > 1 { format!("{case}{}-", models[self.model].0) } else { case }
+    }
+
+    pub(super) fn title(&self, of: &str) -> String {
+        if let [one] = self.ones { format!("{of} in case {}", self.name(one)) } else { of.to_owned() }
+    }
+
+    /// Returns a curve of a case at the initial guess or at the reported point.
+    pub(super) fn curve(&self, index: usize, points: Vec<(f64, f64)>, at_start: bool) -> Curve {
+        let one = self.ones[index];
+        let variant = if at_start { "initial guess" } else { one.both.best_name };
+        let style = if at_start { CurveStyle::Dashed } else { CurveStyle::Line };
+        if self.ones.len() == 1 {
+            let color = if at_start { Color::Start } else { Color::Result };
+            return Curve { name: variant.into(), points, style, color, may_leave: at_start, ..Curve::default() };
+        }
+        Curve {
+            name: self.name(one).to_owned(),
+            points,
+            style,
+            color: self.colors[index],
+            may_leave: at_start,
+            hidden: at_start && self.ones.len() > MOST_AT_START,
+            variant: variant.into(),
+            ..Curve::default()
+        }
+    }
+
+    /// Returns the plot of a signal in all cases, with the bounds of its criteria.
+    fn response(&self, signal: &Variable) -> Plot {
+        let study = self.report.problem.study();
+        let mut curves = Vec::new();
+        for at_start in [true, false] {
+            for (index, one) in self.ones.iter().enumerate() {
+                let analysis = if at_start { &one.both.start } else { &one.both.best };
+                if let Some(trace) = trace(analysis, &signal.name) {
+                    curves.push(self.curve(index, sampling::points(trace), at_start));
+                }
+            }
+        }
+        // Cases without a colour lie behind the others.
+        curves.sort_by_key(|curve| curve.color != Color::Start);
+        let mut drawn: Vec<Bound> = Vec::new();
+        for one in self.ones {
+            let rows: Vec<&Row> = study.rows().iter().filter(|row| row.job == one.job).collect();
+            let of_case = one.both.best.iter().flat_map(|analysis| bounds(&signal.name, &rows, analysis));
+            of_case.for_each(|bound| {
+                if !drawn.contains(&bound) {
+                    drawn.push(bound)
+                }
+            });
+        }
+        Plot { title: self.title(&signal.name), curves, bounds: drawn, ..over_time(signal) }
+    }
+
+    /// Returns the plot of an input in all cases.
+    fn input(&self, input: &Variable) -> Plot {
+        let jobs = self.report.problem.study().jobs();
+        let curve = |(index, one): (usize, &&Simulated)| Curve {
+            variant: String::new(),
+            ..self.curve(index, inputs::points(self.case(one), &input.name, jobs[one.job].horizon), false)
+        };
+        let mut curves: Vec<Curve> = self.ones.iter().enumerate().map(curve).collect();
+        if let [curve] = curves.as_mut_slice() {
+            (curve.name, curve.color) = (input.name.clone(), Color::Faint);
+        }
+        Plot { title: self.title(&format!("input {}", input.name)), curves, supplement: true, ..over_time(input) }
+    }
+
+    /// Returns the values of the criteria that read a signal: the worst of all cases.
+    pub(super) fn caption(&self, signal: &str) -> Vec<String> {
+        let study = self.report.problem.study();
+        let here = |row: &Row| self.ones.iter().any(|one| one.job == row.job);
+        let rows = study.rows().iter().zip(&self.report.outcome.criteria).filter(|(row, _)| here(row));
+        let rows: Vec<(&Row, &CriterionReport)> =
+            rows.filter(|(row, _)| row.criterion.signals().iter().any(|s| s == signal)).collect();
+        let mut names: Vec<&str> = Vec::new();
+        rows.iter().for_each(|(row, _)| {
+            if !names.contains(&row.name.as_str()) {
+                names.push(&row.name)
+            }
+        });
+        names
+            .into_iter()
+            .filter_map(|name| caption(rows.iter().filter(|(row, _)| row.name == name).map(|(_, c)| *c)))
+            .collect()
+    }
+}
+
+/// Returns the caption of a criterion: the value with the largest scaled value of all cases, and the demand.
+fn caption<'c>(of_cases: impl Iterator<Item = &'c CriterionReport> + Clone) -> Option<String> {
+    let count = of_cases.clone().count();
+    // A criterion without a value is the worst.
+    let rank = |criterion: &CriterionReport| {
+        if criterion.scaled.is_nan() && criterion.value.is_nan() { f64::INFINITY } else { criterion.scaled }
+    };
+    let worst = of_cases.max_by(|a, b| rank(a).total_cmp(&rank(b)))?;
+    let mut text = format!("`{}`: {}", worst.name, with_unit(worst.value, &worst.unit));
+    if count > 1 {
+        text.push_str(&format!(" in `{}`, the worst of {}", worst.case, counted(count, "case")));
+    }
+    if let Some(demand) = criteria::demand(worst) {
+        text.push_str(&format!(" (demand {demand})"));
+    }
+    Some(text)
+}
