@@ -213,6 +213,10 @@ fn a_browser_shows_values_during_the_run_and_its_end() {
         assert!(text.contains(part), "{part}: {text}");
     }
     assert!(told["curve"].as_u64().unwrap() > 0 && told["dot"] == 1, "{told}");
+    // Responses of the best point are drawn, and replaced by those of better points.
+    let shown = "document.querySelector('#responses .chart .uplot') ? Number(document.querySelector('#responses').dataset.shown) : null";
+    assert!(page.once(shown).as_u64().unwrap() > 0);
+    page.once("document.querySelector('#responses .readout').textContent.startsWith('time 0 to') ? 1 : null");
     // By keyboard alone: the first focus is the table of criteria, which scrolls on a narrow screen.
     page.press("Tab");
     assert_eq!(page.evaluate("document.activeElement.getAttribute('aria-label')"), "Criteria");

@@ -49,10 +49,12 @@ use crate::files;
 use crate::numbers::FileNames;
 
 pub(crate) use bode::{FrequencyCurve, bode};
+pub(crate) use chart::{SCRIPTS, STYLE as CHART_STYLE};
 pub(crate) use nyquist::nyquist;
 pub use page::page;
 pub use plot::{Band, Color, Curve, CurveStyle, Level, ParallelAxis, Plot, Surface, ZAxis};
 use plot_files::PlotFiles;
+pub(crate) use responses::live;
 pub(crate) use sampling::{points, thinned};
 pub(crate) use sensitivity::combination;
 pub(crate) use side_by_side::{Responses, Rows, comparison_page};

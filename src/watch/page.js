@@ -133,6 +133,43 @@ function verdict(state) {
   text("verdict", sentence + stage + trouble + where);
 }
 
+/** Draws the responses of the best point: the first time as new plots, later with new data. */
+let plots = null;
+function draw(found) {
+  if (found.plots.length === 0) return;
+  at("responses-section").hidden = false;
+  // A signal is missing while its simulation fails; the plots are then made anew.
+  const names = JSON.stringify(found.plots.map((plot) => [plot.title, plot.curves.map((curve) => curve.name)]));
+  if (plots?.names === names) {
+    plots.group.charts.forEach((chart, i) => chart.update(found.plots[i]));
+    return;
+  }
+  at("responses").replaceChildren(...found.plots.map((plot) => {
+    const data = element("script", { type: "application/json" }, JSON.stringify(plot));
+    return element("figure", {}, element("div", { class: "chart" }, data));
+  }));
+  plots = { names, group: window.startPlots(at("responses")) };
+}
+
+/** Asks for the responses of a new best point, one request at a time. */
+let newest = 0;
+let asking = false;
+async function responses(state) {
+  if (asking || state.improvements === newest) return;
+  asking = true;
+  try {
+    const found = await (await fetch("responses")).json();
+    if (found.of > newest) {
+      newest = found.of;
+      draw(found);
+      at("responses").dataset.shown = String(newest);
+    }
+  } catch {
+    // The run is over; the last responses stay.
+  }
+  asking = false;
+}
+
 function show(state) {
   document.title = `${state.study}: ${state.over !== null ? "over" : `${Math.round(100 * state.share)} %`}`;
   text("study", state.study);
@@ -147,6 +184,7 @@ function show(state) {
   if (state.criteria) at("criteria").replaceChildren(...state.criteria.map(criterionRow));
   if (state.tuners) at("tuners").replaceChildren(...state.tuners.map(tunerRow));
   curve(state);
+  responses(state);
   document.body.dataset.shown = String(state.evaluations);
 }
 

@@ -1,4 +1,4 @@
-//! Requests of a browser: three files and a stream of states, by GET, with the host name of this machine.
+//! Requests of a browser: files, a stream of states and the responses of the best point, by GET, with the host name of this machine.
 
 /// Answer to a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -9,6 +9,10 @@ pub(super) enum Answer {
     Style,
     /// The script.
     Script,
+    /// The scripts of interactive plots.
+    Charts,
+    /// Responses of the best point.
+    Responses,
     /// The stream of states.
     Events,
     /// Refusal, with status and reason.
@@ -48,6 +52,8 @@ pub(super) fn answer(head: &[u8], port: u16, token: &str) -> Answer {
         Some("") => Answer::Page,
         Some("style.css") => Answer::Style,
         Some("page.js") => Answer::Script,
+        Some("charts.js") => Answer::Charts,
+        Some("responses") => Answer::Responses,
         Some("events") => Answer::Events,
         _ => Answer::Refused(404, "Not Found"),
     }

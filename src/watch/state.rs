@@ -1,21 +1,35 @@
 //! Latest state of a run for the live page.
 
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use mops_core::{Evaluation, Merit, RunState, Study, Usage, criterion_reports};
+use mops_core::{Evaluation, Merit, Problem, RunState, Study, Usage, criterion_reports};
 use serde_json::{Value, json};
 
 /// Largest number of points of the curve; every second one of more is dropped.
 const CURVE: usize = 600;
 
+/// Time between two simulations for viewers, in units of the time that one takes, so that a run is hardly delayed.
+const SHARE: u32 = 20;
+
 /// Latest state of a run, shared with the viewers; unread states are overwritten.
 pub(super) struct Live {
-    study: Study,
+    problem: Problem,
     solver: String,
     started: Instant,
     state: Mutex<Newest>,
     changed: Condvar,
+    responses: Mutex<Responses>,
+}
+
+/// Responses that were computed last.
+#[derive(Default)]
+struct Responses {
+    /// Number of the best point.
+    of: u64,
+    json: String,
+    /// Earliest time of the next computation.
+    next: Option<Instant>,
 }
 
 struct Newest {
@@ -24,6 +38,8 @@ struct Newest {
     run: RunState,
     stage: Option<(String, f64)>,
     best: Option<Evaluation>,
+    /// Number of best points so far.
+    improvements: u64,
     /// Number of evaluations, objective and violation at each change of the best point.
     curve: Vec<(usize, Merit)>,
     /// Reason why evaluations cannot be written, if so.
@@ -35,14 +51,23 @@ struct Newest {
 impl Live {
     pub fn new(study: Study, solver: &str, budget: usize) -> Self {
         let run = RunState { evaluations: 0, budget, failed: 0, best: Merit::FAILED };
-        let state =
-            Newest { version: 1, run, stage: None, best: None, curve: Vec::new(), write_error: None, over: None };
+        let state = Newest {
+            version: 1,
+            run,
+            stage: None,
+            best: None,
+            improvements: 0,
+            curve: Vec::new(),
+            write_error: None,
+            over: None,
+        };
         Self {
-            study,
+            problem: Problem::new(Arc::new(study)),
             solver: solver.to_owned(),
             started: Instant::now(),
             state: Mutex::new(state),
             changed: Condvar::new(),
+            responses: Mutex::default(),
         }
     }
 
@@ -78,7 +103,10 @@ impl Live {
 
     pub fn improved(&self, best: &Evaluation) {
         let best = Evaluation { residuals: Vec::new(), ..best.clone() };
-        self.change(|newest| newest.best = Some(best));
+        self.change(|newest| {
+            newest.best = Some(best);
+            newest.improvements += 1;
+        });
     }
 
     pub fn stage(&self, what: &str, done: f64) {
@@ -110,6 +138,23 @@ impl Live {
         (newest.version, newest.over.is_some(), self.json(&newest).to_string())
     }
 
+    /// Returns the responses of the best point as JSON, `{"of": number of the point, "plots": [..]}`. They are those of an
+    /// earlier point if the last computation is too recent: simulations for viewers take at most one [`SHARE`]th of the time.
+    pub fn responses(&self) -> String {
+        // One viewer simulates, the others wait for its result.
+        let mut last = self.responses.lock().unwrap_or_else(PoisonError::into_inner);
+        let newest = self.newest();
+        let (of, tuners) = (newest.improvements, newest.best.as_ref().map(|best| best.tuners.clone()));
+        drop(newest);
+        let due = last.next.is_none_or(|next| Instant::now() >= next);
+        if let Some(tuners) = tuners.filter(|_| due && of > last.of) {
+            let start = Instant::now();
+            last.json = json!({ "of": of, "plots": crate::report::live(&self.problem, &tuners) }).to_string();
+            (last.of, last.next) = (of, Some(Instant::now() + SHARE * start.elapsed()));
+        }
+        if last.json.is_empty() { json!({ "of": 0, "plots": [] }).to_string() } else { last.json.clone() }
+    }
+
     fn json(&self, newest: &Newest) -> Value {
         let run = newest.run;
         let seconds =
@@ -125,7 +170,7 @@ impl Live {
             .map(|(at, merit)| json!([at, merit.objective, merit.violation, merit.is_feasible()]))
             .collect();
         json!({
-            "study": self.study.name(), "task": self.study.task(), "solver": self.solver,
+            "study": self.problem.study().name(), "task": self.problem.study().task(), "solver": self.solver,
             "evaluations": run.evaluations, "budget": run.budget, "failed": run.failed,
             "seconds": seconds, "left": left, "share": share,
             "stage": newest.stage.as_ref().map(|(what, _)| what),
@@ -134,6 +179,7 @@ impl Live {
             "best": newest.best.as_ref().map(|best| json!({
                 "objective": best.merit.objective, "violation": best.merit.violation, "feasible": best.merit.is_feasible(),
             })),
+            "improvements": newest.improvements,
             "criteria": newest.best.as_ref().map(|best| self.criteria(best)),
             "tuners": newest.best.as_ref().map(|best| self.tuners(best)),
             "curve": curve,
@@ -141,7 +187,7 @@ impl Live {
     }
 
     fn criteria(&self, best: &Evaluation) -> Vec<Value> {
-        let reports = criterion_reports(&self.study, best);
+        let reports = criterion_reports(self.problem.study(), best);
         let criteria = reports.into_iter().map(|criterion| {
             json!({
                 "name": criterion.name, "case": criterion.case, "usage": criterion.usage, "unit": criterion.unit,
@@ -154,7 +200,7 @@ impl Live {
     }
 
     fn tuners(&self, best: &Evaluation) -> Vec<Value> {
-        let tuners = self.study.tuners().iter().zip(&best.tuners);
+        let tuners = self.problem.study().tuners().iter().zip(&best.tuners);
         let json_of = |(tuner, value): (&mops_core::Tuner, &f64)| {
             json!({
                 "name": tuner.name, "value": value, "unit": tuner.unit.to_string(), "active": tuner.active,

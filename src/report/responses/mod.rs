@@ -3,11 +3,14 @@
 mod active;
 mod inputs;
 mod linear;
+mod live;
 mod of_case;
 mod of_model;
 
 use mops_core::{Analysis, AnalysisKind, Failure};
 use rayon::prelude::*;
+
+pub(crate) use live::live;
 
 use super::Report;
 use super::comparison::Comparison;
