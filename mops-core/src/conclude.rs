@@ -138,12 +138,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         pareto: ending.pareto,
         tuners: outcome::tuners(&study, &best),
         criteria: outcome::criterion_reports(&study, &best),
-        start: StartReport {
-            feasible: start.merit.is_feasible(),
-            worst_scaled: outcome::worst_scaled(&study, &start),
-            objective: start.merit.objective,
-            criteria: outcome::criterion_reports(&study, &start),
-        },
+        start: StartReport::of(&study, &start),
         front: front_points(run, &best),
         calibration,
         found: Findings::default(),

@@ -266,6 +266,18 @@ pub struct StartReport {
     pub criteria: Vec<CriterionReport>,
 }
 
+impl StartReport {
+    /// Returns the report of an evaluation at the initial guess.
+    pub fn of(study: &Study, start: &Evaluation) -> Self {
+        Self {
+            feasible: start.merit.is_feasible(),
+            worst_scaled: worst_scaled(study, start),
+            objective: start.merit.objective,
+            criteria: criterion_reports(study, start),
+        }
+    }
+}
+
 /// Results of a calibration in addition to the tuners.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 #[non_exhaustive]

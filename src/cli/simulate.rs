@@ -59,10 +59,9 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         reports
     };
     print(&criteria(&pick(&start), &pick(&here), "here"))?;
-    let criteria = here.failures.iter().filter(|(job, why)| {
-        matches!(why, Failure::Criterion(_)) && wanted(&study.cases()[study.jobs()[*job].case].name)
-    });
-    let mut failed = here.scaled.is_none();
+    let failures = || here.failures.iter().filter(|(job, _)| wanted(&study.cases()[study.jobs()[*job].case].name));
+    let criteria = failures().filter(|(_, why)| matches!(why, Failure::Criterion(_)));
+    let mut failed = failures().next().is_some();
     let mut names = FileNames::default();
     for (job, why) in criteria {
         print(&format!("no value in case {}: {why}\n", study.cases()[study.jobs()[*job].case].name))?;

@@ -1,5 +1,6 @@
 //! Tables of criteria and tuners on the terminal, and the summary of a run.
 
+use crate::numbers::counted;
 use crate::terminal::{number, table};
 use mops_core::{CriterionReport, Outcome, Stop, Task, Usage};
 
@@ -144,8 +145,12 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
     }
     for failure in &outcome.failures {
         text += &format!(
-            "\nmodel {} in case {}: {}, {} times",
-            failure.model, failure.case, failure.failure, failure.count
+            "\nmodel {} in case {}: {}, {}; first: {}",
+            failure.model,
+            failure.case,
+            failure.failure,
+            counted(failure.count, "time"),
+            failure.first
         );
     }
     for warning in &outcome.warnings {

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use mops_core::{
     AddedReport, Budget, Ending, Evaluation, FEASIBLE, Halt, Oracle, Pareto, Patience, Problem, Record, RobustReport,
-    RobustTask, RoundReport, Run, RunState, Scenario, Stop, Store, Study, Usage, Watch, conclude, uncertain_reports,
+    RobustTask, RoundReport, Run, RunState, Scenario, StartReport, Stop, Store, Study, Usage, Watch, conclude,
+    uncertain_reports,
 };
 
 use super::batches::Stage;
@@ -293,6 +294,8 @@ impl Rounds {
         let end = last.outcome.end.clone().filter(|_| chosen + 1 == self.done.len());
         let (mut outcome, best) = conclude(&run, &options.solver, Ending { stop, end, pareto, seconds: 0.0 });
         drop(run);
+        // The run has the design only.
+        outcome.start = StartReport::of(problem.study(), &problem.evaluate_at(&problem.study().start()));
         (outcome.failures, outcome.methods) = (last.outcome.failures, last.outcome.methods);
         let effort = Effort { samples: 1, starts: 1 };
         let region = Region::new(&self.study, design, |_| true, effort);

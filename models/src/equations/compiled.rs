@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use mops_core::StudyError;
 
-use super::graph::{Id, Op};
+use super::graph::{Id, Level, Op};
 use super::layout::Layout;
 use super::program::Program;
 use super::system::{self, Contact, System};
@@ -43,6 +43,8 @@ pub struct Joint {
     /// Computes the torque that the stuck joint requires, its break-away torque, its sliding friction and its
     /// acceleration.
     pub balance: Program,
+    /// True if the friction depends on parameters only.
+    pub is_fixed: bool,
     /// Event text when the joint comes to rest.
     pub sticks: String,
     /// Event text when the joint breaks away.
@@ -187,6 +189,7 @@ impl Compiled {
         let joint = |contact: &Contact, balance| Joint {
             contact: *contact,
             balance,
+            is_fixed: [contact.coulomb, contact.limit].iter().all(|&id| graph.level(id) <= Level::Parameter),
             sticks: format!("{} sticks", names[contact.position]),
             slides: format!("{} slides", names[contact.position]),
         };

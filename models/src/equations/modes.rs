@@ -53,8 +53,11 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         let mut resting = Vec::new();
         for (j, joint) in model.joints.iter().enumerate() {
             let speed = at.x[joint.contact.velocity].value();
-            let [_, limit, ..] = self.results::<4>(&joint.balance, at).map(Scalar::value);
-            if speed == 0.0 && limit > 0.0 {
+            let [_, limit, ..] = self.results::<4>(&joint.balance, at);
+            // A derivative of the friction needs the direction of motion.
+            self.frictionless[j] =
+                joint.is_fixed && limit.value() == 0.0 && limit.tangents().iter().all(|&slope| slope == 0.0);
+            if speed == 0.0 && limit.value() > 0.0 {
                 resting.push(j);
             }
             self.set_contact(j, if speed >= 0.0 { 1.0 } else { -1.0 });

@@ -26,6 +26,8 @@ pub struct Running<'a, S, B> {
     started: bool,
     /// Current values of the modes.
     pub(super) modes: Vec<f64>,
+    /// Joints whose friction is zero throughout.
+    pub(super) frictionless: Vec<bool>,
     /// Tolerance added to the guard of each switch, so that a kink is clearly passed before the branch changes.
     pub(super) slack: Vec<f64>,
     /// Largest magnitude of the sides of each switch at its evaluations so far.
@@ -82,6 +84,7 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
             tolerance,
             started: false,
             modes: vec![0.0; model.switches.len() + 2 * model.joints.len()],
+            frictionless: vec![false; model.joints.len()],
             slack: vec![0.0; model.switches.len()],
             spans: vec![0.0; model.switches.len()],
             flips: vec![0; model.switches.len()],
@@ -179,6 +182,7 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         }
         registers[usize::from(layout.time())] = *time;
         match self.kind(index) {
+            Guard::Joint(j) if self.frictionless[j] => Enclosure::from(1.0),
             Guard::Joint(j) => {
                 let joint = &self.model.joints[j];
                 if self.is(joint.contact.stuck) {
@@ -311,6 +315,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
 
     fn guard(&self, index: usize, at: &Instant<'_, S>) -> S {
         match self.kind(index) {
+            Guard::Joint(j) if self.frictionless[j] => S::from(1.0),
             Guard::Joint(j) => {
                 let joint = &self.model.joints[j];
                 if self.is(joint.contact.stuck) {

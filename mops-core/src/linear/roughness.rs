@@ -3,6 +3,10 @@
 /// Distances at which derivatives are compared with finite differences, relative to a variable, or absolute if it is 0.
 const DISTANCES: [f64; 5] = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12];
 
+/// Magnitude below which a variable may be the rounding error of a zero, such as that of an equilibrium. Differences over
+/// distances relative to such a variable are noise, so that distances relative to 1 count as well.
+const ROUNDED_ZERO: f64 = 1e-9;
+
 /// Relative tolerance, with respect to the terms of a row, within which a difference agrees with the derivative.
 const CLOSE: f64 = 1e-5;
 
@@ -39,18 +43,37 @@ impl Point<'_> {
                 * if i.is_multiple_of(2) { 1.0 } else { -1.0 }
         };
         let all: Vec<(usize, f64)> = columns.iter().enumerate().map(|(i, &j)| (j, mixed(i))).collect();
-        if self.rough_rows(&mut f, rows, &all).iter().all(|rough| !rough) {
+        if self.rough_at_all_scales(&mut f, rows, &all).iter().all(|rough| !rough) {
             return Vec::new();
         }
         let mut found = Vec::new();
         for &column in columns {
-            let rough = self.rough_rows(&mut f, rows, &[(column, 1.0)]);
+            let rough = self.rough_at_all_scales(&mut f, rows, &[(column, 1.0)]);
             found.extend(rows.iter().zip(rough).filter(|(_, rough)| *rough).map(|(&row, _)| (row, column)));
         }
         found
     }
 
+    /// Returns for each row whether the function lacks a derivative along a direction, for distances relative to the variables,
+    /// and, if some are rounded zeros, also for distances relative to 1. A kink, a jump or an infinite derivative at the point
+    /// shows at both scales.
+    fn rough_at_all_scales(
+        &self,
+        f: &mut impl FnMut(&[f64]) -> Option<Vec<f64>>,
+        rows: &[usize],
+        direction: &[(usize, f64)],
+    ) -> Vec<bool> {
+        let mut rough = self.rough_rows(f, rows, direction, 0.0);
+        let is_tiny = |j: usize| self.x[j] != 0.0 && self.x[j].abs() < ROUNDED_ZERO;
+        if rough.contains(&true) && direction.iter().any(|(j, _)| is_tiny(*j)) {
+            let coarse = self.rough_rows(f, rows, direction, ROUNDED_ZERO);
+            rough.iter_mut().zip(coarse).for_each(|(rough, coarse)| *rough &= coarse);
+        }
+        rough
+    }
+
     /// Returns for each row whether the function lacks a derivative along a direction, given by weights of the columns.
+    /// Variables up to `zero` in magnitude count as 0.
     ///
     /// A side on which the function is undefined is ignored, unless it is undefined on both.
     fn rough_rows(
@@ -58,8 +81,9 @@ impl Point<'_> {
         f: &mut impl FnMut(&[f64]) -> Option<Vec<f64>>,
         rows: &[usize],
         direction: &[(usize, f64)],
+        zero: f64,
     ) -> Vec<bool> {
-        let size = |j: usize| if self.x[j] == 0.0 { 1.0 } else { self.x[j].abs() };
+        let size = |j: usize| if self.x[j].abs() <= zero { 1.0 } else { self.x[j].abs() };
         let mut sides = [vec![Verdict::default(); rows.len()], vec![Verdict::default(); rows.len()]];
         let mut seen = [false; 2];
         for distance in DISTANCES {
@@ -143,6 +167,7 @@ mod tests {
         assert!(is_rough(|x| x.clamp(-2.0, 2.0), 1.0, 2.0) && is_rough(|x| x.max(0.5) * 1e-9, 0.0, 0.5));
         assert!(is_rough(|x| if x > 0.0 { 1.0 } else { -1.0 }, 0.0, 0.0));
         assert!(is_rough(|x| 1e3 + x + 0.01 * x.abs(), 1.0, 0.0));
+        assert!(is_rough(|x| (x - 1e-16).abs(), 1.0, 1e-16) && is_rough(|x| (x + 1e-12).sqrt(), 0.0, -1e-12));
         // A wrong derivative is detected too.
         assert!(is_rough(math::sin, 0.5, 0.3));
     }
@@ -157,6 +182,10 @@ mod tests {
         assert!(!is_rough(math::exp, math::exp(20.0), 20.0) && !is_rough(|_| 7.0, 0.0, 0.0));
         // Defined on one side only, with a derivative there.
         assert!(!is_rough(|x| math::powf(x, 1.5), 0.0, 0.0));
+        // A rounded zero in a value that cancels: the rounding of 3.3 is larger than the movement.
+        for x in [-1.3e-16, 2e-17, -4e-13] {
+            assert!(!is_rough(|x| (0.3 * x + (3.3 + x) - (3.3 + x)) / 0.013, 0.3 / 0.013, x), "{x}");
+        }
         // Smooth near a kink, even very close to it.
         assert!(!is_rough(f64::abs, 1.0, 1e-9) && !is_rough(|x| (x - 1.0).abs(), 1.0, 1.001));
     }

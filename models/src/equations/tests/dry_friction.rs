@@ -75,3 +75,14 @@ fn no_friction_is_the_limit_of_little() {
     let [none, little] = [0.0, 1e-12].map(|c| end(&model, &[("c", c), ("q0", 1.0), ("w0", 0.0)], 20.0));
     close(none, little);
 }
+
+#[test]
+fn a_joint_whose_friction_is_zero_throughout_has_no_events() {
+    let without = joint("-1 [1/s2]*q", "viscous = '1.4'");
+    let with = joint("-1 [1/s2]*q", "coulomb = 'c', viscous = '1.4'");
+    let work = |model: &Equations| {
+        let response = respond(model, &[], &[("c", 0.0), ("q0", 1.0), ("w0", 0.0)], 60.0);
+        (response.events.len(), response.work.steps, response.work.derivatives)
+    };
+    assert_eq!(work(&with), work(&without));
+}
