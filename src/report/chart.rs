@@ -50,7 +50,7 @@ pub(crate) fn data(plot: &Plot) -> Value {
     let level = |level: &Level| json!([level.name, number(level.value)]);
     let bound = |bound: &Bound| {
         let side = bound.excluded.map_or(0, |side| if side == Side::Above { 1 } else { -1 });
-        json!([bound.name, bound.x.map(number), bound.y.map(number), side])
+        json!([bound.name, bound.x.map(number), bound.y.map(number), side, bound.applies_to])
     };
     let bands: Vec<Value> = plot.bands.iter().map(|band| json!([band.name, band.range.map(number)])).collect();
     json!({

@@ -118,6 +118,11 @@
       return !this.group.off.has(curve.owner) && !this.group.offVariants.has(curve.variant);
     }
 
+    /** The bounds of which a curve is shown. */
+    bounds() {
+      return this.data.bounds.filter((bound) => bound[4].length === 0 || bound[4].some((name) => !this.group.off.has(name)));
+    }
+
     /** Creates the plot when it comes into view. */
     create() {
       if (this.plot) return;
@@ -180,7 +185,7 @@
       });
       const lines = this.curves.filter((curve) => curve.isLine).length;
       return {
-        ...this.size(), legend: { show: false }, padding: [8, 12, 0, 0],
+        ...this.size(), legend: { show: false }, padding: [8, 28, 0, 0],
         scales: {
           x: { time: false, distr: data.logX ? 3 : 1, range: (plot, low, high) => [low, high] },
           y: { distr: data.logY ? 3 : 1, range: () => this.height() },
@@ -228,7 +233,7 @@
       const room = high - low;
       let range = [low, high];
       for (const v of values(true)) range = [Math.min(range[0], Math.max(v, low - room)), Math.max(range[1], Math.min(v, high + room))];
-      const bounds = data.bounds.filter(([, x]) => (x[0] ?? -Infinity) < to && (x[1] ?? Infinity) > from).flatMap((bound) => bound[2]);
+      const bounds = this.bounds().filter(([, x]) => (x[0] ?? -Infinity) < to && (x[1] ?? Infinity) > from).flatMap((bound) => bound[2]);
       for (const v of data.levels.map((level) => level[1]).concat(bounds).map(f)) {
         if (v >= low - room && v <= high + room) range = [Math.min(range[0], v), Math.max(range[1], v)];
       }
@@ -257,8 +262,10 @@
         ctx.fillStyle = color("band");
         for (const [, [low, high]] of this.data.bands) ctx.fillRect(left, y(high), box.width, y(low) - y(high));
         ctx.fillStyle = color("excluded");
-        for (const [, [from, to], [start, end], side] of this.data.bounds) {
-          if (side === 0) continue;
+        const owners = new Set(this.curves.filter((curve) => this.isShown(curve)).map((curve) => curve.owner));
+        for (const [, [from, to], [start, end], side, names] of this.bounds()) {
+          // A region for some of the curves would cover the others.
+          if (side === 0 || (names.length && [...owners].some((name) => !names.includes(name)))) continue;
           const [a, b, far] = [x(from, left), x(to, right), side > 0 ? top : bottom];
           ctx.beginPath();
           for (const point of [[a, y(start)], [b, y(end)], [b, far], [a, far]]) ctx.lineTo(...point);
@@ -293,7 +300,7 @@
         ctx.setLineDash([6 * scale, 4 * scale]);
         for (const [name, value] of this.data.levels) line([[left, y(value)], [right, y(value)]], name, [right, y(value)], color("demand"));
         const named = new Set();
-        for (const [name, [from, to], [start, end]] of this.data.bounds) {
+        for (const [name, [from, to], [start, end]] of this.bounds()) {
           const [a, b] = [[x(from, left), y(start)], [x(to, right), y(end)]];
           const label = `${name} ${b[1].toFixed(0)}`;
           line([a, b], named.has(label) ? "" : name, b, color("demand"));

@@ -29,12 +29,15 @@ impl Scene {
         let bands = plot.bands.iter().map(|band| (band.name.as_str(), Color::Band, CurveStyle::Line));
         let curves = plot.shown().filter(|c| !c.points.is_empty()).map(|c| (c.name.as_str(), c.color, c.style));
         let mut at = 10.0;
-        let mut listed = HashSet::new();
-        for (name, color, style) in curves.chain(bands).filter(|(name, ..)| !name.is_empty()) {
-            // Curves of one case have one entry.
-            if !listed.insert(name) {
-                continue;
+        // Curves of one case have one entry, in the style of the last curve, which is on top.
+        let mut entries: Vec<(&str, Color, CurveStyle)> = Vec::new();
+        for entry in curves.chain(bands).filter(|(name, ..)| !name.is_empty()) {
+            match entries.iter_mut().find(|known| known.0 == entry.0) {
+                Some(known) => *known = entry,
+                None => entries.push(entry),
             }
+        }
+        for (name, color, style) in entries {
             let width = 46.0 + ADVANCE * name.chars().count() as f64;
             if at + width > SIZE[0] && at > 10.0 {
                 (at, row) = (10.0, row + 17.0);

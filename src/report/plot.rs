@@ -91,6 +91,9 @@ pub struct Bound {
     pub y: [f64; 2],
     /// Excluded side, drawn as a region.
     pub excluded: Option<Side>,
+    /// Names of the curves that it applies to; empty for all. Otherwise its region is only drawn in a page that hides all other
+    /// curves.
+    pub applies_to: Vec<String>,
 }
 
 /// Range of values behind the curves, such as the noise level.

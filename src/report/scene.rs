@@ -122,7 +122,8 @@ impl Scene {
         let height = |at: f64| frame.to[1] - at.clamp(0.0, 1.0) * (frame.to[1] - top);
         let edges: Vec<Vec<Point>> = plot.bounds.iter().map(|bound| edge(bound, (&x, &y), frame)).collect();
         for (bound, edge) in plot.bounds.iter().zip(&edges) {
-            if let (Some(side), [from, to]) = (bound.excluded, edge.as_slice()) {
+            // A region for some of the curves would cover the others.
+            if let (Some(side), [from, to], true) = (bound.excluded, edge.as_slice(), bound.applies_to.is_empty()) {
                 let end = if side == Side::Above { frame.from[1] } else { frame.to[1] };
                 let points = vec![*from, *to, [to[0], end], [from[0], end]];
                 scene.marks.push(Mark::Area { points, color: Color::Excluded });

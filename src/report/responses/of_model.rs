@@ -16,6 +16,9 @@ const MOST_AT_START: usize = 3;
 /// Largest number of curves that a page shows on request.
 const MOST_ON_REQUEST: usize = 200;
 
+/// Number of columns of a curve that a page shows on request.
+const COLUMNS_ON_REQUEST: f64 = 250.0;
+
 /// Cases of a model, with a colour for each.
 pub(super) struct Cases<'a> {
     pub(super) report: &'a Report<'a>,
@@ -66,7 +69,11 @@ pub(super) fn group(report: &Report<'_>, model: usize, ones: &[&Simulated]) -> G
     }
     let others = (0..signals.len()).filter(|i| !read(i)).take(MOST_ON_REQUEST / ones.len());
     for signal in others.map(|i| &signals[i]) {
-        let plots = vec![(String::new(), cases.response(signal))];
+        let mut plot = cases.response(signal);
+        for curve in &mut plot.curves {
+            curve.points = sampling::within_columns(std::mem::take(&mut curve.points), COLUMNS_ON_REQUEST);
+        }
+        let plots = vec![(String::new(), plot)];
         group.figures.push(Figure { plots, on_request: Some(signal.name.clone()), ..Figure::default() });
     }
     active::narrow(&mut group);
@@ -130,7 +137,6 @@ impl Cases<'_> {
 
     /// Returns the plot of a signal in all cases, with the bounds of its criteria.
     fn response(&self, signal: &Variable) -> Plot {
-        let study = self.report.problem.study();
         let mut curves = Vec::new();
         for at_start in [true, false] {
             for (index, one) in self.ones.iter().enumerate() {
@@ -142,17 +148,32 @@ impl Cases<'_> {
         }
         // Cases without a colour lie behind the others.
         curves.sort_by_key(|curve| curve.color != Color::Start);
+        Plot { title: self.title(&signal.name), curves, bounds: self.bounds(&signal.name), ..over_time(signal) }
+    }
+
+    /// Returns the bounds of a signal, each once, with the cases that it applies to.
+    fn bounds(&self, signal: &str) -> Vec<Bound> {
+        let study = self.report.problem.study();
         let mut drawn: Vec<Bound> = Vec::new();
         for one in self.ones {
             let rows: Vec<&Row> = study.rows().iter().filter(|row| row.job == one.job).collect();
-            let of_case = one.both.best.iter().flat_map(|analysis| bounds(&signal.name, &rows, analysis));
-            of_case.for_each(|bound| {
-                if !drawn.contains(&bound) {
-                    drawn.push(bound)
+            for bound in one.both.best.iter().flat_map(|analysis| bounds(signal, &rows, analysis)) {
+                let same = |known: &&mut Bound| Bound { applies_to: Vec::new(), ..(**known).clone() } == bound;
+                match drawn.iter_mut().find(same) {
+                    Some(known) => known.applies_to.push(self.name(one).to_owned()),
+                    None => drawn.push(Bound { applies_to: vec![self.name(one).to_owned()], ..bound }),
                 }
-            });
+            }
         }
-        Plot { title: self.title(&signal.name), curves, bounds: drawn, ..over_time(signal) }
+        for bound in &mut drawn {
+            bound.applies_to.dedup();
+            if bound.applies_to.len() == self.ones.len() {
+                bound.applies_to.clear();
+            } else if let ([first], false) = (bound.applies_to.as_slice(), bound.name.is_empty()) {
+                bound.name = format!("{} ({first})", bound.name);
+            }
+        }
+        drawn
     }
 
     /// Returns the plot of an input in all cases.
