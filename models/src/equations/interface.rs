@@ -47,11 +47,10 @@ pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Paramet
                 state.name
             )));
         }
-        let constants = d.constants.iter().map(|constant| (&constant.name, "constant", &constant.path));
-        let lets = d.lets.iter().map(|(name, text)| (name, "definition", &text.path));
-        if let Some((_, what, path)) = constants.chain(lets).find(|(taken, ..)| **taken == name) {
-            let fact = format!("this {what} has the name of the parameter for the initial value of `{}`", state.name);
-            return Err(under(path, StudyError::here(fact)).with_help("choose another name"));
+        if let Some((_, text)) = d.lets.iter().find(|(taken, _)| *taken == name) {
+            let fact =
+                format!("this definition has the name of the parameter for the initial value of `{}`", state.name);
+            return Err(under(&text.path, StudyError::here(fact)).with_help("choose another name"));
         }
         let value = start.map_or(Some(0.0), |id| system.graph.constant(id));
         let about = format!("initial value of {}", state.name);
