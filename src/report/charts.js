@@ -118,9 +118,17 @@
       return !this.group.off.has(curve.owner) && !this.group.offVariants.has(curve.variant);
     }
 
-    /** The bounds of which a curve is shown. */
+    /** The bounds of which a curve is shown, each cut at the range of x: name, ends, values there, side, names of its curves. */
     bounds() {
-      return this.data.bounds.filter((bound) => bound[4].length === 0 || bound[4].some((name) => !this.group.off.has(name)));
+      const [low, high] = this.shown;
+      const cut = ([name, x, y, side, names]) => {
+        const [from, to] = [x[0] ?? low, x[1] ?? high];
+        const ends = [Math.max(from, low), Math.min(to, high)];
+        const at = (t) => (y[0] === y[1] ? y[0] : y[0] + ((y[1] - y[0]) * (t - from)) / (to - from));
+        return [name, ends, ends.map(at), side, names];
+      };
+      const isShown = (names) => names.length === 0 || names.some((name) => !this.group.off.has(name));
+      return this.data.bounds.filter((bound) => isShown(bound[4])).map(cut).filter(([, [from, to]]) => from < to);
     }
 
     /** Creates the plot when it comes into view. */
@@ -233,7 +241,7 @@
       const room = high - low;
       let range = [low, high];
       for (const v of values(true)) range = [Math.min(range[0], Math.max(v, low - room)), Math.max(range[1], Math.min(v, high + room))];
-      const bounds = this.bounds().filter(([, x]) => (x[0] ?? -Infinity) < to && (x[1] ?? Infinity) > from).flatMap((bound) => bound[2]);
+      const bounds = this.bounds().flatMap((bound) => bound[2]);
       for (const v of data.levels.map((level) => level[1]).concat(bounds).map(f)) {
         if (v >= low - room && v <= high + room) range = [Math.min(range[0], v), Math.max(range[1], v)];
       }
@@ -249,7 +257,7 @@
       ctx.beginPath();
       ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
       ctx.clip();
-      const x = (value, end) => (value === null ? end : clamp(plot.valToPos(value, "x", true), bbox.left - 1, bbox.left + bbox.width + 1));
+      const x = (value) => plot.valToPos(value, "x", true);
       const y = (value) => plot.valToPos(value, "y", true);
       paint(ctx, x, y, bbox);
       ctx.restore();
@@ -258,15 +266,15 @@
     /** Draws bands and excluded regions behind the curves. */
     regions(plot) {
       this.painting(plot, (ctx, x, y, box) => {
-        const [left, right, top, bottom] = [box.left, box.left + box.width, box.top, box.top + box.height];
+        const [top, bottom] = [box.top, box.top + box.height];
         ctx.fillStyle = color("band");
-        for (const [, [low, high]] of this.data.bands) ctx.fillRect(left, y(high), box.width, y(low) - y(high));
+        for (const [, [low, high]] of this.data.bands) ctx.fillRect(box.left, y(high), box.width, y(low) - y(high));
         ctx.fillStyle = color("excluded");
         const owners = new Set(this.curves.filter((curve) => this.isShown(curve)).map((curve) => curve.owner));
         for (const [, [from, to], [start, end], side, names] of this.bounds()) {
           // A region for some of the curves would cover the others.
           if (side === 0 || (names.length && [...owners].some((name) => !names.includes(name)))) continue;
-          const [a, b, far] = [x(from, left), x(to, right), side > 0 ? top : bottom];
+          const [a, b, far] = [x(from), x(to), side > 0 ? top : bottom];
           ctx.beginPath();
           for (const point of [[a, y(start)], [b, y(end)], [b, far], [a, far]]) ctx.lineTo(...point);
           if (side > 0 ? Math.max(y(start), y(end)) > top : Math.min(y(start), y(end)) < bottom) ctx.fill();
@@ -301,14 +309,14 @@
         for (const [name, value] of this.data.levels) line([[left, y(value)], [right, y(value)]], name, [right, y(value)], color("demand"));
         const named = new Set();
         for (const [name, [from, to], [start, end]] of this.bounds()) {
-          const [a, b] = [[x(from, left), y(start)], [x(to, right), y(end)]];
+          const [a, b] = [[x(from), y(start)], [x(to), y(end)]];
           const label = `${name} ${b[1].toFixed(0)}`;
           line([a, b], named.has(label) ? "" : name, b, color("demand"));
           named.add(label);
         }
         ctx.setLineDash([]);
         for (const [name, value] of this.data.verticals) {
-          const at = x(value, left);
+          const at = x(value);
           line([[at, box.top], [at, box.top + box.height]], "", [0, 0], color("start"));
           ctx.fillStyle = color("faint");
           ctx.textAlign = at > right - 120 * scale ? "right" : "left";

@@ -1,9 +1,9 @@
 //! Layout of a plot: lines, dots, rectangles and texts with their coordinates, for SVG and PNG alike.
 
-use super::axis::Axis;
-use super::clip::{Frame, Point, visible};
 use mops_core::Side;
 
+use super::axis::Axis;
+use super::clip::{Frame, Point, visible};
 use super::plot::{Bound, Color, CurveStyle, Plot, Surface};
 use super::range::{equal, x_range, y_range};
 use super::space::{Point3, View};
@@ -123,9 +123,10 @@ impl Scene {
         let edges: Vec<Vec<Point>> = plot.bounds.iter().map(|bound| edge(bound, (&x, &y), frame)).collect();
         for (bound, edge) in plot.bounds.iter().zip(&edges) {
             // A region for some of the curves would cover the others.
-            if let (Some(side), [from, to], true) = (bound.excluded, edge.as_slice(), bound.applies_to.is_empty()) {
+            if let (Some(side), [from, .., to], true) = (bound.excluded, edge.as_slice(), bound.applies_to.is_empty()) {
                 let end = if side == Side::Above { frame.from[1] } else { frame.to[1] };
-                let points = vec![*from, *to, [to[0], end], [from[0], end]];
+                let inside = edge.iter().map(|p| [p[0], p[1].clamp(frame.from[1], frame.to[1])]);
+                let points = inside.chain([[to[0], end], [from[0], end]]).collect();
                 scene.marks.push(Mark::Area { points, color: Color::Excluded });
             }
         }
@@ -176,8 +177,11 @@ impl Scene {
                 scene.marks.push(Mark::FrontPoint { point, marks });
             }
         }
-        for points in edges.into_iter().filter(|edge| !edge.is_empty()) {
-            scene.marks.push(Mark::Line { points, color: Color::Demand, width: 1.2, dashed: true });
+        for edge in edges {
+            let points: Vec<Option<Point>> = edge.into_iter().map(Some).collect();
+            for points in visible(&points, frame, 0.1) {
+                scene.marks.push(Mark::Line { points, color: Color::Demand, width: 1.2, dashed: true });
+            }
         }
         let mut lowest = f64::INFINITY;
         for (at, name, is_level) in descending(levels) {
@@ -255,21 +259,47 @@ fn longest<'a>(labels: impl Iterator<Item = &'a str>) -> f64 {
     labels.map(|label| label.chars().count()).max().unwrap_or(0) as f64
 }
 
-/// Returns the visible part of the line of a bound: its ends, with the values limited to the frame; empty outside.
+/// Returns the line of a bound within the range of x, with points where it crosses the lower or the upper edge of the frame;
+/// empty outside. Other points may lie above or below the frame.
 fn edge(bound: &Bound, (x, y): (&Axis, &Axis), frame: Frame) -> Vec<Point> {
-    let along = |value: f64, end: f64| x.position(value).unwrap_or(end).clamp(0.0, 1.0);
-    let [from, to] = [along(bound.x[0], 0.0), along(bound.x[1], 1.0)];
+    let [Some(start), Some(end)] = bound.y.map(|value| y.position(value)) else { return Vec::new() };
+    let whole = [x.position(bound.x[0]).unwrap_or(0.0), x.position(bound.x[1]).unwrap_or(1.0)];
+    let [from, to] = whole.map(|at| at.clamp(0.0, 1.0));
     if from >= to {
         return Vec::new();
     }
-    let across =
-        |value: f64| y.position(value).map(|at| frame.to[1] - at.clamp(0.0, 1.0) * (frame.to[1] - frame.from[1]));
-    let [Some(start), Some(end)] = bound.y.map(across) else { return Vec::new() };
-    let at = |position: f64| frame.from[0] + position * (frame.to[0] - frame.from[0]);
-    vec![[at(from), start], [at(to), end]]
+    let height =
+        |at: f64| if start == end { start } else { start + (end - start) * (at - whole[0]) / (whole[1] - whole[0]) };
+    let crossing = |level: f64| whole[0] + (whole[1] - whole[0]) * (level - start) / (end - start);
+    let mut places = vec![from, to];
+    places.extend([0.0, 1.0].map(crossing).into_iter().filter(|at| *at > from && *at < to));
+    places.sort_by(f64::total_cmp);
+    let size = [frame.to[0] - frame.from[0], frame.to[1] - frame.from[1]];
+    places.into_iter().map(|at| [frame.from[0] + at * size[0], frame.to[1] - height(at) * size[1]]).collect()
 }
 
 fn descending(mut levels: Vec<(f64, &str, bool)>) -> Vec<(f64, &str, bool)> {
     levels.sort_by(|a, b| b.0.total_cmp(&a.0));
     levels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sloping_bound_is_cut_at_the_frame_and_keeps_its_slope() {
+        let frame = Frame { from: [0.0, 0.0], to: [100.0, 100.0] };
+        let bound =
+            |y: [f64; 2]| Bound { name: String::new(), x: [0.0, 10.0], y, excluded: None, applies_to: Vec::new() };
+        // The frame shows x from 5 to 15 and y from 0 to 10, the second upwards.
+        let (x, y) = (Axis::new([5.0, 15.0], false, 5.0), Axis::new([0.0, 10.0], false, 5.0));
+        assert_eq!(edge(&bound([0.0, 10.0]), (&x, &y), frame), [[0.0, 50.0], [50.0, 0.0]]);
+        // From 10 at x = 5 to 20 at x = 10: above the frame from its upper edge on.
+        assert_eq!(edge(&bound([0.0, 20.0]), (&x, &y), frame), [[0.0, 0.0], [50.0, -100.0]]);
+        // From 8 at x = 5 to 16 at x = 10, through the upper edge at x = 6.25.
+        assert_eq!(edge(&bound([0.0, 16.0]), (&x, &y), frame), [[0.0, 20.0], [12.5, 0.0], [50.0, -60.0]]);
+        let ended = Bound { x: [0.0, 5.0], ..bound([1.0, 1.0]) };
+        assert!(edge(&ended, (&x, &y), frame).is_empty());
+    }
 }
