@@ -188,14 +188,20 @@ const frame = (i) => { const box = plots[i].querySelector(".u-over").getBounding
 const chip = (name) => [...section.querySelectorAll(".chip")].find((button) => button.textContent === name);
 "#;
 
-/// Opens a report at its responses.
-fn opened(browser: &Path, folder: &Path, page: &Path) -> devtools::Page {
-    let mut page = devtools::Page::open(browser, folder, &format!("file://{}", page.display()));
+/// Writes the report of a study and opens it at its responses, with its folder; `None` without a browser.
+fn opened(arguments: &[&str]) -> Option<(tempfile::TempDir, devtools::Page)> {
+    let Some(browser) = headless::browser() else {
+        eprintln!("{}", headless::SKIPPED);
+        return None;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let file = report(folder.path(), arguments);
+    let mut page = devtools::Page::open(&browser, folder.path(), &format!("file://{}", file.display()));
     page.view(1200, 900, "light");
     page.once("document.querySelector(\"section[aria-labelledby='responses']\")?.scrollIntoView() ?? (document.readyState === 'complete' ? 1 : null)");
     page.evaluate(&format!("(0, eval)({})", serde_json::json!(PLOTS.replace("const ", "var "))));
     page.once("range(0)");
-    page
+    Some((folder, page))
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -204,13 +210,9 @@ fn numbers(value: &Value) -> Vec<f64> {
 
 #[test]
 fn a_plot_zooms_and_shows_values_by_pointer_and_by_keyboard() {
-    let Some(browser) = headless::browser() else {
-        eprintln!("{}", headless::SKIPPED);
+    let Some((_folder, mut page)) = opened(&["run", "pid-design-multi-case", "--max-evaluations", "40"]) else {
         return;
     };
-    let folder = tempfile::tempdir().unwrap();
-    let file = report(folder.path(), &["run", "pid-design-multi-case", "--max-evaluations", "40"]);
-    let mut page = opened(&browser, folder.path(), &file);
     // The first range is the transient, with the demanded settling time of 15 s; the simulation ends at 60 s.
     let first = numbers(&page.evaluate("range(0)"));
     assert!(first[0] == 0.0 && first[1] > 15.0 && first[1] < 40.0, "{first:?}");
@@ -248,13 +250,9 @@ fn a_plot_zooms_and_shows_values_by_pointer_and_by_keyboard() {
 
 #[test]
 fn curves_of_cases_are_switched_off_and_other_signals_on_and_plots_share_their_range() {
-    let Some(browser) = headless::browser() else {
-        eprintln!("{}", headless::SKIPPED);
+    let Some((_folder, mut page)) = opened(&["run", "pid-design-multi-case", "--max-evaluations", "40"]) else {
         return;
     };
-    let folder = tempfile::tempdir().unwrap();
-    let file = report(folder.path(), &["run", "pid-design-multi-case", "--max-evaluations", "40"]);
-    let mut page = opened(&browser, folder.path(), &file);
     page.evaluate("plots[0].querySelector('.canvas').focus()");
     page.evaluate("chip('nominal').click(); chip('initial guess').click()");
     assert_eq!(page.evaluate("chip('nominal').getAttribute('aria-pressed')"), "false");
@@ -282,13 +280,7 @@ fn curves_of_cases_are_switched_off_and_other_signals_on_and_plots_share_their_r
 
 #[test]
 fn a_report_fits_a_phone_and_a_dark_screen() {
-    let Some(browser) = headless::browser() else {
-        eprintln!("{}", headless::SKIPPED);
-        return;
-    };
-    let folder = tempfile::tempdir().unwrap();
-    let file = report(folder.path(), &["run", "step-identification", "--max-evaluations", "40"]);
-    let mut page = opened(&browser, folder.path(), &file);
+    let Some((_folder, mut page)) = opened(&["run", "step-identification", "--max-evaluations", "40"]) else { return };
     page.view(390, 844, "dark");
     page.once("document.documentElement.scrollWidth <= 390 ? 1 : null");
     page.once("plots[0].querySelector('.uplot').getBoundingClientRect().width <= 390 ? 1 : null");

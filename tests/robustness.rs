@@ -210,7 +210,7 @@ fn the_robust_design_of_a_symmetric_problem_is_the_centre_of_the_box() {
     assert!((round.found - 1.1).abs() < 3e-3 && round.found - round.for_cases <= 1e-3, "{round:?}");
     // The worst value over the present cases does not decrease.
     assert!(found.rounds.windows(2).all(|two| two[1].for_cases >= two[0].for_cases - 1e-9));
-    // The report of the initial guess is that of the study, over all cases: t = 0.5 or as the draft has it.
+    // The initial guess is that of the study, not of the last round, which starts near the optimum; the worst case is an end.
     let start = study.start()[0];
     let at_start = math::powi(1.0 + start.abs(), 2) + 0.1;
     assert!((solved.outcome.start.worst_scaled - at_start).abs() < 2e-3, "{:?}", solved.outcome.start);

@@ -22,8 +22,7 @@ pub(super) fn plots(system: &StateSpace, name: &str) -> Vec<(&'static str, Resul
 fn of_frequencies(system: &StateSpace, name: &str) -> Result<[Plot; 3], String> {
     let response = FrequencyCurve::of(system)?;
     let [magnitude, phase] = bode(name, &[(Curve::default(), &response)]);
-    let static_gain = complex::norm(system.response()?.scalar(0.0));
-    Ok([magnitude, phase, nyquist(&response.values, static_gain, None, name)])
+    Ok([magnitude, phase, nyquist(&response, None, name)])
 }
 
 /// Draws the poles of the closed loop `k G/(1 + k G)` for gains k from 0 upwards, with negative feedback. A delay is ignored.

@@ -13,6 +13,8 @@ pub(crate) struct FrequencyCurve {
     pub(crate) omegas: Vec<f64>,
     /// Complex values of the response.
     pub(crate) values: Vec<Complex>,
+    /// Magnitude at frequency 0; infinite with an integrator.
+    pub(crate) static_gain: f64,
 }
 
 impl FrequencyCurve {
@@ -24,7 +26,7 @@ impl FrequencyCurve {
         let response = system.response()?;
         let omegas = frequencies(system)?;
         let values = omegas.iter().map(|&omega| response.scalar(omega)).collect();
-        Ok(Self { omegas, values })
+        Ok(Self { omegas, values, static_gain: complex::norm(response.scalar(0.0)) })
     }
 
     /// Returns the points of the magnitude, dB.

@@ -54,13 +54,17 @@ fn of(analysis: &Result<Analysis, Failure>) -> Option<&StateSpace> {
     analysis.as_ref().ok()?.linear()
 }
 
-/// Returns the loop of a channel if a criterion closes it.
-fn closed(cases: &Cases<'_>, one: &Simulated, channel: &StateSpace) -> Option<Loop> {
+/// Returns true if a criterion of the case reads the channel as loop transfer function.
+fn is_loop(cases: &Cases<'_>, one: &Simulated, channel: &StateSpace) -> bool {
     let rows = cases.report.problem.study().rows();
     let ends = [channel.inputs[0].clone(), channel.outputs[0].clone()];
     let mut of_case = rows.iter().filter(|row| row.job == one.job);
-    let is_loop = of_case.any(|row| row.criterion.feedback_channel().as_ref() == Some(&ends));
-    is_loop.then(|| Loop::new(channel.clone()).ok())?
+    of_case.any(|row| row.criterion.feedback_channel().as_ref() == Some(&ends))
+}
+
+/// Returns the loop of a channel if a criterion closes it.
+fn closed(cases: &Cases<'_>, one: &Simulated, channel: &StateSpace) -> Option<Loop> {
+    is_loop(cases, one, channel).then(|| Loop::new(channel.clone()).ok())?
 }
 
 /// Returns the Bode plots of a channel in all cases, with the margins if there is one case.
@@ -196,9 +200,8 @@ fn nyquist_curve(cases: &Cases<'_>, (input, output): (usize, usize), name: &str)
     let rank = |peak: Option<f64>| peak.unwrap_or(f64::INFINITY);
     let (peak, channel, case) = loops.max_by(|a, b| rank(a.0).total_cmp(&rank(b.0)))?;
     let response = FrequencyCurve::of(&channel).ok()?;
-    let static_gain = complex::norm(channel.response().ok()?.scalar(0.0));
     let name = if cases.ones.len() > 1 { format!("{name} in case {case}") } else { name.to_owned() };
-    Some(nyquist(&response.values, static_gain, peak, &name))
+    Some(nyquist(&response, peak, &name))
 }
 
 /// Returns the poles of the first case while a tuner moves from its lower to its upper bound, with the name of the tuner. For
@@ -211,7 +214,7 @@ fn poles(cases: &Cases<'_>, tuner: usize) -> Option<(String, Plot)> {
     }
     let poles_of = |system: &StateSpace| -> Option<Vec<Complex>> {
         let single = system.inputs.len() == 1 && system.outputs.len() == 1;
-        if !(single && closed(cases, one, &system.channel(0, 0)).is_some()) {
+        if !(single && is_loop(cases, one, system)) {
             return system.poles().ok();
         }
         // A loop with a delay has infinitely many poles.
