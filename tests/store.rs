@@ -139,9 +139,9 @@ fn after_a_change_of_a_demand_no_stored_point_is_simulated_again() {
     let (first, second) = (folder.path().join("first"), folder.path().join("second"));
     run("pid-design", &first, &["--solver", "genetic", "--max-evaluations", "5000"]);
     let known = points(&first);
-    assert!(known >= 5000);
+    assert!(known > 4000, "{known} points");
 
-    // The best of 5000 points under the new demand, computed independently.
+    // The best of these points under the new demand, computed independently.
     let study = changed(folder.path(), "demand = \"15 s\"", "demand = \"9 s\"");
     let table = std::fs::read_to_string(first.join("evaluations.csv")).unwrap();
     let demand = |text: &str| text.parse::<f64>().ok();

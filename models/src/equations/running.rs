@@ -507,7 +507,8 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
                 (quartic(k).map(Scalar::value), over.checks.each_ref().map(|values| values[k].value()));
             let size = values.iter().chain(&checks).fold(0.0, |most: f64, value| most.max(value.abs()));
             let off = Trace::deviation(values, checks);
-            off.is_nan() || off <= allowed(&self.tolerance, delay.size(), size)
+            let rough = over.roughness.get(k).copied().unwrap_or(0.0);
+            off.is_nan() || off <= allowed(&self.tolerance, delay.size(), size) + rough
         };
         if !over.is_last && !self.delays.iter().enumerate().all(agrees) {
             return false;

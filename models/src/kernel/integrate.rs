@@ -123,7 +123,7 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
         if !reaches && h <= 16.0 * f64::EPSILON * t.abs() {
             return Err(Failure::StepTooSmall(t));
         }
-        work.derivatives += 2 * usize::from(weights.feel(dynamics, (t, &x), rejected));
+        work.derivatives += weights.feel(dynamics, (t, h, &x), rejected);
         let error = method.attempt(dynamics, Attempt { t, h, x: &x, weights: &weights }, &mut next, &mut work);
         if !error.is_finite() || error > 1.0 {
             if !error.is_finite() && (h < 1e-12 * span || !all_finite(&x)) {

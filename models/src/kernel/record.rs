@@ -4,7 +4,7 @@ use mops_core::{
     Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Past, Response, Scalar, Trace, WithTangents,
 };
 
-use super::weights::SHARE;
+use super::weights::{SHARE, rounded};
 use super::{Dynamics, Sink, Step, Tolerance, integrate};
 
 /// Recorded simulation: the signals and their derivatives in every direction of the scalar.
@@ -126,8 +126,16 @@ fn remember_part<S: Scalar, D>(
         past(of, time(s), &step.state_at(s))
     };
     let (values, checks) = (Trace::NODES.map(at), Trace::CHECKS.map(at));
-    let over = Past { time: [time(from), time(to)], values: &values, checks: &checks, is_last: halvings == 0 };
-    if !store(of, &over) {
+    let over =
+        Past { time: [time(from), time(to)], values: &values, checks: &checks, roughness: &[], is_last: halvings == 0 };
+    if store(of, &over) {
+        return;
+    }
+    // A difference of large terms is as rough as these are rounded; shorter parts do not help.
+    let (middle, state) = (time(0.5 * (from + to)), step.state_at(0.5 * (from + to)));
+    let (here, there) = (past(of, middle, &state), past(of, middle, &rounded(&state)));
+    let roughness: Vec<f64> = here.iter().zip(&there).map(|(a, b)| (a.value() - b.value()).abs()).collect();
+    if !store(of, &Past { roughness: &roughness, ..over }) {
         let middle = 0.5 * (from + to);
         remember_part(of, step, past, store, ([from, middle], halvings - 1));
         remember_part(of, step, past, store, ([middle, to], halvings - 1));
@@ -163,13 +171,15 @@ impl<S: Scalar> Recorder<'_, S> {
         allowed(self.tolerance, self.resolved[index].size, size)
     }
 
-    /// Returns true if the quartic through the values agrees with the signal near both ends. Values that are not finite
-    /// count as agreeing.
-    fn agrees(&self, index: usize, values: &[S; 5], mut signal: impl FnMut(f64) -> S) -> bool {
-        let checks = Trace::CHECKS.map(|s| signal(s).value());
+    /// Returns true if the quartic through the values agrees with the signal near both ends, up to the rounding of the
+    /// signal. Values that are not finite count as agreeing. `signal` returns the signal at a position, at the state or at
+    /// the [`rounded`] state.
+    fn agrees(&self, index: usize, values: &[S; 5], mut signal: impl FnMut(f64, At) -> S) -> bool {
+        let checks = Trace::CHECKS.map(|s| signal(s, At::State).value());
         let off = Trace::deviation(values.map(Scalar::value), checks);
-        off.is_nan()
-            || off <= self.allowed(index, checks.iter().fold(largest(values), |most, check| most.max(check.abs())))
+        let allowed = self.allowed(index, checks.iter().fold(largest(values), |most, check| most.max(check.abs())));
+        // The node at the middle is one of the values.
+        off.is_nan() || off <= allowed || off <= allowed + (signal(0.5, At::Rounded) - values[2]).value().abs()
     }
 
     /// Returns true if the quartic of a step of this length must be compared with the signal. Reasons: the step is
@@ -194,12 +204,12 @@ impl<S: Scalar> Recorder<'_, S> {
         signal: &impl Fn(f64, &[S]) -> S,
     ) {
         let mut state = self.states[0].clone();
-        let mut at = |s: f64| {
+        let mut at = |s: f64, at: At| {
             let s = from + s * (to - from);
             step.state(s, &mut state);
-            signal(step.start + s * step.taken, &state)
+            at.signal(step.start + s * step.taken, &state, signal)
         };
-        let values = Trace::NODES.map(&mut at);
+        let values = Trace::NODES.map(|s| at(s, At::State));
         if halvings == 0 || self.taken > self.room || self.agrees(index, &values, &mut at) {
             self.push(index, step.start + to * step.taken, &values);
             return;
@@ -207,6 +217,24 @@ impl<S: Scalar> Recorder<'_, S> {
         let middle = 0.5 * (from + to);
         for half in [[from, middle], [middle, to]] {
             self.refine(step, index, half, halvings - 1, signal);
+        }
+    }
+}
+
+/// State at which a signal is evaluated.
+#[derive(Debug, Clone, Copy)]
+enum At {
+    /// State of the step.
+    State,
+    /// The [`rounded`] state.
+    Rounded,
+}
+
+impl At {
+    fn signal<S: Scalar>(self, t: f64, x: &[S], signal: &impl Fn(f64, &[S]) -> S) -> S {
+        match self {
+            Self::State => signal(t, x),
+            Self::Rounded => signal(t, &rounded(x)),
         }
     }
 }
@@ -237,9 +265,9 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
             self.resolved[i].size = self.resolved[i].size.max(largest(&values));
             if self.must_compare(i, step.taken, &values) {
                 let mut state = self.states[0].clone();
-                let inside = |s: f64| {
+                let inside = |s: f64, at: At| {
                     step.state(s, &mut state);
-                    computed(time(s), &state)
+                    at.signal(time(s), &state, &computed)
                 };
                 if !self.agrees(i, &values, inside) {
                     for half in [[0.0, 0.5], [0.5, 1.0]] {

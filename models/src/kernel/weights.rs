@@ -86,36 +86,44 @@ impl Weights {
     }
 
     /// Measures the roughness of the rates, after every [`OFTEN`] attempts and after the third rejection of a step. The
-    /// rates are compared with those of a state whose components differ by a few units in the last place, each by a
-    /// different amount. Returns true if the rates were measured.
+    /// rates are compared with those of a [`rounded`] state. After rejections, the state after a step of length `h` along
+    /// the rates counts as well: states that are 0 before the step have no rounding errors yet. Returns the number of
+    /// evaluations of the rates.
     pub(super) fn feel<S: Scalar, D: Dynamics<S> + ?Sized>(
         &mut self,
         f: &D,
-        (t, x): (f64, &[S]),
+        (t, h, x): (f64, f64, &[S]),
         rejected: usize,
-    ) -> bool {
+    ) -> usize {
         self.attempts += 1;
         if self.attempts < OFTEN && rejected != 3 {
-            return false;
+            return 0;
         }
         self.attempts = 0;
-        let (mut moved, mut here, mut there) = (x.to_vec(), x.to_vec(), x.to_vec());
-        for (i, x) in moved.iter_mut().enumerate() {
-            // Multiples of the golden ratio: no two states change alike, so that their differences change too.
-            #[allow(clippy::cast_precision_loss)]
-            let share = 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0;
-            *x = *x * (1.0 + share * PERTURBATION);
-        }
-        f.derivative(t, x, &mut here);
-        f.derivative(t, &moved, &mut there);
-        let differences = here.iter().zip(&there).map(|(a, b)| (a.value() - b.value()).abs());
-        for (roughness, difference) in self.roughness.iter_mut().zip(differences) {
-            *roughness = if difference.is_finite() { difference } else { 0.0 };
+        self.roughness.fill(0.0);
+        let mut rates = x.to_vec();
+        self.compare(f, (t, x), &mut rates);
+        if rejected == 3 {
+            let ahead: Vec<S> = x.iter().zip(&rates).map(|(&x, &rate)| x + rate * h).collect();
+            self.compare(f, (t + h, &ahead), &mut rates);
         }
         // Floors do not decrease.
         let limits = self.floors.iter().zip(&self.roughness);
         self.smooth = limits.fold(f64::INFINITY, |least, (floor, roughness)| least.min(floor / roughness));
-        true
+        if rejected == 3 { 4 } else { 2 }
+    }
+
+    /// Raises the roughness to the difference of the rates at a state and at the rounded state. `here` becomes the rates.
+    fn compare<S: Scalar, D: Dynamics<S> + ?Sized>(&mut self, f: &D, (t, x): (f64, &[S]), here: &mut [S]) {
+        let mut there = x.to_vec();
+        f.derivative(t, x, here);
+        f.derivative(t, &rounded(x), &mut there);
+        let differences = here.iter().zip(&there).map(|(a, b)| (a.value() - b.value()).abs());
+        for (roughness, difference) in self.roughness.iter_mut().zip(differences) {
+            if difference.is_finite() {
+                *roughness = roughness.max(difference);
+            }
+        }
     }
 
     /// Returns the norm of the errors of `n` states in a step of length `h`, before any error is added.
@@ -182,6 +190,14 @@ impl Norm<'_> {
     pub(super) fn of_errors(self) -> f64 {
         (self.sum / self.floors.len().max(1) as f64).sqrt()
     }
+}
+
+/// Returns a state whose components differ by a few units in the last place, each by a different amount.
+pub(super) fn rounded<S: Scalar>(x: &[S]) -> Vec<S> {
+    // Multiples of the golden ratio: no two states change alike, so that their differences change too.
+    #[allow(clippy::cast_precision_loss)]
+    let share = |i: usize| 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0;
+    x.iter().enumerate().map(|(i, &x)| x * (1.0 + share(i) * PERTURBATION)).collect()
 }
 
 /// Returns the larger of two numbers by a single processor instruction. `f64::max` also checks for NaN, which appears

@@ -100,3 +100,21 @@ fn a_declared_size_replaces_an_unknown_one() {
     let mistake = read("states = { q = { unit = 'C', scale = '-1 nC' } }\nder = { q = '0' }").err().expect("a mistake");
     assert_eq!(mistake.to_string(), "states.q.scale: expected a positive size, found -0.000000001");
 }
+
+#[test]
+fn a_state_that_only_integrates_a_cancelled_difference_does_not_stop_the_simulation() {
+    // A disturbance d acts on w after 35 s, and through a feedforward on x, so that x + w is 0 in exact arithmetic. The
+    // integrator i of the controller has the rounding of x + w, which returns through the delay of 14.7 s.
+    let text = "states = { x = 'K', w = 'K', i = 'V', z = '1' }\ninputs = { d = '1' }\n\
+                outputs = { y = { value = 'x + w', unit = 'K' } }\n\
+                let = { f = '-1 [V]*(21.3/25*d + (1 - 21.3/25)*z)', u = '-1 [V/K]*(x + w) + i + delay(f, \"20.3 s\")' }\n\
+                [der]\nx = '(1 [K/V]*delay(u, \"14.7 s\") - x)/21.3 [s]'\nw = '(1 [K]*delay(d, \"35 s\") - w)/25 [s]'\n\
+                i = '-1 [V/K]*(x + w)/30 [s]'\nz = '(d - z)/25 [s]'";
+    let model = read(text).unwrap_or_else(|mistake| panic!("{mistake}\n{text}"));
+    let step = Input::Step { time: 0.0, before: 0.0, after: 1.0 };
+    let response = respond(&model, &[("d", step)], &[], 500.0);
+    assert!((at(&response, "w", 60.0) - (1.0 - math::exp(-1.0))).abs() < 1e-8);
+    assert!(at(&response, "i", 500.0).abs() < 1e-9 && at(&response, "y", 100.0).abs() < 1e-9);
+    let pieces = response.traces.iter().map(|(_, trace)| trace.knots().len()).max().unwrap();
+    assert!(response.work.steps < 30_000 && pieces < 60_000, "{:?} {pieces}", response.work);
+}
