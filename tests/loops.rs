@@ -75,6 +75,110 @@ fn the_margins_of_a_cut_loop_are_those_of_the_loop_written_by_hand() {
 }
 
 #[test]
+fn the_loop_of_a_pid_controller_is_cut_at_its_output() {
+    for (integral, derivative) in [("2 s", "0.4 s"), ("2 s", "0 s"), ("inf", "0.4 s")] {
+        let text = format!(
+            "[study]\nname = 'pid'
+            [models.loop]
+            pid-loop = {{ plant = {{ poles = [-1, -0.5, -2], gain = 2 }}, horizon = '20 s', limit = [-4, 4] }}
+            parameters = {{ k = 1.2, Ti = '{integral}', Td = '{derivative}' }}
+            [models.cut]
+            like = 'loop'
+            open = 'u'
+            [models.by-hand]
+            pid-open-loop = {{ plant = {{ poles = [-1, -0.5, -2], gain = 2 }} }}
+            parameters = {{ k = 1.2, Ti = '{integral}', Td = '{derivative}' }}
+            [criteria]\n{}{}",
+            criteria("cut"),
+            criteria("by-hand"),
+        );
+        let folder = tempfile::tempdir().unwrap();
+        assert_same(&run(folder.path(), &text), "nominal");
+    }
+    let sampled = refused(
+        "[study]\nname = 'sampled'
+        [models.loop]
+        pid-loop = { plant = { poles = [-1], gain = 1 }, horizon = '1 s', sample-time = '10 ms' }
+        open = 'u'
+        parameters = { k = 1, Ti = '1 s', Td = 0 }
+        [criteria]\nmargin = { phase-margin = {}, usage = 'monitor' }",
+    );
+    assert!(sampled.contains("a loop with a sampled controller has no linearisation"), "{sampled}");
+}
+
+#[test]
+fn the_closed_loop_of_a_cut_state_feedback_has_the_poles_that_were_placed() {
+    // The gains of pole-placement-retuning place -5, -8, -10 and -14, for the linear plant; the filter of the reference has -20.
+    let text = "[study]\nname = 'upright'
+        [models.cut]
+        furuta-state-feedback = { horizon = '1 s', plant = 'linear' }
+        open = 'u'
+        [models.cut.parameters]
+        a = 9.03524e-4
+        b = 1.13313e-3
+        c = 6.30984e-4
+        d = 2.526663e-2
+        c1 = 7.4926e-5
+        d2 = 2.5287e-5
+        setpoint = '30 deg'
+        k1 = -0.13874607
+        k2 = -0.06897883
+        k3 = -0.73455928
+        k4 = -0.1354155
+        [criteria]
+        slowest = { slowest-pole = { of = 'closed-loop' }, usage = 'monitor' }
+        damping = { damping-ratio = { of = 'closed-loop' }, usage = 'monitor' }
+        margin = { phase-margin = {}, usage = 'monitor' }";
+    let folder = tempfile::tempdir().unwrap();
+    let result = run(folder.path(), text);
+    assert!((value(&result, "nominal", "slowest") + 5.0).abs() < 1e-4, "{result}");
+    assert!((value(&result, "nominal", "damping") - 1.0).abs() < 1e-12, "{result}");
+    assert!(value(&result, "nominal", "margin") > 0.0, "{result}");
+}
+
+#[test]
+fn of_several_cut_loops_one_is_read_with_the_others_closed_and_all_have_a_disk_margin() {
+    let two = "[study]\nname = 'tanks'
+        [models.tanks]
+        parameters = { k1 = '2 V/m', k2 = '2 V/m', T1 = '20 s', T2 = '40 s' }
+        [models.tanks.equations]
+        states = { h1 = 'm', h2 = 'm', i1 = 'V', i2 = 'V' }
+        inputs = { r1 = 'm' }
+        parameters = { k1 = 'V/m', k2 = 'V/m', T1 = 's', T2 = 's' }
+        constants = { b = '0.01 m/(V s)' }
+        let = { u1 = 'k1*(r1 - h1) + i1', u2 = 'i2 - k2*h2' }
+        outputs = { u1 = { value = 'u1', unit = 'V' } }
+        der = { h1 = '-h1/60[s] + b*(0.7*u1 + 0.3*u2)', h2 = '-h2/90[s] + b*(0.4*u1 + 0.6*u2)', i1 = 'k1/T1*(r1 - h1)', i2 = '-k2/T2*h2' }
+        horizon = '600 s'
+        [models.both]
+        like = 'tanks'
+        open = ['u1', 'u2']
+        [models.by-hand]
+        like = 'tanks'
+        open = 'u1'
+        [criteria]
+        together = { model = 'both', disk-margin = {}, usage = 'monitor' }
+        cut-disk = { model = 'both', disk-margin = { input = 'u1' }, usage = 'monitor' }
+        by-hand-disk = { model = 'by-hand', disk-margin = {}, usage = 'monitor' }\n";
+    let one = criteria("cut").replace("model = 'cut'", "model = 'both'").replace("= {},", "= { input = 'u1' },");
+    let folder = tempfile::tempdir().unwrap();
+    let result = run(folder.path(), &[two, &one, &criteria("by-hand")].concat());
+    assert_same(&result, "nominal");
+    let [together, cut, by_hand] = ["together", "cut-disk", "by-hand-disk"].map(|name| value(&result, "nominal", name));
+    assert!((cut - by_hand).abs() < 1e-9 * cut, "{cut} {by_hand}");
+    // Largest of the least scaled singular values of S - 1/2 over frequency, by NumPy and SciPy.
+    assert!((together - 1.201_062_989).abs() < 1e-8 && together < cut, "{together} {cut}");
+
+    let wrong = |from: &str, to: &str| refused(&[&two.replace(from, to), "\n"].concat());
+    let twice = wrong("open = ['u1', 'u2']", "open = ['u1', 'u1']");
+    assert!(twice.contains("`u1` is listed twice"), "{twice}");
+    let other = wrong("disk-margin = { input = 'u1' }", "disk-margin = { input = 'u1', output = '-u2' }");
+    assert!(other.contains("the loop that is cut at `u1` does not end in `-u2`"), "{other}");
+    let none = wrong("disk-margin = {}", "phase-margin = {}");
+    assert!(none.contains("the model has 2 inputs") && none.contains("u1, u2"), "{none}");
+}
+
+#[test]
 fn a_loop_is_cut_at_the_operating_point_of_the_closed_loop() {
     // J th'' = torque - m sin(th), torque = u + b u^3, u = p (r - th) - d th' + f; at rest th = 1, torque = m sin(1).
     let [inertia, weight, bend, p, d] = [0.02, 1.5, 0.4, 6.0, 0.7];
@@ -144,7 +248,12 @@ fn a_base_or_a_cut_that_does_not_exist_is_refused_at_its_place() {
         ("like = 'a'\nopen = 'v'", "study.toml:10:8", "not at `v`"),
         ("like = 'a'\nopen = 'x'", "study.toml:10:8", "not at `x`"),
         ("like = 'a'\nopen = 'u'\nlinearise = { inputs = ['u'] }", "study.toml:11:24", "its own input and output"),
-        ("pid-loop = { plant = { poles = [-1] }, horizon = 5 }\nopen = 'u'", "study.toml:10:8", "cannot be cut"),
+        (
+            "pid-loop = { plant = { poles = [-1] }, horizon = 5 }\nopen = 'y'",
+            "study.toml:10:8",
+            "at `u` only, not at `y`",
+        ),
+        ("transfer-function = { poles = [-1] }\nopen = 'u'", "study.toml:10:8", "cannot be cut"),
         (
             "like = 'a'\nopen = 'u'\npid-loop = { plant = { poles = [-1] }, horizon = 5 }",
             "study.toml:11:1",

@@ -83,7 +83,7 @@ impl Criterion for Bound {
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String> {
         let data = case.experiment.as_ref().and_then(|experiment| experiment.response(&self.signal));
         let data = data.ok_or_else(|| format!("`{}` does not measure the response of `{}`", case.name, self.signal))?;
-        let response = self.channel.system(analysis).response()?;
+        let response = self.channel.system(analysis)?.response()?;
         let weight = 1.0 / (data.values.len() as f64).sqrt();
         let mut residuals = Vec::with_capacity(2 * data.values.len());
         for (&frequency, &[re, im]) in data.frequencies.iter().zip(&data.values) {

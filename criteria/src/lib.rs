@@ -16,6 +16,7 @@ pub mod crossover_frequency;
 pub mod damping_ratio;
 pub mod delay_margin;
 pub mod delay_time;
+pub mod disk_margin;
 pub mod expression;
 pub mod final_value;
 pub mod fit;
@@ -80,6 +81,7 @@ pub fn kinds() -> Vec<CriterionKind> {
         CriterionKind::of::<gain_margin::GainMargin>(),
         CriterionKind::of::<phase_margin::PhaseMargin>(),
         CriterionKind::of::<delay_margin::DelayMargin>(),
+        CriterionKind::of::<disk_margin::DiskMargin>(),
         CriterionKind::of::<maximum_sensitivity::MaximumSensitivity>(),
         CriterionKind::of::<maximum_complementary_sensitivity::MaximumComplementarySensitivity>(),
         CriterionKind::of::<bandwidth::Bandwidth>(),

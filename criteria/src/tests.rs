@@ -15,7 +15,7 @@ use serde::Deserialize;
 use crate::kinds;
 
 /// Every kind, with options as written in a study file.
-const EXAMPLES: [(&str, &str); 34] = [
+const EXAMPLES: [(&str, &str); 35] = [
     ("overshoot", "{ signal = 'y', target = 1, from = 0, step-time = '0 s', absolute = false }"),
     ("undershoot", "{ signal = 'y', target = '100 cm' }"),
     ("peak", "{ signal = 'y', of = 'absolute' }"),
@@ -40,6 +40,7 @@ const EXAMPLES: [(&str, &str); 34] = [
     ("gain-margin", "{ input = 'u', output = 'y', either-way = true }"),
     ("phase-margin", "{}"),
     ("delay-margin", "{}"),
+    ("disk-margin", "{ skew = 0.0 }"),
     ("maximum-sensitivity", "{}"),
     ("maximum-complementary-sensitivity", "{}"),
     ("bandwidth", "{ of = 'closed-loop' }"),

@@ -1,8 +1,8 @@
 //! Furuta pendulum: an arm that turns about the vertical axis, and a pendulum that swings at its end.
 
 use mops_core::{
-    AnalysisKind, EventInstant, Failure, Instant, Interface, Model, ModelOptions, Parameter, Plant, Quantity, Scalar,
-    State, StudyError, Unit, Variable,
+    EventInstant, Failure, Instant, Interface, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, State,
+    StudyError, Unit, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -100,7 +100,7 @@ impl Furuta {
             inputs: vec![Variable::new("u", "N m", "torque on the arm")],
             ports: mechanism::ports(&["phi", "theta"], &["u"]),
             horizon,
-            analysis: AnalysisKind::Time,
+            ..Interface::default()
         };
         Simulated::new(Self { interface, tolerance })
     }

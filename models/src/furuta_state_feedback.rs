@@ -1,14 +1,17 @@
 //! Furuta pendulum balanced upright by state feedback, with a setpoint for the angle of the arm.
 
+use std::sync::Arc;
+
 use mops_core::{
-    EventInstant, Failure, Instant, Interface, Model, ModelOptions, Parameter, Quantity, Scalar, StudyError, Variable,
+    Cut, EventInstant, Failure, Instant, Interface, Model, ModelOptions, Parameter, Quantity, Scalar, StudyError,
+    Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::furuta_linear::{Upright, lumped_parameters, upright_joints};
 use crate::kernel::elements::{Lag, Saturation};
-use crate::kernel::{PlantModel, Simulated, Tolerance, mechanism, seconds};
+use crate::kernel::{PlantModel, Simulated, Tolerance, cut_at, mechanism, seconds};
 
 /// Upright Furuta pendulum with a spring and a damper in each joint, under state feedback with a filtered reference:
 ///
@@ -25,7 +28,7 @@ use crate::kernel::{PlantModel, Simulated, Tolerance, mechanism, seconds};
 /// (s, default 0.05); `limit` of the torque (N m, default 0.05); those of the plant (`a`, `b`, `c`, `d`, `c1`, `d1`,
 /// `c2`, `d2`) and the initial states as in `furuta-linear`.
 ///
-/// Signals: `phi`, `dphi`, `theta`, `dtheta`, `ref` (rad, rad/s), `u` (N m).
+/// Signals: `phi`, `dphi`, `theta`, `dtheta`, `ref` (rad, rad/s), `u` (N m). The loop can be cut at `u`.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2nd ed., 2021), section 7.2 (state feedback).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -72,14 +75,18 @@ impl ModelOptions for FurutaStateFeedbackOptions {
         interface.signals.push(Variable::new("ref", "rad", "reference of the arm's angle"));
         interface.signals.push(Variable::new("u", "N m", "torque on the arm"));
         interface.horizon = seconds("horizon", Some(&self.horizon))?;
-        Ok(Box::new(Simulated::new(FurutaStateFeedback { interface, plant: self.plant, tolerance: self.tolerance })))
+        let Self { plant, tolerance, .. } = self;
+        Ok(Box::new(Simulated::new(FurutaStateFeedback { interface, plant, is_cut: false, tolerance })))
     }
 }
 
 /// Model of the kind `furuta-state-feedback`.
+#[derive(Clone)]
 struct FurutaStateFeedback {
     interface: Interface,
     plant: Plant,
+    /// True if an input acts in the place of the torque.
+    is_cut: bool,
     tolerance: Tolerance,
 }
 
@@ -97,6 +104,13 @@ impl PlantModel for FurutaStateFeedback {
         self.tolerance
     }
 
+    fn cut(&self, variables: &[String]) -> Option<Result<Cut, StudyError>> {
+        Some(cut_at("u", &self.interface, variables).map(|(interface, ends)| {
+            let model = Self { interface, is_cut: true, ..self.clone() };
+            Cut { model: Arc::new(Simulated::new(model)), ends }
+        }))
+    }
+
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl mops_core::Plant<S>, Failure> {
         let p: [S; 19] = parameters.try_into().expect("the study gives every parameter");
         let [k1, k2, k3, k4, setpoint, time, limit, plant @ .., phi, dphi, theta, dtheta] = p;
@@ -106,6 +120,7 @@ impl PlantModel for FurutaStateFeedback {
             filter: Lag { time },
             actuator: Saturation::new(-limit, limit),
             equations: self.plant,
+            is_cut: self.is_cut,
             plant: Upright::of(plant)?,
             start: [phi, dphi, theta, dtheta, S::from(0.0)],
         })
@@ -119,6 +134,7 @@ struct Loop<S> {
     filter: Lag<S>,
     actuator: Saturation<S>,
     equations: Plant,
+    is_cut: bool,
     plant: Upright<S>,
     start: [S; 5],
 }
@@ -144,16 +160,18 @@ impl<S: Scalar> mops_core::Plant<S> for Loop<S> {
     fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
         let x = at.x;
         let plant = x.first_chunk().expect("the pendulum has four states");
+        let torque = if self.is_cut { at.u[0] } else { self.torque(x) };
         let [arm, pendulum] = match self.equations {
-            Plant::Nonlinear => self.plant.nonlinear(plant, self.torque(x)),
-            Plant::Linear => self.plant.linear(plant, self.torque(x)),
+            Plant::Nonlinear => self.plant.nonlinear(plant, torque),
+            Plant::Linear => self.plant.linear(plant, torque),
         };
         dx.copy_from_slice(&[x[1], arm, x[3], pendulum, self.filter.derivative(self.setpoint, x[4])]);
     }
 
-    /// Returns a state, or the torque as the last signal.
+    /// Returns a state, the torque, or the output of the cut loop.
     fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
-        at.x.get(signal).copied().unwrap_or_else(|| self.torque(at.x))
+        let torque = || if signal == at.x.len() { self.torque(at.x) } else { -self.torque(at.x) };
+        at.x.get(signal).copied().unwrap_or_else(torque)
     }
 
     fn guards(&self) -> usize {

@@ -1,13 +1,15 @@
 //! PID controller in a loop with a linear plant.
 
+use std::sync::Arc;
+
 use mops_core::{
-    AnalysisKind, EventInstant, Failure, Input, Instant, Interface, Model, ModelOptions, Parameter, Plant, Quantity,
-    Scalar, StudyError, Unit, Variable,
+    Cut, EventInstant, Failure, Input, Instant, Interface, Model, ModelOptions, Parameter, Plant, Quantity, Scalar,
+    StudyError, Unit, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::kernel::{PlantModel, Simulated, Tolerance};
+use crate::kernel::{PlantModel, Simulated, Tolerance, cut_at};
 use crate::rational::{PlantOptions, TransferFunction};
 
 /// PID controller with filtered derivative, in a unity feedback loop with a linear plant `G`:
@@ -26,7 +28,7 @@ use crate::rational::{PlantOptions, TransferFunction};
 /// derivative part (default 1), `Tt` tracking time (s; default sqrt(Ti Td), or Ti if Td = 0), and every name given in
 /// place of a number in the plant.
 ///
-/// Signals: `r`, `y`, `e = r - y`, `u = sat(v)`, `d`. Inputs: `r`, `d`.
+/// Signals: `r`, `y`, `e = r - y`, `u = sat(v)`, `d`. Inputs: `r`, `d`. With a continuous controller the loop can be cut at `u`.
 ///
 /// Source: K. J. Astrom, T. Hagglund, PID Controllers, 2nd edition (1995), sections 3.4 to 3.6; block form of the
 /// derivative as in the Modelica Standard Library, Blocks.Continuous.PID.
@@ -34,7 +36,8 @@ use crate::rational::{PlantOptions, TransferFunction};
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PidLoopOptions {
     /// Plant: `{ poles = [...], zeros = [...], gain = 1.0 }`, or `{ numerator = [...], denominator = [...] }` with
-    /// coefficients of descending powers of s. A name instead of a number becomes a parameter.
+    /// coefficients of descending powers of s, or `{ a = [[...], ...], b = [...], c = [...] }` with the matrices of a state
+    /// space. A name instead of a number becomes a parameter. For a plant of the kind `equations`, see its key `pid`.
     plant: PlantOptions,
     /// End of the simulation.
     horizon: Quantity,
@@ -127,6 +130,7 @@ impl ModelOptions for PidLoopOptions {
             load,
             limit,
             sampling,
+            is_cut: false,
             tolerance: self.tolerance,
         })))
     }
@@ -164,8 +168,7 @@ fn interface(named: &[String], horizon: f64) -> Interface {
             Variable::new("d", "1", "load disturbance at the plant input"),
         ],
         horizon: Some(horizon),
-        ports: Vec::new(),
-        analysis: AnalysisKind::Time,
+        ..Interface::default()
     }
 }
 
@@ -176,6 +179,7 @@ struct Sampling {
 }
 
 /// Model of the kind `pid-loop`.
+#[derive(Clone)]
 struct PidLoop {
     interface: Interface,
     plant: TransferFunction,
@@ -183,6 +187,8 @@ struct PidLoop {
     load: Option<Input>,
     limit: Option<[f64; 2]>,
     sampling: Option<Sampling>,
+    /// True if an input acts in the place of the controller's output.
+    is_cut: bool,
     tolerance: Tolerance,
 }
 
@@ -203,7 +209,22 @@ impl PlantModel for PidLoop {
     }
 
     fn input(&self, index: usize) -> Option<&Input> {
-        if index == 0 { Some(&self.setpoint) } else { self.load.as_ref() }
+        match index {
+            0 => Some(&self.setpoint),
+            1 => self.load.as_ref(),
+            _ => None,
+        }
+    }
+
+    fn not_linear(&self) -> Option<&'static str> {
+        self.sampling.map(|_| "a loop with a sampled controller has no linearisation in continuous time")
+    }
+
+    fn cut(&self, variables: &[String]) -> Option<Result<Cut, StudyError>> {
+        Some(cut_at("u", &self.interface, variables).map(|(interface, ends)| {
+            let model = Self { interface, is_cut: true, ..self.clone() };
+            Cut { model: Arc::new(Simulated::new(model)), ends }
+        }))
     }
 
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
@@ -216,6 +237,7 @@ impl PlantModel for PidLoop {
             limit: self.limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
             saturated: 0.0,
             sampled: self.sampling.map(Sampled::new),
+            is_cut: self.is_cut,
         })
     }
 }
@@ -349,6 +371,8 @@ struct Loop<S> {
     /// Active limit: -1 for the lower, 1 for the upper, 0 for none.
     saturated: f64,
     sampled: Option<Sampled<S>>,
+    /// True if the last input acts in the place of the actuator's output.
+    is_cut: bool,
 }
 
 /// Returns the sum of products of the coefficients and as many states.
@@ -405,7 +429,7 @@ impl<S: Scalar> Plant<S> for Loop<S> {
         let (numerator, denominator) = (&self.numerator[..n], &self.denominator[..n]);
         let (x, dx, r) = (&at.x[..n + 2], &mut dx[..n + 2], at.u[0]);
         let y = dot(numerator, x);
-        let u = self.actuator(r, y, x);
+        let u = if self.is_cut { at.u[2] } else { self.actuator(r, y, x) };
         let input = u + at.u[1] - dot(denominator, x);
         let unbounded = if self.saturated == 0.0 { u } else { self.wanted(r, y, x) };
         let (of_plant, of_controller) = dx.split_at_mut(n);
@@ -423,6 +447,13 @@ impl<S: Scalar> Plant<S> for Loop<S> {
         if self.controller.has_derivative() {
             of_controller[1] = (wd * r - y - x[n + 1]) * filter_rate;
         }
+        // An absent part has a state that stays 0. In the cut loop it must not be a mode at the stability limit.
+        if self.is_cut && integral_gain.value() == 0.0 {
+            of_controller[0] = -x[n];
+        }
+        if self.is_cut && !self.controller.has_derivative() {
+            of_controller[1] = -x[n + 1];
+        }
     }
 
     #[inline(always)]
@@ -433,7 +464,8 @@ impl<S: Scalar> Plant<S> for Loop<S> {
             1 => y,
             2 => -y + r,
             3 => self.actuator(r, y, at.x),
-            _ => at.u[1],
+            4 => at.u[1],
+            _ => -self.actuator(r, y, at.x),
         }
     }
 
@@ -495,9 +527,6 @@ impl<S: Scalar> Plant<S> for Loop<S> {
 
     /// Linearises within the limits of the actuator.
     fn linearised_at(&mut self, _: &Instant<'_, S>, _: bool) -> Result<Vec<usize>, Failure> {
-        match self.sampled {
-            Some(_) => Err(Failure::Undefined("a loop with a sampled controller cannot be linearised".into())),
-            None => Ok(Vec::new()),
-        }
+        Ok(Vec::new())
     }
 }

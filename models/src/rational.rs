@@ -1,11 +1,11 @@
-//! Plant given by its transfer function, whose coefficients may be parameters of the model.
+//! Plant given by its transfer function or by matrices, whose entries may be parameters of the model.
 
 use mops_core::{Failure, Scalar, StudyError};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
 
-/// Transfer function, given by poles and zeros or by coefficients.
+/// Transfer function, given by poles and zeros, by coefficients, or by the matrices of a state space.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub(crate) struct PlantOptions {
@@ -19,6 +19,12 @@ pub(crate) struct PlantOptions {
     numerator: Option<Vec<Coefficient>>,
     /// Coefficients of the denominator, in descending powers of s.
     denominator: Option<Vec<Coefficient>>,
+    /// Matrix `A` of `dx/dt = A x + b u`, `y = c x`, row by row.
+    a: Option<Vec<Vec<Coefficient>>>,
+    /// Vector `b`.
+    b: Option<Vec<Coefficient>>,
+    /// Vector `c`.
+    c: Option<Vec<Coefficient>>,
 }
 
 /// Number, or name of a parameter.
@@ -74,6 +80,7 @@ pub(crate) struct TransferFunction {
 enum Form {
     Roots { poles: Vec<Slot>, zeros: Vec<Slot>, gain: Slot },
     Coefficients { numerator: Vec<Slot>, denominator: Vec<Slot> },
+    Matrices { a: Vec<Vec<Slot>>, b: Vec<Slot>, c: Vec<Slot> },
 }
 
 /// Number, or index into the parameters named in the plant.
@@ -98,6 +105,21 @@ impl TransferFunction {
         let mut slots = |key: &str, list: &[Coefficient]| -> Result<Vec<Slot>, StudyError> {
             list.iter().map(|c| slot(c, taken, names).map_err(|m| m.within(key))).collect()
         };
+        if let (Some(a), Some(b), Some(c)) = (&plant.a, &plant.b, &plant.c) {
+            let others = [&plant.poles, &plant.numerator, &plant.denominator];
+            if others.iter().any(|other| other.is_some()) || plant.gain.is_some() || !plant.zeros.is_empty() {
+                return Err(StudyError::here("a plant is given by matrices or by its transfer function, not by both"));
+            }
+            let n = a.len();
+            if n == 0 || a.iter().any(|row| row.len() != n) || b.len() != n || c.len() != n {
+                let fact = "expected a square matrix `a`, and as many entries in `b` and `c`";
+                return Err(
+                    StudyError::here(fact).with_help("for example a = [[0, 1], [-2, -3]], b = [0, 1], c = [1, 0]")
+                );
+            }
+            let a = a.iter().map(|row| slots("a", row)).collect::<Result<_, _>>()?;
+            return Ok(Self { form: Form::Matrices { a, b: slots("b", b)?, c: slots("c", c)? } });
+        }
         let form = match (&plant.poles, &plant.numerator, &plant.denominator) {
             (Some(poles), None, None) => {
                 let gain = plant.gain.clone().unwrap_or(Coefficient::Number(1.0));
@@ -117,7 +139,7 @@ impl TransferFunction {
                 }
             }
             _ => {
-                return Err(StudyError::here("expected poles, or numerator and denominator, of the plant")
+                return Err(StudyError::here("expected poles, or numerator and denominator, or a, b and c, of the plant")
                     .with_help("for example plant = { poles = [0.0, -4.0, -1.0], gain = 1.0 }, or { numerator = [1.0], denominator = [1.0, 5.0, 4.0, 0.0] }"));
             }
         };
@@ -126,6 +148,7 @@ impl TransferFunction {
             Form::Coefficients { numerator, denominator } => {
                 (numerator.len().saturating_sub(1), denominator.len().saturating_sub(1))
             }
+            Form::Matrices { a, .. } => (0, a.len()),
         };
         if above >= below {
             return Err(StudyError::here(format!(
@@ -141,6 +164,7 @@ impl TransferFunction {
         match &self.form {
             Form::Roots { poles, .. } => poles.len(),
             Form::Coefficients { denominator, .. } => denominator.len().saturating_sub(1),
+            Form::Matrices { a, .. } => a.len(),
         }
     }
 
@@ -159,6 +183,10 @@ impl TransferFunction {
                 above.reverse();
                 below.reverse();
                 (above, below)
+            }
+            Form::Matrices { a, b, c } => {
+                let a: Vec<Vec<S>> = a.iter().map(|row| values(row)).collect();
+                from_matrices(&a, &values(b), &values(c))
             }
         };
         let leading = denominator.pop().unwrap_or(S::from(0.0));
@@ -185,6 +213,33 @@ fn slot(coefficient: &Coefficient, taken: &[&str], names: &mut Vec<String>) -> R
     }
 }
 
+/// Returns numerator and denominator, in ascending powers, of `c (s - A)^-1 b`, by the method of Leverrier and Faddeev: the
+/// adjugate of `s - A` is a polynomial in s, whose matrices and those of the determinant follow from each other.
+///
+/// Source: D. K. Faddeev, V. N. Faddeeva, Computational Methods of Linear Algebra (1963).
+fn from_matrices<S: Scalar>(a: &[Vec<S>], b: &[S], c: &[S]) -> (Vec<S>, Vec<S>) {
+    let n = a.len();
+    let zero = S::from(0.0);
+    let sum = |count: usize, term: &dyn Fn(usize) -> S| (0..count).fold(zero, |sum, i| sum + term(i));
+    let (mut numerator, mut denominator) = (vec![zero; n], vec![zero; n + 1]);
+    denominator[n] = S::from(1.0);
+    // Matrix of the adjugate at a power of s.
+    let mut part: Vec<Vec<S>> =
+        (0..n).map(|i| (0..n).map(|j| S::from(f64::from(u8::from(i == j)))).collect()).collect();
+    let mut count = 0.0;
+    for power in (0..n).rev() {
+        count += 1.0;
+        numerator[power] = sum(n, &|i| c[i] * sum(n, &|j| part[i][j] * b[j]));
+        let mut next: Vec<Vec<S>> =
+            (0..n).map(|i| (0..n).map(|j| sum(n, &|k| a[i][k] * part[k][j])).collect()).collect();
+        let coefficient = sum(n, &|i| next[i][i]) * (-1.0 / count);
+        denominator[power] = coefficient;
+        (0..n).for_each(|i| next[i][i] += coefficient);
+        part = next;
+    }
+    (numerator, denominator)
+}
+
 /// Returns the coefficients, in ascending powers, of `(s - r1)(s - r2)...`.
 pub(crate) fn from_roots<S: Scalar>(roots: &[S]) -> Vec<S> {
     let mut polynomial = vec![S::from(1.0)];
@@ -196,4 +251,42 @@ pub(crate) fn from_roots<S: Scalar>(roots: &[S]) -> Vec<S> {
         }
     }
     polynomial
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mops_core::{Dual, Dual7};
+
+    #[test]
+    fn matrices_have_the_transfer_function_of_the_resolvent() {
+        // s - A at s = 1 is [0.5 -0.5; 1 4.5].
+        let a = [vec![0.5, 0.5], vec![-1.0, -3.5]];
+        let (numerator, denominator) = from_matrices(&a, &[-1.0, 4.0], &[5.0, 2.25]);
+        assert_eq!(denominator, [-1.25, 3.0, 1.0]);
+        // Cramer's rule.
+        let x = [(-4.5 + 2.0) / 2.75, (2.0 + 1.0) / 2.75];
+        let value = |p: &[f64]| p.iter().sum::<f64>();
+        assert!((value(&numerator) / value(&denominator) - (5.0 * x[0] + 2.25 * x[1])).abs() < 1e-14);
+    }
+
+    #[test]
+    fn the_tangents_of_the_coefficients_are_those_of_the_entries() {
+        // 1/(s^2 + b s + a), with both derivatives.
+        let seed = |value: f64, direction: usize| {
+            let mut tangent = [0.0; mops_core::DIRECTIONS];
+            tangent[direction] = 1.0;
+            Dual { value, tangent }
+        };
+        let [a, b]: [Dual7; 2] = [seed(-2.0, 0), seed(-3.0, 1)];
+        let constant = |x: f64| Dual7::from(x);
+        let (_, denominator) = from_matrices(
+            &[vec![constant(0.0), constant(1.0)], vec![a, b]],
+            &[constant(0.0), constant(1.0)],
+            &[constant(1.0), constant(0.0)],
+        );
+        assert_eq!((denominator[0].value, denominator[1].value), (2.0, 3.0));
+        assert_eq!((denominator[0].tangent[0], denominator[0].tangent[1]), (-1.0, 0.0));
+        assert_eq!((denominator[1].tangent[0], denominator[1].tangent[1]), (0.0, -1.0));
+    }
 }

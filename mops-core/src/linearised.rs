@@ -45,8 +45,8 @@ pub struct Linearised {
     starts: Vec<Option<usize>>,
     /// True for each state, then input, that the equilibrium search may vary; `None` without a search.
     free: Option<Vec<bool>>,
-    /// Input and signal of a cut loop, by their indices: the operating point is that of the closed loop.
-    cut: Option<[usize; 2]>,
+    /// Input and signal of each cut loop, by their indices: the operating point is that of the closed loops.
+    cut: Vec<[usize; 2]>,
 }
 
 /// A linear system and its operating point.
@@ -190,15 +190,24 @@ impl Linearised {
             ..Interface::default()
         };
         let free = options.equilibrium.then_some(free);
-        Ok(Self { model, interface, states, inputs, outputs, given, starts, free, cut: None })
+        Ok(Self { model, interface, states, inputs, outputs, given, starts, free, cut: Vec::new() })
     }
 
-    /// Creates the linearised open loop of a model whose loop is cut at a variable. Its operating point is that of the closed
-    /// loop.
+    /// Creates the linearised loop transfer function of a model whose loops are cut at variables. Its operating point is that of
+    /// the closed loops.
     ///
     /// # Errors
-    /// Returns an error if the loop cannot be cut there, or for the reasons of [`Self::new`].
-    pub fn opened(model: &dyn Model, variable: &str, options: Linearise) -> Result<Self, StudyError> {
+    /// Returns an error if a loop cannot be cut there, or for the reasons of [`Self::new`].
+    pub fn opened(model: &dyn Model, variables: &[String], options: Linearise) -> Result<Self, StudyError> {
+        let twice = variables.iter().enumerate().find(|(i, variable)| variables[..*i].contains(variable));
+        if let Some((_, variable)) = twice {
+            return Err(
+                StudyError::new("open", format!("`{variable}` is listed twice")).with_help("remove one of them")
+            );
+        }
+        if variables.is_empty() {
+            return Err(StudyError::new("open", "`open` is empty").with_help("name a variable, or omit `open`"));
+        }
         if let Some(key) = [("inputs", &options.inputs), ("outputs", &options.outputs)].iter().find(|o| o.1.is_some()) {
             let fact = "a cut loop has its own input and output";
             return Err(StudyError::new(key.0, fact).with_help("remove it, or `open`").within("linearise"));
@@ -206,31 +215,33 @@ impl Linearised {
         if let Some(why) = model.not_linear() {
             return Err(StudyError::new("open", why).with_help("cut the loop of a model without clocks"));
         }
-        let Some(cut) = model.cut(variable) else {
+        let Some(cut) = model.cut(variables) else {
             return Err(StudyError::new("open", "the loop of this kind of model cannot be cut")
                 .with_help("write its equations (kind `equations`), and remove `effects`"));
         };
-        let Cut { model, input, signal } = cut.map_err(|mistake| mistake.within("open"))?;
+        let Cut { model, ends } = cut.map_err(|mistake| mistake.within("open"))?;
         let at = options.at.iter().map(|(name, _)| ("at", name)).chain(options.free.iter().map(|name| ("free", name)));
-        if let Some((key, _)) = at.into_iter().find(|(_, name)| *name == variable) {
+        if let Some((key, variable)) = at.into_iter().find(|(_, name)| variables.contains(name)) {
             let fact = "the value of the variable at which the loop is cut follows from the closed loop";
             return Err(StudyError::new(variable, fact).with_help("remove it").within(key).within("linearise"));
         }
         let of = model.interface();
-        let (inputs, outputs) = (vec![of.inputs[input].name.clone()], vec![of.signals[signal].name.clone()]);
+        let inputs = ends.iter().map(|[input, _]| of.inputs[*input].name.clone()).collect();
+        let outputs = ends.iter().map(|[_, signal]| of.signals[*signal].name.clone()).collect();
         let options = Linearise { inputs: Some(inputs), outputs: Some(outputs), ..options };
         let linearised = Self::new(model, &options).map_err(|mistake| mistake.within("linearise"))?;
-        Ok(Self { cut: Some([input, signal]), ..linearised })
+        let interface = Interface { is_cut: true, ..linearised.interface };
+        Ok(Self { cut: ends, interface, ..linearised })
     }
 
-    /// Returns what the equations compute for themselves: the input of a cut loop, and quantities that do not change have their
+    /// Returns what the equations compute for themselves: the inputs of cut loops, and quantities that do not change have their
     /// present values.
     fn ties(&self, delays: usize) -> Vec<Tie> {
         let (n, of) = (self.states.len(), self.model.interface());
-        let cut = self.cut.map(|[input, signal]| Tie { column: n + input, row: n + signal, sign: -1.0 });
+        let cut = self.cut.iter().map(|[input, signal]| Tie { column: n + input, row: n + signal, sign: -1.0 });
         let delayed =
             (0..delays).map(|k| Tie { column: n + of.inputs.len() + k, row: n + of.signals.len() + k, sign: 1.0 });
-        cut.into_iter().chain(delayed).collect()
+        cut.chain(delayed).collect()
     }
 
     /// Evaluates the equations at a point of states, inputs and delayed quantities, after it has moved to where its ties hold.

@@ -110,6 +110,9 @@ pub struct Interface {
     pub horizon: Option<f64>,
     /// Kind of the analyses of the model; criteria reject models of the other kind.
     pub analysis: AnalysisKind,
+    /// True for a loop transfer function of cut loops: each signal belongs to the input with its index, to which it returns, with
+    /// negative sign, where the loop is closed.
+    pub is_cut: bool,
 }
 
 impl Interface {
@@ -212,12 +215,12 @@ pub trait Model: Send + Sync {
         None
     }
 
-    /// Returns the model with the loop cut at a variable: a new input of this name acts in its place, and a new signal is minus the
-    /// value that the model computes. `None` if the model has no loop that can be cut.
+    /// Returns the model with its loops cut at variables: for each, a new input of this name acts in its place, and a new signal is
+    /// minus the value that the model computes. `None` if the model has no loop that can be cut.
     ///
     /// # Errors
     /// The model has no such variable.
-    fn cut(&self, _variable: &str) -> Option<Result<Cut, StudyError>> {
+    fn cut(&self, _variables: &[String]) -> Option<Result<Cut, StudyError>> {
         None
     }
 
@@ -238,14 +241,13 @@ pub trait Model: Send + Sync {
     }
 }
 
-/// Model with a cut loop.
+/// Model with cut loops.
 pub struct Cut {
     /// The model.
     pub model: Arc<dyn Model>,
-    /// Input that acts in the place of the variable, by its index.
-    pub input: usize,
-    /// Signal that is minus the value that the model computes, by its index.
-    pub signal: usize,
+    /// For each variable, by their indices: the input that acts in its place, and the signal that is minus the value that the model
+    /// computes.
+    pub ends: Vec<[usize; 2]>,
 }
 
 /// Operating point at which the model equations are evaluated.

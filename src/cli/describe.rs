@@ -3,7 +3,8 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, CatalogueStudy, Diagnostic, ModelKind, suggestion};
+use mops_core::{Catalogue, CatalogueStudy, Diagnostic, ModelKind, nearest};
+use schemars::Schema;
 
 use super::effect;
 use super::places::places;
@@ -14,7 +15,7 @@ use crate::terminal::{CommandError, print};
 #[derive(Args)]
 pub(super) struct Arguments {
     /// Kind of model, criterion or solver; effect; shipped study; table of study files (study, models, tuners, cases,
-    /// experiments, criteria, solver) or key of one, such as `step` or `hold`.
+    /// experiments, criteria, solver); or key of a table or a kind, such as `step`, `hold` or `clocks`.
     name: String,
 }
 
@@ -43,14 +44,10 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         print(&page_of(study))?;
         return Ok(ExitCode::SUCCESS);
     }
-    // A key of a table, such as `step` or `hold`, is described on the page of the table.
-    let tables = mops_core::file::tables_with(name);
-    if !tables.is_empty() {
-        let pages = mops_core::file::tables().into_iter().filter(|(table, _)| tables.contains(table));
-        let pages =
-            pages.map(|(table, schema)| mops_core::file::describe(&format!("[{table}] of a study file"), &schema));
-        let named: Vec<String> = tables.iter().map(|table| format!("[{table}]")).collect();
-        print(&format!("`{name}` is a key of {}\n\n{}", named.join(", "), pages.collect::<Vec<_>>().join("\n")))?;
+    let tables = mops_core::file::tables().into_iter().map(|(table, schema)| (format!("[{table}]"), schema));
+    let pages = keys_named(name, tables.chain(kinds.clone().map(|(kind, schema)| (kind.to_owned(), schema()))));
+    if !pages.is_empty() {
+        print(&pages)?;
         return Ok(ExitCode::SUCCESS);
     }
     let known: Vec<&str> = kinds
@@ -60,9 +57,28 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         .chain(catalogue.studies.iter().map(CatalogueStudy::name))
         .chain(mops_core::file::tables().into_iter().map(|(table, _)| table))
         .collect();
-    Err(Diagnostic::new(format!("no kind, effect, study or table is named `{name}`"))
-        .with_help(suggestion(name, known.iter().copied()))
-        .into())
+    let help = nearest(name, known.iter().copied()).map_or_else(
+        || "`mops list` shows the kinds, effects and studies".to_owned(),
+        |known| format!("did you mean `{known}`?"),
+    );
+    Err(Diagnostic::new(format!("no kind, effect, study, table or key is named `{name}`")).with_help(help).into())
+}
+
+/// Returns the documentation of a key, with its places in tables and kinds; empty if there is none.
+fn keys_named(key: &str, schemas: impl Iterator<Item = (String, Schema)>) -> String {
+    // Places of one documentation stand together.
+    let mut pages: Vec<(String, Vec<String>)> = Vec::new();
+    for (of, schema) in schemas {
+        for (path, page) in mops_core::file::places_of(key, &schema) {
+            let place = if path == key { of.clone() } else { format!("{of} ({path})") };
+            match pages.iter_mut().find(|(known, _)| *known == page) {
+                Some((_, places)) => places.push(place),
+                None => pages.push((page, vec![place])),
+            }
+        }
+    }
+    let one = |(page, places): &(String, Vec<String>)| format!("`{key}` of {}\n\n{page}", places.join(", "));
+    pages.iter().map(one).collect::<Vec<_>>().join("\n")
 }
 
 /// Returns the page of a study: its README and its study.toml, or the description of a study built in Rust.

@@ -32,13 +32,16 @@ pub struct Channel {
     factor: f64,
     /// True for a loop transfer function.
     is_loop: bool,
+    /// True if the system is one of cut loops: the other loops are closed.
+    is_cut: bool,
 }
 
 impl Channel {
-    /// Selects the channel by names, which may be omitted if the model has one input, or one output.
+    /// Selects the channel by names, which may be omitted if the model has one input, or one output, or if the input is that of a
+    /// cut loop.
     pub fn bind(model: &Interface, input: Option<&String>, output: Option<&String>) -> Result<Self, StudyError> {
         let input = pick("input", input, &model.inputs)?;
-        let output = pick("output", output, &model.signals)?;
+        let output = if model.is_cut && output.is_none() { input } else { pick("output", output, &model.signals)? };
         let (from, to) = (model.inputs[input].unit.difference(), model.signals[output].unit.difference());
         let unit = match (to.to_string().as_str(), from.to_string().as_str()) {
             (to, "1") => Unit::known(to).difference(),
@@ -46,7 +49,7 @@ impl Channel {
             (to, from) => Unit::known(&format!("({to})/({from})")),
         };
         let ends = [model.inputs[input].clone(), model.signals[output].clone()];
-        Ok(Self { input, output, unit, ends, factor: 1.0, is_loop: false })
+        Ok(Self { input, output, unit, ends, factor: 1.0, is_loop: false, is_cut: model.is_cut })
     }
 
     /// Converts the channel to a loop transfer function: the output is fed back to the input, hence expressed in its
@@ -56,6 +59,10 @@ impl Channel {
     /// If the output does not have the dimension of the input.
     pub fn in_loop(self) -> Result<Self, StudyError> {
         let [from, to] = &self.ends;
+        if self.is_cut && self.input != self.output {
+            let fact = format!("the loop that is cut at `{}` does not end in `{}`", from.name, to.name);
+            return Err(StudyError::new("output", fact).with_help("remove `output`"));
+        }
         if !to.unit.is_compatible(&from.unit) {
             let fact = format!(
                 "unity feedback cannot close a loop from `{}` in {} to `{}` in {}",
@@ -81,15 +88,18 @@ impl Channel {
         }
     }
 
-    /// Returns the system from the input to the output.
-    pub fn system(&self, analysis: &Analysis) -> StateSpace {
+    /// Returns the system from the input to the output. If it is a loop, the other cut loops are closed.
+    pub fn system(&self, analysis: &Analysis) -> Result<StateSpace, String> {
         let linear = analysis.linear().expect("checked when the study is built");
+        if self.is_cut && self.is_loop {
+            return linear.loop_at_a_time(self.input);
+        }
         let mut system = linear.channel(self.input, self.output);
         if self.factor != 1.0 {
             system.c *= self.factor;
             system.d *= self.factor;
         }
-        system
+        Ok(system)
     }
 }
 
@@ -176,7 +186,7 @@ impl<F: Fn(StateSpace) -> Result<Value, String> + Send + Sync> Criterion for Lin
     }
 
     fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
-        (self.value)(self.channel.system(analysis))
+        (self.value)(self.channel.system(analysis)?)
     }
 }
 

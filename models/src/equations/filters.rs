@@ -162,7 +162,7 @@ fn bilinear(clock: &Clock, filter: &Filter, of: &Polynomials) -> Result<[Vec<Opt
 }
 
 /// Returns a time as part of an expression.
-fn in_brackets(time: &Formula) -> String {
+pub(super) fn in_brackets(time: &Formula) -> String {
     match Quantity::parse(&time.0) {
         Ok(Quantity { number, unit }) => format!("({number:?} [{}])", unit.map_or("s".to_owned(), |u| u.to_string())),
         Err(_) => format!("({})", time.0),

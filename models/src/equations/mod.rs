@@ -6,6 +6,7 @@ mod bounds;
 mod branches;
 mod clocks;
 mod compiled;
+mod controllers;
 mod definition;
 mod dimensions;
 mod filters;
@@ -27,9 +28,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 use mops_core::data::{Files, Folder};
-use mops_core::{
-    AnalysisKind, Cut, Failure, Interface, Model, ModelOptions, Plant, Port, Scalar, State, StudyError, Unit, Variable,
-};
+use mops_core::{Cut, Failure, Interface, Model, ModelOptions, Plant, Port, Scalar, State, StudyError, Unit, Variable};
 
 use crate::kernel::{PlantModel, Simulated, Tolerance};
 use bank::{Bank, FEW, Large, Small};
@@ -83,10 +82,12 @@ impl Equations {
         options.tolerance.check()?;
         let horizon = options.horizon.as_ref().map(|q| q.to(&Unit::known("s"))).transpose();
         let horizon = horizon.map_err(|why| StudyError::new("horizon", why))?;
-        let expanded = filters::expanded(options.clone())?;
-        let mut definition = Definition::read(&expanded)?;
-        tables::replace(&mut definition, options, files)?;
-        Self::compile(definition, horizon, options.tolerance)
+        let expanded = filters::expanded(controllers::expanded(options.clone())?)?;
+        let model = Definition::read(&expanded).and_then(|mut definition| {
+            tables::replace(&mut definition, options, files)?;
+            Self::compile(definition, horizon, options.tolerance)
+        });
+        model.map_err(|mistake| controllers::at_its_key(mistake, options))
     }
 
     fn compile(mut definition: Definition, horizon: Option<f64>, tolerance: Tolerance) -> Result<Self, StudyError> {
@@ -118,7 +119,7 @@ impl Equations {
             ports: if is_past_free(d, &system) { ports(d, &system, &measured.forces)? } else { Vec::new() },
             parameters,
             horizon,
-            analysis: AnalysisKind::Time,
+            ..Interface::default()
         };
         let notes = measured.notes;
         Ok(Self { definition, interface, compiled, starts, tolerance, notes, opened: OnceLock::new() })
@@ -199,14 +200,15 @@ impl PlantModel for Equations {
         has_clocks.then_some("a model with clocks has no linearisation in continuous time")
     }
 
-    fn cut(&self, variable: &str) -> Option<Result<Cut, StudyError>> {
+    fn cut(&self, variables: &[String]) -> Option<Result<Cut, StudyError>> {
         let mut definition = self.definition.clone();
-        let model =
-            definition.cut(variable).and_then(|()| Self::compile(definition, self.interface.horizon, self.tolerance));
+        let cut = variables.iter().try_for_each(|variable| definition.cut(variable));
+        let model = cut.and_then(|()| Self::compile(definition, self.interface.horizon, self.tolerance));
         Some(model.map(|model| {
             let Definition { states, outputs, inputs, .. } = &model.definition;
-            let (input, signal) = (inputs.len() - 1, states.len() + outputs.len() - 1);
-            Cut { input, signal, model: Arc::new(Simulated::new(model)) }
+            let first = [inputs.len(), states.len() + outputs.len()].map(|end| end - variables.len());
+            let ends = (0..variables.len()).map(|i| first.map(|first| first + i)).collect();
+            Cut { ends, model: Arc::new(Simulated::new(model)) }
         }))
     }
 

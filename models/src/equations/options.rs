@@ -61,6 +61,9 @@ use crate::kernel::Tolerance;
 /// be given by its transfer function, in z or in s: `filter = { u = { of = "r - y", continuous = { numerator = ["k*Ti", "k"],
 /// denominator = ["Ti", 0] }, method = "tustin", prewarp = "5 Hz" } }`; its memory is added.
 ///
+/// `pid.u = { setpoint = "r", measured = "y", k = "k", Ti = "Ti" }` is a PID controller, continuous or sampled, whose output takes
+/// the place of the input `u`.
+///
 /// A state whose derivative is another state, such as `th` above, is a joint. Its friction is given as
 /// `friction.th = { coulomb = "c" }`; a stuck joint is exactly at rest. The places of possible missing effects are
 /// the joints, the equations of the states, the inputs and the signals.
@@ -111,6 +114,10 @@ pub struct EquationsOptions {
     /// "-k*x" } }`.
     #[serde(default)]
     pub(super) clocks: Entries<Clock>,
+    /// PID controllers: `pid.u = { setpoint = "r", measured = "y", k = "k", Ti = "Ti", limit = ["-24 V", "24 V"] }` computes `u`,
+    /// in place of the input `u` if there is one.
+    #[serde(default)]
+    pub(super) pid: Entries<Pid>,
     /// Lookup tables, used as functions in expressions: `torque = { file = "motor.csv", x = "speed", y = "torque" }`.
     #[serde(default)]
     pub(super) tables: Entries<Table>,
@@ -324,6 +331,46 @@ pub(super) struct Filter {
     pub method: Option<Method>,
     /// Frequency at which the bilinear transform keeps the frequency response; a number without a unit is in Hz.
     pub prewarp: Option<Quantity>,
+}
+
+/// PID controller with filtered derivative:
+/// `v = k (wp r - y + 1/(Ti s) (r - y) + Td s/(Td/Nd s + 1) (wd r - y)) + feedforward`, and the output is `v` within its limits.
+/// Values are quantities or expressions; a plain number is in the unit that the equations require.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct Pid {
+    /// Setpoint `r`.
+    pub setpoint: Formula,
+    /// Measured quantity `y`.
+    pub measured: Formula,
+    /// Gain `k`.
+    pub k: Formula,
+    /// Integral time; without it the controller has no integral part.
+    #[serde(rename = "Ti")]
+    pub ti: Option<Formula>,
+    /// Derivative time; without it, or at 0, the controller has no derivative part.
+    #[serde(rename = "Td")]
+    pub td: Option<Formula>,
+    /// Filter ratio of the derivative; default 10.
+    #[serde(rename = "Nd")]
+    pub nd: Option<Formula>,
+    /// Setpoint weight of the proportional part; default 1.
+    pub wp: Option<Formula>,
+    /// Setpoint weight of the derivative part; default 1.
+    pub wd: Option<Formula>,
+    /// Tracking time of the anti-windup by back-calculation; default sqrt(Ti Td), or Ti without a derivative.
+    #[serde(rename = "Tt")]
+    pub tt: Option<Formula>,
+    /// Expression that is added before the limits, such as the output at the operating point.
+    pub feedforward: Option<Formula>,
+    /// Lower and upper limit of the output.
+    pub limit: Option<[Formula; 2]>,
+    /// Unit of the output, unless it takes the place of an input.
+    pub unit: Option<String>,
+    /// Period of a sampled controller (backward differences, integral updated after the output).
+    pub every: Option<Formula>,
+    /// Time between a sample and the change of the output, at most the period.
+    pub delay: Option<Formula>,
 }
 
 /// Numerator and denominator of a transfer function.

@@ -11,6 +11,7 @@ use crate::kernel::Simulated;
 type Equations = Simulated<super::Equations>;
 
 mod clocks;
+mod controllers;
 mod delays;
 mod dry_friction;
 mod events;

@@ -66,8 +66,8 @@ pub(crate) use esdirk::groups;
 use integrate::Attempt;
 pub use integrate::integrate;
 pub(crate) use local::rests;
-pub(crate) use plant_model::shown;
 pub use plant_model::{PlantModel, Simulated};
+pub(crate) use plant_model::{cut_at, shown};
 pub(crate) use record::{Recording, allowed, record, remember, tangents_of, wanted};
 pub use step::Step;
 

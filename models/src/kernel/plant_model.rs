@@ -55,8 +55,8 @@ pub trait PlantModel: Send + Sync {
         None
     }
 
-    /// Returns the model with the loop cut at a variable; see [`Model::cut`].
-    fn cut(&self, _variable: &str) -> Option<Result<Cut, StudyError>> {
+    /// Returns the model with its loops cut at variables; see [`Model::cut`].
+    fn cut(&self, _variables: &[String]) -> Option<Result<Cut, StudyError>> {
         None
     }
 
@@ -64,6 +64,27 @@ pub trait PlantModel: Send + Sync {
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
+}
+
+/// Returns the interface of a model whose loop is cut at the signal `at`, and the ends of the cut: the last input acts in the place
+/// of the signal, and the last signal is minus the value that the model computes.
+///
+/// # Errors
+/// `variables` are not this signal alone.
+pub(crate) fn cut_at(
+    at: &str,
+    of: &Interface,
+    variables: &[String],
+) -> Result<(Interface, Vec<[usize; 2]>), StudyError> {
+    if let Some(other) = variables.iter().find(|variable| *variable != at) {
+        return Err(StudyError::here(format!("the loop can be cut at `{at}` only, not at `{other}`")));
+    }
+    let mut interface = of.clone();
+    let signal = of.signal(at)?;
+    interface.inputs.push(Variable { about: "input of the cut loop".into(), ..signal.clone() });
+    let name = format!("-{at}");
+    interface.signals.push(Variable { name, about: "output of the cut loop".into(), ..signal.clone() });
+    Ok((interface, vec![[of.inputs.len(), of.signals.len()]]))
 }
 
 /// Model of a plant: simulated, with exact tangents, linearised, and open at its ports.
@@ -210,8 +231,8 @@ impl<M: PlantModel> Model for Simulated<M> {
         self.of.not_linear()
     }
 
-    fn cut(&self, variable: &str) -> Option<Result<Cut, StudyError>> {
-        self.of.cut(variable)
+    fn cut(&self, variables: &[String]) -> Option<Result<Cut, StudyError>> {
+        self.of.cut(variables)
     }
 
     fn ported(&self) -> Option<&dyn Open> {

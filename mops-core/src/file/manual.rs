@@ -71,6 +71,26 @@ pub fn describe(name: &str, schema: &Schema) -> String {
     page
 }
 
+/// Returns all places of a key in a schema, at any depth: the keys that lead there, such as `clocks.NAME.filter`, and the
+/// documentation.
+pub fn places_of(key: &str, schema: &Schema) -> Vec<(String, String)> {
+    fn find(key: &str, entries: &[Entry], path: &str, found: &mut Vec<(String, String)>) {
+        for entry in entries {
+            let here = format!("{path}{}", entry.name);
+            if entry.name == key {
+                let mut page = String::new();
+                list(&mut page, std::slice::from_ref(entry), 1);
+                found.push((here.clone(), page));
+            }
+            let name = if entry.any_name.is_some() { "NAME." } else { "" };
+            find(key, &entry.below, &format!("{here}.{name}"), found);
+        }
+    }
+    let mut found = Vec::new();
+    find(key, &entries(schema), "", &mut found);
+    found
+}
+
 fn list(page: &mut String, entries: &[Entry], depth: usize) {
     let indent = "  ".repeat(depth);
     for entry in entries {

@@ -26,9 +26,9 @@ pub use crate::data::{Files, Folder};
 pub use built::built;
 pub use content::digest;
 pub use entries::{Entries, Short};
-pub use manual::{Entry, about, describe, entries};
+pub use manual::{Entry, about, describe, entries, places_of};
 pub use parts::{cases, criterion, experiments, model};
-pub use schema::{study_schema, tables, tables_with};
+pub use schema::{study_schema, tables};
 
 use crate::catalogue::{Catalogue, SolverChoice};
 use crate::catalogue_study::Shipped;
@@ -45,7 +45,8 @@ use crate::unit::{Quantity, Unit};
 use experiment::entry;
 use inputs::Reader;
 use sections::{
-    CaseOptions, CriterionCommon, ModelCommon, PerCase, SensorSection, SolverCommon, StudySection, TunerSection,
+    CaseOptions, CriterionCommon, ModelCommon, OneOrMore, PerCase, SensorSection, SolverCommon, StudySection,
+    TunerSection,
 };
 use tree::{Node, Text};
 
@@ -271,9 +272,13 @@ fn read_model(catalogue: &Catalogue, node: &Node<'_>, files: &dyn Files) -> Resu
     }
     let at_equilibrium = common.linearise.as_ref().and_then(|section| section.equilibrium).unwrap_or(true);
     let linearise = common.linearise.map(Linearise::from);
-    if let Some(variable) = common.open {
+    if let Some(open) = common.open {
+        let variables = match open {
+            OneOrMore::One(variable) => vec![variable],
+            OneOrMore::More(variables) => variables,
+        };
         let options = Linearise { equilibrium: at_equilibrium, ..linearise.unwrap_or_default() };
-        let linearised = Linearised::opened(model.as_ref(), &variable, options);
+        let linearised = Linearised::opened(model.as_ref(), &variables, options);
         model = Box::new(linearised.map_err(|mistake| node.locate(&mistake))?);
     } else if let Some(linearise) = linearise {
         let place = node.child("linearise").expect("it was just read");

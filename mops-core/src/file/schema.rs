@@ -169,17 +169,3 @@ pub fn tables() -> Vec<(&'static str, Schema)> {
         ("uncertainty", schema_of::<UncertaintySection>()),
     ]
 }
-
-/// Returns the tables of a study file that contain a key, at any depth.
-pub fn tables_with(key: &str) -> Vec<&'static str> {
-    let with = tables().into_iter().filter(|(_, schema)| has_key(schema.as_value(), key));
-    with.map(|(table, _)| table).collect()
-}
-
-fn has_key(schema: &Value, key: &str) -> bool {
-    match keys_of(schema) {
-        Some(Keys::Known(known)) => known.iter().any(|(name, below)| *name == key || has_key(below, key)),
-        Some(Keys::Any(each)) => has_key(each, key),
-        None => false,
-    }
-}

@@ -47,7 +47,10 @@ pub(super) struct ModelCommon {
     /// that the poles of the closed loop are the zeros of `1 + L`. The operating point is the equilibrium of the closed loop
     /// with the inputs of the case at time 0; `linearise = { equilibrium = false, at = { .. } }` gives another one. For models
     /// of the kind `equations`, the variable is a named expression of `let`.
-    pub open: Option<String>,
+    ///
+    /// A list, `open = ["u1", "u2"]`, cuts several loops, for a disk margin of all of them. Other criteria of loops select one by
+    /// `input = "u1"`, while the others are closed.
+    pub open: Option<OneOrMore>,
     /// Replaces the model by its linearisation, for criteria of linear systems:
     /// `linearise = { inputs = ["u"], outputs = ["theta"], at = { theta = "180 deg" } }`. `{}` selects all inputs and
     /// outputs.
@@ -132,6 +135,14 @@ pub(super) struct TunerSection {
     /// Initial guesses of single cases or experiments, by name; requires `per-case`.
     #[serde(default)]
     pub starts: Entries<Quantity>,
+}
+
+/// A name, or a list of names.
+#[derive(Debug, Clone, serde::Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum OneOrMore {
+    One(String),
+    More(Vec<String>),
 }
 
 /// Cases in which a tuner has a separate value: all, none, or those of a list.
@@ -369,7 +380,8 @@ impl CriterionCommon {
     pub const KEYS: &[&str] = &["model", "cases", "usage", "demand", "good", "bad", "weight", "from", "until", "unit"];
 }
 
-/// Common keys of all solvers.
+/// Solver of a design: a table named by its kind, with the options of the kind, and common keys of all solvers:
+/// `solver = { max-evaluations = 2000, sqp = {} }`. `mops list` shows the kinds; without one, `auto` chooses.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct SolverCommon {

@@ -198,26 +198,40 @@ pub(super) struct Span {
     turn: f64,
 }
 
-/// Transfer function of the closed loop with unity negative feedback.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Closed {
-    /// Sensitivity `S = 1/(1 + L)`.
-    Sensitivity,
-    /// Complementary sensitivity `T = L/(1 + L)`.
-    Complementary,
+/// Transfer function `(a + b L)/(1 + L)` of the closed loop with unity negative feedback.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Closed {
+    /// Value without feedback, where L is 0.
+    a: f64,
+    /// Value at infinite L.
+    b: f64,
 }
 
 impl Closed {
+    /// Sensitivity `S = 1/(1 + L)`.
+    pub const SENSITIVITY: Self = Self { a: 1.0, b: 0.0 };
+
+    /// Complementary sensitivity `T = L/(1 + L)`.
+    pub const COMPLEMENTARY: Self = Self { a: 0.0, b: 1.0 };
+
+    /// Sensitivity plus a constant.
+    pub fn sensitivity_plus(constant: f64) -> Self {
+        Self { a: 1.0 + constant, b: constant }
+    }
+
     /// Returns the gain for a value of L.
     pub fn gain(self, l: Complex) -> f64 {
-        match self {
-            // L is infinite.
-            Self::Sensitivity if !l.is_finite() => 0.0,
-            Self::Complementary if !l.is_finite() => 1.0,
-            Self::Sensitivity => complex::norm((l + 1.0).inv()),
-            Self::Complementary => complex::norm(l / (l + 1.0)),
-        }
+        if l.is_finite() { complex::norm((l * self.b + self.a) / (l + 1.0)) } else { self.b.abs() }
     }
+}
+
+/// Returns the bounds of `|1 + z|` over `z` of these sizes, whose angles from the negative real axis have these magnitudes, rad.
+fn distance_from_minus_one([low, high]: [f64; 2], [least, most]: [f64; 2]) -> [f64; 2] {
+    let distance = |size: f64, angle: f64| {
+        let sine = math::sin(0.5 * angle);
+        if size.is_finite() { (math::powi(size - 1.0, 2) + 4.0 * size * sine * sine).sqrt() } else { f64::INFINITY }
+    };
+    [distance(math::cos(least).clamp(low, high), least), distance(low, most).max(distance(high, most))]
 }
 
 impl Span {
@@ -260,41 +274,57 @@ impl Span {
     fn by_sector(&self, of: Closed) -> [f64; 2] {
         use std::f64::consts::PI;
         let [low, high] = self.gain().map(math::exp);
-        // |T| = 1/|1 + 1/L|, and 1/L has the opposite angle.
-        let [low, high] = if of == Closed::Sensitivity { [low, high] } else { [1.0 / high, 1.0 / low] };
+        // Where L is large, (a + b L)/(1 + L) is (b + a/L)/(1 + 1/L), and 1/L has the opposite angle.
+        let is_large = complex::norm(self.response) > 1.0;
+        let ([low, high], [a, b]) =
+            if is_large { ([1.0 / high, 1.0 / low], [of.b, of.a]) } else { ([low, high], [of.a, of.b]) };
         if !(low >= 0.0 && high >= low) {
             return [f64::NEG_INFINITY, f64::INFINITY];
         }
         let angle = complex::arg(-self.response).abs();
-        let (least, most) = ((angle - self.turn).max(0.0), (angle + self.turn).min(PI));
-        let distance = |size: f64, angle: f64| {
-            let sine = math::sin(0.5 * angle);
-            if size.is_finite() { (math::powi(size - 1.0, 2) + 4.0 * size * sine * sine).sqrt() } else { f64::INFINITY }
+        let [least, most] = [(angle - self.turn).max(0.0), (angle + self.turn).min(PI)];
+        let [nearest, farthest] = distance_from_minus_one([low, high], [least, most]);
+        // |a + b z| = |b| |z| without a, and |a| |1 + z b/a| with it; with a negative ratio the angles are the supplements.
+        let [least, most] = if a * b < 0.0 { [PI - most, PI - least] } else { [least, most] };
+        let above = if a == 0.0 {
+            [b.abs() * low, b.abs() * high]
+        } else {
+            let ratio = (b / a).abs();
+            distance_from_minus_one(
+                [low, high].map(|size| if ratio == 0.0 { 0.0 } else { ratio * size }),
+                [least, most],
+            )
+            .map(|distance| a.abs() * distance)
         };
-        let nearest = distance(math::cos(least).clamp(low, high), least);
-        let farthest = distance(low, most).max(distance(high, most));
-        [-math::ln(farthest), -math::ln(nearest)]
+        let bounds = [above[0] / farthest, above[1] / nearest].map(math::ln);
+        [
+            if bounds[0].is_nan() { f64::NEG_INFINITY } else { bounds[0] },
+            if bounds[1].is_nan() { f64::INFINITY } else { bounds[1] },
+        ]
     }
 
     /// Returns bounds of the closed loop from its linear part and the bound of the remainder.
     fn by_slope(&self, of: Closed) -> [f64; 2] {
         let l = self.response;
-        let t = l / (l + 1.0);
         let size = complex::norm(self.slope) + self.rest;
         let growth = math::exp_m1(size);
-        let u = complex::norm(t) * growth;
-        if u.is_nan() || u > 0.9 {
+        // ln(a + b L) changes by ln(1 + t (exp(e) - 1)), t = b L/(a + b L), if ln L changes by e. Returns t and the bound of
+        // the part that is not linear.
+        let part = |a: f64, b: f64| {
+            let t = l * b / (l * b + a);
+            let u = complex::norm(t) * growth;
+            let curved = complex::norm(t) * (growth - size) + 0.5 * u * u / (1.0 - u);
+            (t, if u.is_nan() || u > 0.9 { f64::INFINITY } else { curved })
+        };
+        // ln L itself changes by e.
+        let (above, of_above) = if of.a == 0.0 { (Complex::new(1.0, 0.0), 0.0) } else { part(of.a, of.b) };
+        let (below, of_below) = part(1.0, 1.0);
+        let slope = above - below;
+        let change = (slope * self.slope).re.abs() + self.rest * complex::norm(slope) + of_above + of_below;
+        if !change.is_finite() {
             return [f64::NEG_INFINITY, f64::INFINITY];
         }
-        // ln(1 + L) changes by ln(1 + t (exp(e) - 1)) if ln L changes by e.
-        let curved = complex::norm(t) * (growth - size) + 0.5 * u * u / (1.0 - u);
-        let (linear, rest) = match of {
-            Closed::Sensitivity => ((t * self.slope).re, self.rest * complex::norm(t)),
-            Closed::Complementary => {
-                (((Complex::new(1.0, 0.0) - t) * self.slope).re, self.rest * (1.0 + complex::norm(t)))
-            }
-        };
-        let (here, change) = (math::ln(of.gain(l)), linear.abs() + rest + curved);
+        let here = math::ln(of.gain(l));
         [here - change, here + change]
     }
 }

@@ -72,8 +72,8 @@ impl Mask {
     pub fn largest_ratio(&self, system: &StateSpace, of: Masked) -> Result<(f64, f64), String> {
         let closed = match of {
             Masked::System => None,
-            Masked::Sensitivity => Some(Closed::Sensitivity),
-            Masked::Complementary => Some(Closed::Complementary),
+            Masked::Sensitivity => Some(Closed::SENSITIVITY),
+            Masked::Complementary => Some(Closed::COMPLEMENTARY),
         };
         if closed.is_some() && !Loop::new(system.clone())?.is_stable() {
             return Err("the closed loop is not stable".to_owned());

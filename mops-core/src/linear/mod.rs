@@ -7,6 +7,7 @@ mod bounded_response;
 mod components;
 mod controllability;
 mod delays;
+mod disk_margin;
 mod eigen;
 mod equilibrium;
 mod exponential;
@@ -34,6 +35,7 @@ mod zeros;
 use nalgebra::DMatrix;
 
 pub use controllability::check_controllable;
+pub use disk_margin::disk_margin;
 pub use eigen::{eigenvalues, undecided};
 pub use equilibrium::{Balance, NoEquilibrium, equilibrium};
 pub use exponential::exponential;

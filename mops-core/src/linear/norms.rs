@@ -112,7 +112,7 @@ fn polished(peak: Peak, response: &FrequencyResponse) -> Peak {
 }
 
 /// Returns the largest singular value.
-fn largest_singular_value(m: &DMatrix<Complex>) -> f64 {
+pub(super) fn largest_singular_value(m: &DMatrix<Complex>) -> f64 {
     if m.len() == 1 {
         return complex::norm(m[(0, 0)]);
     }
@@ -126,7 +126,7 @@ fn largest_singular_value(m: &DMatrix<Complex>) -> f64 {
 ///
 /// They belong to eigenvalues near the imaginary axis. Rounding moves a double eigenvalue by the square root of the
 /// machine precision, hence the wide strip.
-fn level_frequencies(system: &StateSpace, level: f64) -> Result<Vec<f64>, String> {
+pub(super) fn level_frequencies(system: &StateSpace, level: f64) -> Result<Vec<f64>, String> {
     let StateSpace { a, b, c, d, .. } = system;
     let (n, m) = (a.nrows(), b.ncols());
     let near = |z: &Complex| z.im >= 0.0 && z.re.abs() <= 1e-5 * complex::norm(*z);

@@ -11,7 +11,7 @@ impl Loop {
     /// # Errors
     /// If the closed loop is not stable.
     pub fn peak_sensitivity(&self) -> Result<f64, String> {
-        self.peak(Closed::Sensitivity)
+        self.peak(Closed::SENSITIVITY)
     }
 
     /// Returns the maximum complementary sensitivity, `Mt = max |L/(1 + L)|`, over all frequencies from 0 to infinity.
@@ -19,18 +19,26 @@ impl Loop {
     /// # Errors
     /// If the closed loop is not stable.
     pub fn peak_complementary(&self) -> Result<f64, String> {
-        self.peak(Closed::Complementary)
+        self.peak(Closed::COMPLEMENTARY)
+    }
+
+    /// Returns the disk margin: see [`super::disk_margin`]. A delay is treated exactly.
+    ///
+    /// # Errors
+    /// If the closed loop is not stable.
+    pub fn disk_margin(&self, skew: f64) -> Result<f64, String> {
+        Ok(1.0 / self.peak(Closed::sensitivity_plus(0.5 * (skew - 1.0)))?)
     }
 
     fn peak(&self, what: Closed) -> Result<f64, String> {
         if !self.is_stable() {
             return Err("the closed loop is not stable".to_owned());
         }
-        // At infinite frequency L equals D; with a delay it turns on a circle.
+        // At infinite frequency L equals D. With a delay it turns on a circle about 0, and the gain is largest on the real axis.
         let end = self.system.d[(0, 0)];
-        let end = if self.system.delay > 0.0 { -end.abs() } else { end };
+        let ends = if self.system.delay > 0.0 { [end, -end] } else { [end, end] };
         let (peak, _) = highest(&self.response, |_, l| what.gain(l), |span| span.closed(what))?;
-        Ok(peak.max(what.gain(Complex::new(end, 0.0))))
+        Ok(ends.iter().fold(peak, |peak, end| peak.max(what.gain(Complex::new(*end, 0.0)))))
     }
 
     /// Returns the closed-loop bandwidth, rad/s: the lowest angular frequency at which `|T|` is 3 dB (a factor of
@@ -42,9 +50,9 @@ impl Loop {
         if !self.is_stable() {
             return Err("the closed loop is not stable".to_owned());
         }
-        let gain = |l: Complex| Closed::Complementary.gain(l);
+        let gain = |l: Complex| Closed::COMPLEMENTARY.gain(l);
         let level = three_decibels_below(gain(self.at(0.0)))?;
-        first_below(&self.response, level, |l| math::ln(gain(l)), |span| span.closed(Closed::Complementary))
+        first_below(&self.response, level, |l| math::ln(gain(l)), |span| span.closed(Closed::COMPLEMENTARY))
     }
 }
 

@@ -143,6 +143,32 @@ impl StateSpace {
         })
     }
 
+    /// Returns the loop transfer function at one input while all other loops are closed by unity negative feedback, each output to
+    /// the input with its index.
+    ///
+    /// # Errors
+    /// If the system has a delay, so that the number of states is infinite, or if the closed loops are not well-posed.
+    pub fn loop_at_a_time(&self, index: usize) -> Result<Self, String> {
+        if self.inputs.len() == 1 && self.outputs.len() == 1 {
+            return Ok(self.clone());
+        }
+        let mut kept = self.clone();
+        // The loop that stays open is closed with the gain 0.
+        kept.c.row_mut(index).fill(0.0);
+        kept.d.row_mut(index).fill(0.0);
+        let inverse = kept.loop_inverse()?;
+        let (c, d) = (self.c.rows(index, 1), self.d.rows(index, 1));
+        let closed = Self {
+            a: &self.a - &self.b * &inverse * &kept.c,
+            b: &self.b * &inverse,
+            c: c - d * &inverse * &kept.c,
+            d: d * &inverse,
+            outputs: vec![self.outputs[index].clone()],
+            ..self.clone()
+        };
+        Ok(closed.channel(index, 0))
+    }
+
     /// Returns `(1 + D)^-1`.
     fn loop_inverse(&self) -> Result<DMatrix<f64>, String> {
         if self.delay != 0.0 {

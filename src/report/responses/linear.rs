@@ -30,7 +30,12 @@ pub(super) fn figures(cases: &Cases<'_>, outputs: &[&Variable]) -> Vec<Figure> {
     for output in outputs {
         let Some(row) = system.outputs.iter().position(|name| *name == output.name) else { continue };
         for (column, input) in system.inputs.iter().enumerate() {
-            let name = format!("{}/{input}", output.name);
+            let is_cut = is_cut(cases);
+            if is_cut && column != row {
+                continue;
+            }
+            let others = if is_cut && system.inputs.len() > 1 { ", other loops closed" } else { "" };
+            let name = format!("{}/{input}{others}", output.name);
             let [magnitude, phase] = frequency_responses(cases, (column, row), &cases.title(&name));
             let mut plots = vec![
                 (format!("{place}magnitude-{}-{input}", output.name), magnitude),
@@ -54,8 +59,22 @@ fn of(analysis: &Result<Analysis, Failure>) -> Option<&StateSpace> {
     analysis.as_ref().ok()?.linear()
 }
 
-/// Returns true if a criterion of the case reads the channel as loop transfer function.
+/// Returns true if the system is the loop transfer function of cut loops.
+fn is_cut(cases: &Cases<'_>) -> bool {
+    let study = cases.report.problem.study();
+    study.models()[study.jobs()[cases.ones[0].job].model].1.interface().is_cut
+}
+
+/// Returns the system from an input to an output. Of several cut loops, the others are closed.
+fn channel(cases: &Cases<'_>, system: &StateSpace, (input, output): (usize, usize)) -> Option<StateSpace> {
+    if is_cut(cases) { system.loop_at_a_time(input).ok() } else { Some(system.channel(input, output)) }
+}
+
+/// Returns true if the model is a cut loop, or a criterion of the case reads the channel as loop transfer function.
 fn is_loop(cases: &Cases<'_>, one: &Simulated, channel: &StateSpace) -> bool {
+    if is_cut(cases) {
+        return true;
+    }
     let rows = cases.report.problem.study().rows();
     let ends = [channel.inputs[0].clone(), channel.outputs[0].clone()];
     let mut of_case = rows.iter().filter(|row| row.job == one.job);
@@ -75,7 +94,9 @@ fn frequency_responses(cases: &Cases<'_>, (input, output): (usize, usize), name:
     for at_start in [true, false] {
         for (index, one) in cases.ones.iter().enumerate() {
             let analysis = if at_start { &one.both.start } else { &one.both.best };
-            let Some(channel) = of(analysis).map(|system| system.channel(input, output)) else { continue };
+            let Some(channel) = of(analysis).and_then(|system| channel(cases, system, (input, output))) else {
+                continue;
+            };
             let Ok(response) = FrequencyCurve::of(&channel) else { continue };
             let closed = closed(cases, one, &channel);
             if !at_start || of(&one.both.best).is_none() {
@@ -191,7 +212,7 @@ fn measurement(data: &ResponseData, model: Option<&Curve>) -> [Curve; 2] {
 /// Returns the Nyquist curve of the case whose loop has the largest sensitivity.
 fn nyquist_curve(cases: &Cases<'_>, (input, output): (usize, usize), name: &str) -> Option<Plot> {
     let loops = cases.ones.iter().filter_map(|one| {
-        let channel = of(&one.both.best)?.channel(input, output);
+        let channel = channel(cases, of(&one.both.best)?, (input, output))?;
         let closed = closed(cases, one, &channel)?;
         let peak = closed.peak_sensitivity().ok();
         Some((peak, channel, cases.name(one)))
@@ -214,7 +235,7 @@ fn poles(cases: &Cases<'_>, tuner: usize) -> Option<(String, Plot)> {
     }
     let poles_of = |system: &StateSpace| -> Option<Vec<Complex>> {
         let single = system.inputs.len() == 1 && system.outputs.len() == 1;
-        if !(single && is_loop(cases, one, system)) {
+        if !((single || is_cut(cases)) && is_loop(cases, one, system)) {
             return system.poles().ok();
         }
         // A loop with a delay has infinitely many poles.

@@ -1,0 +1,111 @@
+//! Disk margin of feedback loops.
+
+use mops_core::linear::disk_margin;
+use mops_core::{
+    Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit, Value,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::common::{Channel, LinearCriterion, Values};
+
+/// Disk margin `alpha = 1/max_w |S(j w) + (skew - 1)/2|`, dimensionless: the size of simultaneous changes of gain and phase that
+/// the closed loop tolerates.
+///
+/// The model is the loop transfer function L, with unity negative feedback, and `S = 1/(1 + L)`. The loop stays stable with any
+/// factor `f = (1 + (1 - skew)/2 delta)/(1 - (1 + skew)/2 delta)`, `|delta| < alpha`, which may vary with frequency. For skew 0,
+/// the gain may change by a factor between `(2 - alpha)/(2 + alpha)` and its reciprocal, or the phase by `2 atan(alpha/2)`:
+/// 1/2 allows a factor of 1.67 or 28 deg, 2/3 a factor of 2 or 37 deg. With skew 1 it is the modulus margin `1/Ms`.
+///
+/// Of a model whose loops are cut at several variables (`open = ["u1", "u2"]`), it is the margin for independent changes in all
+/// loops at once, unless `input` selects one loop; the others are then closed. For more than three loops it is a lower bound,
+/// usually by less than 15 % too small.
+///
+/// More is better. Range: from 0 up, at most 2 for skew 0. There is no value if the closed loop is unstable, or for several loops
+/// with a delay.
+///
+/// Source: P. Seiler, A. Packard, P. Gahinet, An introduction to disk margins, IEEE Control Systems Magazine 40(5) (2020) 78-95.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct DiskMargin {
+    /// Input of the loop transfer function; may be omitted if there is only one, or for all loops at once.
+    pub input: Option<String>,
+    /// Output of the loop transfer function; may be omitted if there is only one, or for all loops at once.
+    pub output: Option<String>,
+    /// Skew of the disk: 0 (default) for gains that may rise by the factor by which they may fall, above 0 for a larger rise, below 0 for
+    /// a larger fall.
+    pub skew: f64,
+}
+
+impl CriterionOptions for DiskMargin {
+    const KIND: &'static str = "disk-margin";
+}
+
+impl CriterionSpec for DiskMargin {
+    fn reads(&self) -> AnalysisKind {
+        AnalysisKind::Linear
+    }
+
+    fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
+        let skew = self.skew;
+        if !skew.is_finite() {
+            return Err(StudyError::new("skew", format!("expected a finite skew, found {skew}")));
+        }
+        if model.is_cut && model.inputs.len() > 1 && self.input.is_none() && self.output.is_none() {
+            return Ok(Box::new(OfAllLoops { signals: model.signals.iter().map(|s| s.name.clone()).collect(), skew }));
+        }
+        let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.in_loop()?;
+        let values = Values::of(Unit::one(), Sense::More).within(0.0, f64::INFINITY);
+        Ok(LinearCriterion::boxed(channel, values, move |system| Ok(disk_margin(&system, skew)?.into())))
+    }
+}
+
+/// Disk margin of all cut loops at once.
+struct OfAllLoops {
+    signals: Vec<String>,
+    skew: f64,
+}
+
+impl Criterion for OfAllLoops {
+    fn unit(&self) -> Unit {
+        Unit::one()
+    }
+
+    fn signals(&self) -> Vec<String> {
+        self.signals.clone()
+    }
+
+    fn sense(&self) -> Sense {
+        Sense::More
+    }
+
+    fn range(&self) -> [f64; 2] {
+        [0.0, f64::INFINITY]
+    }
+
+    fn value(&self, _: &Case, analysis: &Analysis) -> Result<Value, String> {
+        let system = analysis.linear().expect("checked when the study is built");
+        Ok(disk_margin(system, self.skew)?.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::testing::{assert_near, channel, linear, undefined, value};
+
+    #[test]
+    fn the_margin_of_an_integrator_is_the_largest_possible() {
+        // S - 1/2 = (s - 1)/(2 (s + 1)) has the gain 1/2 at all frequencies.
+        assert_near(value(&DiskMargin::default(), &linear(&[1.0], &[1.0, 0.0])).number, 2.0, 1e-9);
+        let unstable = undefined(&DiskMargin::default(), &linear(&[9.0], &[1.0, 3.0, 3.0, 1.0]));
+        assert_eq!(unstable, "the closed loop is not stable");
+    }
+
+    #[test]
+    fn a_skew_that_is_not_finite_is_refused() {
+        let wrong = DiskMargin { skew: f64::NAN, ..DiskMargin::default() };
+        let mistake = wrong.bind(&channel("V", "V")).err().unwrap().to_string();
+        assert_eq!(mistake, "skew: expected a finite skew, found NaN");
+    }
+}
