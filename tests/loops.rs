@@ -343,8 +343,66 @@ fn a_transfer_function_and_its_matrices_answer_over_time_too() {
         assert!((value(&result, case, "through") - input).abs() < 1e-12);
         assert!((value(&result, case, "margin") - 2.0 * 3.0f64.sqrt()).abs() < 1e-9);
     }
-    let delayed = refused(&text.replace("['T', 1], units", "['T', 1], delay = 1, units"));
-    assert!(delayed.contains("a linear system with a delay is not simulated"), "{delayed}");
+    let late = text.replace("['T', 1], units", "['T', 1], delay = 1, units").replace("u = 1 }", "u.step.after = 1 }");
+    let result = run(folder.path(), &late);
+    let late = 2.0 * (1.0 - math::exp(-4.0));
+    assert!((value(&result, "step", "end") - late).abs() < 1e-7, "{result}");
+}
+
+#[test]
+fn signals_of_joined_models_are_compared_in_one_formula() {
+    // Two lags with time constants of 1 s and 2 s: their step responses differ by exp(-t/2) - exp(-t).
+    let text = "
+        [study]
+        name = 'pair'
+        [models.fast]
+        transfer-function = { numerator = ['g'], denominator = ['T1', 1], units = { T1 = 's' }, horizon = '60 s' }
+        parameters = { T1 = '1 s' }
+        [models.slow]
+        transfer-function = { numerator = ['g'], denominator = ['T2', 1], units = { T2 = 's' }, horizon = '60 s' }
+        [models.both]
+        join = ['fast', 'slow']
+        parameters = { T2 = '2 s' }
+        [tuners]
+        g = { start = 3, min = 1, max = 5 }
+        [cases]
+        step = { inputs.u = 1 }
+        [criteria]
+        power = { model = 'both', expression = { value = 'integral((fast_y - slow_y)^2)' }, demand = '1 s' }
+        most = { model = 'both', expression = { value = 'maximum(fast_y - slow_y)' }, usage = 'monitor' }\n";
+    let folder = tempfile::tempdir().unwrap();
+    // The common gain is tuned to its bound; both models take it.
+    let result = run(folder.path(), text);
+    let [power, most] = ["power", "most"].map(|name| value(&result, "step", name));
+    assert!((power - 1.0 / 6.0).abs() < 1e-8 && (most - 0.25).abs() < 1e-8, "{power} {most}");
+
+    for (from, to, fact) in [
+        ("['fast', 'slow']", "['fast', 'slowly']", "the study has no other model `slowly`"),
+        ("['fast', 'slow']", "['fast', 'both']", "the study has no other model `both`"),
+        ("['fast', 'slow']", "['fast', 'fast']", "`fast` is joined twice"),
+        ("['fast', 'slow']", "['fast']", "fewer than two models are joined"),
+        ("join = ", "open = 'u'\njoin = ", "no keys but `join` and `parameters`"),
+        (
+            "units = { T2 = 's' }, horizon = '60 s' }",
+            "units = { T2 = 's' } }",
+            "`slow` is a linear system without simulation",
+        ),
+        ("units = { T2 = 's' }", "units = { T2 = 's', g = 'V' }", "`g` is in 1 in one model and in V in another"),
+        (
+            "[models.both]",
+            "parameters = { T2 = '1 s', g = 1 }\n[models.third]\nlike = 'slow'\nparameters.g = 2\n[models.both]",
+            "",
+        ),
+    ] {
+        if fact.is_empty() {
+            let differing = text.replace(from, to).replace("['fast', 'slow']", "['slow', 'third']");
+            let message = refused(&differing);
+            assert!(message.contains("`g` has different values in the models that are joined"), "{message}");
+            continue;
+        }
+        let message = refused(&text.replace(from, to)).replace('\n', " ");
+        assert!(message.contains(fact), "{to}: {message}");
+    }
 }
 
 #[test]

@@ -5,15 +5,16 @@ use std::fmt;
 
 use mops_core::expression::units::{Conflict, Dimensions, Measure, Named};
 use mops_core::{
-    Analysis, AnalysisKind, DIRECTIONS, Dual, Dual7, Expression, Failure, Instant, Interface, Job, Parameter, Plant,
-    Quantity, Scalar, StateSpace, StudyError, Unit, Variable, WithTangents,
+    Analysis, AnalysisKind, DIRECTIONS, Dual, Dual7, Expression, Failure, Instant, Interface, Job, Parameter, Past,
+    Plant, Quantity, Scalar, StateSpace, StudyError, Unit, Variable, WithTangents,
 };
 use nalgebra::DMatrix;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
 
-use crate::kernel::{PlantModel, Simulated};
+use crate::kernel::elements::delay::{Delay, pass_delays, remember_delays};
+use crate::kernel::{PlantModel, Simulated, Tolerance};
 
 /// Matrix, row by row.
 pub(crate) type Rows<S> = Vec<Vec<S>>;
@@ -24,8 +25,8 @@ pub(crate) struct Matrices<S> {
     pub b: Rows<S>,
     pub c: Rows<S>,
     pub d: Rows<S>,
-    /// Delay of the inputs, s.
-    pub delay: S,
+    /// Delay of the inputs, s, if there is one.
+    pub delay: Option<S>,
     pub states: Vec<String>,
 }
 
@@ -60,7 +61,14 @@ impl<G: LinearSystem + Send + Sync> PlantModel for InTime<G> {
     }
 
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
-        self.of.matrices(parameters)
+        let matrices = self.of.matrices(parameters)?;
+        let Some(delay) = matrices.delay else { return Ok(Delayed { matrices, inputs: Vec::new() }) };
+        if !(delay.value() > 0.0 && delay.value().is_finite()) {
+            let fact = format!("a simulation needs a delay above 0 s, and that of the system is {} s", delay.value());
+            return Err(Failure::Undefined(fact));
+        }
+        let inputs = self.interface.inputs.iter().map(|_| Delay::new(delay, S::from(0.0))).collect();
+        Ok(Delayed { matrices, inputs })
     }
 
     fn states(&self) -> Vec<Variable> {
@@ -68,19 +76,78 @@ impl<G: LinearSystem + Send + Sync> PlantModel for InTime<G> {
     }
 }
 
-impl<S: Scalar> Plant<S> for Matrices<S> {
+/// Linear system over time, with the delays of its inputs; none without a delay.
+struct Delayed<S> {
+    matrices: Matrices<S>,
+    inputs: Vec<Delay<S>>,
+}
+
+impl<S: Scalar> Delayed<S> {
+    /// Returns the products of rows with the state and with the inputs.
+    fn sum(&self, [of_state, of_input]: [&[S]; 2], at: &Instant<'_, S>) -> S {
+        let direct = product(of_state, at.x);
+        if self.inputs.is_empty() {
+            return direct + product(of_input, at.u);
+        }
+        of_input.iter().zip(&self.inputs).fold(direct, |sum, (b, input)| sum + *b * input.at(at.t))
+    }
+}
+
+impl<S: Scalar> Plant<S> for Delayed<S> {
     fn start(&self) -> Vec<S> {
-        vec![S::from(0.0); self.a.len()]
+        vec![S::from(0.0); self.matrices.a.len()]
     }
 
     fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
-        for (dx, (a, b)) in dx.iter_mut().zip(self.a.iter().zip(&self.b)) {
-            *dx = product(a, at.x) + product(b, at.u);
+        let Matrices { a, b, .. } = &self.matrices;
+        for (dx, (a, b)) in dx.iter_mut().zip(a.iter().zip(b)) {
+            *dx = self.sum([a, b], at);
         }
     }
 
     fn signal(&self, signal: usize, at: &Instant<'_, S>) -> S {
-        product(&self.c[signal], at.x) + product(&self.d[signal], at.u)
+        self.sum([&self.matrices.c[signal], &self.matrices.d[signal]], at)
+    }
+
+    fn remembers(&self) -> bool {
+        !self.inputs.is_empty()
+    }
+
+    fn past(&self, at: &Instant<'_, S>) -> Vec<S> {
+        at.u[..self.inputs.len()].to_vec()
+    }
+
+    fn delays(&self) -> Vec<f64> {
+        self.inputs.iter().map(|delay| delay.time().value()).collect()
+    }
+
+    fn hold(&mut self, past: &[S]) {
+        self.inputs.iter_mut().zip(past).for_each(|(delay, &past)| delay.set_before(past));
+    }
+
+    fn begin(&mut self, at: &Instant<'_, S>) {
+        let past = self.past(at);
+        self.hold(&past);
+    }
+
+    fn remember(&mut self, over: &Past<'_, S>) -> bool {
+        remember_delays(&mut self.inputs, &Tolerance::default(), over)
+    }
+
+    fn samples(&self) -> bool {
+        self.remembers()
+    }
+
+    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
+        pass_delays(self, |system| &mut system.inputs, |_, _| {}, at, x);
+    }
+
+    fn next_break(&self, t: f64) -> f64 {
+        self.inputs.iter().map(|delay| delay.next_break(t)).fold(f64::INFINITY, f64::min)
+    }
+
+    fn longest_step(&self) -> f64 {
+        self.inputs.iter().map(Delay::longest_step).fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -89,12 +156,8 @@ fn product<S: Scalar>(row: &[S], column: &[S]) -> S {
 }
 
 /// Returns the end of the simulation of a linear system, if it is to be simulated over time.
-pub(crate) fn horizon(given: Option<&Quantity>, has_delay: bool) -> Result<Option<f64>, StudyError> {
+pub(crate) fn horizon(given: Option<&Quantity>) -> Result<Option<f64>, StudyError> {
     let Some(given) = given else { return Ok(None) };
-    if has_delay {
-        let help = "write it as `equations`, with `delay(u, T)`, or omit `horizon` for criteria of linear systems";
-        return Err(StudyError::new("delay", "a linear system with a delay is not simulated").with_help(help));
-    }
     given.to(&Unit::known("s")).map(Some).map_err(|why| StudyError::new("horizon", why))
 }
 
@@ -141,13 +204,18 @@ fn part<S: Scalar>(model: &impl LinearSystem, m: &Matrices<S>, take: impl Fn(S) 
         states: m.states.clone(),
         inputs,
         outputs,
-        delay: take(m.delay),
+        delay: m.delay.map_or(0.0, take),
     }
 }
 
 /// Returns the controllable canonical form of a transfer function. Coefficients are in ascending powers. The
 /// denominator omits its leading 1; the numerator has at most one coefficient more.
-pub(crate) fn canonical<S: Scalar>(numerator: &[S], denominator: &[S], states: Vec<String>, delay: S) -> Matrices<S> {
+pub(crate) fn canonical<S: Scalar>(
+    numerator: &[S],
+    denominator: &[S],
+    states: Vec<String>,
+    delay: Option<S>,
+) -> Matrices<S> {
     let (n, zero) = (denominator.len(), S::from(0.0));
     let above = |i: usize| numerator.get(i).copied().unwrap_or(zero);
     let direct = above(n);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use mops_core::linear::{Complex, Loop, TransferFunction};
 use mops_core::math::{self, complex};
 use mops_core::{
-    Analysis, Case, Job, Linearise, Linearised, Model, ModelOptions, OperatingPoint, Quantity, StateSpace,
+    Analysis, Case, Input, Job, Linearise, Linearised, Model, ModelOptions, OperatingPoint, Quantity, StateSpace,
 };
 
 use crate::furuta::Furuta;
@@ -232,4 +232,39 @@ fn invalid_systems_are_an_error_with_a_remedy() {
     let order = toml::from_str::<TransferFunctionOptions>("numerator = [1, 2]\ndenominator = [3]").unwrap().build();
     assert!(order.err().unwrap().to_string().contains("order 1"));
     assert!(TransferFunction::new(vec![1.0, 2.0], vec![3.0]).state_space().is_err());
+}
+
+#[test]
+fn a_delayed_system_over_time_is_its_closed_form_later_and_so_are_its_tangents() {
+    // 3 exp(-T s)/(2 s + 1), a step from 0.5 to 2 at 1 s: from rest, 0.5 acts from T on.
+    let late = model::<TransferFunctionOptions>(
+        "numerator = [3]\ndenominator = [2, 1]\ndelay = 'T'\nunits = { T = 's' }\nhorizon = '9 s'",
+    );
+    let lag = |t: f64| if t > 0.0 { 3.0 * (1.0 - math::exp(-t / 2.0)) } else { 0.0 };
+    let rate = |t: f64| if t > 0.0 { 1.5 * math::exp(-t / 2.0) } else { 0.0 };
+    let step = Input::Step { time: 1.0, before: 0.0, after: 1.5 };
+    let case = Case { inputs: vec![("u".to_owned(), step)], ..Case::default() };
+    let job = Job { case: &case, parameters: &[0.7], signals: &[0], horizon: 9.0 };
+    let (analysis, tangents) = late.tangents(&job, &[vec![1.0]]).expect("it has tangents").unwrap();
+    for t in (1..90).map(|i| 0.0997 * f64::from(i)) {
+        let (y, slope) = (1.5 * lag(t - 1.7), -1.5 * rate(t - 1.7));
+        assert!((analysis.trace("y").at(t) - y).abs() < 1e-7, "{t}: {} {y}", analysis.trace("y").at(t));
+        assert!((tangents[0].trace("y").at(t) - slope).abs() < 1e-6, "{t}: {} {slope}", tangents[0].trace("y").at(t));
+    }
+
+    // A direct part passes the delayed input on: y = x + 2 u(t - 0.3), x' = -x + u(t - 0.3), u = sin(2 t).
+    let direct =
+        model::<StateSpaceOptions>("a = [[-1]]\nb = [[1]]\nc = [[1]]\nd = [[2]]\ndelay = 0.3\nhorizon = '6 s'");
+    let name = direct.interface().inputs[0].name.clone();
+    let sine = Input::Sine { amplitude: 1.0, frequency: 1.0 / std::f64::consts::PI, phase: 0.0, offset: 0.0 };
+    let case = Case { inputs: vec![(name, sine)], ..Case::default() };
+    let job = Job { case: &case, parameters: &[], signals: &[0], horizon: 6.0 };
+    let analysis = direct.analyse(&job).unwrap();
+    for t in (0..60).map(|i| 0.0997 * f64::from(i)) {
+        let s: f64 = (t - 0.3).max(0.0);
+        let x = (math::sin(2.0 * s) - 2.0 * math::cos(2.0 * s) + 2.0 * math::exp(-s)) / 5.0;
+        let y = x + 2.0 * math::sin(2.0 * s);
+        let found = analysis.trace(&direct.interface().signals[0].name).at(t);
+        assert!((found - y).abs() < 1e-7, "{t}: {found} {y}");
+    }
 }

@@ -78,7 +78,7 @@ impl LinearSystem for PidOpenLoop {
         let (numerator, denominator) = self.plant.polynomials(named)?;
         let n = denominator.len();
         let states = (1..=n).map(|i| format!("x{i}")).collect();
-        let mut m = canonical(&numerator, &denominator, states, delay);
+        let mut m = canonical(&numerator, &denominator, states, Some(delay));
         // An absent integral or derivative has no state, which would be an uncontrollable mode.
         let mut through = k;
         let zero = S::from(0.0);

@@ -40,7 +40,8 @@ pub struct StateSpaceOptions {
     inputs: Option<Vec<String>>,
     /// Names of the outputs; default `y`, or `y1`, `y2`, ...
     outputs: Option<Vec<String>>,
-    /// End of a simulation. With it, the system is simulated over time, from rest, for criteria over time; without it, criteria of
+    /// End of a simulation. With it, the system is simulated over time, from rest, for criteria over time (a delayed
+    /// input has its value just before 0 s until then); without it, criteria of
     /// linear systems read it. `like` makes one of the other.
     horizon: Option<Quantity>,
     /// Units of parameters, inputs and outputs, such as `{ k = "N/m" }`.
@@ -100,7 +101,7 @@ impl ModelOptions for StateSpaceOptions {
             analysis: AnalysisKind::Linear,
             ..Interface::default()
         };
-        let horizon = linear_system::horizon(self.horizon.as_ref(), delay.is_some())?;
+        let horizon = linear_system::horizon(self.horizon.as_ref())?;
         let given = Given { interface: interface.clone(), matrices, delay, states: states.clone() };
         Ok(match horizon {
             Some(horizon) => Box::new(InTime::model(given, &interface, &states, horizon)),
@@ -134,7 +135,7 @@ impl LinearSystem for Given {
             rows.iter().map(|row| row.iter().map(|entry| entry.value(parameters)).collect()).collect()
         };
         let [a, b, c, d] = self.matrices.each_ref().map(values);
-        let delay = self.delay.as_ref().map_or(S::from(0.0), |delay| delay.value(parameters));
+        let delay = self.delay.as_ref().map(|delay| delay.value(parameters));
         Ok(Matrices { a, b, c, d, delay, states: self.states.clone() })
     }
 

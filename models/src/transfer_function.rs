@@ -43,7 +43,8 @@ pub struct TransferFunctionOptions {
     input: Option<String>,
     /// Name of the output; default `y`.
     output: Option<String>,
-    /// End of a simulation. With it, the system is simulated over time, from rest, for criteria over time; without it, criteria of
+    /// End of a simulation. With it, the system is simulated over time, from rest, for criteria over time (a delayed
+    /// input has its value just before 0 s until then); without it, criteria of
     /// linear systems read it. `like` makes one of the other.
     horizon: Option<Quantity>,
     /// Units of parameters, input and output, such as `{ T = "s" }`.
@@ -118,7 +119,7 @@ impl ModelOptions for TransferFunctionOptions {
             analysis: AnalysisKind::Linear,
             ..Interface::default()
         };
-        let horizon = linear_system::horizon(self.horizon.as_ref(), delay.is_some())?;
+        let horizon = linear_system::horizon(self.horizon.as_ref())?;
         let given = Given { interface: interface.clone(), form, delay };
         Ok(match horizon {
             Some(horizon) => Box::new(InTime::model(given, &interface, &states(below - 1), horizon)),
@@ -152,7 +153,7 @@ impl LinearSystem for Given {
             return Err(Failure::Undefined("the leading coefficient of the denominator is 0".into()));
         }
         numerator.iter_mut().chain(&mut denominator).for_each(|c| *c = *c / leading);
-        let delay = self.delay.as_ref().map_or(S::from(0.0), |delay| delay.value(parameters));
+        let delay = self.delay.as_ref().map(|delay| delay.value(parameters));
         Ok(canonical(&numerator, &denominator, states(denominator.len()), delay))
     }
 

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use mops_core::enclosure::Enclosure;
 use mops_core::expression::Comparison;
-use mops_core::{DIRECTIONS, Dual, Dual7, EventInstant, Failure, Instant, Past, Plant, Scalar, Span, Trace};
+use mops_core::{DIRECTIONS, Dual, Dual7, EventInstant, Failure, Instant, Past, Plant, Scalar, Span};
 
 use super::bank::{Bank, Large, Register};
 use super::bounds::{self, moved, signed};
@@ -12,8 +12,8 @@ use super::clocks::Ticking;
 use super::compiled::{Compiled, Signal};
 use super::happenings::Phase;
 use super::program::Program;
-use crate::kernel::elements::delay::{Delay, Restart};
-use crate::kernel::{Tolerance, allowed, next_of};
+use crate::kernel::elements::delay::{Delay, Restart, pass_delays, remember_delays};
+use crate::kernel::{Tolerance, next_of};
 
 /// Plant of a compiled model; `B` is the bank of registers.
 pub struct Running<'a, S, B> {
@@ -235,39 +235,6 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         for (&state, &register) in states.iter().zip(&tape.results) {
             x[state] = bank.get(register);
         }
-    }
-
-    /// Lets the jumps of delayed quantities that are due take effect. A jump that moves with the parameters moves the state by the
-    /// jump of its rates.
-    fn pass_delays(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
-        let mut restarts = vec![Restart::fixed(); self.delays.len()];
-        for k in 0..self.delays.len() {
-            let moves = S::DIRECTIONS > 0 && self.delays[k].jumps_at(at.t);
-            let look = |running: &Self, x: &[S]| {
-                let (at, mut rates) = (Instant { x, ..*at }, x.to_vec());
-                running.rates(&at, &mut rates);
-                (rates, running.past(&at))
-            };
-            let before = moves.then(|| look(self, x));
-            let Some(arrival) = self.delays[k].pass_break(at.t) else { continue };
-            for restart in &mut restarts {
-                // A jump that arrives in the rates is one derivative higher in the states.
-                let derivative = arrival.derivative + 1;
-                restart.derivative = Some(restart.derivative.map_or(derivative, |known| known.min(derivative)));
-            }
-            let Some((rates_before, past_before)) = before else { continue };
-            self.settle_modes(&Instant { x, ..*at });
-            let (rates, past) = look(self, x);
-            for ((x, before), after) in x.iter_mut().zip(rates_before).zip(rates) {
-                *x += arrival.moves * (before.value() - after.value());
-            }
-            for ((restart, before), after) in restarts.iter_mut().zip(past_before).zip(past) {
-                if before.value() != after.value() {
-                    restart.moves = arrival.moves;
-                }
-            }
-        }
-        self.delays.iter_mut().zip(restarts).for_each(|(delay, restart)| delay.restart(restart));
     }
 
     fn note_sizes(&mut self, x: &[S]) {
@@ -501,24 +468,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
     }
 
     fn remember(&mut self, over: &Past<'_, S>) -> bool {
-        let quartic = |k: usize| over.values.each_ref().map(|values| values[k]);
-        let agrees = |(k, delay): (usize, &Delay<S>)| {
-            let (values, checks) =
-                (quartic(k).map(Scalar::value), over.checks.each_ref().map(|values| values[k].value()));
-            let size = values.iter().chain(&checks).fold(0.0, |most: f64, value| most.max(value.abs()));
-            let off = Trace::deviation(values, checks);
-            let rough = over.roughness.get(k).copied().unwrap_or(0.0);
-            off.is_nan() || off <= allowed(&self.tolerance, delay.size(), size) + rough
-        };
-        if !over.is_last && !self.delays.iter().enumerate().all(agrees) {
-            return false;
-        }
-        for (k, delay) in self.delays.iter_mut().enumerate() {
-            let values = quartic(k);
-            let size = values.iter().fold(delay.size(), |most, value| most.max(value.value().abs()));
-            delay.push(over.time, values, allowed(&self.tolerance, size, size));
-        }
-        true
+        remember_delays(&mut self.delays, &self.tolerance, over)
     }
 
     fn samples(&self) -> bool {
@@ -526,7 +476,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
     }
 
     fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
-        self.pass_delays(at, x);
+        pass_delays(self, |running| &mut running.delays, Self::settle_modes, at, x);
         self.tick(at, x);
     }
 

@@ -9,6 +9,7 @@ mod experiment;
 mod frequency;
 mod inputs;
 mod manual;
+mod models;
 mod parts;
 mod robustness;
 mod schema;
@@ -37,17 +38,13 @@ use crate::data::read_regular;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::expression::Expression;
 use crate::input::Input;
-use crate::linearised::{Linearise, Linearised};
 use crate::model::{AnalysisKind, Interface};
 use crate::study::{CaseBuilder, CriterionBuilder, ModelBuilder, Study, StudyBuilder, TunerBuilder};
 use crate::study_error::StudyError;
 use crate::unit::{Quantity, Unit};
 use experiment::entry;
 use inputs::Reader;
-use sections::{
-    CaseOptions, CriterionCommon, ModelCommon, OneOrMore, PerCase, SensorSection, SolverCommon, StudySection,
-    TunerSection,
-};
+use sections::{CaseOptions, CriterionCommon, PerCase, SensorSection, SolverCommon, StudySection, TunerSection};
 use tree::{Node, Text};
 
 impl Files for Shipped {
@@ -156,10 +153,9 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
         seed: study.seed.unwrap_or(1),
         ..StudyBuilder::default()
     };
-    let models = root.table("models")?;
-    for (name, node) in &models {
-        let node = with_base(&models, node, &mut vec![name.clone()])?;
-        draft.models.push((name.clone(), read_model(catalogue, &node, files)?));
+    let nodes = root.table("models")?;
+    for (name, node) in &nodes {
+        draft.models.push((name.clone(), models::read(catalogue, &nodes, (name, node), files)?));
     }
     for (name, node) in root.table("tuners")? {
         draft.tuners.push((name, read_tuner(&node)?));
@@ -239,52 +235,6 @@ fn kind<'t, 'k, K>(
         };
         node.key_diagnostic(format!("the {what} has no kind")).with_help(help)
     })
-}
-
-/// Returns the table of a model with all keys of the model that it is `like`, unless it gives them itself.
-fn with_base<'t>(all: &[(String, Node<'t>)], node: &Node<'t>, path: &mut Vec<String>) -> Result<Node<'t>, Diagnostic> {
-    let Some(like) = node.child("like") else { return Ok(node.clone()) };
-    let name: String = like.read()?;
-    let names = || all.iter().map(|(name, _)| name.as_str());
-    let Some((_, base)) = all.iter().find(|(known, _)| *known == name) else {
-        return Err(like.diagnostic(format!("the study has no model `{name}`")).with_help(suggestion(&name, names())));
-    };
-    if path.contains(&name) {
-        let fact = format!("circular `like`: {} -> {name}", path.join(" -> "));
-        return Err(like.diagnostic(fact).with_help("one of these models must be defined without `like`"));
-    }
-    path.push(name);
-    with_base(all, base, path)?.overlaid(node, "like")
-}
-
-fn read_model(catalogue: &Catalogue, node: &Node<'_>, files: &dyn Files) -> Result<ModelBuilder, Diagnostic> {
-    let (kind, options) = kind(node, ModelCommon::KEYS, &catalogue.models, |k| k.name, "model")?;
-    let common: ModelCommon = node.only(ModelCommon::KEYS).read()?;
-    if let Some(like) = &common.like {
-        return Err(node
-            .locate(&StudyError::new("like", format!("`{like}` is a model of a study, and this is a single model")))
-            .with_help("give all keys of the model"));
-    }
-    let model = options.read_with(&(kind.schema)(), |value| (kind.read)(value, files))?;
-    let mut model = model.map_err(|mistake| options.locate(&mistake))?;
-    if let Some(place) = node.child("effects") {
-        model = effects::add(catalogue, model, common.effects, &place)?;
-    }
-    let at_equilibrium = common.linearise.as_ref().and_then(|section| section.equilibrium).unwrap_or(true);
-    let linearise = common.linearise.map(Linearise::from);
-    if let Some(open) = common.open {
-        let variables = match open {
-            OneOrMore::One(variable) => vec![variable],
-            OneOrMore::More(variables) => variables,
-        };
-        let options = Linearise { equilibrium: at_equilibrium, ..linearise.unwrap_or_default() };
-        let linearised = Linearised::opened(model.as_ref(), &variables, options);
-        model = Box::new(linearised.map_err(|mistake| node.locate(&mistake))?);
-    } else if let Some(linearise) = linearise {
-        let place = node.child("linearise").expect("it was just read");
-        model = Box::new(Linearised::new(model.into(), &linearise).map_err(|mistake| place.locate(&mistake))?);
-    }
-    Ok(ModelBuilder { model, parameters: common.parameters.0 })
 }
 
 fn read_tuner(node: &Node<'_>) -> Result<TunerBuilder, Diagnostic> {

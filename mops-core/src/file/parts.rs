@@ -1,8 +1,9 @@
 //! Readers of single tables of a study file, for studies assembled in Rust.
 
 use super::experiment::read as read_experiments;
+use super::models::read_model;
 use super::tree::Text;
-use super::{Files, read_cases, read_criterion, read_model};
+use super::{Files, read_cases, read_criterion};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::Diagnostic;
 use crate::study::{CaseBuilder, CriterionBuilder, ModelBuilder};

@@ -84,6 +84,7 @@ fn one_kind(mut common: Value, kinds: Map<String, Value>, must_be: bool) -> Valu
         if common["properties"]["like"].is_object() {
             // A table that is like another one takes the kind from there.
             choices.push(json!({ "required": ["like"], "not": { "anyOf": choices.clone() } }));
+            choices.push(json!({ "required": ["join"] }));
         }
         common["oneOf"] = choices.into();
     }

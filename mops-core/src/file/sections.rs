@@ -42,6 +42,9 @@ pub(super) struct ModelCommon {
     pub parameters: Entries<Quantity>,
     /// Model from which this one takes all keys that it does not give itself: `like = "servo"`. Tables are merged key by key.
     pub like: Option<String>,
+    /// Simulates several models side by side, to compare their signals: `join = ["loop", "reference"]`, beside `parameters` only. The
+    /// signal `y` of `loop` is `loop_y`. Parameters, inputs and initial values of the same name are one.
+    pub join: Option<Vec<String>>,
     /// Cuts the loop at a variable, and replaces the model by the linearised open loop `L`, for margins and sensitivities:
     /// `open = "u"`. `L` is the transfer function from an input in the place of the variable to minus its computed value, so
     /// that the poles of the closed loop are the zeros of `1 + L`. The operating point is the equilibrium of the closed loop
@@ -63,7 +66,7 @@ pub(super) struct ModelCommon {
 }
 
 impl ModelCommon {
-    pub const KEYS: &[&str] = &["like", "parameters", "open", "linearise", "effects"];
+    pub const KEYS: &[&str] = &["like", "join", "parameters", "open", "linearise", "effects"];
 }
 
 /// Place of an effect. The effect parameters are model parameters, set by tuners, cases and `parameters`. By default they

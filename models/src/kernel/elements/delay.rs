@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-use mops_core::{Scalar, Trace};
+use mops_core::{Instant, Past, Plant, Scalar, Tolerance, Trace};
 
-use crate::kernel::is_due;
+use crate::kernel::{allowed, is_due};
 
 /// Delay `y(t) = u(t - time)`, with `u(t) = before` for t < 0.
 ///
@@ -210,4 +210,65 @@ impl<S: Scalar> Delay<S> {
     pub fn jumps_at(&self, t: f64) -> bool {
         self.ahead.iter().take_while(|arrival| is_due(arrival.time, t)).any(|arrival| arrival.derivative == 0)
     }
+}
+
+/// Lets the jumps of delayed quantities that are due take effect; `settle` determines the mode of the plant. A jump that moves with
+/// the parameters moves the state by the jump of its rates.
+pub(crate) fn pass_delays<S: Scalar, P: Plant<S>>(
+    plant: &mut P,
+    delays: impl Fn(&mut P) -> &mut [Delay<S>],
+    settle: impl Fn(&mut P, &Instant<'_, S>),
+    at: &Instant<'_, S>,
+    x: &mut [S],
+) {
+    let count = delays(plant).len();
+    let mut restarts = vec![Restart::fixed(); count];
+    for k in 0..count {
+        let moves = S::DIRECTIONS > 0 && delays(plant)[k].jumps_at(at.t);
+        let look = |plant: &P, x: &[S]| {
+            let (at, mut rates) = (Instant { x, ..*at }, x.to_vec());
+            plant.rates(&at, &mut rates);
+            (rates, plant.past(&at))
+        };
+        let before = moves.then(|| look(plant, x));
+        let Some(arrival) = delays(plant)[k].pass_break(at.t) else { continue };
+        for restart in &mut restarts {
+            // A jump that arrives in the rates is one derivative higher in the states.
+            let derivative = arrival.derivative + 1;
+            restart.derivative = Some(restart.derivative.map_or(derivative, |known| known.min(derivative)));
+        }
+        let Some((rates_before, past_before)) = before else { continue };
+        settle(plant, &Instant { x, ..*at });
+        let (rates, past) = look(plant, x);
+        for ((x, before), after) in x.iter_mut().zip(rates_before).zip(rates) {
+            *x += arrival.moves * (before.value() - after.value());
+        }
+        for ((restart, before), after) in restarts.iter_mut().zip(past_before).zip(past) {
+            if before.value() != after.value() {
+                restart.moves = arrival.moves;
+            }
+        }
+    }
+    delays(plant).iter_mut().zip(restarts).for_each(|(delay, restart)| delay.restart(restart));
+}
+
+/// Stores delayed quantities over a part of a step, or returns false if a quartic through the values is not accurate enough.
+pub(crate) fn remember_delays<S: Scalar>(delays: &mut [Delay<S>], tolerance: &Tolerance, over: &Past<'_, S>) -> bool {
+    let quartic = |k: usize| over.values.each_ref().map(|values| values[k]);
+    let agrees = |(k, delay): (usize, &Delay<S>)| {
+        let (values, checks) = (quartic(k).map(Scalar::value), over.checks.each_ref().map(|values| values[k].value()));
+        let size = values.iter().chain(&checks).fold(0.0, |most: f64, value| most.max(value.abs()));
+        let off = Trace::deviation(values, checks);
+        let rough = over.roughness.get(k).copied().unwrap_or(0.0);
+        off.is_nan() || off <= allowed(tolerance, delay.size(), size) + rough
+    };
+    if !over.is_last && !delays.iter().enumerate().all(agrees) {
+        return false;
+    }
+    for (k, delay) in delays.iter_mut().enumerate() {
+        let values = quartic(k);
+        let size = values.iter().fold(delay.size(), |most, value| most.max(value.value().abs()));
+        delay.push(over.time, values, allowed(tolerance, size, size));
+    }
+    true
 }
