@@ -14,9 +14,14 @@ use studies::{run, value};
 
 /// Returns standard output and standard error of `mops check`.
 fn check(folder: &Path, text: &str) -> String {
+    printed("check", folder, text)
+}
+
+/// Returns standard output and standard error of a command on a study.
+fn printed(command: &str, folder: &Path, text: &str) -> String {
     let study = folder.join("study.toml");
     std::fs::write(&study, text).unwrap();
-    let output = cargo_bin_cmd!("mops").args(["check", study.to_str().unwrap()]).output().unwrap();
+    let output = cargo_bin_cmd!("mops").current_dir(folder).args([command, "study.toml"]).output().unwrap();
     let all = [&output.stdout[..], &output.stderr].concat();
     String::from_utf8(all).unwrap()
 }
@@ -512,4 +517,85 @@ fn a_window_ends_at_a_pause_of_the_record() {
     assert!((found_gain(folder, experiment) - 2.0).abs() < 1e-6);
     let short = check(folder, &gain(&experiment.replace("0.5 s", "0.05 s")));
     assert!(short.contains("less than two samples"), "{short}");
+}
+
+#[test]
+fn an_unstable_plant_in_closed_loop_is_calibrated_in_windows() {
+    // x'' = a x - d x' + b u, unstable, with u of a sampled controller held over 20 ms. The matrix exponential is a Taylor series.
+    let [a, d, b, step] = [9.0, 0.4, 4.0, 0.02];
+    let rate = |x: [f64; 2], u: f64| [x[1], a * x[0] - d * x[1] + b * u];
+    let next = |x: [f64; 2], u: f64| {
+        let mut term = rate(x, u);
+        let mut sum = [x[0] + step * term[0], x[1] + step * term[1]];
+        let mut factor = step;
+        for k in 2..20 {
+            term = rate(term, 0.0);
+            factor *= step / f64::from(k);
+            sum = [sum[0] + factor * term[0], sum[1] + factor * term[1]];
+        }
+        sum
+    };
+    let (mut x, mut seed) = ([0.1, 0.0], 1_u64);
+    let mut random = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        f64::from(u32::try_from(seed >> 33).unwrap()) / f64::from(1u32 << 31)
+    };
+    let mut text = "t [s],x [rad],u [V]\n".to_owned();
+    for k in 0..1000 {
+        let t = step * f64::from(k);
+        // Sum of twelve uniform numbers: nearly normal.
+        let noise = 0.002 * ((0..12).map(|_| random()).sum::<f64>() - 6.0);
+        let wanted = 0.1 * math::sin(0.9 * t).signum() + 0.05 * math::sin(5.0 * t);
+        let u = -6.0 * (x[0] - wanted) - 1.8 * x[1];
+        text += &format!("{t:.4},{:.6},{u:.8}\n", x[0] + noise);
+        x = next(x, u);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("run.csv"), text).unwrap();
+    let study = "
+        [study]
+        name = 'unstable'
+        task = 'calibration'
+        [models.plant.equations]
+        states = { x = 'rad', v = 'rad/s' }
+        inputs = { u = 'V' }
+        parameters = { a = '1/s2', d = '1/s', b = 'rad/(V s2)' }
+        der = { x = 'v', v = 'a*x - d*v + b*u' }
+        [tuners]
+        a = { start = 5, min = 1, max = 50 }
+        d = { start = 0.1, min = 0, max = 5 }
+        b = { start = 2, min = 0.5, max = 20 }
+        [experiments.run]
+        file = 'run.csv'
+        windows = '1 s'
+        free = ['x', 'v']
+        channels = { x = 'x' }
+        inputs = { u = 'u' }
+        [criteria]
+        fit = { normalised-error = { signal = 'x' } }
+        [sensors]
+        x = { noise = '0.002 rad' }";
+    let result = run(folder.path(), study);
+    let found = |name: &str| -> [f64; 2] {
+        let all = result["calibration"]["parameters"].as_array().unwrap();
+        let found = all.iter().find(|p| p["name"] == name).unwrap_or_else(|| panic!("{all:?}"));
+        ["value", "std_error"].map(|key| found[key].as_f64().unwrap_or_else(|| panic!("{found}")))
+    };
+    for (name, exact) in [("a", a), ("d", d), ("b", b)] {
+        let [value, error] = found(name);
+        assert!((value - exact).abs() < 3.5 * error && error < 0.1 * exact, "{name}: {value} +- {error}");
+    }
+    // What is said of every window is said once.
+    let shown = printed("run", folder.path(), study);
+    assert!(shown.contains("`u` of `run-*` looks smooth") && !shown.contains("`u` of `run-1`"), "{shown}");
+    assert_eq!(shown.matches("persistently exciting").count(), 2, "{shown}");
+    assert_eq!(shown.matches("Ljung-Box").count(), 1, "{shown}");
+}
+
+#[test]
+fn a_window_after_the_end_of_the_simulation_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = integrators(&[("a", " = 1")], 5.0).replace("usage = 'monitor' }", "usage = 'monitor', from = '7 s' }");
+    let message = check(folder.path(), &text);
+    assert!(message.contains("`from` at 7 s is not before the end of the simulation at 5 s in case `a`"), "{message}");
 }

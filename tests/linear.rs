@@ -415,3 +415,20 @@ fn an_equilibrium_is_found_from_a_start_without_a_slope() {
         assert!((x - expected).abs() < 1e-7 * expected.abs().max(0.01), "{der} {u}: {x}");
     }
 }
+
+#[test]
+fn a_parameter_without_a_value_may_be_set_by_the_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study.toml");
+    let text = "[study]\nname = 'x'\n[models.a.equations]\nstates = { x = '1' }\ninputs = { u = '1' }\n\
+                parameters = { T = 's' }\nder = { x = '(u - x)/T' }\nhorizon = '1 s'\n";
+    std::fs::write(&study, text).unwrap();
+    let linearise = |at: &[&str]| {
+        let arguments = [&["linearise", study.to_str().unwrap()], at].concat();
+        let output = cargo_bin_cmd!("mops").args(&arguments).output().unwrap();
+        String::from_utf8([output.stdout, output.stderr].concat()).unwrap()
+    };
+    let set = linearise(&["--at", "T=500 ms"]);
+    assert!(set.lines().any(|line| line.split_whitespace().collect::<Vec<_>>() == ["-2", "1", "2", "0.5"]), "{set}");
+    assert!(linearise(&[]).contains("the parameter `T` has no value"));
+}

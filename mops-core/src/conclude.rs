@@ -8,7 +8,7 @@ use crate::evaluation::Evaluation;
 use crate::experiment::{Channel, Role};
 use crate::failure::Failure;
 use crate::front;
-use crate::identification::{self, Local, Point, SensitivityReport};
+use crate::identification::{self, Local, Point, SensitivityReport, Whiteness};
 use crate::math;
 use crate::model::Analysis;
 use crate::outcome::{
@@ -255,11 +255,13 @@ fn experiments(problem: &Problem, best: &Evaluation, unknown: &[usize]) -> Vec<E
     reports
 }
 
-/// Returns one sentence per calibration channel on the whiteness of its residuals.
+/// Returns the findings on the whiteness of the residuals of the calibration channels, as sentences.
 fn whiteness_words(experiments: &[ExperimentReport]) -> Vec<String> {
     let fitted = experiments.iter().filter(|experiment| experiment.role == Role::Calibration);
     let channels = fitted.flat_map(|experiment| experiment.channels.iter().map(move |channel| (experiment, channel)));
-    channels.filter_map(|(e, c)| Some(c.whiteness?.words(&c.name, &e.name))).collect()
+    let found: Vec<(&str, &str, Whiteness)> =
+        channels.filter_map(|(e, c)| Some((c.name.as_str(), e.name.as_str(), c.whiteness?))).collect();
+    identification::whiteness_words(&found)
 }
 
 fn channel_report(channel: &Channel, unit: &str, analysis: Option<&Analysis>) -> ChannelReport {

@@ -118,7 +118,8 @@ fn excitation(file: &DataFile, name: &str, shown: &str) -> Result<String, Diagno
     };
     let unit = column.unit.unwrap_or("");
     let report = excitation_report(column.values, None, [shown, name, unit], step, None);
-    Ok(findings::excitation(&[report]))
+    let reports = [report];
+    Ok(findings::excitation(&reports, &findings::words_of(&reports)))
 }
 
 /// Largest deviation of a sample from the line through the next two that noise explains, in standard deviations of the noise: with

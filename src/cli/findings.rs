@@ -1,6 +1,6 @@
 //! Text of the findings of tasks and of the identifiability of a calibration, for the terminal.
 
-use mops_core::identification::{ExcitationReport, RegressionReport, SensitivityReport};
+use mops_core::identification::{ExcitationReport, RegressionReport, SensitivityReport, excitation_words};
 use mops_core::{Outcome, Pareto, SweepReport, TradeOffs};
 use serde_json::{Map, Value};
 
@@ -21,11 +21,11 @@ pub(super) fn text(outcome: &Outcome) -> String {
         text += &sensitivity(found);
     }
     if let Some(found) = &outcome.found.excitation {
-        text += &excitation(&found.inputs);
+        text += &excitation(&found.inputs, &words_of(&found.inputs));
         text += &found.regressions.iter().map(regression).collect::<String>();
     }
     if !inputs.is_empty() {
-        text += &excitation(inputs);
+        text += &excitation(inputs, &excitation_words(inputs));
     }
     if let Some(found) = &outcome.found.sweep {
         text += &sweep(found);
@@ -117,8 +117,13 @@ fn sensitivity(found: &SensitivityReport) -> String {
     text
 }
 
-/// Formats the excitation of inputs, one line and one sentence each.
-pub(super) fn excitation(inputs: &[ExcitationReport]) -> String {
+/// Returns the sentence on every input.
+pub(super) fn words_of(inputs: &[ExcitationReport]) -> Vec<String> {
+    inputs.iter().map(|input| input.words.clone()).collect()
+}
+
+/// Formats the excitation of inputs: a line for each, then sentences.
+pub(super) fn excitation(inputs: &[ExcitationReport], words: &[String]) -> String {
     let rows = inputs.iter().map(|input| {
         let least = if input.at_least { "at least " } else { "" };
         vec![
@@ -146,7 +151,6 @@ pub(super) fn excitation(inputs: &[ExcitationReport]) -> String {
         "samples",
         "sample time",
     ];
-    let words: Vec<String> = inputs.iter().map(|input| input.words.clone()).collect();
     let rows: Vec<Vec<String>> = rows.collect();
     // For a data file alone the number of parameters is unknown.
     let text = if inputs.iter().all(|input| input.parameters.is_none()) {
@@ -156,7 +160,7 @@ pub(super) fn excitation(inputs: &[ExcitationReport]) -> String {
     } else {
         table(&header, &[2, 3, 5, 6, 7, 8, 9], rows)
     };
-    format!("\n{text}\n{}", sentences(&words))
+    format!("\n{text}\n{}", sentences(words))
 }
 
 fn regression(found: &RegressionReport) -> String {

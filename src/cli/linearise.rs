@@ -181,7 +181,8 @@ fn chosen(study: &Study, arguments: &Arguments) -> Result<JobPlan, Diagnostic> {
         None => study.jobs().iter().find(|job| job.model == model).map_or(0, |job| job.case),
     };
     let diagnostic = |StudyError { message, help, .. }: StudyError| Diagnostic { help, ..Diagnostic::new(message) };
-    let parameters = study.parameter_sources(model, case).map_err(diagnostic)?;
+    let set: Vec<&str> = arguments.at.iter().filter_map(|text| text.split_once('=')).map(|at| at.0.trim()).collect();
+    let parameters = study.parameter_sources(model, case, &set).map_err(diagnostic)?;
     Ok(JobPlan { model, case, parameters, signals: Vec::new(), horizon: 0.0 })
 }
 

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 use mops_core::ExcitationFindings;
-use mops_core::identification::{ExcitationReport, RegressionReport};
+use mops_core::identification::{ExcitationReport, RegressionReport, excitation_words};
 
 use super::figures::{Figure, Group};
 use super::page::scrolling;
@@ -13,7 +13,8 @@ use crate::numbers::{number, percent, significant};
 /// Returns the findings of the task `excitation`.
 pub(super) fn section(found: &ExcitationFindings) -> Markup {
     html! {
-        (inputs(&found.inputs))
+        (sentences(found.inputs.iter().map(|input| &input.words)))
+        (table(&found.inputs))
         @if !found.regressions.is_empty() {
             h3 { "Regressions" }
             (sentences(found.regressions.iter().map(|r| &r.words)))
@@ -22,10 +23,16 @@ pub(super) fn section(found: &ExcitationFindings) -> Markup {
     }
 }
 
-/// Returns the findings on inputs: sentences and a table.
+/// Returns the findings on the inputs of a calibration: sentences and a table.
 pub(super) fn inputs(inputs: &[ExcitationReport]) -> Markup {
     html! {
-        (sentences(inputs.iter().map(|input| &input.words)))
+        (sentences(excitation_words(inputs).iter()))
+        (table(inputs))
+    }
+}
+
+fn table(inputs: &[ExcitationReport]) -> Markup {
+    html! {
         p {
             "An input that is persistently exciting of order n permits consistent estimates of n parameters of a linear model "
             "(impulse response, transfer function): the covariance matrix of n neighbouring samples is positive definite in the "

@@ -42,7 +42,28 @@ pub(super) fn read(name: &str, node: &Node<'_>, files: &dyn Files) -> Result<Vec
             found.push(experiment(own, node, &section, table, &opened)?);
         }
     }
+    share_warnings(&mut found, name);
     Ok(found)
+}
+
+/// Replaces warnings that differ only in the name of the experiment by one that names all, `NAME-*`.
+fn share_warnings(found: &mut [CaseBuilder], name: &str) {
+    let common = |case: &CaseBuilder, text: &str| text.replace(&format!("`{}`", case.name), &format!("`{name}-*`"));
+    let texts: Vec<Vec<String>> =
+        found.iter().map(|case| case.warnings.iter().map(|text| common(case, text)).collect()).collect();
+    let count = |text: &String| texts.iter().filter(|texts| texts.contains(text)).count();
+    let mut shown: Vec<&String> = Vec::new();
+    for (case, texts) in found.iter_mut().zip(&texts) {
+        let own = std::mem::take(&mut case.warnings);
+        for (warning, text) in own.into_iter().zip(texts) {
+            if count(text) == 1 {
+                case.warnings.push(warning);
+            } else if !shown.contains(&text) {
+                case.warnings.push(text.clone());
+                shown.push(text);
+            }
+        }
+    }
 }
 
 /// Returns names and data files of the experiments of a table.

@@ -3,7 +3,7 @@
 use super::excitation;
 use super::local::start_parameters;
 use super::report::ExcitationReport;
-use super::words::{counted, percent};
+use super::words::{MANY, counted, distinct, percent};
 use crate::case::Case;
 use crate::input::Input;
 use crate::study::{ExcitationQuestion, Study};
@@ -28,6 +28,26 @@ pub fn excitations(study: &Study, question: &ExcitationQuestion) -> Vec<Excitati
         }
     }
     reports
+}
+
+/// Returns the findings on inputs as sentences: one for each case, or for an input of many cases, that of the least excited case
+/// and the orders of the others.
+pub fn excitation_words(reports: &[ExcitationReport]) -> Vec<String> {
+    let mut sentences = Vec::new();
+    for input in distinct(reports.iter().map(|report| report.input.as_str())) {
+        let own: Vec<&ExcitationReport> = reports.iter().filter(|report| report.input == input).collect();
+        let worst = (0..own.len()).min_by_key(|&i| own[i].order).unwrap_or(0);
+        if own.len() <= MANY {
+            sentences.extend(own.iter().map(|report| report.words.clone()));
+            continue;
+        }
+        sentences.push(own[worst].words.clone());
+        let orders = || own.iter().enumerate().filter(|(i, _)| *i != worst).map(|(_, report)| report.order);
+        let (low, high) = (orders().min().unwrap_or(0), orders().max().unwrap_or(0));
+        let orders = if low == high { format!("order {low}") } else { format!("orders from {low} to {high}") };
+        sentences.push(format!("`{input}` in the other {} cases is persistently exciting of {orders}.", own.len() - 1));
+    }
+    sentences
 }
 
 /// Returns the report on one signal.

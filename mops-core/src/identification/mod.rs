@@ -24,7 +24,7 @@ mod words;
 pub use blind::{BlindDirection, Limit};
 pub use covariance::Covariance;
 pub use excitation::{Excitation, excitation};
-pub use excited::{excitation_report, excitations, spacing};
+pub use excited::{excitation_report, excitation_words, excitations, spacing};
 pub use fitted::regressions;
 pub(crate) use insight::report as report_of;
 pub use insight::sensitivity_at;
@@ -38,4 +38,4 @@ pub use report::{
     DirectionReport, ExcitationReport, RegressionReport, RelativeReport, SensitivityReport, TunerSensitivity,
 };
 pub use sensitivity::{Coordinate, DIFFERENCES, Sensitivity, TANGENTS};
-pub use whiteness::{Whiteness, whiteness};
+pub use whiteness::{Whiteness, whiteness, whiteness_words};

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::pools::{self, Fitted, Pool, SHOWN, Sharing, Weighted};
 use super::records::Record;
 use super::whiteness::whiteness;
-use super::words::coefficient;
+use super::words::{MANY, coefficient, distinct};
 use crate::math;
 use crate::study::Study;
 
@@ -203,8 +203,28 @@ impl Noise {
 
     /// Returns remarks on the noise of records, a sentence each.
     pub(super) fn remarks(&self, study: &Study) -> Vec<String> {
+        let disputed = || self.sources.iter().filter(|source| source.disputed);
+        let signals = disputed().filter_map(|source| source.record.signal.as_deref());
+        let of = |signal: &str| -> Vec<&Source> {
+            disputed().filter(|source| source.record.signal.as_deref() == Some(signal)).collect()
+        };
+        let often: Vec<&str> = distinct(signals).into_iter().filter(|signal| of(signal).len() > MANY).collect();
+        let summary = |signal: &&str| {
+            let shown: Vec<f64> = of(signal).into_iter().map(|source| self.deviation(source)).collect();
+            let [low, high] = [shown.iter().copied().reduce(f64::min), shown.iter().copied().reduce(f64::max)]
+                .map(|level| coefficient(level.unwrap_or(f64::NAN)));
+            format!(
+                "The residuals of `{signal}` in {} experiments show noise levels from {low} to {high}, not as declared: the standard \
+                 errors are based on the residuals.",
+                shown.len()
+            )
+        };
         let remark = |source: &Source| {
-            let place = format!("`{}` in `{}`", source.record.signal.as_ref()?, study.cases[source.record.case].name);
+            let signal = source.record.signal.as_deref()?;
+            let place = format!("`{signal}` in `{}`", study.cases[source.record.case].name);
+            if source.disputed && often.contains(&signal) {
+                return None;
+            }
             if source.disputed {
                 let [shown, declared] = [self.deviation(source), source.record.noise?].map(coefficient);
                 return Some(format!(
@@ -216,7 +236,7 @@ impl Noise {
                 format!("The residuals of {place} are white, but their variance changes: the standard errors allow for this.")
             })
         };
-        self.sources.iter().filter_map(remark).collect()
+        often.iter().map(summary).chain(self.sources.iter().filter_map(remark)).collect()
     }
 
     /// Returns the change and standard error of the estimate of every tuner, in its unit, with samples weighted by

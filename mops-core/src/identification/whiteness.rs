@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::words::{coefficient, percent};
+use super::words::{MANY, coefficient, distinct, percent};
 use crate::math;
 
 /// Probability below which residuals do not count as white.
@@ -65,29 +65,60 @@ impl Whiteness {
         self.probability >= UNLIKELY
     }
 
-    /// Returns the finding on a channel of an experiment as a sentence.
-    pub fn words(&self, channel: &str, experiment: &str) -> String {
+    /// Returns the statistics in words.
+    fn numbers(&self) -> String {
         let chance = match self.probability {
             p if p < 1e-4 => "< 0.01 %".to_owned(),
             p => format!("= {}", percent(p)),
         };
-        let numbers = format!(
+        format!(
             "lag-1 autocorrelation {}, Ljung-Box {} over {} lags, p {chance}",
             coefficient(self.lag1),
             coefficient(self.ljung_box),
             self.lags
-        );
-        let place = format!("The residuals of `{channel}` in `{experiment}`");
-        if self.is_white() {
-            format!("{place} are consistent with white noise ({numbers}), as the standard errors assume.")
-        } else {
-            format!(
-                "{place} are not white ({numbers}). The standard errors allow for the correlation of neighbours, but \
+        )
+    }
+}
+
+/// Returns the finding on residuals, with the beginning of the sentence and numbers.
+fn finding(place: &str, is_white: bool, numbers: &str) -> String {
+    if is_white {
+        format!("{place} are consistent with white noise{numbers}, as the standard errors assume.")
+    } else {
+        format!(
+            "{place} are not white{numbers}. The standard errors allow for the correlation of neighbours, but \
                  intervals still cover the truth less often than stated: look for an effect that the model lacks, a \
                  delay, or an input with the wrong `hold`."
-            )
-        }
+        )
     }
+}
+
+/// Returns the findings on channels of experiments, each with the names of both, as sentences: one for each, or if a channel is in
+/// many experiments, one for all of these.
+pub fn whiteness_words(found: &[(&str, &str, Whiteness)]) -> Vec<String> {
+    let mut sentences = Vec::new();
+    for channel in distinct(found.iter().map(|(channel, ..)| *channel)) {
+        let own: Vec<&(&str, &str, Whiteness)> = found.iter().filter(|(name, ..)| *name == channel).collect();
+        if own.len() <= MANY {
+            sentences.extend(own.iter().map(|(_, experiment, found)| {
+                let place = format!("The residuals of `{channel}` in `{experiment}`");
+                finding(&place, found.is_white(), &format!(" ({})", found.numbers()))
+            }));
+            continue;
+        }
+        let Some((_, experiment, worst)) = own.iter().min_by(|a, b| a.2.probability.total_cmp(&b.2.probability)) else {
+            continue;
+        };
+        // Bonferroni's correction: of many white records, one fails a single test.
+        #[allow(clippy::cast_precision_loss)]
+        let level = UNLIKELY / own.len() as f64;
+        let coloured = own.iter().filter(|(.., found)| found.probability < level).count();
+        let count = if coloured == 0 { "all" } else { &format!("{coloured} of the") };
+        let place = format!("The residuals of `{channel}` in {count} {} experiments", own.len());
+        let numbers = format!(" (at most in `{experiment}`: {})", worst.numbers());
+        sentences.push(finding(&place, coloured == 0, &numbers));
+    }
+    sentences
 }
 
 #[cfg(test)]
@@ -120,7 +151,25 @@ mod tests {
         let slow: Vec<f64> = (0..60).map(|i| math::sin(0.2 * f64::from(i))).collect();
         let slow = whiteness(&slow).unwrap();
         assert!(slow.lag1 > 0.9 && !slow.is_white());
-        assert!(slow.words("y", "swing").contains("not white"));
+        let words = whiteness_words(&[("y", "swing", slow), ("y", "rest", white)]);
+        assert!(words[0].starts_with("The residuals of `y` in `swing` are not white (lag-1"), "{words:?}");
+        assert!(
+            words[1].starts_with("The residuals of `y` in `rest` are consistent with white noise (lag-1"),
+            "{words:?}"
+        );
+        // Many experiments have one sentence.
+        let names: Vec<String> = (0..6).map(|i| format!("e-{i}")).collect();
+        let many: Vec<(&str, &str, Whiteness)> =
+            names.iter().map(|name| ("y", name.as_str(), if name == "e-4" { slow } else { white })).collect();
+        let words = whiteness_words(&many);
+        assert_eq!(words.len(), 1);
+        assert!(
+            words[0]
+                .starts_with("The residuals of `y` in 1 of the 6 experiments are not white (at most in `e-4`: lag-1"),
+            "{words:?}"
+        );
+        let words = whiteness_words(&many[..4].iter().chain(&many[5..]).copied().collect::<Vec<_>>());
+        assert!(words[0].starts_with("The residuals of `y` in all 5 experiments are consistent"), "{words:?}");
     }
 
     #[test]

@@ -2,6 +2,19 @@
 
 use crate::math;
 
+/// Largest number of findings of one kind, on different cases, with a sentence each; more of them have one in common.
+pub(super) const MANY: usize = 4;
+
+/// Returns names without repetitions, in the order of their first occurrence.
+pub(super) fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    names.fold(Vec::new(), |mut known, name| {
+        if !known.contains(&name) {
+            known.push(name);
+        }
+        known
+    })
+}
+
 /// Formats a number with three significant digits: `0.0150`, `4.00`, `1230`, `3.20e-7`.
 pub(super) fn coefficient(value: f64) -> String {
     digits(value, 3)

@@ -33,7 +33,8 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -
     let reads = if draft.criterion.reads_any() { interface.analysis } else { draft.criterion.reads() };
     check_sort(reads, interface.analysis, &study.models, model)?;
     let others = others(study, model, draft.criterion.as_ref());
-    let criterion = match window(&draft, reads)? {
+    let window = window(&draft, reads)?;
+    let criterion = match window {
         Some(window) => draft.criterion.bind_within(interface, &others, window)?,
         None => draft.criterion.bind_with(interface, &others)?,
     };
@@ -65,6 +66,15 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -
     for case in cases {
         criterion.suits(&study.cases[case])?;
         let job = job(study, model, case, &criterion.signals())?;
+        let interface = study.models[model].1.interface();
+        let end = study.cases[case].horizon.or(interface.horizon).unwrap_or(f64::INFINITY);
+        if let Some([from, _]) = window.filter(|[from, _]| *from >= end) {
+            let case = &study.cases[case].name;
+            let fact =
+                format!("`from` at {from} s is not before the end of the simulation at {end} s in case `{case}`");
+            let help = "give an earlier time, a longer `horizon`, or the cases for which it applies in `cases`";
+            return Err(StudyError::new("from", fact).with_help(help));
+        }
         study.rows.push(Row {
             name: name.to_owned(),
             job,

@@ -34,12 +34,18 @@ impl Study {
         Ok(JobPlan { model, case, parameters, signals, horizon })
     }
 
-    /// Returns the sources of the parameters of a model in a case.
+    /// Returns the sources of the parameters of a model in a case. The caller sets the parameters `set` itself, so that they need
+    /// none.
     ///
     /// # Errors
     /// Returns an error if a parameter has no value in the case.
-    pub fn parameter_sources(&self, model: usize, case: usize) -> Result<Vec<ParameterSource>, StudyError> {
-        sources(self, self.models[model].1.interface(), &self.fixed[model], case)
+    pub fn parameter_sources(
+        &self,
+        model: usize,
+        case: usize,
+        set: &[&str],
+    ) -> Result<Vec<ParameterSource>, StudyError> {
+        sources(self, self.models[model].1.interface(), &self.fixed[model], case, set)
     }
 }
 
@@ -54,7 +60,7 @@ pub(super) fn complete(study: &Study, model: usize, case: usize) -> Result<(f64,
             return Err(StudyError::here(fact).with_help("set `horizon` in the case or in the model"));
         }
     };
-    Ok((horizon, study.parameter_sources(model, case)?))
+    Ok((horizon, study.parameter_sources(model, case, &[])?))
 }
 
 /// Returns the error for a parameter with incompatible units in two models.
@@ -64,12 +70,13 @@ fn apart(name: &str, unit: &Unit, other: &Unit) -> StudyError {
 }
 
 /// Returns the source of each parameter. The first existing one is used: a tuner of the case, a value in the case, a tuner
-/// of the study, the table of the model, the default.
+/// of the study, the table of the model, the default. Parameters in `set` without a source are NaN.
 fn sources(
     study: &Study,
     interface: &Interface,
     fixed: &[(String, f64)],
     case: usize,
+    set: &[&str],
 ) -> Result<Vec<ParameterSource>, StudyError> {
     let find = |list: &[(String, f64)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
     interface
@@ -99,7 +106,8 @@ fn sources(
             if let Some(tuner) = tuner(None) {
                 return by(tuner);
             }
-            find(fixed, name).or(p.default).map(ParameterSource::Constant).ok_or_else(|| {
+            let later = set.contains(&name.as_str()).then_some(f64::NAN);
+            find(fixed, name).or(p.default).or(later).map(ParameterSource::Constant).ok_or_else(|| {
                 StudyError::here(format!("the parameter `{name}` has no value in case `{}`", study.cases[case].name))
                     .with_help(format!("make `{name}` a tuner, or set it in the case or in `parameters` of the model"))
             })
