@@ -5,7 +5,8 @@ mod entries;
 #[cfg(test)]
 mod tests;
 
-use toml::de::DeTable;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 use entries::{Entry, Form, entries};
 
@@ -84,8 +85,11 @@ pub(crate) fn settled(text: &str, settings: &[String], locate: &dyn Fn(&str) -> 
             text.set(&path.iter().map(String::as_str).collect::<Vec<_>>(), &value);
         }
     }
-    for (path, _) in text.values() {
+    for (path, value) in text.values() {
         let path: Vec<&str> = path.iter().map(String::as_str).collect();
+        if let (["cases", _, "inputs", _], Some(moved)) = (&path[..], files_of_sum(&value, locate)) {
+            text.set(&path, &moved);
+        }
         let is_data = match path[..] {
             ["experiments", _, key] => key == "file" || key == "files",
             ["experiments", _, "channels" | "inputs", _, "file"] => true,
@@ -98,6 +102,22 @@ pub(crate) fn settled(text: &str, settings: &[String], locate: &dyn Fn(&str) -> 
         }
     }
     text
+}
+
+/// Returns an input that is a list of signals, with the converted paths of their data files; `None` for other values.
+fn files_of_sum(value: &str, locate: &dyn Fn(&str) -> String) -> Option<String> {
+    let mut text = format!("v = {value}");
+    let table = DeTable::parse(&text).ok()?;
+    let list = table.get_ref().get("v")?.get_ref().as_array()?;
+    let path = |part: &Spanned<DeValue<'_>>| {
+        let path = part.get_ref().get("file")?.get_ref().get("path")?;
+        Some((path.span(), path.get_ref().as_str()?.to_owned()))
+    };
+    let found: Vec<_> = list.iter().filter_map(path).collect();
+    for (span, file) in found.into_iter().rev() {
+        text.replace_range(span, &quoted(&locate(&file)));
+    }
+    Some(text.split_off("v = ".len()))
 }
 
 fn owned(path: &[&str]) -> Vec<String> {

@@ -99,6 +99,16 @@ fn keys_and_texts_are_quoted_where_they_must_be() {
     assert_eq!(text.keys(&["tuners"]), ["b", "bp", "d"]);
 }
 
+#[test]
+fn paths_of_data_files_are_converted_wherever_they_are() {
+    let text = "[cases.a]\ninputs.u = [{ constant = 2 }, { file = { path = \"u.csv\", column = \"v\" } }]  # a sum\n\
+                inputs.w.file = { path = 'w.csv', column = \"file\" }\n\
+                [experiments.e]\nfile = \"e.csv\"\ninputs.z = [1, 2]\n";
+    let moved = settled(text, &[], &|path| format!("../{path}")).into_text();
+    let expected = text.replace("u.csv", "../u.csv").replace("'w.csv'", "\"../w.csv\"").replace("e.csv", "../e.csv");
+    assert_eq!(moved, expected);
+}
+
 /// Generates a document or a setting: numbers and tables under a few keys.
 fn tables() -> impl Strategy<Value = Value> {
     let number = (0i64..100).prop_map(Value::Integer);
