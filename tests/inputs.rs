@@ -585,7 +585,7 @@ fn an_unstable_plant_in_closed_loop_is_calibrated_in_windows() {
         let [value, error] = found(name);
         assert!((value - exact).abs() < 3.5 * error && error < 0.1 * exact, "{name}: {value} +- {error}");
     }
-    // What is said of every window is said once.
+    // A finding common to all windows is reported once.
     let shown = printed("run", folder.path(), study);
     assert!(shown.contains("`u` of `run-*` looks smooth") && !shown.contains("`u` of `run-1`"), "{shown}");
     assert_eq!(shown.matches("persistently exciting").count(), 2, "{shown}");

@@ -107,6 +107,41 @@ fn the_loop_of_a_pid_controller_is_cut_at_its_output() {
 }
 
 #[test]
+fn a_limited_controller_of_equations_is_cut_within_its_limits() {
+    // P = sat(k (r - T) + k/Ti integral) in front of C T' = P - G (T - Tu): L = k (1 + 1/(Ti s))/(C s + G), by hand.
+    let text = "[study]\nname = 'oven'
+        [models.loop.equations]
+        states = { T = 'degC' }
+        inputs = { P = 'kW', r = 'degC' }
+        constants = { C = '20 kJ/K', G = '0.5 kW/K', Tu = '15 degC' }
+        der = { T = \"C*T' = P - G*(T - Tu)\" }
+        start = { T = '15 degC' }
+        horizon = '200 s'
+        pid.P = { setpoint = 'r', measured = 'T', k = '2 kW/K', Ti = '8 s', limit = [0, 60] }
+        [models.cut]
+        like = 'loop'
+        open = 'P'
+        [models.before-the-limit]
+        like = 'loop'
+        open = 'P_unlimited'
+        [models.by-hand]
+        transfer-function = { numerator = [16e3, 2e3], denominator = [160e3, 4e3, 0] }
+        [cases.a]
+        inputs.r = '60 degC'
+        [criteria]
+        unlimited = { model = 'before-the-limit', phase-margin = {}, usage = 'monitor' }\n";
+    let folder = tempfile::tempdir().unwrap();
+    let margins =
+        |name: &str| criteria(name).lines().filter(|line| !line.contains("gain-margin")).collect::<Vec<_>>().join("\n");
+    let result = run(folder.path(), &[text, &margins("cut"), "\n", &margins("by-hand")].concat());
+    for kind in ["phase-margin", "maximum-sensitivity", "crossover-frequency", "delay-margin"] {
+        let [cut, by_hand] = ["cut", "by-hand"].map(|name| value(&result, "a", &format!("{name}-{kind}")));
+        assert!((cut - by_hand).abs() <= 1e-8 * by_hand.abs(), "{kind}: {cut} {by_hand}");
+    }
+    assert!((value(&result, "a", "unlimited") - value(&result, "a", "by-hand-phase-margin")).abs() < 1e-8, "{result}");
+}
+
+#[test]
 fn the_closed_loop_of_a_cut_state_feedback_has_the_poles_that_were_placed() {
     // The gains of pole-placement-retuning place -5, -8, -10 and -14, for the linear plant; the filter of the reference has -20.
     let text = "[study]\nname = 'upright'
@@ -173,7 +208,7 @@ fn of_several_cut_loops_one_is_read_with_the_others_closed_and_all_have_a_disk_m
     let twice = wrong("open = ['u1', 'u2']", "open = ['u1', 'u1']");
     assert!(twice.contains("`u1` is listed twice"), "{twice}");
     let other = wrong("disk-margin = { input = 'u1' }", "disk-margin = { input = 'u1', output = '-u2' }");
-    assert!(other.contains("the loop that is cut at `u1` does not end in `-u2`"), "{other}");
+    assert!(other.contains("the output of the loop cut at `u1` is `-u1`, not `-u2`"), "{other}");
     let none = wrong("disk-margin = {}", "phase-margin = {}");
     assert!(none.contains("the model has 2 inputs") && none.contains("u1, u2"), "{none}");
 }
@@ -376,18 +411,41 @@ fn signals_of_joined_models_are_compared_in_one_formula() {
     let [power, most] = ["power", "most"].map(|name| value(&result, "step", name));
     assert!((power - 1.0 / 6.0).abs() < 1e-8 && (most - 0.25).abs() < 1e-8, "{power} {most}");
 
+    // A default of one model does not give way to a value of the other.
+    let loops = "[study]\nname = 'two'
+        [models.loop]
+        pid-loop = { plant = { poles = [-1, -2], gain = 2 }, horizon = '9 s' }
+        parameters = { k = 1, Ti = '1 s', Td = 0, wp = 0.5 }
+        [models.reference-loop]
+        like = 'loop'
+        parameters = { wp = 1 }
+        [models.both]
+        join = ['loop', 'reference-loop']
+        [criteria]
+        off = { model = 'both', expression = { value = 'rms(loop_y - reference_loop_y)' }, usage = 'monitor' }";
+    let message = refused(loops);
+    assert!(message.contains("`wp` has different values in the models that are joined"), "{message}");
+    let message = refused(&loops.replace("parameters = { wp = 1 }", "parameters = { wp = '100 %' }"));
+    assert!(message.contains("`wp` has different values"), "{message}");
+    let same = run(folder.path(), &loops.replace("parameters = { wp = 1 }", "parameters = { wp = '50 %' }"));
+    assert!(value(&same, "nominal", "off").abs() < 1e-15);
+
     for (from, to, fact) in [
         ("['fast', 'slow']", "['fast', 'slowly']", "the study has no other model `slowly`"),
         ("['fast', 'slow']", "['fast', 'both']", "the study has no other model `both`"),
         ("['fast', 'slow']", "['fast', 'fast']", "`fast` is joined twice"),
-        ("['fast', 'slow']", "['fast']", "fewer than two models are joined"),
+        ("['fast', 'slow']", "['fast']", "expected at least two models in `join`, found 1"),
         ("join = ", "open = 'u'\njoin = ", "no keys but `join` and `parameters`"),
         (
             "units = { T2 = 's' }, horizon = '60 s' }",
             "units = { T2 = 's' } }",
             "`slow` is a linear system without simulation",
         ),
-        ("units = { T2 = 's' }", "units = { T2 = 's', g = 'V' }", "`g` is in 1 in one model and in V in another"),
+        (
+            "units = { T2 = 's' }",
+            "units = { T2 = 's', g = 'V' }",
+            "`g` has the unit `1` in one model and `V` in another",
+        ),
         (
             "[models.both]",
             "parameters = { T2 = '1 s', g = 1 }\n[models.third]\nlike = 'slow'\nparameters.g = 2\n[models.both]",

@@ -64,7 +64,7 @@ impl<G: LinearSystem + Send + Sync> PlantModel for InTime<G> {
         let matrices = self.of.matrices(parameters)?;
         let Some(delay) = matrices.delay else { return Ok(Delayed { matrices, inputs: Vec::new() }) };
         if !(delay.value() > 0.0 && delay.value().is_finite()) {
-            let fact = format!("a simulation needs a delay above 0 s, and that of the system is {} s", delay.value());
+            let fact = format!("expected a delay above 0 s for a simulation, found {} s", delay.value());
             return Err(Failure::Undefined(fact));
         }
         let inputs = self.interface.inputs.iter().map(|_| Delay::new(delay, S::from(0.0))).collect();

@@ -236,7 +236,7 @@ fn invalid_systems_are_an_error_with_a_remedy() {
 
 #[test]
 fn a_delayed_system_over_time_is_its_closed_form_later_and_so_are_its_tangents() {
-    // 3 exp(-T s)/(2 s + 1), a step from 0.5 to 2 at 1 s: from rest, 0.5 acts from T on.
+    // 3 exp(-T s)/(2 s + 1), a step from 0 to 1.5 at 1 s.
     let late = model::<TransferFunctionOptions>(
         "numerator = [3]\ndenominator = [2, 1]\ndelay = 'T'\nunits = { T = 's' }\nhorizon = '9 s'",
     );

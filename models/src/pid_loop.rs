@@ -36,8 +36,8 @@ use crate::rational::{PlantOptions, TransferFunction};
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PidLoopOptions {
     /// Plant: `{ poles = [...], zeros = [...], gain = 1.0 }`, or `{ numerator = [...], denominator = [...] }` with
-    /// coefficients of descending powers of s, or `{ a = [[...], ...], b = [...], c = [...] }` with the matrices of a state
-    /// space. A name instead of a number becomes a parameter. For a plant of the kind `equations`, see its key `pid`.
+    /// coefficients of descending powers of s, or `{ a = [[...], ...], b = [...], c = [...] }` with state-space
+    /// matrices. A name instead of a number becomes a parameter. For a plant of the kind `equations`, see its key `pid`.
     plant: PlantOptions,
     /// End of the simulation.
     horizon: Quantity,
@@ -187,7 +187,7 @@ struct PidLoop {
     load: Option<Input>,
     limit: Option<[f64; 2]>,
     sampling: Option<Sampling>,
-    /// True if an input acts in the place of the controller's output.
+    /// True if an input replaces the limited output of the actuator.
     is_cut: bool,
     tolerance: Tolerance,
 }
@@ -371,7 +371,7 @@ struct Loop<S> {
     /// Active limit: -1 for the lower, 1 for the upper, 0 for none.
     saturated: f64,
     sampled: Option<Sampled<S>>,
-    /// True if the last input acts in the place of the actuator's output.
+    /// True if the last input replaces the limited output of the actuator.
     is_cut: bool,
 }
 
@@ -525,7 +525,7 @@ impl<S: Scalar> Plant<S> for Loop<S> {
         };
     }
 
-    /// Linearises within the limits of the actuator.
+    /// Linearises within the limits of the actuator: the default would enter the saturated mode.
     fn linearised_at(&mut self, _: &Instant<'_, S>, _: bool) -> Result<Vec<usize>, Failure> {
         Ok(Vec::new())
     }

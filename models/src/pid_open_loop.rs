@@ -28,8 +28,8 @@ use crate::rational::{PlantOptions, TransferFunction};
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PidOpenLoopOptions {
     /// Plant, as in `pid-loop`: `{ poles = [...], zeros = [...], gain = 1.0 }`, or
-    /// `{ numerator = [...], denominator = [...] }` with coefficients of descending powers of s. A name instead of a
-    /// number becomes a parameter.
+    /// `{ numerator = [...], denominator = [...] }` with coefficients of descending powers of s, or
+    /// `{ a = [[...], ...], b = [...], c = [...] }` with state-space matrices. A name instead of a number becomes a parameter.
     plant: PlantOptions,
 }
 

@@ -5,7 +5,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
 
-/// Transfer function, given by poles and zeros, by coefficients, or by the matrices of a state space.
+/// Transfer function, given by poles and zeros, by coefficients, or by state-space matrices.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub(crate) struct PlantOptions {
@@ -105,11 +105,12 @@ impl TransferFunction {
         let mut slots = |key: &str, list: &[Coefficient]| -> Result<Vec<Slot>, StudyError> {
             list.iter().map(|c| slot(c, taken, names).map_err(|m| m.within(key))).collect()
         };
+        let others = [&plant.poles, &plant.numerator, &plant.denominator];
+        let is_function = others.iter().any(|other| other.is_some()) || plant.gain.is_some() || !plant.zeros.is_empty();
+        if is_function && (plant.a.is_some() || plant.b.is_some() || plant.c.is_some()) {
+            return Err(StudyError::here("a plant is given by matrices or by its transfer function, not by both"));
+        }
         if let (Some(a), Some(b), Some(c)) = (&plant.a, &plant.b, &plant.c) {
-            let others = [&plant.poles, &plant.numerator, &plant.denominator];
-            if others.iter().any(|other| other.is_some()) || plant.gain.is_some() || !plant.zeros.is_empty() {
-                return Err(StudyError::here("a plant is given by matrices or by its transfer function, not by both"));
-            }
             let n = a.len();
             if n == 0 || a.iter().any(|row| row.len() != n) || b.len() != n || c.len() != n {
                 let fact = "expected a square matrix `a`, and as many entries in `b` and `c`";
@@ -202,6 +203,11 @@ impl TransferFunction {
 fn slot(coefficient: &Coefficient, taken: &[&str], names: &mut Vec<String>) -> Result<Slot, StudyError> {
     match coefficient {
         Coefficient::Number(number) => Ok(Slot::Number(*number)),
+        Coefficient::Name(name) if !is_name(name) => {
+            let help = "an expression is possible in `transfer-function`, `state-space` and `equations` (with `pid`)";
+            Err(StudyError::here(format!("expected a number or the name of a parameter, found `{name}`"))
+                .with_help(help))
+        }
         Coefficient::Name(name) if taken.contains(&name.as_str()) => {
             Err(StudyError::here(format!("`{name}` is a parameter of the controller"))
                 .with_help("give the plant's parameter another name"))
@@ -211,6 +217,12 @@ fn slot(coefficient: &Coefficient, taken: &[&str], names: &mut Vec<String>) -> R
             names.len() - 1
         }))),
     }
+}
+
+/// Returns true if a text can be the name of a parameter.
+fn is_name(text: &str) -> bool {
+    let mut letters = text.chars();
+    letters.next().is_some_and(|c| c.is_alphabetic() || c == '_') && letters.all(|c| c.is_alphanumeric() || c == '_')
 }
 
 /// Returns numerator and denominator, in ascending powers, of `c (s - A)^-1 b`, by the method of Leverrier and Faddeev: the

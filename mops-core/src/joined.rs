@@ -3,18 +3,21 @@
 use std::sync::Arc;
 
 use crate::failure::Failure;
-use crate::model::{Analysis, AnalysisKind, Interface, Job, Model, Parameter, Response, Variable, WithTangents, Work};
+use crate::model::{
+    Analysis, AnalysisKind, Event, Interface, Job, Model, Parameter, Response, Variable, WithTangents, Work,
+};
 use crate::study_error::StudyError;
 
-/// Models that are simulated side by side. The signal `y` of the model `loop` is `loop_y`. Parameters, inputs and initial values of
-/// the same name are one.
+/// Models that are simulated side by side. The signal `y` of the model `loop` is `loop_y`; characters that cannot be part of a name
+/// in a formula become `_`. Parameters and initial values of the same name are one, and so are inputs that the case gives.
 pub struct Joined {
     parts: Vec<Part>,
     interface: Interface,
 }
 
 struct Part {
-    name: String,
+    /// Beginning of the names of its signals.
+    prefix: String,
     model: Arc<dyn Model>,
     /// Index in the joined model, for each parameter of this one.
     parameters: Vec<usize>,
@@ -30,18 +33,20 @@ impl Joined {
     /// the same name has different units.
     pub fn new(models: Vec<(String, Box<dyn Model>)>) -> Result<Self, StudyError> {
         if models.len() < 2 {
-            return Err(StudyError::here("fewer than two models are joined").with_help("list at least two models"));
+            let fact = format!("expected at least two models in `join`, found {}", models.len());
+            return Err(StudyError::here(fact).with_help("add another model"));
         }
         let mut interface = Interface::default();
         let mut parts = Vec::new();
         for (name, model) in models {
             let of = model.interface();
+            let prefix = prefix(&name);
             if of.analysis == AnalysisKind::Linear {
                 let fact = format!("`{name}` is a linear system without simulation");
                 return Err(StudyError::here(fact).with_help("give it a `horizon`, or leave it out"));
             }
             let first = interface.signals.len();
-            let own = |signal: &Variable| Variable { name: format!("{name}_{}", signal.name), ..signal.clone() };
+            let own = |signal: &Variable| Variable { name: format!("{prefix}{}", signal.name), ..signal.clone() };
             interface.signals.extend(of.signals.iter().map(own));
             for input in &of.inputs {
                 match interface.inputs.iter().find(|known| known.name == input.name) {
@@ -55,7 +60,7 @@ impl Joined {
                 parameters.push(shared(&mut interface.parameters, parameter)?);
             }
             interface.horizon = interface.horizon.into_iter().chain(of.horizon).reduce(f64::max);
-            parts.push(Part { name, model: model.into(), parameters, first });
+            parts.push(Part { prefix, model: model.into(), parameters, first });
         }
         Ok(Self { parts, interface })
     }
@@ -86,6 +91,11 @@ impl Joined {
     }
 }
 
+/// Returns the beginning of the names of the signals of a model.
+fn prefix(model: &str) -> String {
+    model.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).chain(['_']).collect()
+}
+
 /// Returns the index of a parameter among those known so far, to which it is added if it is new.
 fn shared(known: &mut Vec<Parameter>, new: &Parameter) -> Result<usize, StudyError> {
     let Some(index) = known.iter().position(|known| known.variable.name == new.variable.name) else {
@@ -104,7 +114,7 @@ fn shared(known: &mut Vec<Parameter>, new: &Parameter) -> Result<usize, StudyErr
 }
 
 fn in_two_units(one: &Variable, other: &Variable) -> StudyError {
-    let fact = format!("`{}` is in {} in one model and in {} in another", one.name, one.unit, other.unit);
+    let fact = format!("`{}` has the unit `{}` in one model and `{}` in another", one.name, one.unit, other.unit);
     StudyError::here(fact).with_help("rename it in one of them, or give it one unit")
 }
 
@@ -113,9 +123,9 @@ fn merged(parts: Vec<(&Part, Analysis)>) -> Analysis {
     let mut all = Response::default();
     for (part, analysis) in parts {
         let Analysis::Time(response) = analysis else { unreachable!("checked when the models were joined") };
-        let name = |signal: String| format!("{}_{signal}", part.name);
+        let name = |text: String| format!("{}{text}", part.prefix);
         all.traces.extend(response.traces.into_iter().map(|(signal, trace)| (name(signal), trace)));
-        all.events.extend(response.events);
+        all.events.extend(response.events.into_iter().map(|event| Event { what: name(event.what), ..event }));
         let Work { steps, rejected, derivatives, rough } = response.work;
         all.work = Work {
             steps: all.work.steps + steps,

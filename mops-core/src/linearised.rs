@@ -124,7 +124,7 @@ impl Linearised {
     /// wrong unit.
     pub fn new(model: Arc<dyn Model>, options: &Linearise) -> Result<Self, StudyError> {
         if let Some(why) = model.not_linear() {
-            let help = "replace the sampled quantity by an input, in a model that is `like` this one";
+            let help = "linearise a model without the sampling, or with an input in the place of the sampled quantity";
             return Err(StudyError::here(why).with_help(help));
         }
         let states = model.equation_states();
@@ -213,7 +213,7 @@ impl Linearised {
             return Err(StudyError::new(key.0, fact).with_help("remove it, or `open`").within("linearise"));
         }
         if let Some(why) = model.not_linear() {
-            return Err(StudyError::new("open", why).with_help("cut the loop of a model without clocks"));
+            return Err(StudyError::new("open", why).with_help("cut the loop of a model without the sampling"));
         }
         let Some(cut) = model.cut(variables) else {
             return Err(StudyError::new("open", "the loop of this kind of model cannot be cut")

@@ -38,7 +38,7 @@ pub struct Past<'a, S> {
     pub values: &'a [Vec<S>; 5],
     /// Values at [`crate::Trace::CHECKS`] of the part, to compare the quartic through the others with.
     pub checks: &'a [Vec<S>; 2],
-    /// Changes of the quantities by rounding of the states, once these were measured; else empty.
+    /// Changes of the quantities by rounding of the states, if measured, otherwise empty.
     pub roughness: &'a [f64],
     /// True if the part is not halved any more.
     pub is_last: bool,

@@ -66,7 +66,7 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
 
 /// Returns the documentation of a key, with its places in tables and kinds; empty if there is none.
 fn keys_named(key: &str, schemas: impl Iterator<Item = (String, Schema)>) -> String {
-    // Places of one documentation stand together.
+    // Keys with identical documentation share one entry.
     let mut pages: Vec<(String, Vec<String>)> = Vec::new();
     for (of, schema) in schemas {
         for (path, page) in mops_core::file::places_of(key, &schema) {

@@ -32,7 +32,7 @@ pub struct Channel {
     factor: f64,
     /// True for a loop transfer function.
     is_loop: bool,
-    /// True if the system is one of cut loops: the other loops are closed.
+    /// True for cut loops. Read as a loop, the other loops are closed; otherwise all are open.
     is_cut: bool,
 }
 
@@ -60,7 +60,7 @@ impl Channel {
     pub fn in_loop(self) -> Result<Self, StudyError> {
         let [from, to] = &self.ends;
         if self.is_cut && self.input != self.output {
-            let fact = format!("the loop that is cut at `{}` does not end in `{}`", from.name, to.name);
+            let fact = format!("the output of the loop cut at `{0}` is `-{0}`, not `{1}`", from.name, to.name);
             return Err(StudyError::new("output", fact).with_help("remove `output`"));
         }
         if !to.unit.is_compatible(&from.unit) {

@@ -1,7 +1,7 @@
 //! PID controllers of a model, as definitions, states and clocks.
 
 use mops_core::file::{Entries, Short};
-use mops_core::{Quantity, StudyError};
+use mops_core::{Quantity, StudyError, Unit};
 
 use super::definition::{path, under};
 use super::filters::in_brackets;
@@ -13,9 +13,10 @@ use super::options::{Clock, Described, EquationsOptions, Formula, Output, Pid};
 ///
 /// Source: K. J. Astrom, T. Hagglund, PID Controllers, 2nd edition (1995), sections 3.4 to 3.6.
 pub(super) fn expanded(mut options: EquationsOptions) -> Result<EquationsOptions, StudyError> {
-    for (name, pid) in std::mem::take(&mut options.pid.0) {
+    for (name, pid) in options.pid.0.clone() {
         add(&mut options, &name, &pid).map_err(|mistake| under(&path(&["pid", &name]), mistake))?;
     }
+    options.pid.0.clear();
     Ok(options)
 }
 
@@ -24,14 +25,26 @@ pub(super) fn at_its_key(mistake: StudyError, options: &EquationsOptions) -> Stu
     let keys: Vec<&str> = mistake.path.iter().map(String::as_str).collect();
     let [section, key, rest @ ..] = keys.as_slice() else { return mistake };
     if let ("clocks", [table @ ("next" | "memory"), memory, ..]) = (*section, rest) {
-        let filters = options.clocks.0.iter().filter(|(name, _)| name == key).flat_map(|(_, clock)| &clock.filter.0);
+        let clock = options.clocks.0.iter().find(|(name, _)| name == key).map(|(_, clock)| clock);
+        let is_own = clock.is_some_and(|clock| {
+            let next = clock.next.0.iter().any(|(name, _)| *table == "next" && name == memory);
+            next || clock.memory.0.iter().any(|(name, _)| *table == "memory" && name == memory)
+        });
+        let filters = clock.into_iter().filter(|_| !is_own).flat_map(|clock| &clock.filter.0);
         let part_of = |of: &str| memory.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('_'));
-        let found = filters.map(|(name, _)| name).find(|name| part_of(name) && (*table == "next" || name != memory));
-        if let Some(name) = found {
+        if let Some(name) = filters.map(|(name, _)| name).find(|name| part_of(name)) {
             return StudyError { path: path(&["clocks", key, "filter", name]), span: None, ..mistake.clone() };
         }
     }
-    for (name, pid) in options.pid.0.iter().filter(|_| !["inputs", "start"].contains(section)) {
+    let is_own = options.definitions.0.iter().any(|(name, _)| *section == "let" && name == key)
+        || options.constants.0.iter().any(|(name, _)| *section == "constants" && name == key)
+        || options.states.0.iter().any(|(name, _)| ["states", "der"].contains(section) && name == key)
+        || options.outputs.0.iter().any(|(name, _)| *section == "outputs" && name == key)
+        || ["inputs", "start"].contains(section);
+    for (name, pid) in options.pid.0.iter().filter(|_| !is_own) {
+        if let ("clocks", true, [time @ ("every" | "delay"), ..]) = (*section, key == name, rest) {
+            return StudyError { path: path(&["pid", name, time]), ..mistake.clone() };
+        }
         let part = key.strip_prefix(name.as_str()).and_then(|part| part.strip_prefix('_'));
         if let Some((given, _)) = pid.given().iter().find(|(given, _)| part == Some(given)) {
             // The text is the given one, so that its span holds.
@@ -46,7 +59,7 @@ pub(super) fn at_its_key(mistake: StudyError, options: &EquationsOptions) -> Stu
 }
 
 /// Endings of the names of computed quantities.
-const COMPUTED: [&str; 5] = ["unlimited", "integral", "filtered", "derivative", "last"];
+const COMPUTED: [&str; 6] = ["unlimited", "limited", "integral", "filtered", "derivative", "last"];
 
 impl Pid {
     /// Returns the given values with their keys; both limits have one key.
@@ -71,20 +84,128 @@ impl Pid {
 }
 
 fn add(options: &mut EquationsOptions, u: &str, pid: &Pid) -> Result<(), StudyError> {
+    if options.states.0.iter().any(|(name, _)| name == u) {
+        let fact = format!("`{u}` is a state, and the output of a controller is none");
+        return Err(StudyError::here(fact).with_help("name the input of the plant that the controller replaces"));
+    }
     let unit = unit_of(options, u, pid)?;
+    check(options, u, pid, &unit)?;
     options.inputs.0.retain(|(name, _)| name != u);
+    let plain = is_plain(options) && unit == "1";
     for (key, formula) in pid.given() {
         let name = format!("{u}_{key}");
         match Quantity::parse(&formula.0) {
-            Ok(quantity) => options.constants.0.push((name, quantity)),
+            Ok(mut quantity) => {
+                if quantity.unit.is_none() && !plain {
+                    quantity.unit = unit_of_number(options, pid, key, &unit, quantity.number)?;
+                }
+                options.constants.0.push((name, quantity));
+            }
             Err(_) => options.definitions.0.push((name, formula.clone())),
         }
     }
-    let mut controller = Controller { u, unit, pid, options };
+    let mut controller = Controller { u, unit, pid, options, second: if plain { "1" } else { "1 [s]" } };
     match &pid.every {
         None => controller.continuous(),
         Some(every) => controller.sampled(every),
     }
+}
+
+/// Checks the values that are quantities, and that the controller acts.
+fn check(options: &EquationsOptions, u: &str, pid: &Pid, unit: &str) -> Result<(), StudyError> {
+    for (key, formula) in pid.given() {
+        let Ok(Quantity { number, unit: given }) = Quantity::parse(&formula.0) else { continue };
+        let (key, expected) = match key {
+            "Ti" | "Td" | "Tt" => (key, "s"),
+            "Nd" | "wp" | "wd" => (key, "1"),
+            "limit_low" | "limit_high" => ("limit", unit),
+            "feedforward" => (key, unit),
+            _ => continue,
+        };
+        let wrong = given.zip(Unit::parse(expected).ok()).filter(|(given, expected)| !given.is_compatible(expected));
+        if let Some((given, expected)) = wrong {
+            return Err(StudyError::new(key, format!("expected a quantity in {expected}, found {given}")));
+        }
+        let is_positive = number > 0.0 || key == "Td" && number == 0.0;
+        if ["Ti", "Td", "Tt", "Nd"].contains(&key) && !is_positive {
+            return Err(StudyError::new(key, format!("expected a value above 0 for `{key}`, found {number}"))
+                .with_help("omit `Ti` or `Td` for a controller without this part"));
+        }
+    }
+    if pid.tt.is_some() && (pid.ti.is_none() || pid.limit.is_none()) {
+        let fact = "a tracking time has an effect only with an integral part and a limit";
+        return Err(StudyError::new("Tt", fact).with_help("give `Ti` and `limit`, or omit `Tt`"));
+    }
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    let uses = |text: &str| {
+        text.match_indices(u)
+            .any(|(at, _)| !text[..at].ends_with(is_name) && !text[at + u.len()..].starts_with(is_name))
+    };
+    let texts = options.definitions.0.iter().chain(&options.der.0).map(|(_, text)| &text.0);
+    let outputs = options.outputs.0.iter().map(|(_, output)| &output.0.value.0);
+    let others = options.pid.0.iter().flat_map(|(_, pid)| pid.given()).map(|(_, text)| &text.0);
+    let events = options
+        .when
+        .0
+        .iter()
+        .flat_map(|(_, when)| std::iter::once(&when.guard.0).chain(when.reset.0.iter().map(|(_, text)| &text.0)));
+    let clocks = options.clocks.0.iter().flat_map(|(_, clock)| {
+        let filters = clock.filter.0.iter().map(|(_, filter)| &filter.of.0);
+        clock.next.0.iter().map(|(_, text)| &text.0).chain(filters)
+    });
+    if !texts.chain(outputs).chain(others).chain(events).chain(clocks).any(|text| uses(text)) {
+        return Err(StudyError::here(format!("no equation contains the output `{u}` of the controller"))
+            .with_help("name the input of the plant that the controller replaces, or use it in an equation"));
+    }
+    Ok(())
+}
+
+/// Returns true if nothing in the model has a unit, so that time is a pure number.
+fn is_plain(options: &EquationsOptions) -> bool {
+    let states = options.states.0.iter().map(|(_, state)| &state.0.unit);
+    let described = options.inputs.0.iter().map(|(_, input)| &input.0.unit);
+    let parameters = options.parameters.0.iter().map(|(_, parameter)| &parameter.0.unit);
+    let outputs = options.outputs.0.iter().filter_map(|(_, output)| output.0.unit.as_ref());
+    let mut units = states.chain(described).chain(parameters).chain(outputs);
+    let texts = options.definitions.0.iter().chain(&options.der.0).chain(&options.start.0).map(|(_, text)| &text.0);
+    let mut texts = texts.chain(options.outputs.0.iter().map(|(_, output)| &output.0.value.0));
+    units.all(|unit| ["", "1"].contains(&unit.trim()))
+        && options.constants.0.iter().all(|(_, constant)| constant.unit.is_none())
+        && texts.all(|text| !text.contains(" [") && !text.contains('"'))
+}
+
+/// Returns the unit of a number without one: that of the output for its limits, that of the measured quantity for the setpoint,
+/// s for times. `None` for the unit that the equations require, which counts in SI units.
+fn unit_of_number(
+    options: &EquationsOptions,
+    pid: &Pid,
+    key: &str,
+    unit: &str,
+    number: f64,
+) -> Result<Option<Unit>, StudyError> {
+    let name = &pid.measured.0;
+    let states = options.states.0.iter().map(|(state, of)| (state, Some(&of.0.unit)));
+    let inputs = options.inputs.0.iter().map(|(input, of)| (input, Some(&of.0.unit)));
+    let outputs = options.outputs.0.iter().map(|(output, of)| (output, of.0.unit.as_ref()));
+    let memory = options.clocks.0.iter().flat_map(|(_, clock)| &clock.memory.0);
+    let mut known = states.chain(inputs).chain(outputs).chain(memory.map(|(memory, of)| (memory, Some(&of.0.unit))));
+    let measured = known.find(|(known, _)| *known == name).and_then(|(_, unit)| unit);
+    let unit = match key {
+        "limit_low" | "limit_high" | "feedforward" => Some(unit),
+        "setpoint" => match measured {
+            Some(unit) => Some(unit.as_str()),
+            None if number == 0.0 => None,
+            None => {
+                let fact = format!("the setpoint {number} has no unit");
+                return Err(StudyError::new("setpoint", fact).with_help("give it one, for example \"90 deg\""));
+            }
+        },
+        "Ti" | "Td" | "Tt" => Some("s"),
+        "Nd" | "wp" | "wd" => Some("1"),
+        _ => None,
+    };
+    // A wrong unit is refused where it is declared.
+    Ok(unit.filter(|unit| !unit.trim().is_empty()).and_then(|unit| Unit::parse(unit).ok()))
 }
 
 /// Returns the unit of the output: that of the input it replaces, or the one given.
@@ -93,10 +214,10 @@ fn unit_of(options: &EquationsOptions, u: &str, pid: &Pid) -> Result<String, Stu
     match (input, &pid.unit) {
         (Some(unit), None) => Ok(unit),
         (None, Some(unit)) => Ok(unit.clone()),
-        (None, None) => Err(StudyError::here(format!("the unit of `{u}` is not known"))
+        (None, None) => Err(StudyError::here(format!("the output `{u}` of the controller has no unit"))
             .with_help("give unit = \"V\", or declare the output of the controller as an input, whose place it takes")),
         (Some(_), Some(_)) => {
-            let fact = format!("`{u}` takes the place of an input, and has its unit");
+            let fact = format!("the controller replaces the input `{u}`, whose unit applies");
             Err(StudyError::new("unit", fact).with_help("remove `unit`"))
         }
     }
@@ -107,6 +228,8 @@ struct Controller<'a> {
     unit: String,
     pid: &'a Pid,
     options: &'a mut EquationsOptions,
+    /// A second, in an expression.
+    second: &'static str,
 }
 
 impl Controller<'_> {
@@ -130,7 +253,7 @@ impl Controller<'_> {
         let u = self.u;
         match (&self.pid.tt, &self.pid.td) {
             (Some(_), _) => format!("{u}_Tt"),
-            (None, Some(_)) => format!("if({u}_Td > 0 [s], sqrt({u}_Ti*{u}_Td), {u}_Ti)"),
+            (None, Some(_)) => format!("if({u}_Td > 0*{u}_Td, sqrt({u}_Ti*{u}_Td), {u}_Ti)"),
             (None, None) => format!("{u}_Ti"),
         }
     }
@@ -190,21 +313,24 @@ impl Controller<'_> {
             return Err(StudyError::new("delay", "a delay needs a sampled controller").with_help("give `every`"));
         }
         if self.pid.ti.is_some() {
-            let rate = self.integral_rate(u);
+            let rate = self.integral_rate(&format!("{u}_limited"));
             self.state("integral", "integral part of the controller", rate);
         }
         let derivative = self.pid.td.as_ref().map(|_| {
             let nd = self.part(self.pid.nd.is_some(), "Nd", "10");
             let input = self.derivative_input();
             // Without a derivative time the state stays 0, and is no mode at the stability limit.
-            let rate = format!("if({u}_Td > 0 [s], ({input} - {u}_filtered)*{nd}/{u}_Td, -{u}_filtered/1 [s])");
+            let (is_active, second) = (format!("{u}_Td > 0*{u}_Td"), self.second);
+            let rate = format!("if({is_active}, ({input} - {u}_filtered)*{nd}/{u}_Td, -{u}_filtered/({second}))");
             self.state("filtered", "filter of the derivative part", rate);
-            format!("if({u}_Td > 0 [s], {input} - {u}_filtered, 0*{u}_filtered)")
+            format!("if({is_active}, {input} - {u}_filtered, 0*{u}_filtered)")
         });
         let unlimited = self.unlimited(derivative);
         self.define(format!("{u}_unlimited"), unlimited);
+        // A cut at `u` leaves the anti-windup as it is.
         let limited = self.limited();
-        self.define(u.to_owned(), limited);
+        self.define(format!("{u}_limited"), limited);
+        self.define(u.to_owned(), format!("{u}_limited"));
         let is_shown = self.options.outputs.0.iter().any(|(name, _)| name == u);
         if !is_shown {
             let Described { unit, about } = self.described("output of the controller");

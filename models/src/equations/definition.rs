@@ -131,8 +131,8 @@ pub struct Definition {
     pub when: Vec<When>,
     /// Clocks.
     pub clocks: Vec<Clock>,
-    /// True if the last input and the last output are those of a cut loop.
-    pub is_cut: bool,
+    /// Number of cut loops, whose inputs and outputs are the last ones, in order.
+    pub cuts: usize,
     /// Names of joints: name, position, path in the study.
     pub ports: Vec<(String, String, Vec<String>)>,
 }
@@ -398,12 +398,12 @@ impl Definition {
 }
 
 impl Definition {
-    /// Cuts the loop at a named expression: an input of this name acts in its place; the output that follows the others is minus
-    /// the expression.
+    /// Cuts the loop at a named expression, which has this unit unless an output declares it: an input of this name acts in its place;
+    /// the output that follows the others is minus the expression.
     ///
     /// # Errors
     /// There is no such expression.
-    pub fn cut(&mut self, variable: &str) -> Result<(), StudyError> {
+    pub fn cut(&mut self, variable: &str, unit: Option<Unit>) -> Result<(), StudyError> {
         let Some(index) = self.lets.iter().position(|(name, _)| name == variable) else {
             let fact = format!("the loop can be cut at a named expression of `let` only, not at `{variable}`");
             let names = self.lets.iter().map(|(name, _)| name.as_str());
@@ -411,11 +411,12 @@ impl Definition {
         };
         let (name, mut text) = self.lets.remove(index);
         let shown = self.outputs.iter().position(|(output, _)| output.name == name);
-        let unit = shown.map(|k| self.outputs.remove(k).0).map_or_else(Unit::one, |output| output.unit.difference());
+        let shown = shown.map(|k| self.outputs.remove(k).0.unit);
+        let unit = shown.or(unit).map_or_else(Unit::one, |unit| unit.difference());
         let declared = |name: String, about: &str| Declared {
             name,
             unit: unit.clone(),
-            open: shown.is_none(),
+            open: false,
             about: about.to_owned(),
             path: text.path.clone(),
         };
@@ -427,7 +428,7 @@ impl Definition {
         text.equation = Arc::new(Equation { left: None, right });
         self.inputs.push(input);
         self.outputs.push((output, text));
-        self.is_cut = true;
+        self.cuts += 1;
         Ok(())
     }
 

@@ -60,7 +60,7 @@ pub fn check(d: &Definition, joints: &[(usize, usize)]) -> Result<Measured, Stud
     for (k, (_, text)) in d.outputs.iter().enumerate() {
         model.fits(&model.outputs[k].clone(), text, "an output must have the dimension of its unit")?;
     }
-    if let (true, Some(input), Some((_, text))) = (d.is_cut, d.inputs.last(), d.outputs.last()) {
+    for (input, (_, text)) in d.inputs.iter().rev().zip(d.outputs.iter().rev()).take(d.cuts) {
         model.fits(&model.names[&input.name].clone(), text, "the loop is cut at a quantity of one dimension")?;
     }
     for (state, text) in d.start.iter().filter(|(_, text)| !text.is_bare()) {

@@ -125,6 +125,23 @@ impl Equations {
         Ok(Self { definition, interface, compiled, starts, tolerance, notes, opened: OnceLock::new() })
     }
 
+    /// Returns the coherent unit of a named expression; `None` if there is no such expression.
+    fn unit_of_let(&self, name: &str) -> Result<Option<Unit>, StudyError> {
+        let mut definition = self.definition.clone();
+        let Some((_, text)) = definition.lets.iter().find(|(known, _)| known == name).cloned() else { return Ok(None) };
+        let output = definition::Declared {
+            name: format!("-{name}"),
+            unit: Unit::one(),
+            open: true,
+            about: String::new(),
+            path: text.path.clone(),
+        };
+        definition.outputs.push((output, text));
+        let system = System::new(&definition, &[])?;
+        dimensions::check(&definition, &system.joints)?.declare(&mut definition);
+        Ok(definition.outputs.last().map(|(output, _)| output.unit.clone()))
+    }
+
     /// Returns the pairs of derivative and state in which the derivative depends on the state.
     pub fn jacobian_pattern(&self) -> &[(usize, usize)] {
         &self.compiled.pattern
@@ -202,7 +219,10 @@ impl PlantModel for Equations {
 
     fn cut(&self, variables: &[String]) -> Option<Result<Cut, StudyError>> {
         let mut definition = self.definition.clone();
-        let cut = variables.iter().try_for_each(|variable| definition.cut(variable));
+        let cut = variables.iter().try_for_each(|variable| {
+            let unit = self.unit_of_let(variable)?;
+            definition.cut(variable, unit)
+        });
         let model = cut.and_then(|()| Self::compile(definition, self.interface.horizon, self.tolerance));
         Some(model.map(|model| {
             let Definition { states, outputs, inputs, .. } = &model.definition;

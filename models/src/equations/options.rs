@@ -335,7 +335,8 @@ pub(super) struct Filter {
 
 /// PID controller with filtered derivative:
 /// `v = k (wp r - y + 1/(Ti s) (r - y) + Td s/(Td/Nd s + 1) (wd r - y)) + feedforward`, and the output is `v` within its limits.
-/// Values are quantities or expressions; a plain number is in the unit that the equations require.
+/// Values are quantities or expressions. A number without a unit is in the unit of the output for `limit` and `feedforward`, in that
+/// of the measured quantity for `setpoint`, in s for times, and in SI units for `k`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct Pid {

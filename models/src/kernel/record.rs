@@ -4,7 +4,7 @@ use mops_core::{
     Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Past, Response, Scalar, Trace, WithTangents,
 };
 
-use super::weights::{SHARE, rounded};
+use super::weights::{SHARE, perturbed};
 use super::{Dynamics, Sink, Step, Tolerance, integrate};
 
 /// Recorded simulation: the signals and their derivatives in every direction of the scalar.
@@ -133,7 +133,7 @@ fn remember_part<S: Scalar, D>(
     }
     // A difference of large terms is as rough as these are rounded; shorter parts do not help.
     let (middle, state) = (time(0.5 * (from + to)), step.state_at(0.5 * (from + to)));
-    let (here, there) = (past(of, middle, &state), past(of, middle, &rounded(&state)));
+    let (here, there) = (past(of, middle, &state), past(of, middle, &perturbed(&state)));
     let roughness: Vec<f64> = here.iter().zip(&there).map(|(a, b)| (a.value() - b.value()).abs()).collect();
     if !store(of, &Past { roughness: &roughness, ..over }) {
         let middle = 0.5 * (from + to);
@@ -173,13 +173,13 @@ impl<S: Scalar> Recorder<'_, S> {
 
     /// Returns true if the quartic through the values agrees with the signal near both ends, up to the rounding of the
     /// signal. Values that are not finite count as agreeing. `signal` returns the signal at a position, at the state or at
-    /// the [`rounded`] state.
+    /// the [`perturbed`] state.
     fn agrees(&self, index: usize, values: &[S; 5], mut signal: impl FnMut(f64, At) -> S) -> bool {
         let checks = Trace::CHECKS.map(|s| signal(s, At::State).value());
         let off = Trace::deviation(values.map(Scalar::value), checks);
         let allowed = self.allowed(index, checks.iter().fold(largest(values), |most, check| most.max(check.abs())));
         // The node at the middle is one of the values.
-        off.is_nan() || off <= allowed || off <= allowed + (signal(0.5, At::Rounded) - values[2]).value().abs()
+        off.is_nan() || off <= allowed || off <= allowed + (signal(0.5, At::Perturbed) - values[2]).value().abs()
     }
 
     /// Returns true if the quartic of a step of this length must be compared with the signal. Reasons: the step is
@@ -226,15 +226,15 @@ impl<S: Scalar> Recorder<'_, S> {
 enum At {
     /// State of the step.
     State,
-    /// The [`rounded`] state.
-    Rounded,
+    /// The [`perturbed`] state.
+    Perturbed,
 }
 
 impl At {
     fn signal<S: Scalar>(self, t: f64, x: &[S], signal: &impl Fn(f64, &[S]) -> S) -> S {
         match self {
             Self::State => signal(t, x),
-            Self::Rounded => signal(t, &rounded(x)),
+            Self::Perturbed => signal(t, &perturbed(x)),
         }
     }
 }

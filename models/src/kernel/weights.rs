@@ -86,7 +86,7 @@ impl Weights {
     }
 
     /// Measures the roughness of the rates, after every [`OFTEN`] attempts and after the third rejection of a step. The
-    /// rates are compared with those of a [`rounded`] state. After rejections, the state after a step of length `h` along
+    /// rates are compared with those of a [`perturbed`] state. After the third rejection, the state after a step of length `h` along
     /// the rates counts as well: states that are 0 before the step have no rounding errors yet. Returns the number of
     /// evaluations of the rates.
     pub(super) fn feel<S: Scalar, D: Dynamics<S> + ?Sized>(
@@ -113,11 +113,11 @@ impl Weights {
         if rejected == 3 { 4 } else { 2 }
     }
 
-    /// Raises the roughness to the difference of the rates at a state and at the rounded state. `here` becomes the rates.
+    /// Raises the roughness to the difference of the rates at a state and at the perturbed state. `here` becomes the rates.
     fn compare<S: Scalar, D: Dynamics<S> + ?Sized>(&mut self, f: &D, (t, x): (f64, &[S]), here: &mut [S]) {
         let mut there = x.to_vec();
         f.derivative(t, x, here);
-        f.derivative(t, &rounded(x), &mut there);
+        f.derivative(t, &perturbed(x), &mut there);
         let differences = here.iter().zip(&there).map(|(a, b)| (a.value() - b.value()).abs());
         for (roughness, difference) in self.roughness.iter_mut().zip(differences) {
             if difference.is_finite() {
@@ -193,7 +193,7 @@ impl Norm<'_> {
 }
 
 /// Returns a state whose components differ by a few units in the last place, each by a different amount.
-pub(super) fn rounded<S: Scalar>(x: &[S]) -> Vec<S> {
+pub(super) fn perturbed<S: Scalar>(x: &[S]) -> Vec<S> {
     // Multiples of the golden ratio: no two states change alike, so that their differences change too.
     #[allow(clippy::cast_precision_loss)]
     let share = |i: usize| 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0;

@@ -46,12 +46,14 @@ pub(super) fn read(name: &str, node: &Node<'_>, files: &dyn Files) -> Result<Vec
     Ok(found)
 }
 
-/// Replaces warnings that differ only in the name of the experiment by one that names all, `NAME-*`.
+/// Replaces warnings that differ only in the name of the experiment by one: on all, `NAME-*`, or on the first and the number of others.
 fn share_warnings(found: &mut [CaseBuilder], name: &str) {
-    let common = |case: &CaseBuilder, text: &str| text.replace(&format!("`{}`", case.name), &format!("`{name}-*`"));
+    let all = format!("`{name}-*`");
+    let common = |case: &CaseBuilder, text: &str| text.replace(&format!("`{}`", case.name), &all);
     let texts: Vec<Vec<String>> =
         found.iter().map(|case| case.warnings.iter().map(|text| common(case, text)).collect()).collect();
     let count = |text: &String| texts.iter().filter(|texts| texts.contains(text)).count();
+    let total = found.len();
     let mut shown: Vec<&String> = Vec::new();
     for (case, texts) in found.iter_mut().zip(&texts) {
         let own = std::mem::take(&mut case.warnings);
@@ -59,7 +61,9 @@ fn share_warnings(found: &mut [CaseBuilder], name: &str) {
             if count(text) == 1 {
                 case.warnings.push(warning);
             } else if !shown.contains(&text) {
-                case.warnings.push(text.clone());
+                let others = count(text) - 1;
+                let some = format!("`{}` and {others} other experiments", case.name);
+                case.warnings.push(if others + 1 == total { text.clone() } else { text.replace(&all, &some) });
                 shown.push(text);
             }
         }

@@ -8,6 +8,7 @@ use crate::catalogue::Catalogue;
 use crate::diagnostic::{Diagnostic, suggestion};
 use crate::joined::Joined;
 use crate::linearised::{Linearise, Linearised};
+use crate::model::{Parameter, Variable};
 use crate::study::ModelBuilder;
 use crate::study_error::StudyError;
 
@@ -83,7 +84,7 @@ fn read_joined(
     join: &Node<'_>,
     files: &dyn Files,
 ) -> Result<ModelBuilder, Diagnostic> {
-    let allowed = ["join", "like", "parameters"];
+    let allowed = ["join", "parameters"];
     if let Some((_, other)) = node.entries()?.into_iter().find(|(key, _)| !allowed.contains(&key.as_str())) {
         let fact = "a joined model has no keys but `join` and `parameters`".to_owned();
         return Err(other.key_diagnostic(fact).with_help("move it to one of the models that are joined"));
@@ -91,6 +92,7 @@ fn read_joined(
     let common: ModelCommon = node.only(ModelCommon::KEYS).read()?;
     let mut models = Vec::new();
     let mut parameters = common.parameters.0;
+    let mut values: Vec<(Variable, f64)> = Vec::new();
     let given: Vec<String> = parameters.iter().map(|(name, _)| name.clone()).collect();
     for name in common.join.unwrap_or_default() {
         let names = || all.iter().map(|(name, _)| name.as_str()).filter(|name| *name != own);
@@ -107,19 +109,29 @@ fn read_joined(
             return Err(join.diagnostic(fact).with_help("list the models that it joins"));
         }
         let part = read_model(catalogue, &base, files)?;
-        for (parameter, value) in part.parameters {
-            match parameters.iter().find(|(known, _)| *known == parameter) {
-                Some((_, known)) if given.contains(&parameter) || *known == value => {}
-                Some(_) => {
-                    let fact = format!("`{parameter}` has different values in the models that are joined");
-                    let help =
-                        format!("set it here, parameters = {{ {parameter} = ... }}, or rename it in one of them");
-                    return Err(join.diagnostic(fact).with_help(help));
-                }
-                None => parameters.push((parameter, value)),
+        for Parameter { variable, default, .. } in &part.model.interface().parameters {
+            let own = part.parameters.iter().find(|(known, _)| *known == variable.name).map(|(_, value)| value);
+            if let Some(own) = own.filter(|_| !parameters.iter().any(|(known, _)| *known == variable.name)) {
+                parameters.push((variable.name.clone(), own.clone()));
+            }
+            // A value in a wrong unit is refused when the study is built.
+            if let Some(value) = own.map_or(*default, |own| own.to(&variable.unit).ok()).filter(|v| !v.is_nan()) {
+                values.push((variable.clone(), value));
             }
         }
         models.push((name, part.model));
+    }
+    let differs = |(variable, value): &&(Variable, f64)| {
+        let is_other = |(other, known): &(Variable, f64)| {
+            other.name == variable.name
+                && other.unit.convert(*known, &variable.unit).is_some_and(|known| known != *value)
+        };
+        !given.contains(&variable.name) && values.iter().any(is_other)
+    };
+    if let Some((Variable { name, .. }, _)) = values.iter().find(differs) {
+        let fact = format!("`{name}` has different values in the models that are joined");
+        let help = format!("set it here, parameters = {{ {name} = ... }}, or rename it in one of them");
+        return Err(join.diagnostic(fact).with_help(help));
     }
     let model = Joined::new(models).map_err(|mistake| join.locate(&mistake))?;
     Ok(ModelBuilder { model: Box::new(model), parameters })

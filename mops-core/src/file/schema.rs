@@ -83,8 +83,8 @@ fn one_kind(mut common: Value, kinds: Map<String, Value>, must_be: bool) -> Valu
         let mut choices: Vec<Value> = kinds.keys().map(|name| json!({ "required": [name] })).collect();
         if common["properties"]["like"].is_object() {
             // A table that is like another one takes the kind from there.
-            choices.push(json!({ "required": ["like"], "not": { "anyOf": choices.clone() } }));
             choices.push(json!({ "required": ["join"] }));
+            choices.push(json!({ "required": ["like"], "not": { "anyOf": choices.clone() } }));
         }
         common["oneOf"] = choices.into();
     }

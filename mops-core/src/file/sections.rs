@@ -43,7 +43,8 @@ pub(super) struct ModelCommon {
     /// Model from which this one takes all keys that it does not give itself: `like = "servo"`. Tables are merged key by key.
     pub like: Option<String>,
     /// Simulates several models side by side, to compare their signals: `join = ["loop", "reference"]`, beside `parameters` only. The
-    /// signal `y` of `loop` is `loop_y`. Parameters, inputs and initial values of the same name are one.
+    /// signal `y` of `loop` is `loop_y`. Parameters and initial values of the same name are one. An input that the case gives acts in
+    /// all models that have it; otherwise each model keeps its default.
     pub join: Option<Vec<String>>,
     /// Cuts the loop at a variable, and replaces the model by the linearised open loop `L`, for margins and sensitivities:
     /// `open = "u"`. `L` is the transfer function from an input in the place of the variable to minus its computed value, so
@@ -51,8 +52,8 @@ pub(super) struct ModelCommon {
     /// with the inputs of the case at time 0; `linearise = { equilibrium = false, at = { .. } }` gives another one. For models
     /// of the kind `equations`, the variable is a named expression of `let`.
     ///
-    /// A list, `open = ["u1", "u2"]`, cuts several loops, for a disk margin of all of them. Other criteria of loops select one by
-    /// `input = "u1"`, while the others are closed.
+    /// A list, `open = ["u1", "u2"]`, cuts several loops, for a disk margin of all of them. Criteria of loops select one by
+    /// `input = "u1"`, with the others closed; criteria of other linear systems read the loop transfer function with all loops open.
     pub open: Option<OneOrMore>,
     /// Replaces the model by its linearisation, for criteria of linear systems:
     /// `linearise = { inputs = ["u"], outputs = ["theta"], at = { theta = "180 deg" } }`. `{}` selects all inputs and
@@ -383,7 +384,7 @@ impl CriterionCommon {
     pub const KEYS: &[&str] = &["model", "cases", "usage", "demand", "good", "bad", "weight", "from", "until", "unit"];
 }
 
-/// Solver of a design: a table named by its kind, with the options of the kind, and common keys of all solvers:
+/// Solver of a design: common keys, and one table named after the kind with its options:
 /// `solver = { max-evaluations = 2000, sqp = {} }`. `mops list` shows the kinds; without one, `auto` chooses.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]

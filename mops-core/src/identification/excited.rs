@@ -44,7 +44,11 @@ pub fn excitation_words(reports: &[ExcitationReport]) -> Vec<String> {
         sentences.push(own[worst].words.clone());
         let orders = || own.iter().enumerate().filter(|(i, _)| *i != worst).map(|(_, report)| report.order);
         let (low, high) = (orders().min().unwrap_or(0), orders().max().unwrap_or(0));
-        let orders = if low == high { format!("order {low}") } else { format!("orders from {low} to {high}") };
+        let least = if own.iter().any(|report| report.at_least) { "at least " } else { "" };
+        let orders = match low == high {
+            true => format!("order {least}{low}"),
+            false => format!("orders from {least}{low} to {least}{high}"),
+        };
         sentences.push(format!("`{input}` in the other {} cases is persistently exciting of {orders}.", own.len() - 1));
     }
     sentences

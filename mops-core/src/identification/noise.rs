@@ -214,8 +214,8 @@ impl Noise {
             let [low, high] = [shown.iter().copied().reduce(f64::min), shown.iter().copied().reduce(f64::max)]
                 .map(|level| coefficient(level.unwrap_or(f64::NAN)));
             format!(
-                "The residuals of `{signal}` in {} experiments show noise levels from {low} to {high}, not as declared: the standard \
-                 errors are based on the residuals.",
+                "The residuals of `{signal}` in {} experiments have noise levels of {low} to {high}, which differ from the declared \
+                 ones: the standard errors are based on the residuals.",
                 shown.len()
             )
         };

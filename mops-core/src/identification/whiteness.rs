@@ -81,12 +81,12 @@ impl Whiteness {
 }
 
 /// Returns the finding on residuals, with the beginning of the sentence and numbers.
-fn finding(place: &str, is_white: bool, numbers: &str) -> String {
+fn finding(subject: &str, is_white: bool, numbers: &str) -> String {
     if is_white {
-        format!("{place} are consistent with white noise{numbers}, as the standard errors assume.")
+        format!("{subject} are consistent with white noise{numbers}, as the standard errors assume.")
     } else {
         format!(
-            "{place} are not white{numbers}. The standard errors allow for the correlation of neighbours, but \
+            "{subject} are not white{numbers}. The standard errors allow for the correlation of neighbours, but \
                  intervals still cover the truth less often than stated: look for an effect that the model lacks, a \
                  delay, or an input with the wrong `hold`."
         )
@@ -101,22 +101,22 @@ pub fn whiteness_words(found: &[(&str, &str, Whiteness)]) -> Vec<String> {
         let own: Vec<&(&str, &str, Whiteness)> = found.iter().filter(|(name, ..)| *name == channel).collect();
         if own.len() <= MANY {
             sentences.extend(own.iter().map(|(_, experiment, found)| {
-                let place = format!("The residuals of `{channel}` in `{experiment}`");
-                finding(&place, found.is_white(), &format!(" ({})", found.numbers()))
+                let subject = format!("The residuals of `{channel}` in `{experiment}`");
+                finding(&subject, found.is_white(), &format!(" ({})", found.numbers()))
             }));
             continue;
         }
         let Some((_, experiment, worst)) = own.iter().min_by(|a, b| a.2.probability.total_cmp(&b.2.probability)) else {
             continue;
         };
-        // Bonferroni's correction: of many white records, one fails a single test.
+        // Bonferroni's correction: among many white records some fail a single test by chance.
         #[allow(clippy::cast_precision_loss)]
         let level = UNLIKELY / own.len() as f64;
         let coloured = own.iter().filter(|(.., found)| found.probability < level).count();
         let count = if coloured == 0 { "all" } else { &format!("{coloured} of the") };
-        let place = format!("The residuals of `{channel}` in {count} {} experiments", own.len());
-        let numbers = format!(" (at most in `{experiment}`: {})", worst.numbers());
-        sentences.push(finding(&place, coloured == 0, &numbers));
+        let subject = format!("The residuals of `{channel}` in {count} {} experiments", own.len());
+        let numbers = format!(" (largest in `{experiment}`: {})", worst.numbers());
+        sentences.push(finding(&subject, coloured == 0, &numbers));
     }
     sentences
 }
@@ -165,7 +165,7 @@ mod tests {
         assert_eq!(words.len(), 1);
         assert!(
             words[0]
-                .starts_with("The residuals of `y` in 1 of the 6 experiments are not white (at most in `e-4`: lag-1"),
+                .starts_with("The residuals of `y` in 1 of the 6 experiments are not white (largest in `e-4`: lag-1"),
             "{words:?}"
         );
         let words = whiteness_words(&many[..4].iter().chain(&many[5..]).copied().collect::<Vec<_>>());

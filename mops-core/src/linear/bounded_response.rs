@@ -275,7 +275,7 @@ impl Span {
         use std::f64::consts::PI;
         let [low, high] = self.gain().map(math::exp);
         // Where L is large, (a + b L)/(1 + L) is (b + a/L)/(1 + 1/L), and 1/L has the opposite angle.
-        let is_large = complex::norm(self.response) > 1.0;
+        let is_large = of.b != 0.0 && (of.a == 0.0 || complex::norm(self.response) > 1.0);
         let ([low, high], [a, b]) =
             if is_large { ([1.0 / high, 1.0 / low], [of.b, of.a]) } else { ([low, high], [of.a, of.b]) };
         if !(low >= 0.0 && high >= low) {

@@ -13,11 +13,12 @@ const SURE: f64 = 1e-6;
 /// Largest number of frequencies examined; some tens are usual.
 const MOST: usize = 500;
 
-/// Largest logarithm of a ratio of two scales. Scales tend to infinity where the loops act on each other in one direction only;
-/// at this ratio what remains is below rounding.
+/// Bound of the logarithms of scales. With one-way coupling the optimal ratio of scales is infinite; at this bound the remaining
+/// coupling is below rounding.
 const LARGEST_SCALE: f64 = 30.0;
 
-/// Imbalance of the scaled singular vectors at which the scales are optimal. The error of the gain is of its square.
+/// Imbalance of the scaled singular vectors at which the scales are optimal. The relative error of the gain is of the order of its
+/// square.
 const BALANCED: f64 = 1e-7;
 
 /// Relative error of the gain at which the search for scales ends where the largest singular value is multiple.
@@ -48,7 +49,9 @@ pub fn disk_margin(of: &StateSpace, skew: f64) -> Result<f64, String> {
         return Loop::new(of.clone())?.disk_margin(skew);
     }
     if of.delay > 0.0 {
-        return Err("the disk margin of several loops with a delay is not computed; cut one loop at a time".to_owned());
+        return Err(
+            "several cut loops with a delay are not supported; replace the delay by a Padé approximation".to_owned()
+        );
     }
     let sensitivity = of.sensitivity()?;
     if !sensitivity.is_stable()? || !undecided(&sensitivity.a)?.is_empty() {
@@ -84,13 +87,23 @@ fn largest_scaled_gain(system: &StateSpace) -> Result<f64, String> {
         if here > best.0 {
             best = (here, frequency);
         }
+        if best.0 == 0.0 {
+            // The level 0 has no crossings.
+            open = open.iter().flat_map(|range| without(*range, &[[0.1 * frequency, 10.0 * frequency]])).collect();
+            open.retain(|[low, high]| *high > 1e-100 && *low < 1e100);
+            continue;
+        }
         let level = best.0 * (1.0 + SURE);
         let scaled = scaled(system, &logarithms);
         let at = scaled.response()?;
         let mut crossings = level_frequencies(&scaled, level)?;
         crossings.extend([0.0, f64::INFINITY]);
         crossings.sort_by(f64::total_cmp);
-        let below = |[low, high]: [f64; 2]| largest_singular_value(&at.at_frequency(middle([low, high]))) <= level;
+        // One frequency decides on a range between crossings; those of the poles within guard against crossings that rounding hides.
+        let below = |[low, high]: [f64; 2]| {
+            let within = ends.iter().copied().filter(|end| *end > low && *end < high && end.is_finite());
+            within.chain([middle([low, high])]).all(|w| largest_singular_value(&at.at_frequency(w)) <= level)
+        };
         let mut covered: Vec<[f64; 2]> =
             crossings.windows(2).map(|pair| [pair[0], pair[1]]).filter(|r| below(*r)).collect();
         // The range shrinks even if rounding hides the crossings.
@@ -140,8 +153,8 @@ fn scaled(system: &StateSpace, logarithms: &[f64]) -> StateSpace {
     system
 }
 
-/// Returns the smallest largest singular value of `D M D^-1` over all positive diagonal matrices `D`, and the logarithms of the
-/// entries of `D`. The logarithm of the value is convex in these.
+/// Minimises the largest singular value of `D M D^-1` over positive diagonal matrices `D`. Returns the minimum and the logarithms of
+/// the entries of `D`, in which the logarithm of the value is convex.
 fn scaled_gain(m: &DMatrix<Complex>) -> (f64, Vec<f64>) {
     let n = m.nrows();
     let mut x = vec![0.0; n];

@@ -152,6 +152,10 @@ impl StateSpace {
         if self.inputs.len() == 1 && self.outputs.len() == 1 {
             return Ok(self.clone());
         }
+        if self.delay != 0.0 {
+            return Err("several cut loops with a delay are not supported; replace the delay by a Padé approximation"
+                .to_owned());
+        }
         let mut kept = self.clone();
         // The loop that stays open is closed with the gain 0.
         kept.c.row_mut(index).fill(0.0);

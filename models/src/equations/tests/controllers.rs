@@ -88,6 +88,26 @@ fn units_weights_and_a_feedforward_are_those_of_the_formula() {
 }
 
 #[test]
+fn plain_numbers_are_in_the_unit_of_their_quantity() {
+    // Setpoint in deg as the measured state, limits in mV as the input; at first the output is at its limit.
+    let text = |setpoint: &str, measured: &str| {
+        format!(
+            "states = {{ x = 'deg' }}\ninputs = {{ u = 'mV' }}\nconstants = {{ J = '1 V s/rad' }}\nder = {{ x = 'u/J' }}\n\
+             pid.u = {{ setpoint = {setpoint}, measured = '{measured}', k = '2 V/rad', Ti = 4, limit = [-500, 500] }}"
+        )
+    };
+    let response = respond(&model(&text("90", "x")), &[], &[("x0", 0.0), ("u_integral0", 0.0)], 60.0);
+    assert!((at(&response, "u", 1e-9) - 500.0).abs() < 1e-9 && (at(&response, "x", 60.0) - 90.0).abs() < 1e-3);
+    let bare = read(&text("90", "1*x")).err().expect("a mistake").to_string();
+    assert!(bare.starts_with("pid.u.setpoint: the setpoint 90 has no unit"), "{bare}");
+    // Without any unit, time is a number too.
+    let pure = "states = { x = '1' }\ninputs = { u = '1' }\nder = { x = 'u - x' }\n\
+                pid.u = { setpoint = 1, measured = 'x', k = 2, Ti = 1, Td = 0.1 }";
+    let given = [("x0", 0.0), ("u_integral0", 0.0), ("u_filtered0", 0.0)];
+    assert!((at(&respond(&model(pure), &[], &given, 60.0), "x", 60.0) - 1.0).abs() < 1e-6);
+}
+
+#[test]
 fn mistakes_are_at_the_keys_of_the_controller() {
     let mistake = |pid: &str| read(&plant(pid)).err().expect("a mistake").to_string();
     let unknown = mistake("Ti = 'Tii'");
@@ -97,10 +117,29 @@ fn mistakes_are_at_the_keys_of_the_controller() {
     let wrong = mistake("Ti = '2 m'");
     assert!(wrong.starts_with("pid.u"), "{wrong}");
     let twice = mistake("unit = 'V'");
-    assert!(twice.starts_with("pid.u.unit: `u` takes the place of an input"), "{twice}");
+    assert!(twice.starts_with("pid.u.unit: the controller replaces the input `u`"), "{twice}");
     let late = mistake("delay = '1 ms'");
     assert!(late.starts_with("pid.u.delay: a delay needs a sampled controller"), "{late}");
+    for (pid, key, fact) in [
+        ("Ti = '-1 s'", "Ti", "above 0"),
+        ("Ti = '50 mm'", "Ti", "expected a quantity in s, found mm"),
+        ("Td = '1 s', Nd = 0", "Nd", "above 0"),
+        ("Ti = 'Ti', Tt = '1 s'", "Tt", "only with an integral part and a limit"),
+        ("limit = ['-1 V', '1 V']", "limit", "expected a quantity in 1, found V"),
+    ] {
+        let wrong = mistake(pid);
+        assert!(wrong.starts_with(&format!("pid.u.{key}: ")) && wrong.contains(fact), "{wrong}");
+    }
+    let elsewhere =
+        |name: &str| read(&plant("unit = '1'").replace("pid.u", name)).err().expect("a mistake").to_string();
+    assert!(elsewhere("pid.uu").starts_with("pid.uu: no equation contains the output `uu`"), "{}", elsewhere("pid.uu"));
+    assert!(elsewhere("pid.x").starts_with("pid.x: `x` is a state"), "{}", elsewhere("pid.x"));
+    let never = mistake("every = '0 ms'");
+    assert!(never.starts_with("pid.u.every: "), "{never}");
+    let own = plant("Ti = 'Ti'") + "\nlet = { u_last = 'yy' }";
+    let own = read(&own).err().expect("a mistake").to_string();
+    assert!(own.starts_with("let.u_last: "), "{own}");
     let text = plant("Ti = 'Ti'").replace(", u = '1' }", " }");
     let bare = read(&text).err().expect("a mistake").to_string();
-    assert!(bare.starts_with("pid.u: the unit of `u` is not known"), "{bare}");
+    assert!(bare.starts_with("pid.u: the output `u` of the controller has no unit"), "{bare}");
 }
