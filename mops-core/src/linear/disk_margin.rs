@@ -3,7 +3,6 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::norms::{largest_singular_value, level_frequencies};
-use super::search::maximise;
 use super::{Complex, Loop, StateSpace, undecided};
 use crate::math::{self, complex};
 
@@ -20,6 +19,9 @@ const LARGEST_SCALE: f64 = 30.0;
 /// Imbalance of the scaled singular vectors at which the scales are optimal. The relative error of the gain is of the order of its
 /// square.
 const BALANCED: f64 = 1e-7;
+
+/// Imbalance that suffices at frequencies with less than the largest gain.
+const NEARLY_BALANCED: f64 = 0.03;
 
 /// Relative error of the gain at which the search for scales ends where the largest singular value is multiple.
 const ACCURATE: f64 = 1e-9;
@@ -65,8 +67,8 @@ pub fn disk_margin(of: &StateSpace, skew: f64) -> Result<f64, String> {
 /// Returns the maximum over all frequencies of the upper bound of the structured singular value.
 fn largest_scaled_gain(system: &StateSpace) -> Result<f64, String> {
     let response = system.response()?;
-    let gain = |frequency: f64| scaled_gain(&response.at_frequency(frequency));
-    let mut best = (scaled_gain(&system.d.map(|d| Complex::new(d, 0.0))).0, f64::INFINITY);
+    let gain = |frequency: f64, enough: f64| scaled_gain(&response.at_frequency(frequency), enough);
+    let mut best = (scaled_gain(&system.d.map(|d| Complex::new(d, 0.0)), 0.0).0, f64::INFINITY);
     // Ranges of frequencies in which the bound may exceed the best value.
     let corners: Vec<f64> =
         system.poles()?.iter().map(|pole| complex::norm(*pole)).filter(|size| *size > 0.0).collect();
@@ -75,7 +77,7 @@ fn largest_scaled_gain(system: &StateSpace) -> Result<f64, String> {
     ends.sort_by(f64::total_cmp);
     let mut open: Vec<[f64; 2]> = ends.windows(2).map(|pair| [pair[0], pair[1]]).filter(|[a, b]| a < b).collect();
     for frequency in corners.into_iter().chain([0.0]) {
-        let here = gain(frequency).0;
+        let here = gain(frequency, best.0).0;
         if here > best.0 {
             best = (here, frequency);
         }
@@ -83,7 +85,7 @@ fn largest_scaled_gain(system: &StateSpace) -> Result<f64, String> {
     for _ in 0..MOST {
         let Some(&range) = open.last() else { break };
         let frequency = middle(range);
-        let (here, logarithms) = gain(frequency);
+        let (here, logarithms) = gain(frequency, best.0);
         if here > best.0 {
             best = (here, frequency);
         }
@@ -113,12 +115,24 @@ fn largest_scaled_gain(system: &StateSpace) -> Result<f64, String> {
     if !open.is_empty() {
         return Err("the disk margin was not found: too many frequencies are close to the worst one".to_owned());
     }
-    let (mut most, at) = best;
-    if at.is_finite() && at > 0.0 {
-        let top = maximise(|frequency| gain(frequency).0, at * (1.0 - 1e-3), at * (1.0 + 1e-3));
-        most = most.max(gain(top).0);
+    let (most, at) = best;
+    Ok(if at.is_finite() && at > 0.0 { polished(|frequency| gain(frequency, 0.0).0, [at, most]) } else { most })
+}
+
+/// Returns the top of a peak from a point close to it, by parabolas through three points.
+fn polished(gain: impl Fn(f64) -> f64, [mut at, mut most]: [f64; 2]) -> f64 {
+    let mut reach = 1e-3 * at;
+    for _ in 0..4 {
+        let sides = [gain(at - reach), gain(at + reach)];
+        let bend = sides[0] - 2.0 * most + sides[1];
+        let vertex = at + 0.5 * reach * (sides[0] - sides[1]) / bend;
+        let inside = (bend < 0.0 && (vertex - at).abs() < reach).then(|| [vertex, gain(vertex)]);
+        let found = [Some([at - reach, sides[0]]), Some([at + reach, sides[1]]), inside];
+        let [next, value] = found.into_iter().flatten().fold([at, most], |a, b| if b[1] > a[1] { b } else { a });
+        (at, most) = (next, value);
+        reach *= 0.1;
     }
-    Ok(most)
+    most
 }
 
 /// Returns a frequency within a range that may begin at 0 and end at infinity.
@@ -155,12 +169,15 @@ fn scaled(system: &StateSpace, logarithms: &[f64]) -> StateSpace {
 
 /// Minimises the largest singular value of `D M D^-1` over positive diagonal matrices `D`. Returns the minimum and the logarithms of
 /// the entries of `D`, in which the logarithm of the value is convex.
-fn scaled_gain(m: &DMatrix<Complex>) -> (f64, Vec<f64>) {
+///
+/// Once the value is below `enough`, nearly optimal scales suffice.
+fn scaled_gain(m: &DMatrix<Complex>, enough: f64) -> (f64, Vec<f64>) {
     let n = m.nrows();
     let mut x = vec![0.0; n];
     let Some(mut here) = Gain::of(m, &x) else { return (f64::INFINITY, x) };
     for _ in 0..60 {
-        if here.imbalance() <= BALANCED {
+        let balanced = if here.value < enough { NEARLY_BALANCED } else { BALANCED };
+        if here.imbalance() <= balanced {
             return (here.value, x);
         }
         let mut step = 0.5;
@@ -175,6 +192,9 @@ fn scaled_gain(m: &DMatrix<Complex>) -> (f64, Vec<f64>) {
         };
         let Some(next) = next else { break };
         (here, x) = next;
+    }
+    if here.value < enough {
+        return (here.value, x);
     }
     let found = by_cuts(m, &x);
     if found.0 < here.value { found } else { (here.value, x) }
