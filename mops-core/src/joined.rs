@@ -29,8 +29,8 @@ impl Joined {
     /// Joins models, with their names.
     ///
     /// # Errors
-    /// Returns an error if there are fewer than two models, if one is a linear system without time, or if a parameter or an input of
-    /// the same name has different units.
+    /// Returns an error if there are fewer than two models, if one is a linear system without time, or if parameters or inputs
+    /// with one name differ in their units.
     pub fn new(models: Vec<(String, Box<dyn Model>)>) -> Result<Self, StudyError> {
         if models.len() < 2 {
             let fact = format!("expected at least two models in `join`, found {}", models.len());

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::norms::{largest_singular_value, level_frequencies};
+use super::system::SEVERAL_DELAYED;
 use super::{Complex, Loop, StateSpace, undecided};
 use crate::math::{self, complex};
 
@@ -51,9 +52,7 @@ pub fn disk_margin(of: &StateSpace, skew: f64) -> Result<f64, String> {
         return Loop::new(of.clone())?.disk_margin(skew);
     }
     if of.delay > 0.0 {
-        return Err(
-            "several cut loops with a delay are not supported; replace the delay by a Padé approximation".to_owned()
-        );
+        return Err(SEVERAL_DELAYED.to_owned());
     }
     let sensitivity = of.sensitivity()?;
     if !sensitivity.is_stable()? || !undecided(&sensitivity.a)?.is_empty() {

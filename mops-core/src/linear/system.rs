@@ -5,6 +5,10 @@ use nalgebra::DMatrix;
 use super::eigen::balance;
 use super::{Complex, StateSpace, eigenvalues};
 
+/// Failure of several loops with a delay.
+pub(super) const SEVERAL_DELAYED: &str =
+    "several cut loops with a delay are not supported; replace the delay by a Padé approximation";
+
 impl StateSpace {
     /// Creates a system without delay, with states `x1`, `x2`, ..., inputs `u1`, ... and outputs `y1`, ....
     ///
@@ -153,8 +157,7 @@ impl StateSpace {
             return Ok(self.clone());
         }
         if self.delay != 0.0 {
-            return Err("several cut loops with a delay are not supported; replace the delay by a Padé approximation"
-                .to_owned());
+            return Err(SEVERAL_DELAYED.to_owned());
         }
         let mut kept = self.clone();
         // The loop that stays open is closed with the gain 0.
