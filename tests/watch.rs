@@ -68,14 +68,18 @@ impl Watched {
         answer
     }
 
-    /// Returns the first state that has a best point.
-    fn first_state(&self) -> Value {
+    /// Returns the states and responses that a viewer receives from now on.
+    fn events(&self) -> impl Iterator<Item = Value> {
         let mut stream = self.connect();
         let head = format!("GET /{}/events HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", self.token, self.port);
         stream.write_all(head.as_bytes()).unwrap();
-        let lines = BufReader::new(stream).lines().map(Result::unwrap);
-        let mut states = lines.filter_map(|line| serde_json::from_str::<Value>(line.strip_prefix("data: ")?).ok());
-        states.find(|state| !state["best"].is_null()).unwrap()
+        let lines = BufReader::new(stream).lines().map_while(Result::ok);
+        lines.filter_map(|line| serde_json::from_str(line.strip_prefix("data: ")?).ok())
+    }
+
+    /// Returns the first state that has a best point.
+    fn first_state(&self) -> Value {
+        self.events().find(|event| event["best"].is_object()).unwrap()
     }
 
     fn get(&self, path: &str, host: &str) -> String {
@@ -127,6 +131,27 @@ fn events_count_only_committed_evaluations() {
     let database = rusqlite::Connection::open(out.join("evaluations.sqlite")).unwrap();
     let written: i64 = database.query_row("SELECT count(*) FROM points", [], |row| row.get(0)).unwrap();
     assert!(written >= told, "{told} evaluations reported, {written} committed");
+}
+
+#[test]
+fn the_stream_ends_with_the_last_state_and_the_responses_of_the_best_point() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut run = watched(&folder.path().join("out"), &["--solver", "genetic", "--max-evaluations", "20000"]);
+    let events: Vec<Value> = run.events().collect();
+    assert!(run.process.wait().unwrap().success());
+    let last = events.iter().rfind(|event| event["study"].is_string()).unwrap();
+    assert!(last["over"].is_string(), "{last}");
+    let overshoot = last["criteria"].as_array().unwrap().iter().find(|row| row["name"] == "overshoot").unwrap();
+    let responses = events.iter().rfind(|event| event["plots"].is_array()).unwrap();
+    let curves = responses["plots"].as_array().unwrap().iter().flat_map(|plot| plot["curves"].as_array().unwrap());
+    let highest = |curve: &Value| {
+        let values = curve["y"].as_array().unwrap().iter().filter_map(Value::as_f64);
+        values.fold(f64::NEG_INFINITY, f64::max)
+    };
+    // The setpoint is 1; the curve is rounded and has one value per pixel.
+    let expected = 1.0 + overshoot["value"].as_f64().unwrap();
+    let found: Vec<f64> = curves.map(highest).collect();
+    assert!(found.iter().any(|found| (found - expected).abs() < 1e-4), "{found:?} {expected}");
 }
 
 #[test]

@@ -151,23 +151,10 @@ function draw(found) {
   plots = { names, group: window.startPlots(at("responses")) };
 }
 
-/** Asks for the responses of a new best point, one request at a time. */
-let newest = 0;
-let asking = false;
-async function responses(state) {
-  if (asking || state.improvements === newest) return;
-  asking = true;
-  try {
-    const found = await (await fetch("responses")).json();
-    if (found.of > newest) {
-      newest = found.of;
-      draw(found);
-      at("responses").dataset.shown = String(newest);
-    }
-  } catch {
-    // The run is over; the last responses stay.
-  }
-  asking = false;
+/** Shows the responses of a new best point. */
+function responses(found) {
+  draw(found);
+  at("responses").dataset.shown = String(found.of);
 }
 
 function show(state) {
@@ -184,17 +171,21 @@ function show(state) {
   if (state.criteria) at("criteria").replaceChildren(...state.criteria.map(criterionRow));
   if (state.tuners) at("tuners").replaceChildren(...state.tuners.map(tunerRow));
   curve(state);
-  responses(state);
   document.body.dataset.shown = String(state.evaluations);
 }
 
 show(JSON.parse(at("now").textContent));
 const events = new EventSource("events");
-events.onmessage = (event) => show(JSON.parse(event.data));
-events.addEventListener("over", (event) => { show(JSON.parse(event.data)); events.close(); });
+let over = false;
+events.onmessage = (event) => {
+  const state = JSON.parse(event.data);
+  over = state.over !== null;
+  show(state);
+};
+events.addEventListener("responses", (event) => responses(JSON.parse(event.data)));
 events.onerror = () => {
-  // A killed run sends no last state; the page reports this after a timeout.
-  if (events.readyState === EventSource.CLOSED) return;
+  // The stream ends with the run; that of a killed run ends without a last state, which the page reports after a timeout.
+  if (over) return events.close();
   clearTimeout(window.silence);
   window.silence = setTimeout(() => {
     if (events.readyState !== EventSource.OPEN) {

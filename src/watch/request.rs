@@ -1,4 +1,4 @@
-//! Requests of a browser: files, a stream of states and the responses of the best point, by GET, with the host name of this machine.
+//! Requests of a browser: files and a stream of states, by GET, with the host name of this machine.
 
 /// Answer to a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,9 +11,7 @@ pub(super) enum Answer {
     Script,
     /// The scripts of interactive plots.
     Charts,
-    /// Responses of the best point.
-    Responses,
-    /// The stream of states.
+    /// The stream of states and responses.
     Events,
     /// Refusal, with status and reason.
     Refused(u16, &'static str),
@@ -53,7 +51,6 @@ pub(super) fn answer(head: &[u8], port: u16, token: &str) -> Answer {
         Some("style.css") => Answer::Style,
         Some("page.js") => Answer::Script,
         Some("charts.js") => Answer::Charts,
-        Some("responses") => Answer::Responses,
         Some("events") => Answer::Events,
         _ => Answer::Refused(404, "Not Found"),
     }

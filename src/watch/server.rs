@@ -27,6 +27,9 @@ const PACE: Duration = Duration::from_millis(500);
 /// Longest time between two messages of a stream; a failed write shows that the viewer has left.
 const HEARTBEAT: Duration = Duration::from_secs(2);
 
+/// Longest time for viewers to receive the last state and responses.
+const FAREWELL: Duration = Duration::from_secs(1);
+
 const PAGE: &str = include_str!("page.html");
 const SCRIPT: &str = include_str!("page.js");
 const OWN_STYLE: &str = include_str!("page.css");
@@ -43,8 +46,8 @@ struct Shared {
     /// Connections without a request, in the order of arrival.
     pending: Mutex<VecDeque<(u64, TcpStream)>>,
     connections: AtomicUsize,
-    /// Number of streams that wait for a state and will take the last one at once.
-    waiting: AtomicUsize,
+    /// Number of streams of states that have not ended.
+    streams: AtomicUsize,
     closed: AtomicBool,
 }
 
@@ -60,7 +63,7 @@ impl Server {
             live,
             pending: Mutex::default(),
             connections: AtomicUsize::new(0),
-            waiting: AtomicUsize::new(0),
+            streams: AtomicUsize::new(0),
             closed: AtomicBool::new(false),
         });
         let (of_thread, token_of_thread) = (Arc::clone(&shared), token.clone());
@@ -74,10 +77,10 @@ impl Server {
         format!("http://127.0.0.1:{}/{}/", self.port, self.token)
     }
 
-    /// Stops the server. Viewers that wait for the last state receive it; idle or stuck connections are not awaited.
+    /// Stops the server. Streams receive the last state and responses within [`FAREWELL`]; other connections are not awaited.
     pub fn close(self) {
-        let until = Instant::now() + Duration::from_secs(1);
-        while self.shared.waiting.load(Ordering::Relaxed) > 0 && Instant::now() < until {
+        let until = Instant::now() + FAREWELL;
+        while self.shared.streams.load(Ordering::Relaxed) > 0 && Instant::now() < until {
             thread::sleep(Duration::from_millis(2));
         }
         self.shared.closed.store(true, Ordering::Relaxed);
@@ -163,7 +166,6 @@ fn serve(mut stream: TcpStream, (port, token): (u16, &str), number: u64, shared:
         Answer::Charts => {
             whole(&mut stream, "200 OK", "text/javascript; charset=utf-8", &crate::report::SCRIPTS.join("\n"))
         }
-        Answer::Responses => whole(&mut stream, "200 OK", "application/json; charset=utf-8", &shared.live.responses()),
         Answer::Events => events(&mut stream, shared),
         Answer::Refused(status, reason) => {
             whole(&mut stream, &format!("{status} {reason}"), "text/plain; charset=utf-8", reason)
@@ -216,19 +218,20 @@ fn whole(stream: &mut TcpStream, status: &str, kind: &str, body: &str) -> io::Re
     stream.write_all([head.as_bytes(), body.as_bytes()].concat().as_slice())
 }
 
-/// Writes server-sent events. Source: HTML Living Standard, section 9.2.
+/// Writes server-sent events: states, and the responses of each new best point. Source: HTML Living Standard, section 9.2.
 fn events(stream: &mut TcpStream, shared: &Shared) -> io::Result<()> {
+    let _open = Open::start(&shared.streams);
     let head = format!("HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\n{HEADERS}\r\n");
     stream.write_all(head.as_bytes())?;
-    let (mut seen, mut pace) = (0, Duration::ZERO);
+    let (mut seen, mut drawn, mut pace) = (0, 0, Duration::ZERO);
     loop {
-        let waiting = Waiting::start(&shared.waiting);
         shared.live.pause(pace);
         let (version, over, state) = shared.live.after(seen, HEARTBEAT);
-        // The stream still counts as waiting until the last state is sent.
-        let _waiting = over.then_some(waiting);
-        let name = if over { "event: over\n" } else { "" };
-        stream.write_all(format!("{name}data: {state}\n\n").as_bytes())?;
+        stream.write_all(format!("data: {state}\n\n").as_bytes())?;
+        if let Some((of, responses)) = shared.live.responses(drawn) {
+            stream.write_all(format!("event: responses\ndata: {responses}\n\n").as_bytes())?;
+            drawn = of;
+        }
         if over || shared.closed.load(Ordering::Relaxed) {
             return Ok(());
         }
@@ -236,17 +239,17 @@ fn events(stream: &mut TcpStream, shared: &Shared) -> io::Result<()> {
     }
 }
 
-/// Guard that counts a waiting stream.
-struct Waiting<'a>(&'a AtomicUsize);
+/// Guard that counts an open stream.
+struct Open<'a>(&'a AtomicUsize);
 
-impl<'a> Waiting<'a> {
+impl<'a> Open<'a> {
     fn start(count: &'a AtomicUsize) -> Self {
         count.fetch_add(1, Ordering::Relaxed);
         Self(count)
     }
 }
 
-impl Drop for Waiting<'_> {
+impl Drop for Open<'_> {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }

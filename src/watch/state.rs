@@ -138,21 +138,22 @@ impl Live {
         (newest.version, newest.over.is_some(), self.json(&newest).to_string())
     }
 
-    /// Returns the responses of the best point as JSON, `{"of": number of the point, "plots": [..]}`. They are those of an
-    /// earlier point if the last computation is too recent: simulations for viewers take at most one [`SHARE`]th of the time.
-    pub fn responses(&self) -> String {
+    /// Returns the number of the best point and its responses as JSON, if it is later than point `drawn`. During the run
+    /// simulations for viewers take at most one [`SHARE`]th of the time; until the next one is due, the responses are those of
+    /// an earlier point.
+    pub fn responses(&self, drawn: u64) -> Option<(u64, String)> {
         // One viewer simulates, the others wait for its result.
         let mut last = self.responses.lock().unwrap_or_else(PoisonError::into_inner);
         let newest = self.newest();
         let (of, tuners) = (newest.improvements, newest.best.as_ref().map(|best| best.tuners.clone()));
+        let due = newest.over.is_some() || last.next.is_none_or(|next| Instant::now() >= next);
         drop(newest);
-        let due = last.next.is_none_or(|next| Instant::now() >= next);
         if let Some(tuners) = tuners.filter(|_| due && of > last.of) {
             let start = Instant::now();
             last.json = json!({ "of": of, "plots": crate::report::live(&self.problem, &tuners) }).to_string();
             (last.of, last.next) = (of, Some(Instant::now() + SHARE * start.elapsed()));
         }
-        if last.json.is_empty() { json!({ "of": 0, "plots": [] }).to_string() } else { last.json.clone() }
+        (last.of > drawn).then(|| (last.of, last.json.clone()))
     }
 
     fn json(&self, newest: &Newest) -> Value {
@@ -179,7 +180,6 @@ impl Live {
             "best": newest.best.as_ref().map(|best| json!({
                 "objective": best.merit.objective, "violation": best.merit.violation, "feasible": best.merit.is_feasible(),
             })),
-            "improvements": newest.improvements,
             "criteria": newest.best.as_ref().map(|best| self.criteria(best)),
             "tuners": newest.best.as_ref().map(|best| self.tuners(best)),
             "curve": curve,
