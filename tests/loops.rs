@@ -1,7 +1,8 @@
 //! Models that take another one as their base, and loops cut at a variable, compared with loops written by hand.
 
 use assert_cmd::cargo::cargo_bin_cmd;
-use mops_core::math;
+use mops_core::linear::Complex;
+use mops_core::math::{self, complex};
 use serde_json::Value;
 
 #[path = "common/studies.rs"]
@@ -103,7 +104,7 @@ fn the_loop_of_a_pid_controller_is_cut_at_its_output() {
         parameters = { k = 1, Ti = '1 s', Td = 0 }
         [criteria]\nmargin = { phase-margin = {}, usage = 'monitor' }",
     );
-    assert!(sampled.contains("a loop with a sampled controller has no linearisation"), "{sampled}");
+    assert!(sampled.contains("sampled controller") && sampled.contains("`pid` that has `every`"), "{sampled}");
 }
 
 #[test]
@@ -139,6 +140,78 @@ fn a_limited_controller_of_equations_is_cut_within_its_limits() {
         assert!((cut - by_hand).abs() <= 1e-8 * by_hand.abs(), "{kind}: {cut} {by_hand}");
     }
     assert!((value(&result, "a", "unlimited") - value(&result, "a", "by-hand-phase-margin")).abs() < 1e-8, "{result}");
+}
+
+#[test]
+fn the_margins_of_a_sampled_controller_are_those_of_its_difference_equation() {
+    // A limited PI controller with computing time at a tank, A h' = q - kv h, by hand: from the change of q to the next sample of h,
+    // and u = k e + s, s(k+1) = s + k T/Ti e.
+    let (area, outflow, gain, integral, period, delay) = (0.5, 0.02, 0.05, 20.0, 2.0, 0.5);
+    let text = format!(
+        "[study]\nname = 'tank'
+        [models.tank.equations]
+        states = {{ h = 'm' }}
+        inputs = {{ q = 'm3/s', r = 'm' }}
+        constants = {{ A = '{area} m2', kv = '{outflow} m2/s' }}
+        der.h = \"A*h' = q - kv*h\"
+        horizon = '200 s'
+        pid.q = {{ setpoint = 'r', measured = 'h', k = '{gain} m2/s', Ti = '{integral} s', limit = ['0 m3/s', '0.1 m3/s'], every = '{period} s', delay = '{delay} s' }}
+        [models.cut]
+        like = 'tank'
+        open = 'q'
+        [cases.a]
+        inputs.r = '1 m'
+        [criteria]
+        slowest = {{ model = 'cut', slowest-pole = {{ of = 'closed-loop' }}, usage = 'monitor' }}
+        still = {{ model = 'tank', peak = {{ signal = 'q' }}, usage = 'monitor' }}
+        {}",
+        criteria("cut"),
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let result = run(folder.path(), &text);
+    let decay = |time: f64| math::exp(-outflow / area * time);
+    let at = |z: Complex| {
+        let left = period - delay;
+        let at_change = (1.0 - decay(period)) / outflow / (z - decay(period));
+        let sample = (at_change * decay(left) + (1.0 - decay(left)) / outflow) / z;
+        sample * gain * ((z - 1.0).inv() * period / integral + 1.0)
+    };
+    let response = |omega: f64| at(complex::exp(Complex::new(0.0, omega * period)));
+    let root = |f: &dyn Fn(Complex) -> f64, mut low: f64, mut high: f64| {
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if (f(response(middle)) > 0.0) == (f(response(low)) > 0.0) { low = middle } else { high = middle }
+        }
+        low
+    };
+    let nyquist = std::f64::consts::PI / period;
+    let crossover = root(&|l| complex::norm(l) - 1.0, 1e-3, 0.99 * nyquist);
+    let turned = complex::arg(-response(crossover));
+    // L is real at half of the sampling frequency.
+    let end = at(Complex::new(-1.0, 0.0)).re;
+    assert!(end < 0.0, "{end}");
+    let peak =
+        (1..20_000).map(|i| 1.0 / complex::norm(response(nyquist * f64::from(i) / 20_000.0) + 1.0)).fold(1.0, f64::max);
+    for (kind, exact, tolerance) in [
+        ("crossover-frequency", crossover, 1e-9),
+        ("phase-margin", turned, 1e-9),
+        ("delay-margin", turned / crossover, 1e-9),
+        ("gain-margin", -20.0 * math::log10(-end), 1e-9),
+        ("maximum-sensitivity", peak, 1e-6),
+    ] {
+        let found = value(&result, "a", &format!("cut-{kind}"));
+        assert!((found - exact).abs() <= tolerance * exact, "{kind}: {found} {exact}");
+    }
+    // The return difference vanishes at the slowest pole, whose magnitude is known.
+    let size = math::exp(period * value(&result, "a", "slowest"));
+    let difference = |angle: f64| complex::norm(at(complex::from_polar(size, angle)) + 1.0);
+    let (mut angle, mut step) = (0.0, 0.5 * std::f64::consts::PI);
+    while step > 1e-12 {
+        let tried = (-4..=4).map(|i| angle + 0.25 * f64::from(i) * step);
+        angle = tried.min_by(|a, b| difference(*a).total_cmp(&difference(*b))).unwrap();
+        step *= 0.5;
+    }
+    assert!(difference(angle) < 1e-7, "{angle}: {}", difference(angle));
 }
 
 #[test]

@@ -17,7 +17,8 @@ use crate::common::{Channel, LinearCriterion, Values, number};
 /// `decibel = true`. At least one bound is needed. Example: `of = "sensitivity"`, `upper = [["0.1 Hz", -40], ["1 Hz", -20], ["10 Hz", 6],
 /// ["100 Hz", 6]]`, `decibel = true`.
 ///
-/// The ratio is located by bounds of the response over all frequencies of the mask, with or without delay, not on a grid.
+/// The ratio is located by bounds of the response over all frequencies of the mask, with or without delay, not on a grid. A sampled
+/// system is compared up to half of the sampling frequency.
 ///
 /// Less is better. Range: from 0 up. The default demand is 1. There is no value if a loop is unstable.
 ///

@@ -15,7 +15,7 @@ use crate::common::{Channel, LinearCriterion, Values};
 ///
 /// The norm is computed from both Gramians, which must agree. Less is better. Range: from 0 up. There is no value if
 /// the system is unstable or its stability is undecided within rounding. There is none either if the system has direct
-/// feedthrough, or if the Gramians differ by more than 1e-6 (relative).
+/// feedthrough or is sampled, or if the Gramians differ by more than 1e-6 (relative).
 ///
 /// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]

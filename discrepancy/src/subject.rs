@@ -108,10 +108,12 @@ impl Subject {
             .with_help("keep one model in the study"));
         }
         let (name, model) = &study.models()[index];
-        let has_delays =
-            || model.delays(&study.parameters(&study.jobs()[first], &study.start())).is_ok_and(|d| !d.is_empty());
-        let why =
-            model.not_linear().or_else(|| has_delays().then_some("no effect can be added to a model with delays"));
+        let parameters = study.parameters(&study.jobs()[first], &study.start());
+        let has_delays = || model.delays(&parameters).is_ok_and(|delays| !delays.is_empty());
+        let has_clocks = || model.clocks(&parameters).is_ok_and(|clocks| !clocks.is_empty());
+        let why = (model.not_linear())
+            .or_else(|| has_clocks().then_some("no effect can be added to a model with clocks"))
+            .or_else(|| has_delays().then_some("no effect can be added to a model with delays"));
         if let Some(why) = why {
             let fact = format!("the model `{name}` cannot be diagnosed: {why}");
             return Err(StudyError::new("models", fact).with_help("calibrate it with `mops run`"));

@@ -205,6 +205,7 @@ fn part<S: Scalar>(model: &impl LinearSystem, m: &Matrices<S>, take: impl Fn(S) 
         inputs,
         outputs,
         delay: m.delay.map_or(0.0, take),
+        period: None,
     }
 }
 

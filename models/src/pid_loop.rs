@@ -217,7 +217,7 @@ impl PlantModel for PidLoop {
     }
 
     fn not_linear(&self) -> Option<&'static str> {
-        self.sampling.map(|_| "a loop with a sampled controller has no linearisation in continuous time")
+        self.sampling.map(|_| "a `pid-loop` with a sampled controller cannot be linearised")
     }
 
     fn cut(&self, variables: &[String]) -> Option<Result<Cut, StudyError>> {

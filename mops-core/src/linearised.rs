@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::case::Case;
 use crate::diagnostic::suggestion;
 use crate::failure::Failure;
-use crate::linear::{Balance, NoEquilibrium, Point, StateSpace, equilibrium};
+use crate::linear::{Balance, Clock, NoEquilibrium, Point, StateSpace, equilibrium};
 use crate::model::{Analysis, AnalysisKind, Cut, Interface, Job, Local, Model, OperatingPoint, Variable};
 use crate::study_error::StudyError;
 use crate::unit::Quantity;
@@ -58,7 +58,8 @@ pub struct Resting {
     pub states: Vec<f64>,
     /// Values of all inputs of the model.
     pub inputs: Vec<f64>,
-    /// Rates of change of the states at the operating point; zero at an equilibrium.
+    /// Rates of change of the states at the operating point, those of memory on average over a period of its clock; zero at an
+    /// equilibrium.
     pub rates: Vec<f64>,
     /// Joints whose dry friction is omitted, as names of their positions.
     pub frictionless: Vec<String>,
@@ -124,7 +125,7 @@ impl Linearised {
     /// wrong unit.
     pub fn new(model: Arc<dyn Model>, options: &Linearise) -> Result<Self, StudyError> {
         if let Some(why) = model.not_linear() {
-            let help = "linearise a model without the sampling, or with an input in the place of the sampled quantity";
+            let help = "write its equations, with a clock or a `pid` that has `every`: they have a discrete equivalent";
             return Err(StudyError::here(why).with_help(help));
         }
         let states = model.equation_states();
@@ -213,7 +214,8 @@ impl Linearised {
             return Err(StudyError::new(key.0, fact).with_help("remove it, or `open`").within("linearise"));
         }
         if let Some(why) = model.not_linear() {
-            return Err(StudyError::new("open", why).with_help("cut the loop of a model without the sampling"));
+            let help = "write its equations, with a clock or a `pid` that has `every`: they have a discrete equivalent";
+            return Err(StudyError::new("open", why).with_help(help));
         }
         let Some(cut) = model.cut(variables) else {
             return Err(StudyError::new("open", "the loop of this kind of model cannot be cut")
@@ -323,8 +325,12 @@ impl Linearised {
         point.resize(point.len() + delays.len(), 0.0);
         let here = self.local(parameters, &mut point, &ties)?;
         let rough = self.rough(&point, &here, |point| self.evaluate(parameters, point).ok());
-        let Local { rates, slopes, frictionless, .. } = here;
-        let system = self.system(&slopes, &delays).map_err(Failure::Undefined)?;
+        let Local { mut rates, slopes, frictionless, .. } = here;
+        let clocks = self.model.clocks(parameters)?;
+        let system = self.system(&slopes, &delays, &clocks).map_err(Failure::Undefined)?;
+        for clock in &clocks {
+            rates[clock.memory.clone()].iter_mut().for_each(|change| *change /= clock.period);
+        }
         let mut inputs = point.split_off(n);
         inputs.truncate(of.inputs.len());
         Ok(Resting { system, states: point, inputs, rates, frictionless, rough })
@@ -381,8 +387,9 @@ impl Linearised {
     /// Returns the linear system between the chosen inputs and outputs.
     ///
     /// # Errors
-    /// If it is not a system with one delay, see [`StateSpace::with_delays`].
-    fn system(&self, slopes: &DMatrix<f64>, delays: &[f64]) -> Result<StateSpace, String> {
+    /// If it is not a system with one delay, or without a discrete equivalent, see [`StateSpace::with_delays`] and
+    /// [`StateSpace::sampled`].
+    fn system(&self, slopes: &DMatrix<f64>, delays: &[f64], clocks: &[Clock]) -> Result<StateSpace, String> {
         let (n, of) = (self.states.len(), self.model.interface());
         let names = |variables: &[Variable]| variables.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
         let indices = |chosen: &[usize], all: usize| -> Vec<usize> {
@@ -400,8 +407,18 @@ impl Linearised {
             inputs: [names(&self.interface.inputs), past.clone()].concat(),
             outputs: [names(&self.interface.signals), past].concat(),
             delay: 0.0,
+            period: None,
         };
-        if delays.is_empty() { Ok(system) } else { system.with_delays(delays) }
+        match (clocks.is_empty(), delays.is_empty()) {
+            (true, true) => Ok(system),
+            (true, false) => system.with_delays(delays),
+            (false, true) => system.sampled(clocks, !self.cut.is_empty()),
+            (false, false) => {
+                Err("a model with clocks and delays has no linearisation; replace its delays by memory of a clock, or \
+                                   its clocks by continuous equations"
+                    .to_owned())
+            }
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use crate::case::Case;
 use crate::diagnostic::suggestion;
 use crate::effect::Placement;
 use crate::failure::Failure;
-use crate::linear::StateSpace;
+use crate::linear::{Clock, StateSpace};
 use crate::plant::Open;
 use crate::port::Port;
 use crate::study_error::StudyError;
@@ -210,7 +210,15 @@ pub trait Model: Send + Sync {
         Ok(Vec::new())
     }
 
-    /// Returns the reason why the equations have no linearisation in continuous time, if so.
+    /// Returns the clocks of the equations, whose memory is among [`Model::equation_states`].
+    ///
+    /// # Errors
+    /// Returns an error if the model is not defined for the parameters.
+    fn clocks(&self, _parameters: &[f64]) -> Result<Vec<Clock>, Failure> {
+        Ok(Vec::new())
+    }
+
+    /// Returns the reason why the equations have no linearisation, if so.
     fn not_linear(&self) -> Option<&'static str> {
         None
     }
@@ -269,7 +277,7 @@ pub struct OperatingPoint<'a, S = f64> {
 /// Model equations at an operating point, with exact derivatives: the data of a linearisation.
 #[derive(Debug, Clone)]
 pub struct Local {
-    /// Rates of change of the states.
+    /// Rates of change of the states; of the memory of a clock, its change at an instant.
     pub rates: Vec<f64>,
     /// Values of the signals, in the order of [`Interface::signals`].
     pub signals: Vec<f64>,

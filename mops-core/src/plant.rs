@@ -2,6 +2,7 @@
 
 use crate::enclosure::Enclosure;
 use crate::failure::Failure;
+use crate::linear::Clock;
 use crate::scalar::{Dual7, Scalar};
 
 /// Time, states, inputs and forces at which a plant is evaluated.
@@ -146,6 +147,14 @@ pub trait Plant<S: Scalar> {
         Vec::new()
     }
 
+    /// Returns the clocks of the plant, if a linearisation can treat them.
+    fn clocks(&self) -> Vec<Clock> {
+        Vec::new()
+    }
+
+    /// Writes the changes of the memory of all clocks at an instant of each, its next value minus the present one.
+    fn changes(&self, _at: &Instant<'_, S>, _dx: &mut [S]) {}
+
     /// Takes the past as constant, with these values of the quantities.
     fn hold(&mut self, _past: &[S]) {}
 
@@ -264,6 +273,12 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Plant<S> for Box<P> {
     }
     fn delays(&self) -> Vec<f64> {
         (**self).delays()
+    }
+    fn clocks(&self) -> Vec<Clock> {
+        (**self).clocks()
+    }
+    fn changes(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        (**self).changes(at, dx);
     }
     fn hold(&mut self, past: &[S]) {
         (**self).hold(past)

@@ -2,7 +2,7 @@
 
 use mops_core::StateSpace;
 use mops_core::linear::{Complex, eigenvalues, zeros};
-use mops_core::math::complex;
+use mops_core::math::{self, complex};
 
 use crate::report::{Color, Curve, CurveStyle, FrequencyCurve, Level, Plot, bode, nyquist};
 
@@ -25,9 +25,13 @@ fn of_frequencies(system: &StateSpace, name: &str) -> Result<[Plot; 3], String> 
     Ok([magnitude, phase, nyquist(&response, None, name)])
 }
 
-/// Draws the poles of the closed loop `k G/(1 + k G)` for gains k from 0 upwards, with negative feedback. A delay is ignored.
+/// Draws the poles of the closed loop `k G/(1 + k G)` for gains k from 0 upwards, with negative feedback; those of a sampled system in
+/// z. A delay is ignored.
 fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
-    let (poles, zeros) = (system.poles()?, zeros(system)?);
+    let in_z = system.difference_equation();
+    let is_sampled = in_z.is_some();
+    let system = in_z.as_ref().unwrap_or(system);
+    let (poles, zeros) = (eigenvalues(&system.a)?, zeros(system)?);
     let size = shown(poles.iter().chain(&zeros).map(|z| complex::norm(*z)).collect());
     let direct = system.d[(0, 0)];
     let closed = |k: f64| eigenvalues(&(&system.a - &system.b * &system.c * (k / (1.0 + k * direct))));
@@ -79,11 +83,21 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
         points: branch.iter().map(point).collect(),
         ..Curve::default()
     });
+    let angles = (0..=200).map(|i| math::sin_cos(std::f64::consts::TAU * f64::from(i) / 200.0));
+    let circle = is_sampled.then(|| Curve {
+        name: "unit circle".into(),
+        points: angles.map(|(sin, cos)| (cos, sin)).collect(),
+        color: Color::Grid,
+        ..Curve::default()
+    });
+    let unit = if is_sampled { "of z" } else { "(1/s)" };
     Ok(Plot {
         title: format!("root locus of {name}, negative feedback"),
-        x_label: "real part (1/s)".into(),
-        y_label: "imaginary part (1/s)".into(),
-        curves: lines
+        x_label: format!("real part {unit}"),
+        y_label: format!("imaginary part {unit}"),
+        curves: circle
+            .into_iter()
+            .chain(lines)
             .chain([
                 marks("poles", &poles, CurveStyle::Crosses, Color::Demand),
                 marks("zeros", &zeros, CurveStyle::Dots, Color::Measured),

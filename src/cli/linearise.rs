@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use mops_core::linear::{Complex, TransferFunction, zeros};
+use mops_core::linear::{Complex, TransferFunction, eigenvalues, zeros};
 use mops_core::{
     Analysis, AnalysisKind, Catalogue, Diagnostic, Failure, Job, JobPlan, Linearise, Linearised, Quantity, Resting,
     StateSpace, Study, StudyError, suggestion,
@@ -86,14 +86,17 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
         }
     }
     let unit = |name: &str| text::unit_of(name, &states, &interface.inputs, &interface.signals);
-    print(&text::matrices(&system, &unit))?;
-    let poles = system.poles();
+    // The matrices of a sampled system are those of its difference equation, its poles are those in z.
+    let equation = system.difference_equation().unwrap_or_else(|| system.clone());
+    print(&text::matrices(&equation, system.period, &unit))?;
+    let in_z = |root: Complex| system.period.map_or(root, |period| StateSpace::z(root, period));
+    let poles = eigenvalues(&system.a).map(|roots| roots.into_iter().map(in_z).collect::<Vec<_>>());
     match &poles {
-        Ok(poles) => print(&(text::poles_table("pole", poles) + &text::undecided_note(&system.a)))?,
+        Ok(poles) => print(&(text::poles_table("pole", poles, system.period) + &text::undecided_note(&system)))?,
         Err(why) => print(&format!("\nnote: no poles: {why}\n"))?,
     }
     let known: &[Complex] = poles.as_deref().unwrap_or_default();
-    let channels = channels(&system, known, arguments.out.is_some())?;
+    let channels = channels(&equation, system.period, known, arguments.out.is_some())?;
     let feedback = wanted.map(|wanted| wanted.design(&system, &unit));
     if let Some(Ok((text, _))) = &feedback {
         print(text)?;
@@ -105,7 +108,8 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
         };
         let content = json!({
             "model": name, "case": case.name, "states": system.states, "inputs": system.inputs, "outputs": system.outputs,
-            "a": rows(&system.a), "b": rows(&system.b), "c": rows(&system.c), "d": rows(&system.d), "delay": system.delay,
+            "a": rows(&equation.a), "b": rows(&equation.b), "c": rows(&equation.c), "d": rows(&equation.d),
+            "delay": system.delay, "period": system.period,
             "at": { "states": found.states, "inputs": found.inputs, "rates": found.rates },
             "poles": poles.ok().map(|poles| complex(&poles)), "channels": channels, "feedback": feedback,
         });
@@ -118,7 +122,12 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
 
 /// Prints zeros and transfer functions of the channels, and returns them as JSON: of all channels if `all`, else of the
 /// printed ones.
-fn channels(system: &StateSpace, poles: &[Complex], all: bool) -> Result<Vec<Value>, CommandError> {
+fn channels(
+    system: &StateSpace,
+    period: Option<f64>,
+    poles: &[Complex],
+    all: bool,
+) -> Result<Vec<Value>, CommandError> {
     let mut values = Vec::new();
     let pairs = (0..system.inputs.len()).flat_map(|i| (0..system.outputs.len()).map(move |o| (i, o)));
     for (count, (i, o)) in pairs.enumerate() {
@@ -135,7 +144,7 @@ fn channels(system: &StateSpace, poles: &[Complex], all: bool) -> Result<Vec<Val
                     "input": input, "output": output, "zeros": complex(&zeros),
                     "numerator": numerator, "denominator": denominator, "delay": delay,
                 });
-                (text::channel(&channel, &zeros, &function, poles), value)
+                (text::channel(&channel, period, &zeros, &function, poles), value)
             }
             Err(why) => {
                 let nothing =

@@ -1,5 +1,7 @@
 //! Bode plots of linear systems.
 
+use std::f64::consts::PI;
+
 use mops_core::StateSpace;
 use mops_core::linear::{Complex, zeros};
 use mops_core::math::{self, complex};
@@ -42,9 +44,10 @@ impl FrequencyCurve {
 }
 
 /// Returns angular frequencies, rad/s, from two decades below the lowest corner frequency to two decades above the highest.
-/// They are dense around sharp resonances. A delay limits the highest frequency.
+/// They are dense around sharp resonances. A delay limits the highest frequency, and a sampled system ends at half of the sampling
+/// frequency.
 pub(super) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
-    let corners = [system.poles()?, zeros(system)?].concat();
+    let corners = [system.poles()?, system.in_seconds(zeros(system)?)].concat();
     let largest = corners.iter().map(|z| complex::norm(*z)).fold(0.0, f64::max);
     let sizes = corners.iter().map(|z| complex::norm(*z)).filter(|size| *size > 1e-9 * largest);
     let sizes = || sizes.clone().chain((system.delay > 0.0).then(|| 1.0 / system.delay));
@@ -53,6 +56,9 @@ pub(super) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
     if system.delay > 0.0 {
         // Beyond that, the phase of the delay only wraps around.
         high = high.min((3.0 * corners.iter().map(|z| complex::norm(*z)).fold(0.0, f64::max)).max(6.0 / system.delay));
+    }
+    if let Some(period) = system.period {
+        high = PI / period;
     }
     const COUNT: usize = 1200;
     let step = math::ln(high / low) / COUNT as f64;

@@ -185,6 +185,9 @@ impl Text {
     }
 }
 
+/// Suffix of the name of memory at which a loop is cut.
+pub const OWN: &str = " (own value)";
+
 /// Way out of a mistake in an expression.
 pub const HELP: &str = "see `mops describe equations` for the syntax of expressions";
 
@@ -398,21 +401,57 @@ impl Definition {
 }
 
 impl Definition {
-    /// Cuts the loop at a named expression, which has this unit unless an output declares it: an input of this name acts in its place;
-    /// the output that follows the others is minus the expression.
+    /// Cuts the loop at a named expression, which has this unit unless an output declares it, or at the memory of a clock: an input of
+    /// this name acts in its place; the output that follows the others is minus the expression.
     ///
     /// # Errors
-    /// There is no such expression.
+    /// There is no such variable.
     pub fn cut(&mut self, variable: &str, unit: Option<Unit>) -> Result<(), StudyError> {
+        if let Some(state) = (self.continuous..self.states.len()).find(|&state| self.states[state].name == variable) {
+            self.cut_memory(state);
+            return Ok(());
+        }
         let Some(index) = self.lets.iter().position(|(name, _)| name == variable) else {
-            let fact = format!("the loop can be cut at a named expression of `let` only, not at `{variable}`");
-            let names = self.lets.iter().map(|(name, _)| name.as_str());
+            let fact = format!(
+                "the loop can be cut at a named expression of `let` or at the memory of a clock, not at `{variable}`"
+            );
+            let memory = self.states[self.continuous..].iter().map(|state| state.name.as_str());
+            let names = self.lets.iter().map(|(name, _)| name.as_str()).chain(memory);
             return Err(StudyError::here(fact).with_help(suggestion(variable, names)));
         };
-        let (name, mut text) = self.lets.remove(index);
+        let (name, text) = self.lets.remove(index);
         let shown = self.outputs.iter().position(|(output, _)| output.name == name);
         let shown = shown.map(|k| self.outputs.remove(k).0.unit);
         let unit = shown.or(unit).map_or_else(Unit::one, |unit| unit.difference());
+        self.add_cut(&name, &unit, text);
+        Ok(())
+    }
+
+    /// Cuts the loop at the memory of a clock, which keeps its value under another name. The clock itself uses this value, for example to
+    /// continue from it; all others use the input.
+    fn cut_memory(&mut self, state: usize) {
+        let declared = &mut self.states[state];
+        let (name, unit, path) = (declared.name.clone(), declared.unit.difference(), declared.path.clone());
+        let own = format!("{name}{OWN}");
+        declared.name.clone_from(&own);
+        if let Some(start) = self.start.remove(&name) {
+            self.start.insert(own.clone(), start);
+        }
+        let assigned = self.when.iter_mut().flat_map(|when| when.resets.iter_mut().chain(&mut when.at_rest));
+        assigned.filter(|(state, _)| *state == name).for_each(|(state, _)| state.clone_from(&own));
+        let clock = self.clocks.iter_mut().find(|clock| clock.memory.contains(&state)).expect("memory of a clock");
+        let mut rename = |node: &Node| (node.form == Form::Name(name.clone())).then(|| Form::Name(own.clone()));
+        for text in &mut clock.next {
+            let mut equation = (*text.equation).clone();
+            equation.right.replace(&mut rename);
+            text.equation = Arc::new(equation);
+        }
+        let right = Node { form: Form::Name(own), span: 0..name.len() };
+        self.add_cut(&name, &unit, Text { path, equation: Arc::new(Equation { left: None, right }), index: None });
+    }
+
+    /// Adds the input of a cut loop, and minus the expression as its output.
+    fn add_cut(&mut self, name: &str, unit: &Unit, mut text: Text) {
         let declared = |name: String, about: &str| Declared {
             name,
             unit: unit.clone(),
@@ -420,7 +459,7 @@ impl Definition {
             about: about.to_owned(),
             path: text.path.clone(),
         };
-        let input = declared(name.clone(), "input of the cut loop");
+        let input = declared(name.to_owned(), "input of the cut loop");
         let output = declared(format!("-{name}"), "output of the cut loop");
         let right = text.equation.right.clone();
         let span = right.span.clone();
@@ -429,7 +468,6 @@ impl Definition {
         self.inputs.push(input);
         self.outputs.push((output, text));
         self.cuts += 1;
-        Ok(())
     }
 
     fn read_clocks(&mut self, options: &EquationsOptions) -> Result<(), StudyError> {

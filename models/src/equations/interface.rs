@@ -2,7 +2,7 @@
 
 use mops_core::{Parameter, Port, StudyError, Unit, Variable, suggestion};
 
-use super::definition::{self, Definition, under};
+use super::definition::{self, Definition, OWN, under};
 use super::graph::Op;
 use super::system::System;
 
@@ -35,9 +35,10 @@ pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Paramet
             starts.push(Start::Parameter(index));
             continue;
         }
-        let name = match state.name.split_once('[') {
+        let own = state.name.trim_end_matches(OWN);
+        let name = match own.split_once('[') {
             Some((family, index)) => format!("{family}0[{index}"),
-            None => format!("{}0", state.name),
+            None => format!("{own}0"),
         };
         if let Some(taken) = d.parameters.iter().find(|p| p.quantity.name == name) {
             let mistake =

@@ -212,11 +212,6 @@ impl PlantModel for Equations {
         self.tolerance
     }
 
-    fn not_linear(&self) -> Option<&'static str> {
-        let has_clocks = !self.definition.clocks.is_empty();
-        has_clocks.then_some("a model with clocks has no linearisation in continuous time")
-    }
-
     fn cut(&self, variables: &[String]) -> Option<Result<Cut, StudyError>> {
         let mut definition = self.definition.clone();
         let cut = variables.iter().try_for_each(|variable| {

@@ -68,7 +68,9 @@ use crate::kernel::Tolerance;
 /// `friction.th = { coulomb = "c" }`; a stuck joint is exactly at rest. The places of possible missing effects are
 /// the joints, the equations of the states, the inputs and the signals.
 ///
-/// A model with clocks is simulated, but not linearised. A model with clocks or delays has no places for effects.
+/// The linearisation of a model with clocks is its discrete equivalent, for inputs that are constant between the instants of the slowest
+/// clock. It has no delays. A loop is cut with `open` at the memory of the slowest clock, or at an expression of `let` that depends on
+/// it only. A model with clocks or delays has no places for effects.
 ///
 /// Source: F. Cellier, E. Kofman, Continuous System Simulation (2006), chapters 7 (sorting and solving equations) and 9
 /// (discontinuities); A. Bellen, M. Zennaro, Numerical Methods for Delay Differential Equations (2003), section 3.2.

@@ -4,12 +4,13 @@ use std::cell::RefCell;
 
 use mops_core::enclosure::Enclosure;
 use mops_core::expression::Comparison;
+use mops_core::linear;
 use mops_core::{DIRECTIONS, Dual, Dual7, EventInstant, Failure, Instant, Past, Plant, Scalar, Span};
 
 use super::bank::{Bank, Large, Register};
 use super::bounds::{self, moved, signed};
 use super::clocks::Ticking;
-use super::compiled::{Compiled, Signal};
+use super::compiled::{Clock, Compiled, Signal};
 use super::happenings::Phase;
 use super::program::Program;
 use crate::kernel::elements::delay::{Delay, Restart, pass_delays, remember_delays};
@@ -461,6 +462,27 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
 
     fn delays(&self) -> Vec<f64> {
         self.delays.iter().map(|delay| delay.time().value()).collect()
+    }
+
+    fn clocks(&self) -> Vec<linear::Clock> {
+        let clock = |clock: &Clock| linear::Clock {
+            memory: clock.memory.clone(),
+            period: clock.period,
+            offset: clock.offset,
+            delay: clock.delay,
+        };
+        self.model.clocks.iter().map(clock).collect()
+    }
+
+    fn changes(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        for clock in &self.model.clocks {
+            let mut bank = self.bank.borrow_mut();
+            self.load(&mut bank, at);
+            clock.next.run(&mut *bank);
+            for (state, &register) in clock.memory.clone().zip(&clock.next.results) {
+                dx[state] = bank.get(register) - at.x[state];
+            }
+        }
     }
 
     fn hold(&mut self, past: &[S]) {

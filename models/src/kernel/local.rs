@@ -16,7 +16,7 @@ pub fn rests<S: Scalar>(at_rest: bool, speed: S) -> bool {
 
 /// Values of the equations at an operating point.
 struct Here<S> {
-    /// Rates of the states, then the signals, then the quantities whose past matters.
+    /// Rates of the states, or changes of memory at an instant, then the signals, then the quantities whose past matters.
     values: Vec<S>,
     /// Positions, as states, of the joints whose dry friction is left out.
     left_out: Vec<usize>,
@@ -30,6 +30,7 @@ fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Resul
     let left_out = plant.linearised_at(&here, at.at_rest)?;
     let mut values = at.states.to_vec();
     plant.rates(&here, &mut values);
+    plant.changes(&here, &mut values);
     values.extend((0..model.interface().signals.len()).map(|signal| plant.signal(signal, &here)));
     values.extend(plant.past(&here));
     Ok(Here { values, left_out })

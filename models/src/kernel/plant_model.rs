@@ -1,5 +1,6 @@
 //! Models given by their plants.
 
+use mops_core::linear::Clock;
 use mops_core::{
     Analysis, Cut, Dual7, Failure, Input, Interface, Job, Local, Model, Open, OperatingPoint, Plant, Scalar,
     StudyError, Variable, WithTangents,
@@ -225,6 +226,10 @@ impl<M: PlantModel> Model for Simulated<M> {
 
     fn delays(&self, parameters: &[f64]) -> Result<Vec<f64>, Failure> {
         Ok(self.of.plant(parameters)?.delays())
+    }
+
+    fn clocks(&self, parameters: &[f64]) -> Result<Vec<Clock>, Failure> {
+        Ok(self.of.plant(parameters)?.clocks())
     }
 
     fn not_linear(&self) -> Option<&'static str> {

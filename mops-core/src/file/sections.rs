@@ -50,7 +50,8 @@ pub(super) struct ModelCommon {
     /// `open = "u"`. `L` is the transfer function from an input in the place of the variable to minus its computed value, so
     /// that the poles of the closed loop are the zeros of `1 + L`. The operating point is the equilibrium of the closed loop
     /// with the inputs of the case at time 0; `linearise = { equilibrium = false, at = { .. } }` gives another one. For models
-    /// of the kind `equations`, the variable is a named expression of `let`.
+    /// of the kind `equations`, the variable is a named expression of `let`, or the memory of a clock: `L` is then the discrete
+    /// transfer function `L(z)`, and frequencies are those of `z = exp(j omega T)`, up to half of the sampling frequency.
     ///
     /// A list, `open = ["u1", "u2"]`, cuts several loops, for a disk margin of all of them. Criteria of loops select one by
     /// `input = "u1"`, with the others closed; criteria of other linear systems read the loop transfer function with all loops open.

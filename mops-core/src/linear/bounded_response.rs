@@ -1,6 +1,6 @@
 //! Bounds of a frequency response over ranges of frequencies; unlike a grid, they miss no peak or crossing.
 
-use super::{Complex, FrequencyResponse, StateSpace, zeros};
+use super::{Complex, FrequencyResponse, StateSpace, eigenvalues, zeros};
 use crate::math::{self, complex};
 
 /// Gain below which a response counts as zero: -200 dB.
@@ -40,7 +40,7 @@ impl BoundedResponse {
     /// If an entry is not finite, or if poles and zeros do not reproduce the response, so that they give no bounds.
     pub fn new(system: &StateSpace) -> Result<Self, String> {
         let zeros = zeros(system)?.into_iter().map(|z| (z, 1.0));
-        let roots: Vec<(Complex, f64)> = zeros.chain(system.poles()?.into_iter().map(|p| (p, -1.0))).collect();
+        let roots: Vec<(Complex, f64)> = zeros.chain(eigenvalues(&system.a)?.into_iter().map(|p| (p, -1.0))).collect();
         let delay = system.delay;
         let sizes = roots.iter().map(|(root, _)| complex::norm(*root)).chain((delay > 0.0).then(|| 1.0 / delay));
         let sizes: Vec<f64> = sizes.filter(|size| *size > 0.0 && size.is_finite()).collect();
@@ -54,7 +54,7 @@ impl BoundedResponse {
 
     /// Returns the response at an angular frequency, rad/s.
     pub fn at(&self, omega: f64) -> Complex {
-        self.response.scalar(omega)
+        self.response.on_axis(omega)[(0, 0)]
     }
 
     /// Returns the number of poles and zeros.

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::norms::{largest_singular_value, level_frequencies};
 use super::system::SEVERAL_DELAYED;
-use super::{Complex, Loop, StateSpace, undecided};
+use super::{Complex, Loop, StateSpace, eigenvalues, undecided};
 use crate::math::{self, complex};
 
 /// Relative gap between the largest value found and its bound over all frequencies, before refinement.
@@ -66,11 +66,11 @@ pub fn disk_margin(of: &StateSpace, skew: f64) -> Result<f64, String> {
 /// Returns the maximum over all frequencies of the upper bound of the structured singular value.
 fn largest_scaled_gain(system: &StateSpace) -> Result<f64, String> {
     let response = system.response()?;
-    let gain = |frequency: f64, enough: f64| scaled_gain(&response.at_frequency(frequency), enough);
+    let gain = |frequency: f64, enough: f64| scaled_gain(&response.on_axis(frequency), enough);
     let mut best = (scaled_gain(&system.d.map(|d| Complex::new(d, 0.0)), 0.0).0, f64::INFINITY);
     // Ranges of frequencies in which the bound may exceed the best value.
     let corners: Vec<f64> =
-        system.poles()?.iter().map(|pole| complex::norm(*pole)).filter(|size| *size > 0.0).collect();
+        eigenvalues(&system.a)?.iter().map(|pole| complex::norm(*pole)).filter(|size| *size > 0.0).collect();
     let mut ends = corners.clone();
     ends.extend([0.0, f64::INFINITY]);
     ends.sort_by(f64::total_cmp);
@@ -103,7 +103,7 @@ fn largest_scaled_gain(system: &StateSpace) -> Result<f64, String> {
         // One frequency decides on a range between crossings; those of the poles within guard against crossings that rounding hides.
         let below = |[low, high]: [f64; 2]| {
             let within = ends.iter().copied().filter(|end| *end > low && *end < high && end.is_finite());
-            within.chain([middle([low, high])]).all(|w| largest_singular_value(&at.at_frequency(w)) <= level)
+            within.chain([middle([low, high])]).all(|w| largest_singular_value(&at.on_axis(w)) <= level)
         };
         let mut covered: Vec<[f64; 2]> =
             crossings.windows(2).map(|pair| [pair[0], pair[1]]).filter(|r| below(*r)).collect();

@@ -2,14 +2,23 @@
 
 use nalgebra::DMatrix;
 
-/// Returns the exponential of a square matrix: the Taylor series of a part whose norm is at most 1/2, squared repeatedly.
+/// Returns the exponential of a square matrix.
+///
+/// # Panics
+/// If the matrix is not square.
+pub fn exponential(of: &DMatrix<f64>) -> DMatrix<f64> {
+    exponential_m1(of) + DMatrix::identity(of.nrows(), of.nrows())
+}
+
+/// Returns the exponential of a square matrix minus 1, without cancellation for a small matrix: the Taylor series of a part whose
+/// norm is at most 1/2, squared repeatedly.
 ///
 /// Source: C. Moler, C. Van Loan, Nineteen dubious ways to compute the exponential of a matrix, twenty-five years later, SIAM
 /// Review 45 (2003) 3-49, method 3.
 ///
 /// # Panics
 /// If the matrix is not square.
-pub fn exponential(of: &DMatrix<f64>) -> DMatrix<f64> {
+pub fn exponential_m1(of: &DMatrix<f64>) -> DMatrix<f64> {
     assert!(of.is_square(), "the exponential of a square matrix");
     let norm = of.row_iter().map(|row| row.iter().map(|x| x.abs()).sum::<f64>()).fold(0.0, f64::max);
     let (mut squarings, mut part) = (0, of.clone());
@@ -19,14 +28,15 @@ pub fn exponential(of: &DMatrix<f64>) -> DMatrix<f64> {
         part *= 0.5;
         squarings += 1;
     }
-    let mut sum = DMatrix::identity(of.nrows(), of.nrows());
-    let mut term = sum.clone();
+    let mut term = part.clone();
+    let mut sum = term.clone();
     // The remainder after 16 terms is below 0.5^17/17!, less than rounding.
-    for k in 1..=16 {
+    for k in 2..=16 {
         term = &term * &part / f64::from(k);
         sum += &term;
     }
-    (0..squarings).fold(sum, |power, _| &power * &power)
+    // (1 + x)^2 - 1
+    (0..squarings).fold(sum, |power, _| &power * &power + &power * 2.0)
 }
 
 #[cfg(test)]

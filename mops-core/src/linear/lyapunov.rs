@@ -48,9 +48,12 @@ const DIFFERENT: f64 = 1e-6;
 /// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3.
 ///
 /// # Errors
-/// If the system is not stable or has direct feedthrough: the norm is infinite. If the results from the two Gramians
+/// If the system is sampled, is not stable or has direct feedthrough: the norm is infinite. If the results from the two Gramians
 /// differ.
 pub fn h2_norm(system: &StateSpace) -> Result<f64, String> {
+    if system.period.is_some() {
+        return Err("the H2 norm is defined here for continuous systems only".to_owned());
+    }
     check_stable(system, "H2 norm")?;
     if system.d.iter().any(|&d| d != 0.0) {
         return Err("the system has direct feedthrough (D is not 0): its H2 norm is infinite".to_owned());

@@ -15,7 +15,8 @@ pub(super) const STRONG: f64 = 1e10;
 /// Crossing of a level or of the negative real axis by the response of a loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
-    /// Angular frequency, rad/s. 0 and infinity also count as crossings if the response ends on the negative real axis.
+    /// Angular frequency, rad/s. 0 and infinity, or half of the sampling frequency, also count as crossings if the response ends on
+    /// the negative real axis.
     pub frequency: f64,
     /// Loop transfer function at the crossing.
     pub response: Complex,
@@ -67,7 +68,12 @@ impl Loop {
 
     /// Returns the loop transfer function at an angular frequency, rad/s.
     pub fn at(&self, frequency: f64) -> Complex {
-        self.response.at(frequency)
+        self.response.at(self.system.on_axis(frequency))
+    }
+
+    /// Returns the crossing at the point `j v` of the imaginary axis.
+    fn crossing(&self, v: f64, rises: bool) -> Crossing {
+        Crossing { frequency: self.system.frequency(v), response: self.response.at(v), rises }
     }
 
     /// Returns the crossings of `|L| = level`, by ascending frequency.
@@ -79,8 +85,8 @@ impl Loop {
             &self.response,
             |l| math::ln(complex::norm(l)) - level,
             bounds,
-            |frequency, rises| {
-                found.push(Crossing { frequency, response: self.at(frequency), rises });
+            |v, rises| {
+                found.push(self.crossing(v, rises));
                 true
             },
         )?;
@@ -102,16 +108,17 @@ impl Loop {
             &self.response,
             |l| complex::arg(-l),
             bounds,
-            |frequency, rises| {
-                found(Crossing { frequency, response: self.at(frequency), rises });
+            |v, rises| {
+                found(self.crossing(v, rises));
                 true
             },
         )?;
-        // At infinite frequency a response with delay turns on a circle, and crosses the axis on both sides.
+        // A sampled response ends at half of the sampling frequency. At infinite frequency a response with delay turns on a circle, and crosses the axis on both sides.
         let end = self.system.d[(0, 0)];
         let end = if self.system.delay > 0.0 { -end.abs() } else { end };
         if end < 0.0 {
-            found(Crossing { frequency: f64::INFINITY, response: Complex::new(end, 0.0), rises: false });
+            let frequency = self.system.frequency(f64::INFINITY);
+            found(Crossing { frequency, response: Complex::new(end, 0.0), rises: false });
         }
         Ok(())
     }
@@ -210,6 +217,9 @@ impl Loop {
     }
 
     /// Returns the delay margin, s: the smallest additional delay that makes the closed loop unstable, or infinity.
+    ///
+    /// For a sampled loop, the delay of the sampled values; it is exact for whole periods, and between them takes the values as those
+    /// of a signal without frequencies above half of the sampling frequency.
     ///
     /// For an unstable loop: minus the smallest change of the delay, of either sign, that makes it stable. A reduction
     /// may exceed the delay of the loop.

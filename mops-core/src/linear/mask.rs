@@ -65,7 +65,8 @@ impl Mask {
     }
 
     /// Returns the largest ratio of the gain to the bound if it is an upper one, of the bound to the gain if it is a lower one, and the
-    /// angular frequency, rad/s: 1 where the gain touches its bound. It is located by bounds of the response over ranges of frequencies.
+    /// angular frequency, rad/s: 1 where the gain touches its bound. Of a sampled system, frequencies up to half of the sampling frequency
+    /// count. It is located by bounds of the response over ranges of frequencies.
     ///
     /// # Errors
     /// If the system has several inputs or outputs, or the closed loop is not stable.
@@ -81,7 +82,7 @@ impl Mask {
         let gain = |l: Complex| closed.map_or_else(|| complex::norm(l), |closed| closed.gain(l));
         let [low, high] = self.ends();
         let bounds = |span: &Span| {
-            let (from, to) = (span.low.max(low), span.high.min(high));
+            let (from, to) = (system.frequency(span.low).max(low), system.frequency(span.high).min(high));
             if from > to {
                 return [f64::NEG_INFINITY; 2];
             }
@@ -94,10 +95,12 @@ impl Mask {
             if self.is_upper { [gains[0] - most, gains[1] - least] } else { [least - gains[1], most - gains[0]] }
         };
         let response = BoundedResponse::new(system)?;
-        let mut best = highest(&response, |w, l| self.ratio(w, gain(l)), bounds)?;
+        let (ratio, v) = highest(&response, |v, l| self.ratio(system.frequency(v), gain(l)), bounds)?;
+        let mut best = (ratio, system.frequency(v));
         // A bend of the mask, and its ends, are no maxima of smooth curves.
-        for &[w, _] in &self.points {
-            let ratio = self.ratio(w, gain(response.at(w)));
+        let last = system.frequency(f64::INFINITY);
+        for &[w, _] in self.points.iter().filter(|point| point[0] <= last) {
+            let ratio = self.ratio(w, gain(response.at(system.on_axis(w))));
             if ratio > best.0 {
                 best = (ratio, w);
             }

@@ -23,6 +23,7 @@ mod reference;
 mod response;
 mod riccati;
 mod roughness;
+mod sampled;
 mod schur;
 mod search;
 mod stabilising;
@@ -48,6 +49,7 @@ pub use place::{Placement, place};
 pub use response::FrequencyResponse;
 pub use riccati::{lqr, riccati};
 pub(crate) use roughness::Point;
+pub use sampled::{Clock, NEXT};
 pub use schur::Schur;
 pub use transfer::TransferFunction;
 pub use zeros::zeros;
@@ -60,6 +62,8 @@ pub type Complex = nalgebra::Complex<f64>;
 /// ```text
 /// dx/dt = A x + B u(t - delay),   y = C x + D u(t - delay)
 /// ```
+///
+/// A sampled system is represented by its bilinear image, see [`StateSpace::sampled`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct StateSpace {
     /// Matrix `A`, states x states.
@@ -78,6 +82,8 @@ pub struct StateSpace {
     pub outputs: Vec<String>,
     /// Delay of all inputs, s.
     pub delay: f64,
+    /// Sampling period of a sampled system, s; `None` for a continuous one.
+    pub period: Option<f64>,
 }
 
 impl StateSpace {

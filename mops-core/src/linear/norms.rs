@@ -59,7 +59,13 @@ pub(super) fn check_stable(system: &StateSpace, norm: &str) -> Result<(), String
 /// # Errors
 /// If a pole lies on the imaginary axis, where the gain is infinite, or if an entry is not finite.
 pub fn peak_gain(system: &StateSpace) -> Result<Peak, String> {
-    let poles = system.poles()?;
+    let Peak { gain, frequency } = peak_on_axis(system)?;
+    Ok(Peak { gain, frequency: system.frequency(frequency) })
+}
+
+/// Returns the peak with its point `j v` of the imaginary axis as frequency.
+fn peak_on_axis(system: &StateSpace) -> Result<Peak, String> {
+    let poles = eigenvalues(&system.a)?;
     if poles.iter().any(|p| p.re == 0.0) || !undecided(&system.a)?.is_empty() {
         return Err("a pole lies on the imaginary axis: the gain is infinite there".to_owned());
     }
@@ -97,7 +103,7 @@ pub fn peak_gain(system: &StateSpace) -> Result<Peak, String> {
 }
 
 fn better(best: Peak, response: &FrequencyResponse, frequency: f64) -> Peak {
-    let gain = largest_singular_value(&response.at_frequency(frequency));
+    let gain = largest_singular_value(&response.on_axis(frequency));
     if gain > best.gain { Peak { gain, frequency } } else { best }
 }
 
@@ -106,7 +112,7 @@ fn polished(peak: Peak, response: &FrequencyResponse) -> Peak {
     if !peak.frequency.is_finite() || peak.frequency == 0.0 {
         return peak;
     }
-    let gain = |frequency: f64| largest_singular_value(&response.at_frequency(frequency));
+    let gain = |frequency: f64| largest_singular_value(&response.on_axis(frequency));
     let frequency = maximise(gain, peak.frequency * (1.0 - 1e-3), peak.frequency * (1.0 + 1e-3));
     better(peak, response, frequency)
 }

@@ -52,7 +52,8 @@ impl Loop {
         }
         let gain = |l: Complex| Closed::COMPLEMENTARY.gain(l);
         let level = three_decibels_below(gain(self.at(0.0)))?;
-        first_below(&self.response, level, |l| math::ln(gain(l)), |span| span.closed(Closed::COMPLEMENTARY))
+        let v = first_below(&self.response, level, |l| math::ln(gain(l)), |span| span.closed(Closed::COMPLEMENTARY));
+        Ok(self.system.frequency(v?))
     }
 }
 
@@ -65,7 +66,7 @@ pub fn bandwidth(system: &StateSpace) -> Result<f64, String> {
     // A delay changes no gain.
     let response = BoundedResponse::new(&StateSpace { delay: 0.0, ..system.clone() })?;
     let level = three_decibels_below(complex::norm(response.at(0.0)))?;
-    first_below(&response, level, |l| math::ln(complex::norm(l)), Span::gain)
+    Ok(system.frequency(first_below(&response, level, |l| math::ln(complex::norm(l)), Span::gain)?))
 }
 
 /// Returns the logarithm of the gain 3 dB below that at frequency 0.

@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use super::sampled::on_axis;
 use super::{Complex, StateSpace};
 use crate::math::complex;
 
@@ -16,6 +17,7 @@ pub struct FrequencyResponse {
     c: DMatrix<f64>,
     d: DMatrix<f64>,
     delay: f64,
+    period: Option<f64>,
 }
 
 impl StateSpace {
@@ -28,13 +30,14 @@ impl StateSpace {
         if all.iter().any(|m| m.iter().any(|x| !x.is_finite())) || !self.delay.is_finite() {
             return Err("the system has an entry that is not finite".to_owned());
         }
-        let Self { a, b, c, d, delay, .. } = self.balanced();
-        Ok(FrequencyResponse { a, b, c, d, delay })
+        let Self { a, b, c, d, delay, period, .. } = self.balanced();
+        Ok(FrequencyResponse { a, b, c, d, delay, period })
     }
 }
 
 impl FrequencyResponse {
-    /// Returns `(C (s - A)^-1 B + D) exp(-s delay)`, outputs x inputs; not finite at a pole.
+    /// Returns `(C (s - A)^-1 B + D) exp(-s delay)`, outputs x inputs; not finite at a pole. For a sampled system, s is the variable of
+    /// the bilinear image.
     pub fn at(&self, s: Complex) -> DMatrix<Complex> {
         let rational = self.c.map(|x| Complex::new(x, 0.0)) * self.states(s) + self.d.map(|x| Complex::new(x, 0.0));
         if self.delay == 0.0 { rational } else { rational * complex::exp(-s * self.delay) }
@@ -84,9 +87,14 @@ impl FrequencyResponse {
         x
     }
 
+    /// Returns the response at the point `j v` of the imaginary axis.
+    pub(super) fn on_axis(&self, v: f64) -> DMatrix<Complex> {
+        self.at(Complex::new(0.0, v))
+    }
+
     /// Returns the response at the angular frequency `omega`, rad/s.
     pub fn at_frequency(&self, omega: f64) -> DMatrix<Complex> {
-        self.at(Complex::new(0.0, omega))
+        self.on_axis(on_axis(self.period, omega))
     }
 
     /// Returns the response from the first input to the first output at the angular frequency `omega`, rad/s.

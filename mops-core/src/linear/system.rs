@@ -19,7 +19,7 @@ impl StateSpace {
         assert!(d.nrows() == c.nrows() && d.ncols() == b.ncols(), "inputs and outputs of B, C and D");
         let names = |letter: char, count: usize| (1..=count).map(|i| format!("{letter}{i}")).collect();
         let (states, inputs, outputs) = (names('x', a.nrows()), names('u', b.ncols()), names('y', c.nrows()));
-        Self { a, b, c, d, states, inputs, outputs, delay: 0.0 }
+        Self { a, b, c, d, states, inputs, outputs, delay: 0.0, period: None }
     }
 
     /// Returns the number of states.
@@ -27,20 +27,20 @@ impl StateSpace {
         self.a.nrows()
     }
 
-    /// Returns the poles: eigenvalues of `A`, 1/s.
+    /// Returns the poles, 1/s: eigenvalues of `A`, or `ln(z)/T` of the poles z of a sampled system, except z = 0.
     ///
     /// # Errors
     /// If an entry is not finite.
     pub fn poles(&self) -> Result<Vec<Complex>, String> {
-        eigenvalues(&self.a)
+        Ok(self.in_seconds(eigenvalues(&self.a)?))
     }
 
-    /// Returns true if every pole lies in the open left half-plane.
+    /// Returns true if every pole lies in the open left half-plane, or in the unit circle.
     ///
     /// # Errors
     /// If an entry is not finite.
     pub fn is_stable(&self) -> Result<bool, String> {
-        Ok(self.poles()?.iter().all(|pole| pole.re < 0.0))
+        Ok(eigenvalues(&self.a)?.iter().all(|pole| pole.re < 0.0))
     }
 
     /// Returns the system with its states scaled by powers of two, so that the entries of `A` have similar magnitude.
@@ -70,10 +70,11 @@ impl StateSpace {
     /// Returns the series connection in which the outputs of this system drive `next`; the delays add up.
     ///
     /// # Panics
-    /// If `next` does not have one input per output of this system.
+    /// If `next` does not have one input per output of this system, or another sampling period.
     #[must_use]
     pub fn series(&self, next: &Self) -> Self {
         assert_eq!(self.outputs.len(), next.inputs.len(), "one input per output");
+        assert_eq!(self.period, next.period, "one sampling period");
         let (n, m) = (self.order(), next.order());
         let mut a = DMatrix::zeros(n + m, n + m);
         a.view_mut((0, 0), (n, n)).copy_from(&self.a);
@@ -88,6 +89,7 @@ impl StateSpace {
             inputs: self.inputs.clone(),
             outputs: next.outputs.clone(),
             delay: self.delay + next.delay,
+            period: self.period,
         }
     }
 
@@ -97,8 +99,9 @@ impl StateSpace {
     /// If the delays differ.
     ///
     /// # Panics
-    /// If the numbers of inputs or outputs differ.
+    /// If the numbers of inputs or outputs, or the sampling periods differ.
     pub fn parallel(&self, other: &Self) -> Result<Self, String> {
+        assert_eq!(self.period, other.period, "one sampling period");
         if self.delay != other.delay {
             return Err("systems with different delays cannot be added without further states".to_owned());
         }

@@ -50,12 +50,16 @@ impl Wanted {
     /// Designs the feedback; returns it as text and as JSON.
     ///
     /// # Errors
-    /// If no such feedback exists for the system, or if it has a delay.
+    /// If no such feedback exists for the system, or if it is sampled or has a delay.
     pub(super) fn design(
         &self,
         system: &StateSpace,
         unit: &dyn Fn(&str) -> String,
     ) -> Result<(String, Value), Diagnostic> {
+        if system.period.is_some() {
+            return Err(Diagnostic::new("state feedback cannot be designed for a sampled system")
+                .with_help("design it for a model without clocks, and check the sampled loop by its margins"));
+        }
         if system.delay != 0.0 {
             return Err(Diagnostic::new("state feedback cannot be designed for a system with a delay").with_help(
                 "model the delay as a rational function, or design for a model without it and check the margins",
@@ -101,7 +105,7 @@ fn shown(
     unit: &dyn Fn(&str) -> String,
 ) -> String {
     let matrix = named("K", &rounded_matrix(k), &labels(&system.inputs, unit), &labels(&system.states, unit));
-    format!("\n{heading}, u = -K x\n\n{matrix}{}", poles_table("closed-loop pole", closed))
+    format!("\n{heading}, u = -K x\n\n{matrix}{}", poles_table("closed-loop pole", closed, None))
 }
 
 /// Formats the sensitivity and the error of the placed poles.

@@ -1,6 +1,6 @@
 //! Text of a linear system: operating point, matrices, poles, zeros and transfer functions.
 
-use mops_core::linear::{Complex, TransferFunction, undecided};
+use mops_core::linear::{Complex, NEXT, TransferFunction, undecided};
 use mops_core::math::{self, complex};
 use mops_core::{Resting, StateSpace, Unit, Variable};
 use nalgebra::DMatrix;
@@ -29,6 +29,7 @@ pub(super) fn operating_point(states: &[Variable], inputs: &[Variable], found: &
 
 /// Returns the unit of a variable as text; empty if dimensionless.
 pub(super) fn unit_of(name: &str, states: &[Variable], inputs: &[Variable], signals: &[Variable]) -> String {
+    let name = name.trim_start_matches(NEXT);
     let variable = states.iter().chain(inputs).chain(signals).find(|v| v.name == name);
     variable.map(|v| v.unit.to_string()).filter(|unit| unit != "1").unwrap_or_default()
 }
@@ -42,15 +43,19 @@ pub(super) fn labels(names: &[String], unit: &dyn Fn(&str) -> String) -> Vec<Str
     names.iter().map(label).collect()
 }
 
-/// Formats the matrices A, B, C and D with names and units.
-pub(super) fn matrices(system: &StateSpace, unit: &dyn Fn(&str) -> String) -> String {
+/// Formats the matrices A, B, C and D with names and units; with a sampling period, those of a difference equation.
+pub(super) fn matrices(system: &StateSpace, period: Option<f64>, unit: &dyn Fn(&str) -> String) -> String {
     let rate = |name: &String| match unit(name) {
+        _ if period.is_some() => format!("{name}(k+1)"),
         unit if unit.is_empty() => format!("{name}' [1/s]"),
         unit => format!("{name}' [{}]", Unit::known(&unit).power(1, -1)),
     };
     let (states, rates) = (labels(&system.states, unit), system.states.iter().map(rate).collect());
     let (inputs, outputs) = (labels(&system.inputs, unit), labels(&system.outputs, unit));
-    let mut text = String::new();
+    let mut text = period.map_or_else(String::new, |period| {
+        let period = number(period);
+        format!("\ndiscrete equivalent with a period of {period} s; inputs are constant in between\n")
+    });
     if system.order() > MANY {
         text += &format!("\nA, B, C and D ({} states) are in {WHERE}\n", system.order());
     }
@@ -119,35 +124,48 @@ pub(super) fn spelled(z: Complex) -> String {
     }
 }
 
-/// Returns a note on poles whose distance to the imaginary axis is within the rounding error; else an empty text.
-pub(super) fn undecided_note(a: &DMatrix<f64>) -> String {
-    let found = undecided(a).unwrap_or_default();
+/// Returns a note on poles whose distance to the border of stability is within the rounding error; else an empty text.
+pub(super) fn undecided_note(system: &StateSpace) -> String {
+    let found = undecided(&system.a).unwrap_or_default();
     if found.is_empty() {
         return String::new();
     }
-    let names: Vec<String> = found.iter().map(|pole| spelled(*pole)).collect();
-    format!(
-        "note: stability undecided, as these poles are within rounding of the imaginary axis: {}\n",
-        names.join(", ")
-    )
+    let (border, names): (_, Vec<String>) = match system.period {
+        Some(period) => ("unit circle", found.iter().map(|pole| spelled(StateSpace::z(*pole, period))).collect()),
+        None => ("imaginary axis", found.iter().map(|pole| spelled(*pole)).collect()),
+    };
+    format!("note: stability undecided, as these poles are within rounding of the {border}: {}\n", names.join(", "))
 }
 
-/// Formats poles with damping ratio, frequency and time constant, the slowest decay first.
-pub(super) fn poles_table(what: &str, poles: &[Complex]) -> String {
-    let mut sorted = rounded(poles, poles);
-    sorted.sort_by(|a, b| b.re.total_cmp(&a.re).then(b.im.total_cmp(&a.im)));
-    let row = |p: &Complex| {
-        let damping = if complex::norm(*p) == 0.0 { String::new() } else { number(-p.re / complex::norm(*p)) };
-        let constant = if p.re < 0.0 { number(-1.0 / p.re) } else { String::new() };
-        vec![spelled(*p), damping, number(complex::norm(*p)), constant]
+/// Formats poles with damping ratio, frequency and time constant, the slowest decay first. With a sampling period, the poles are
+/// those in z, and the others are those of `ln(z)/T`.
+pub(super) fn poles_table(what: &str, poles: &[Complex], period: Option<f64>) -> String {
+    let in_seconds =
+        |z: Complex| period.map_or(z, |period| Complex::new(math::ln(complex::norm(z)), complex::arg(z)) / period);
+    let mut sorted: Vec<(Complex, Complex)> = rounded(poles, poles).into_iter().map(|p| (p, in_seconds(p))).collect();
+    sorted.sort_by(|a, b| b.1.re.total_cmp(&a.1.re).then(b.1.im.total_cmp(&a.1.im)));
+    let row = |(pole, p): &(Complex, Complex)| {
+        let size = complex::norm(*p);
+        let text = |shown: bool, value: f64| if shown { number(value) } else { String::new() };
+        let (damping, constant) = (-p.re / size, -1.0 / p.re);
+        // A pole at z = 0 is a delay by a period.
+        let is_finite = size.is_finite();
+        vec![
+            spelled(*pole),
+            text(size > 0.0 && is_finite, damping),
+            text(is_finite, size),
+            text(p.re < 0.0 && is_finite, constant),
+        ]
     };
-    let header = [&format!("{what} (1/s)"), "damping", "frequency (rad/s)", "time constant (s)"];
+    let unit = if period.is_some() { "(z)" } else { "(1/s)" };
+    let header = [&format!("{what} {unit}"), "damping", "frequency (rad/s)", "time constant (s)"];
     format!("\n{}", table(&header, &[1, 2, 3], sorted.iter().map(row).collect()))
 }
 
-/// Formats the transfer function and the zeros of one channel.
+/// Formats the transfer function and the zeros of one channel; with a sampling period, those in z.
 pub(super) fn channel(
     system: &StateSpace,
+    period: Option<f64>,
     zeros: &[Complex],
     function: &TransferFunction,
     poles: &[Complex],
@@ -157,18 +175,19 @@ pub(super) fn channel(
         count if count > MANY => vec![format!("{count} zeros, see {WHERE}")],
         _ => spelled_zeros,
     };
+    let (variable, unit) = if period.is_some() { ("z", "(z)") } else { ("s", "(1/s)") };
     let is_zero = function.numerator.iter().all(|c| *c == 0.0);
     match (is_zero, spelled_zeros.is_empty()) {
         (true, _) => "  0\n".to_owned(),
         (false, empty) => format!(
-            "{}  zeros (1/s): {}\n",
-            if system.order() > MANY { String::new() } else { format!("  {}\n", quotient(function, poles)) },
+            "{}  zeros {unit}: {}\n",
+            if system.order() > MANY { String::new() } else { format!("  {}\n", quotient(function, poles, variable)) },
             if empty { "none".to_owned() } else { spelled_zeros.join(", ") }
         ),
     }
 }
 
-fn quotient(function: &TransferFunction, poles: &[Complex]) -> String {
+fn quotient(function: &TransferFunction, poles: &[Complex], variable: &str) -> String {
     let polynomial = |coefficients: &[f64]| {
         let degree = coefficients.len() - 1;
         let mut text = String::new();
@@ -181,8 +200,8 @@ fn quotient(function: &TransferFunction, poles: &[Complex]) -> String {
             };
             let power = match degree - i {
                 0 => String::new(),
-                1 => "s".to_owned(),
-                power => format!("s^{power}"),
+                1 => variable.to_owned(),
+                power => format!("{variable}^{power}"),
             };
             let factor = if c.abs() == 1.0 && !power.is_empty() { String::new() } else { number(c.abs()) };
             let space = if factor.is_empty() || power.is_empty() { "" } else { " " };

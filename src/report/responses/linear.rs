@@ -171,7 +171,8 @@ fn decades(system: &StateSpace, response: &FrequencyCurve, closed: Option<&Loop>
     let positive = |frequency: &f64| *frequency > 0.0 && frequency.is_finite();
     let mut matter: Vec<f64> = crossings.into_iter().filter(positive).collect();
     if matter.is_empty() {
-        let corners = [system.poles().unwrap_or_default(), zeros(system).unwrap_or_default()].concat();
+        let corners =
+            [system.poles().unwrap_or_default(), system.in_seconds(zeros(system).unwrap_or_default())].concat();
         let largest = response.values.iter().map(|g| complex::norm(*g)).fold(0.0, f64::max);
         let gain = |omega: f64| {
             let at = response.omegas.partition_point(|&x| x < omega).min(response.omegas.len() - 1);

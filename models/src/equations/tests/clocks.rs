@@ -1,6 +1,11 @@
 //! Clocks, compared with the exact solution: a matrix exponential between any two changes.
 
-use nalgebra::{Matrix3, Vector3};
+use std::sync::Arc;
+
+use mops_core::linear::Complex;
+use mops_core::math::complex;
+use mops_core::{Linearise, Linearised, StateSpace};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::*;
 
@@ -202,4 +207,120 @@ fn wrong_clocks_are_an_error_with_a_remedy() {
         assert!(mistake.help.is_some(), "{text}: {mistake}");
         assert_eq!(mistake.path.join("."), key, "{text}: {mistake}");
     }
+}
+
+/// Returns the linearised system of a model at rest, with its loop cut at a variable, if any.
+fn linearised(text: &str, cut: Option<&str>, given: &[(&str, f64)]) -> Result<StateSpace, String> {
+    let model = tight(text);
+    let parameters = values(&model, given);
+    let linearised = match cut {
+        Some(variable) => Linearised::opened(&model, &[variable.to_owned()], Linearise::default()),
+        None => Linearised::new(Arc::new(model), &Linearise::default()),
+    };
+    let found = linearised.map_err(|mistake| mistake.to_string())?.at(&Case::default(), &parameters);
+    found.map(|found| found.system).map_err(|failure| failure.to_string())
+}
+
+fn gains() -> [(&'static str, f64); 3] {
+    [("kp", GAINS[0]), ("ki", GAINS[1]), ("kc", GAINS[2])]
+}
+
+#[test]
+fn the_discrete_equivalent_follows_the_simulation_of_ten_pairs_of_rates() {
+    for rates in RATES {
+        let text = motor(rates);
+        let sampled = linearised(&text, None, &gains()).unwrap();
+        let difference = sampled.difference_equation().unwrap();
+        let period = sampled.period.unwrap();
+        let slowest = f64::from(rates[0].max(rates[2])) * 1e-6;
+        assert!((period / slowest - (period / slowest).round()).abs() < 1e-12, "{rates:?}: {period}");
+        // The current reference is 0 up to the first instant of the speed controller.
+        let first = if rates[2] >= rates[0] { f64::from(rates[3]) * 1e-6 } else { 0.0 };
+        let response = respond(&tight(&text), &[("r", Input::Constant(0.01))], &gains(), 6.0 * period + first);
+        let mut x = DVector::zeros(difference.order());
+        let r = DVector::from_element(1, 0.01);
+        for k in 0..6 {
+            let t = first + f64::from(k) * period;
+            let outputs = &difference.c * &x + &difference.d * &r;
+            for signal in ["i", "w", "e"] {
+                let row = difference.outputs.iter().position(|output| output == signal).unwrap();
+                let (found, exact) = (outputs[row], at(&response, signal, t));
+                assert!(
+                    (found - exact).abs() < 1e-9 * exact.abs().max(0.01),
+                    "{rates:?} {signal} {t}: {found} {exact}"
+                );
+            }
+            x = &difference.a * x + &difference.b * &r;
+        }
+    }
+}
+
+#[test]
+fn the_return_difference_of_a_cut_loop_is_that_of_the_closed_one() {
+    let characteristic = |system: &StateSpace, z: Complex| {
+        let a = system.difference_equation().unwrap().a;
+        let one = DMatrix::<Complex>::identity(a.nrows(), a.nrows());
+        (one * z - a.map(|x| Complex::new(x, 0.0))).determinant()
+    };
+    // Values of the last two arrive when the other clock computes.
+    let arriving = [[1000, 1000, 1000, 0], [1000, 500, 250, 0]];
+    let speed = [0, 1, 2, 5, 6, 8, 9].map(|k| ("ref", RATES[k]));
+    let current = [RATES[4], RATES[5], RATES[8], arriving[0], arriving[1]].map(|rates| ("u", rates));
+    for (variable, rates) in speed.into_iter().chain(current) {
+        let text = motor(rates);
+        let (closed, open) =
+            (linearised(&text, None, &gains()).unwrap(), linearised(&text, Some(variable), &gains()).unwrap());
+        assert_eq!(closed.period, open.period);
+        let period = open.period.unwrap();
+        let response = open.response().unwrap();
+        for angle in [0.1, 0.7, 1.9, 3.0] {
+            let z = complex::exp(Complex::new(0.0, angle));
+            let found = response.scalar(angle / period) + 1.0;
+            let exact = characteristic(&closed, z) / characteristic(&open, z);
+            assert!(
+                complex::norm(found - exact) < 1e-8 * complex::norm(exact),
+                "{variable} {rates:?}: {found} {exact}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_cut_keeps_what_a_clock_remembers_of_its_own_output() {
+    // Speed form of a controller, u[k] = u[k-1] - g (x[k] - a x[k-1]), at an integrator.
+    let (gain, zero, period) = (0.6, 0.8, 0.5);
+    let text = format!(
+        "states = {{ x = 'm' }}
+         parameters = {{ g = '1/s' }}
+         der = {{ x = 'u' }}
+         start = {{ u = '0.1 [m/s]' }}
+         clocks.c = {{ every = '{period} s', memory = {{ u = 'm/s', last = 'm' }}, next = {{ u = 'u - g*(x - {zero}*last)', last = 'x' }} }}"
+    );
+    let open = linearised(&text, Some("u"), &[("g", gain)]).unwrap();
+    assert_eq!((open.inputs.join(" "), open.outputs.join(" ")), ("u".to_owned(), "-u".to_owned()));
+    let response = open.response().unwrap();
+    for omega in [0.1, 1.0, 5.0] {
+        let z = complex::exp(Complex::new(0.0, omega * period));
+        let exact = (-z.inv() * zero + 1.0) / (-z.inv() + 1.0) * gain * period / (z - 1.0);
+        let found = response.scalar(omega);
+        assert!(complex::norm(found - exact) < 1e-12 * complex::norm(exact), "{omega}: {found} {exact}");
+    }
+}
+
+#[test]
+fn a_loop_that_is_cut_between_the_instants_is_refused() {
+    let text = motor(RATES[0]);
+    let text =
+        text.replace("next_sum = 'sum + ki*T*(r - w)'", "next_sum = 'sum + ki*T*(r - w)', v = '2*u', back = 'K*w'");
+    let text = text.replace("u - R*i - K*w", "v/2 - R*i - back");
+    // `v` follows the memory `u`, whose clock is the faster one; `back` is continuous.
+    let fast = linearised(&text, Some("v"), &gains()).unwrap_err();
+    assert!(fast.contains("slowest clock"), "{fast}");
+    let continuous = linearised(&text, Some("back"), &gains()).unwrap_err();
+    assert!(continuous.contains("`back` changes between the instants"), "{continuous}");
+    let unknown = linearised(&text, Some("i"), &gains()).unwrap_err();
+    assert!(unknown.contains("or at the memory of a clock, not at `i`"), "{unknown}");
+    let delayed = text.replace("back = 'K*w'", "back = \"K*delay(w, '1 ms')\"");
+    let both = linearised(&delayed, None, &gains()).unwrap_err();
+    assert!(both.contains("clocks and delays"), "{both}");
 }
