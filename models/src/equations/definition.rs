@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use mops_core::expression::{Equation, Form, Node, equation};
+use mops_core::linear::OWN;
 use mops_core::{Quantity, StudyError, Unit, suggestion};
 
 use super::key::{Index, Key, member};
@@ -184,9 +185,6 @@ impl Text {
         bare
     }
 }
-
-/// Suffix of the name of memory at which a loop is cut.
-pub const OWN: &str = " (own value)";
 
 /// Way out of a mistake in an expression.
 pub const HELP: &str = "see `mops describe equations` for the syntax of expressions";
@@ -432,7 +430,7 @@ impl Definition {
     fn cut_memory(&mut self, state: usize) {
         let declared = &mut self.states[state];
         let (name, unit, path) = (declared.name.clone(), declared.unit.difference(), declared.path.clone());
-        let own = format!("{name}{OWN}");
+        let own = format!("{OWN}{name}");
         declared.name.clone_from(&own);
         if let Some(start) = self.start.remove(&name) {
             self.start.insert(own.clone(), start);

@@ -1,8 +1,9 @@
 //! Interface of a model from text: parameters, initial states, and places of effects.
 
+use mops_core::linear::OWN;
 use mops_core::{Parameter, Port, StudyError, Unit, Variable, suggestion};
 
-use super::definition::{self, Definition, OWN, under};
+use super::definition::{self, Definition, under};
 use super::graph::Op;
 use super::system::System;
 
@@ -35,7 +36,7 @@ pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Paramet
             starts.push(Start::Parameter(index));
             continue;
         }
-        let own = state.name.trim_end_matches(OWN);
+        let own = state.name.trim_start_matches(OWN);
         let name = match own.split_once('[') {
             Some((family, index)) => format!("{family}0[{index}"),
             None => format!("{own}0"),

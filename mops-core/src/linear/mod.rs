@@ -49,7 +49,7 @@ pub use place::{Placement, place};
 pub use response::FrequencyResponse;
 pub use riccati::{lqr, riccati};
 pub(crate) use roughness::Point;
-pub use sampled::{Clock, NEXT};
+pub use sampled::{Clock, NEXT, OWN};
 pub use schur::Schur;
 pub use transfer::TransferFunction;
 pub use zeros::zeros;

@@ -44,6 +44,9 @@ const MOST_PERIODS: u32 = 100;
 /// Prefix of the name of a value that a clock has computed and not applied yet.
 pub const NEXT: &str = "next ";
 
+/// Prefix of the name of memory at which a loop is cut: the value that its clock has computed.
+pub const OWN: &str = "own ";
+
 /// What happens at an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Act {
@@ -123,7 +126,8 @@ impl StateSpace {
         let b = &inverse * &self.b * (2.0 * half);
         let c = sum_of_products(&DMatrix::zeros(self.outputs.len(), n), &self.c, &inverse);
         let d = sum_of_products(&self.d, &c, &(&self.b * half));
-        Some(Self { a: (&one + &self.a * half) * inverse, b, c, d, period: None, ..self.clone() })
+        let a = without_rounding((&one + &self.a * half) * inverse);
+        Some(Self { a, b, c, d, period: None, ..self.clone() })
     }
 }
 
@@ -217,7 +221,7 @@ impl Equivalent<'_> {
 
     /// Returns the name of the first memory of a clock.
     fn name(&self, clock: &Clock) -> &str {
-        &self.system.states[clock.memory.start]
+        self.system.states[clock.memory.start].trim_start_matches(OWN)
     }
 
     fn slowest(&self) -> usize {
@@ -330,6 +334,16 @@ impl Equivalent<'_> {
 fn sum_of_products(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64> {
     let (sum, terms) = (a + b * c, a.abs() + b.abs() * c.abs());
     sum.zip_map(&terms, |sum, terms| if sum.abs() <= ROUNDING * terms { 0.0 } else { sum })
+}
+
+/// Sets entries to 0 that are small beside others of their row and of their column.
+fn without_rounding(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let rows: Vec<f64> = matrix.row_iter().map(|row| row.amax()).collect();
+    let columns: Vec<f64> = matrix.column_iter().map(|column| column.amax()).collect();
+    DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
+        let entry = matrix[(i, j)];
+        if entry.abs() <= 10.0 * ROUNDING * rows[i].min(columns[j]) { 0.0 } else { entry }
+    })
 }
 
 /// Returns the change of two changes in succession. Changes instead of transition matrices keep the distance of slow poles from 1.

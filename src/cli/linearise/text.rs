@@ -203,7 +203,8 @@ fn quotient(function: &TransferFunction, poles: &[Complex], variable: &str) -> S
                 1 => variable.to_owned(),
                 power => format!("{variable}^{power}"),
             };
-            let factor = if c.abs() == 1.0 && !power.is_empty() { String::new() } else { number(c.abs()) };
+            let factor = number(c.abs());
+            let factor = if factor == "1" && !power.is_empty() { String::new() } else { factor };
             let space = if factor.is_empty() || power.is_empty() { "" } else { " " };
             text += &format!("{sign}{factor}{space}{power}");
         }
