@@ -410,14 +410,9 @@ impl Linearised {
             period: None,
         };
         match (clocks.is_empty(), delays.is_empty()) {
-            (true, true) => Ok(system),
+            (false, _) => system.sampled(clocks, delays, !self.cut.is_empty()),
             (true, false) => system.with_delays(delays),
-            (false, true) => system.sampled(clocks, !self.cut.is_empty()),
-            (false, false) => {
-                Err("a model with clocks and delays has no linearisation; replace its delays by memory of a clock, or \
-                                   its clocks by continuous equations"
-                    .to_owned())
-            }
+            (true, true) => Ok(system),
         }
     }
 }

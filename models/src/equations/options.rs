@@ -69,7 +69,7 @@ use crate::kernel::Tolerance;
 /// the joints, the equations of the states, the inputs and the signals.
 ///
 /// The linearisation of a model with clocks is its discrete equivalent, for inputs that are constant between the instants of the slowest
-/// clock. It has no delays. A loop is cut with `open` at the memory of the slowest clock, or at an expression of `let` that depends on
+/// clock. A loop is cut with `open` at the memory of the slowest clock, or at an expression of `let` that depends on
 /// it only. A model with clocks or delays has no places for effects.
 ///
 /// Source: F. Cellier, E. Kofman, Continuous System Simulation (2006), chapters 7 (sorting and solving equations) and 9

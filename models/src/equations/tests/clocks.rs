@@ -255,6 +255,48 @@ fn the_discrete_equivalent_follows_the_simulation_of_ten_pairs_of_rates() {
     }
 }
 
+/// Delays of a motor with a sampled current controller and a sampled speed controller: a part of the voltage, of the measured current
+/// and of the reference arrives later.
+fn delayed(rates: [u32; 4], actuator: u32, sensor: u32, reference: u32) -> String {
+    motor(rates)
+        .replace("= u - R*i", &format!("= 0.4*u + 0.6*delay(u, {actuator} [us]) - R*i"))
+        .replace("kc*(ref - i)", &format!("kc*(ref - 0.7*i - 0.3*delay(i, {sensor} [us]))"))
+        .replace("kp*(r - w)", &format!("kp*(delay(r, {reference} [us]) - w)"))
+}
+
+const DELAYS: [[u32; 3]; 5] =
+    [[300, 400, 5000], [1000, 1000, 10_000], [2500, 3100, 12_500], [12_345, 999, 600], [5000, 20_000, 7000]];
+
+#[test]
+fn the_discrete_equivalent_of_a_model_with_delays_follows_its_simulation() {
+    for rates in [RATES[0], RATES[1], RATES[2], RATES[5], RATES[9], [1000, 250, 1000, 0]] {
+        for [actuator, sensor, reference] in DELAYS {
+            let text = delayed(rates, actuator, sensor, reference);
+            let sampled = linearised(&text, None, &gains()).unwrap();
+            let difference = sampled.difference_equation().unwrap();
+            let period = sampled.period.unwrap();
+            // The reference steps after the start, since the past has its value at the start.
+            let input = Input::Step { time: 0.0, before: 0.0, after: 0.01 };
+            let response = respond(&tight(&text), &[("r", input)], &gains(), 12.0 * period);
+            let mut x = DVector::zeros(difference.order());
+            let r = DVector::from_element(1, 0.01);
+            for k in 0..12 {
+                let t = f64::from(k) * period;
+                let outputs = &difference.c * &x + &difference.d * &r;
+                for signal in ["i", "w"] {
+                    let row = difference.outputs.iter().position(|output| output == signal).unwrap();
+                    let (found, exact) = (outputs[row], at(&response, signal, t));
+                    assert!(
+                        (found - exact).abs() < 1e-9 * exact.abs().max(0.01),
+                        "{rates:?} {actuator} {sensor} {reference} {signal} {t}: {found} {exact}"
+                    );
+                }
+                x = &difference.a * x + &difference.b * &r;
+            }
+        }
+    }
+}
+
 #[test]
 fn the_return_difference_of_a_cut_loop_is_that_of_the_closed_one() {
     let characteristic = |system: &StateSpace, z: Complex| {
@@ -267,20 +309,22 @@ fn the_return_difference_of_a_cut_loop_is_that_of_the_closed_one() {
     let speed = [0, 1, 2, 5, 6, 8, 9].map(|k| ("ref", RATES[k]));
     let current = [RATES[4], RATES[5], RATES[8], arriving[0], arriving[1]].map(|rates| ("u", rates));
     for (variable, rates) in speed.into_iter().chain(current) {
-        let text = motor(rates);
-        let (closed, open) =
-            (linearised(&text, None, &gains()).unwrap(), linearised(&text, Some(variable), &gains()).unwrap());
-        assert_eq!(closed.period, open.period);
-        let period = open.period.unwrap();
-        let response = open.response().unwrap();
-        for angle in [0.1, 0.7, 1.9, 3.0] {
-            let z = complex::exp(Complex::new(0.0, angle));
-            let found = response.scalar(angle / period) + 1.0;
-            let exact = characteristic(&closed, z) / characteristic(&open, z);
-            assert!(
-                complex::norm(found - exact) < 1e-8 * complex::norm(exact),
-                "{variable} {rates:?}: {found} {exact}"
-            );
+        let late = DELAYS.map(|[actuator, sensor, reference]| delayed(rates, actuator, sensor, reference));
+        for text in late.iter().chain([&motor(rates)]) {
+            let (closed, open) =
+                (linearised(text, None, &gains()).unwrap(), linearised(text, Some(variable), &gains()).unwrap());
+            assert_eq!(closed.period, open.period);
+            let period = open.period.unwrap();
+            let response = open.response().unwrap();
+            for angle in [0.1, 0.7, 1.9, 3.0] {
+                let z = complex::exp(Complex::new(0.0, angle));
+                let found = response.scalar(angle / period) + 1.0;
+                // Each value more or less that waits for its delay is a pole at z = 0.
+                let order = open.order() as i32 - closed.order() as i32;
+                let exact = characteristic(&closed, z) / characteristic(&open, z) * z.powi(order);
+                let error = complex::norm(found - exact) / complex::norm(exact);
+                assert!(error < 1e-8, "{variable} {rates:?}: {found} {exact}\n{text}");
+            }
         }
     }
 }
@@ -321,6 +365,6 @@ fn a_loop_that_is_cut_between_the_instants_is_refused() {
     let unknown = linearised(&text, Some("i"), &gains()).unwrap_err();
     assert!(unknown.contains("or at the memory of a clock, not at `i`"), "{unknown}");
     let delayed = text.replace("back = 'K*w'", "back = \"K*delay(w, '1 ms')\"");
-    let both = linearised(&delayed, None, &gains()).unwrap_err();
-    assert!(both.contains("clocks and delays"), "{both}");
+    let between = linearised(&delayed, None, &gains()).unwrap_err();
+    assert!(between.contains("acts between them"), "{between}");
 }

@@ -12,7 +12,7 @@ fn lag(gain: f64, clock: Clock) -> Result<StateSpace, String> {
         DMatrix::from_row_slice(1, 2, &[0.0, -1.0]),
         DMatrix::zeros(1, 1),
     );
-    system.sampled(&[clock], true)
+    system.sampled(&[clock], &[], true)
 }
 
 fn clock(period: f64, offset: f64, delay: f64) -> Clock {
@@ -27,7 +27,7 @@ fn integrator(gain: f64, period: f64) -> StateSpace {
         DMatrix::from_row_slice(1, 2, &[0.0, -1.0]),
         DMatrix::zeros(1, 1),
     );
-    system.sampled(&[clock(period, 0.0, 0.0)], true).unwrap()
+    system.sampled(&[clock(period, 0.0, 0.0)], &[], true).unwrap()
 }
 
 #[test]
@@ -133,7 +133,7 @@ fn poles_of_integrators_stay_at_one_whatever_the_period() {
     let system = StateSpace::new(a, b, DMatrix::from_row_slice(1, 4, &[0.0, 0.0, 0.0, -1.0]), DMatrix::zeros(1, 1));
     for period in [1e-5, 1e-3, 1.0] {
         let clock = Clock { memory: 3..4, period, offset: 0.0, delay: 0.5 * period };
-        let sampled = system.sampled(&[clock], true).unwrap();
+        let sampled = system.sampled(&[clock], &[], true).unwrap();
         let slow = eigenvalues(&sampled.a).unwrap().iter().filter(|pole| complex::norm(**pole) == 0.0).count();
         assert_eq!(slow, 3, "{period}: {:?}", eigenvalues(&sampled.a).unwrap());
     }
@@ -150,7 +150,7 @@ fn what_has_no_equivalent_is_refused() {
             DMatrix::from_row_slice(1, n, output),
             DMatrix::zeros(1, 1),
         );
-        system.sampled(clocks, is_cut).unwrap_err()
+        system.sampled(clocks, &[], is_cut).unwrap_err()
     };
     let fast = |memory: Range<usize>| Clock { memory, period: 0.1, offset: 0.0, delay: 0.0 };
     let slow = |memory: Range<usize>| Clock { memory, period: 0.4, offset: 0.0, delay: 0.0 };
