@@ -9,6 +9,8 @@ use mops_core::{
     Task, Watch, conclude,
 };
 
+use crate::numbers::significant;
+
 /// Options of [`crate::solve()`].
 #[derive(Clone)]
 pub struct Options {
@@ -182,7 +184,11 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let cause = if options.replayed.is_some() { Stop::Interrupted } else { stop };
     let end = run.best().map(|best| {
         let is_noise = best.merit.is_feasible() && problem.shape().is_noise(best.merit.objective);
-        End::new(point, best.merit, solver.ends(), cause, is_noise)
+        let end = End::new(point, best.merit, solver.ends(), cause, is_noise);
+        match twin(&run, best) {
+            Some(sentence) if problem.study().task() == Task::Calibration => end.with_twin(sentence),
+            _ => end,
+        }
     });
     let ending = Ending { stop, end, pareto, seconds: started.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
@@ -193,6 +199,42 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let archive = run.archive().to_vec();
     drop((run, probe));
     Ok(Solved { outcome, problem, best, archive, front: Vec::new() })
+}
+
+/// Difference of the objective, relative to its value, that is rounding and the tolerance of a search.
+const SAME_FIT: f64 = 1e-6;
+
+/// Difference of a tuner, as a part of its range, that makes another point.
+const ELSEWHERE: f64 = 0.05;
+
+/// Returns a sentence on the point farthest from the best one with the same objective, if there is one.
+fn twin(run: &Run<'_>, best: &Evaluation) -> Option<String> {
+    let study = run.problem().study();
+    let same = best.merit.objective * (1.0 + SAME_FIT);
+    let shift = |at: &[f64], i: usize| {
+        let tuner = &study.tuners()[i];
+        let shift = (tuner.position_of(at[i]) - tuner.position_of(best.tuners[i])).abs();
+        if tuner.active && shift.is_finite() { shift } else { 0.0 }
+    };
+    let all = 0..study.tuners().len();
+    let distance = |at: &[f64]| all.clone().map(|i| shift(at, i)).fold(0.0, f64::max);
+    let others = run.archive().iter().filter(|record| record.merit.is_feasible() && record.merit.objective <= same);
+    let other = others.max_by(|a, b| distance(&a.tuners).total_cmp(&distance(&b.tuners)))?;
+    let mut moved: Vec<usize> = all.clone().filter(|&i| shift(&other.tuners, i) > ELSEWHERE).collect();
+    moved.sort_by(|&a, &b| shift(&other.tuners, b).total_cmp(&shift(&other.tuners, a)));
+    if moved.is_empty() {
+        return None;
+    }
+    let values = moved.iter().take(3).map(|&i| {
+        let [there, here] = [&other.tuners, &best.tuners].map(|tuners| significant(tuners[i], 4));
+        format!("{} = {there} (here {here})", study.tuners()[i].name)
+    });
+    let values: Vec<String> = values.collect();
+    Some(format!(
+        "Not unique: another point fits as well, {}; the data do not distinguish them. Limit the ranges of the tuners, fix one, or \
+         add data.",
+        values.join(", ")
+    ))
 }
 
 /// Lowers the criteria of the best point that do not decide its objective, while the others stay. Returns true if there is such a

@@ -265,6 +265,45 @@ fn residuals_above_or_far_below_the_stated_noise_do_not_end_a_calibration() {
 }
 
 #[test]
+fn two_points_that_fit_equally_well_are_not_one_optimum() {
+    // tau y' = p^2 u - y: the data do not show the sign of p. The stated noise is too small, so that searches go on.
+    let folder = tempfile::tempdir().unwrap();
+    let mut noise = noise(3);
+    let rows = (0..=200).map(|k| {
+        let t = 0.1 * f64::from(k);
+        format!("{t},1,{}\n", 2.0 * (1.0 - mops_core::math::exp(-t / 3.0)) + 0.01 * noise())
+    });
+    std::fs::write(folder.path().join("step.csv"), format!("t[s],u,y\n{}", rows.collect::<String>())).unwrap();
+    let study = folder.path().join("study.toml");
+    std::fs::write(
+        &study,
+        "[study]\nname = 'sign'\ntask = 'calibration'
+        [models.m.equations]
+        states = { y = '1' }
+        inputs = { u = '1' }
+        parameters = { tau = 's', p = '1' }
+        der = { y = \"tau*y' = p^2*u - y\" }
+        [tuners]
+        tau = { start = 5, min = 0.3, max = 50, scale = 'log' }
+        p = { start = 0.5, min = -5, max = 5 }
+        [experiments.e]
+        file = 'step.csv'
+        channels = { y = { column = 'y', noise = 0.004 } }
+        inputs = { u = 'u' }
+        [criteria]
+        y = { normalised-error = { signal = 'y' } }",
+    )
+    .unwrap();
+    let (result, text) = run(study.to_str().unwrap(), folder.path(), &[]);
+    let doubt = result["end"]["doubt"].as_str().unwrap_or_else(|| panic!("{text}"));
+    assert!(doubt.starts_with("Not unique") && doubt.contains("p = ") && !doubt.contains("tau"), "{doubt}");
+    assert!(!text.contains("all in 1 optimum"), "{text}");
+    // The report says that the residuals exceed the noise.
+    let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(page.contains("The model does not describe the data"), "a misfit is not green");
+}
+
+#[test]
 fn solvers_are_compared_on_a_study_by_their_success() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("bench");

@@ -259,6 +259,7 @@ fn what_a_recording_suggests_is_a_note_and_what_it_lacks_is_refused() {
     record(folder, "gaps.csv", "t[s],x[rad],u[rad/s]", |t| {
         format!("{t},{},{}", 2.0 * t, if (t - 1.05).abs() < 0.5 { String::new() } else { "1".into() })
     });
+    record(folder, "epoch.csv", "time,x[rad],u[rad/s]", |t| format!("{},{},1", 1_714_730_390_000.0 + 1e3 * t, 2.0 * t));
     record(folder, "stamps.csv", "when,x[rad]", |t| format!("2024-05-17T10:00:{:04.1},{}", t, 2.0 * t));
     let checked = |experiment: &str| check(folder, &gain(&format!("[experiments.e]\n{experiment}")));
     let plain = "channels = { x = 'x' }\ninputs = { u = 'u' }\n";
@@ -273,6 +274,9 @@ fn what_a_recording_suggests_is_a_note_and_what_it_lacks_is_refused() {
         (format!("file = 'gaps.csv'\nwindows = '20 s'\n{plain}"), "more than twice as long"),
         (format!("file = 'gaps.csv'\nwindows = '0 s'\n{plain}"), "less than two samples"),
         (format!("file = 'gaps.csv'\nsample-time = '1 s'\ntime = 't'\n{plain}"), "both `time` and `sample-time`"),
+        (format!("file = 'gaps.csv'\nsample-time = '0.2 s'\n{plain}"), "but `t` of the file increases by 0.1 s"),
+        (format!("file = 'gaps.csv'\ntime-unit = 'ms'\n{plain}"), "the header of `t` has the unit `s`, not `ms`"),
+        (format!("file = 'epoch.csv'\n{plain}"), "no dates as s since 1970"),
         (
             "file = 'gaps.csv'\nchannels = { x = 'x' }\ninputs = { u = { column = 'u', hold = 'first' } }\n".to_owned(),
             "missing sample at 0.6",

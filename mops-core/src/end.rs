@@ -122,6 +122,15 @@ impl End {
         end
     }
 
+    /// Returns the end of a search with an equally good point elsewhere, described by a sentence: a reason to doubt the point. Searches that
+    /// ended at the same value then did not all end here.
+    #[must_use]
+    pub fn with_twin(mut self, sentence: String) -> Self {
+        self.words = self.words_of_point().into_iter().collect();
+        self.doubt.get_or_insert(sentence);
+        self
+    }
+
     fn words_of_point(&self) -> Option<String> {
         let words = match self.point {
             Optimality::Stationary => "The point is stationary: to first order, no direction lowers the objective.",

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use mops_core::Diagnostic;
-use mops_core::data::DataFile;
+use mops_core::data::{DataFile, is_since_1970};
 use mops_core::identification::{excitation_report, spacing};
 use mops_discrepancy::noise_of;
 
@@ -60,11 +60,17 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
         finite().for_each(|value| (count, low, high) = (count + 1, low.min(value), high.max(value)));
         let is_time = time.as_ref() == Some(name);
         if is_time {
-            sampling = sample_time(name, &finite().collect::<Vec<f64>>());
+            sampling = sample_time(name, column.unit.unwrap_or("s"), &finite().collect::<Vec<f64>>());
+            if column.unit.is_none() && finite().next().is_some_and(is_since_1970) {
+                advice.push(format!(
+                    "`{name}`: counts as s, but is probably in ms, us or ns since 1970; see `time-unit`\n"
+                ));
+            }
         }
-        let noise = if is_time { None } else { noise(column.values, times) };
+        let noise = if is_time || is_switched(column.values) { None } else { noise(column.values, times) };
         if let (Some(times), Some(noise)) = (times, noise) {
-            advice.extend(suspicious_start(name, times, column.values, noise));
+            let unit = time.as_ref().and_then(|time| file.column(time).ok()?.unit).unwrap_or("s");
+            advice.extend(suspicious_start(name, (times, unit), column.values, noise));
         }
         if noise.is_none() && !is_time {
             unknown.push(format!("`{name}`"));
@@ -89,7 +95,10 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
     }
     if !unknown.is_empty() {
         let names = unknown.join(", ");
-        text += &format!("no noise estimate for {names}: needs seven consecutive samples that are not all equal\n");
+        text += &format!(
+            "no noise estimate for {names}: needs seven consecutive samples that are not all equal, and no switching between \
+             constant values\n"
+        );
     }
     for line in advice {
         text += &line;
@@ -127,7 +136,7 @@ fn excitation(file: &DataFile, name: &str, shown: &str) -> Result<String, Diagno
 const STARTS: f64 = 12.2;
 
 /// Returns advice on the first samples of a column: how many to skip, and from when on it moves.
-fn suspicious_start(name: &str, times: &[f64], values: &[f64], noise: f64) -> Option<String> {
+fn suspicious_start(name: &str, (times, unit): (&[f64], &str), values: &[f64], noise: f64) -> Option<String> {
     let samples: Vec<(f64, f64)> =
         times.iter().zip(values).filter(|(t, v)| t.is_finite() && v.is_finite()).map(|(&t, &v)| (t, v)).collect();
     let off = |k: usize| (samples[k].1 - 2.0 * samples[k + 1].1 + samples[k + 2].1).abs();
@@ -142,7 +151,7 @@ fn suspicious_start(name: &str, times: &[f64], values: &[f64], noise: f64) -> Op
     let moves = samples.iter().position(|(_, v)| (v - rest).abs() > 6.0 * noise)?;
     (noise > 0.0 && moves > (samples.len() / 10).max(20)).then(|| {
         format!(
-            "`{name}`: at rest until {} s; `from` can cut that off, and `--rest` measures its noise\n",
+            "`{name}`: at rest until {} {unit}; `from` can cut that off, and `--rest` measures its noise\n",
             number(samples[moves].0)
         )
     })
@@ -231,7 +240,7 @@ fn plot(file: &DataFile, path: &Path) -> Result<Vec<PathBuf>, CommandError> {
     Ok(written)
 }
 
-fn sample_time(name: &str, times: &[f64]) -> String {
+fn sample_time(name: &str, unit: &str, times: &[f64]) -> String {
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
     let (Some(least), Some(most)) = (steps.first(), steps.last()) else { return String::new() };
@@ -244,15 +253,41 @@ fn sample_time(name: &str, times: &[f64]) -> String {
         false => format!("{} to {}", number(first), number(last)),
     };
     format!(
-        "`{name}` from {ends}, step {} (median), {} (min), {} (max){order}",
+        "`{name}` ({unit}) from {ends}, step {} (median), {} (min), {} (max){order}",
         number(median),
         number(*least),
         number(*most)
     )
 }
 
+/// Smallest jump between two samples, as a part of the range of a column, at which a record is divided: a turn of a wrapped angle, or a
+/// placeholder for a missing value.
+const JUMP: f64 = 0.8;
+
+/// Smallest step of a signal that switches between constant values, as a part of its range.
+const SWITCH: f64 = 0.05;
+
+/// Returns true if a column is constant at most samples and else steps by a considerable part of its range, as an input that a program
+/// sets.
+fn is_switched(values: &[f64]) -> bool {
+    let values: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    let mut steps: Vec<f64> =
+        values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).collect();
+    steps.sort_unstable_by(f64::total_cmp);
+    let Some(median) = steps.get(steps.len() / 2) else { return false };
+    2 * steps.len() < values.len() && *median > SWITCH * range(&values)
+}
+
+/// Returns the difference of the largest and the smallest value.
+fn range(values: &[f64]) -> f64 {
+    let (low, high) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
+    high - low
+}
+
 /// Estimates the standard deviation of white noise on a smooth signal, in each part of the record between two gaps. Empty cells are
-/// skipped; a distance of more than 1.5 times the median distance between samples is a gap. `None` if no part has enough samples.
+/// skipped; a distance of more than 1.5 times the median distance between samples is a gap, and so is a jump over most of the range.
+/// `None` if no part has enough samples.
 pub(super) fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
     let times = times.filter(|times| times.len() == values.len());
     #[allow(clippy::cast_precision_loss)]
@@ -262,7 +297,9 @@ pub(super) fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_unstable_by(f64::total_cmp);
     let longest = 1.5 * steps.get(steps.len() / 2)?;
-    let ends = (1..=times.len()).filter(|&k| k == times.len() || times[k] - times[k - 1] > longest);
+    let jump = JUMP * range(&values);
+    let jumps = |k: usize| times[k] - times[k - 1] > longest || (values[k] - values[k - 1]).abs() > jump;
+    let ends = (1..=times.len()).filter(|&k| k == times.len() || jumps(k));
     let mut start = 0;
     let parts: Vec<(&[f64], &[f64])> = ends
         .map(|end| {

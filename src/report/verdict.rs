@@ -1,6 +1,6 @@
 //! Verdict of a run, in one to three sentences, and warnings.
 
-use mops_core::{CriterionReport, Outcome, Pareto, Record, Role, Stop, Task, Usage};
+use mops_core::{ChannelReport, CriterionReport, Outcome, Pareto, Record, Role, Stop, Task, Usage};
 
 use super::Report;
 use crate::numbers::{counted, percent, significant, with_unit};
@@ -139,7 +139,42 @@ fn calibration(outcome: &Outcome, archive: &[Record]) -> (Tone, String) {
             ));
         }
     }
-    (Tone::Good, text)
+    let doubts = doubts_of_fit(outcome);
+    let tone = if doubts.is_empty() { Tone::Good } else { Tone::Mixed };
+    (tone, doubts + &text)
+}
+
+/// Residuals above this multiple of the noise show that the model does not describe the data.
+const MISFIT: f64 = 2.0;
+
+/// Returns what speaks against a calibrated model, as sentences: residuals far above the noise, a fit worse than the mean of the data,
+/// tuners at their bounds.
+fn doubts_of_fit(outcome: &Outcome) -> String {
+    let experiments = outcome.calibration.iter().flat_map(|c| &c.experiments);
+    let channels: Vec<_> = experiments.flat_map(|e| e.channels.iter().map(move |c| (e, c))).collect();
+    let ratio = |channel: &ChannelReport| channel.noise.map_or(0.0, |noise| channel.rmse / noise);
+    let mut text = String::new();
+    let misfit = channels.iter().filter(|(e, _)| e.role == Role::Calibration);
+    if let Some((experiment, channel)) = misfit.max_by(|a, b| ratio(a.1).total_cmp(&ratio(b.1)))
+        && ratio(channel) > MISFIT
+    {
+        text += &format!(
+            "The model does not describe the data: the residuals of `{}` in `{}` are {} times the noise. ",
+            channel.name,
+            experiment.name,
+            significant(ratio(channel), 3)
+        );
+    }
+    if let Some((experiment, channel)) = channels.iter().find(|(_, c)| c.fit_percent < 0.0) {
+        text +=
+            &format!("The mean of the data fits `{}` in `{}` better than the model. ", channel.name, experiment.name);
+    }
+    let bounds: Vec<String> =
+        outcome.tuners.iter().filter(|t| t.at_bound.is_some()).map(|tuner| format!("`{}`", tuner.name)).collect();
+    if !bounds.is_empty() {
+        text += &format!("At a bound of its range: {}. ", bounds.join(", "));
+    }
+    text
 }
 
 fn changed(what: &str, start: f64, now: f64) -> String {

@@ -48,6 +48,14 @@ pub(super) fn read(source: &Arc<Source>) -> Result<(Vec<Variable>, Vec<String>, 
         let span = layout.cell(&source.text, cell, row).expect("the row is in the layout");
         return Err(not_a_number(source, span, &header.names[cell].0));
     }
+    if let Some((row, cell)) = columns.iter().enumerate().find_map(|(k, column)| Some((column.thousands.found()?, k))) {
+        let span = layout.cell(&source.text, cell, row).expect("the row is in the layout");
+        let fact = format!("`{}` is a thousand or a decimal number", source.text[span.clone()].trim());
+        return Err(Diagnostic::new(fact)
+            .with_label("every mark in this column is followed by three digits")
+            .with_help("write thousands without a mark, or decimal numbers with a fixed number of digits")
+            .at(source, span));
+    }
     let (mut variables, mut skipped) = (Vec::new(), Vec::new());
     for (cell, (column, (name, unit))) in columns.into_iter().zip(&header.names).enumerate() {
         if let Some((values, origin)) = column.stamps(|row| layout.cell(&source.text, cell, row), &source.text) {
@@ -105,8 +113,12 @@ impl Header {
         let separator = separator(text, start);
         let spans: Vec<_> = cells(text, start, separator).collect();
         let span = start..spans.last().expect("every line has a cell").end;
-        let numbers = |cell: &Range<usize>| number(text[cell.clone()].as_bytes(), separator);
-        let numbers: Option<Vec<f64>> = spans.iter().map(numbers).collect();
+        // A line of numbers and time stamps is a row; the file has no header then.
+        let number = |cell: &Range<usize>| {
+            let cell = &text[cell.clone()];
+            number(cell.as_bytes(), separator).or_else(|| nanoseconds(cell).map(|ns| ns as f64))
+        };
+        let numbers: Option<Vec<f64>> = spans.iter().map(number).collect();
         if numbers.is_some_and(|numbers| numbers.iter().any(|number| !number.is_nan())) {
             let names = (1..=spans.len()).map(|k| (k.to_string(), None)).collect();
             return Ok(Self { separator, names, span, body: start });
@@ -233,6 +245,7 @@ fn refuse_duplicates(
 #[derive(Clone, Default)]
 struct Reading {
     values: Vec<f64>,
+    thousands: Thousands,
     /// First row with a cell that is not a finite number.
     bad: Option<usize>,
     has_numbers: bool,
@@ -304,6 +317,7 @@ fn read_rows(source: &Arc<Source>, header: &Header, layout: &mut Layout) -> Resu
         }
         layout.rows.push(start);
         for (k, (column, cell)) in columns.iter_mut().zip(&record).enumerate() {
+            column.thousands.see(cell, layout.rows.len() - 1, header.separator);
             column.push(number(cell, header.separator));
             marks.refuse_both(source, cell, || layout.cell(text, k, layout.rows.len() - 1))?;
         }
@@ -345,6 +359,50 @@ fn refuse_long_quotes(source: &Arc<Source>, start: usize, separator: u8) -> Resu
         .with_label("opened here")
         .with_help("remove the quotation mark, or close it in the same line")
         .at(source, cell.start..cell.start + line))
+}
+
+/// Marks of thousands in the numbers of a column, as in `993` and `1.535`: some numbers have marks, each followed by three digits.
+#[derive(Clone, Default)]
+struct Thousands {
+    /// Numbers with and without marks.
+    marked: usize,
+    plain: usize,
+    /// First row with a mark.
+    first: usize,
+    /// True if a number cannot have marks of thousands.
+    excluded: bool,
+}
+
+impl Thousands {
+    fn see(&mut self, cell: &[u8], row: usize, separator: u8) {
+        let text = cell.trim_ascii();
+        let digits = text.strip_prefix(b"-").or_else(|| text.strip_prefix(b"+")).unwrap_or(text);
+        if self.excluded || digits.is_empty() || digits.eq_ignore_ascii_case(b"nan") || digits == b"NA" {
+            return;
+        }
+        let is_mark = |byte: &u8| *byte == b'.' || (*byte == b',' && separator != b',');
+        let mut groups = digits.split(is_mark);
+        let first = groups.next().unwrap_or_default();
+        let rest: Vec<&[u8]> = groups.collect();
+        let is_number = |group: &[u8]| !group.is_empty() && group.iter().all(u8::is_ascii_digit);
+        let fits =
+            is_number(first) && first.len() <= 3 && rest.iter().all(|group| group.len() == 3 && is_number(group));
+        // A leading 0 is that of a decimal number.
+        self.excluded = !fits || (!rest.is_empty() && first.starts_with(b"0"));
+        if rest.is_empty() {
+            self.plain += 1;
+        } else {
+            if self.marked == 0 {
+                self.first = row;
+            }
+            self.marked += 1;
+        }
+    }
+
+    /// Returns the first row with a mark if the column has marks of thousands.
+    fn found(&self) -> Option<usize> {
+        (!self.excluded && self.marked >= 2 && self.plain >= 2).then_some(self.first)
+    }
 }
 
 /// Decimal marks of a file whose cells are not separated by commas, where `1,234` and `1.5` together are ambiguous.

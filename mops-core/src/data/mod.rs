@@ -251,6 +251,12 @@ impl DataFile {
     }
 }
 
+/// Returns true for a time that is far beyond any date as seconds since 1970, but a usual one in ms, us or ns.
+pub fn is_since_1970(time: f64) -> bool {
+    // 1e11 s are 3000 years, and as ms the year 1973.
+    (1e11..1e20).contains(&time)
+}
+
 /// Returns the bytes of a regular file.
 ///
 /// # Errors

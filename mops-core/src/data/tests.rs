@@ -213,6 +213,35 @@ mod csv {
     }
 
     #[test]
+    fn marks_of_thousands_are_refused_and_decimal_numbers_of_three_digits_are_not() {
+        let way_out = "write thousands without a mark, or decimal numbers with a fixed number of digits";
+        let expected =
+            |place: &str, cell: &str| format!("data:{place}: `{cell}` is a thousand or a decimal number; {way_out}");
+        for (text, place, cell) in [
+            ("t;n\n0;993\n1;999\n2;1.024\n3;1.043\n", "4:3", "1.024"),
+            ("t\tn\n0\t993\n1\t999\n2\t-1,024\n3\t1,043\n", "4:3", "-1,024"),
+            ("t,n\n0,993\n1,999\n2,1.024\n3,1.043\n", "4:3", "1.024"),
+        ] {
+            assert_eq!(error(text), (expected(place, cell), cell.to_owned()), "{text}");
+        }
+        for cells in
+            ["1 1.125 2.250 3", "1 0.125 0.375 2", "1 1.125 1.25 2.375 3", "1.000 1.125 2.375 999.125", "1 2 1.125 3"]
+        {
+            let rows: Vec<String> = cells.split(' ').enumerate().map(|(t, y)| format!("{t};{y}")).collect();
+            let file = DataFile::parse("data", format!("t;y\n{}\n", rows.join("\n")).into_bytes());
+            assert_eq!(file.is_ok(), cells != "1 1.125 2.250 3", "{cells}");
+        }
+    }
+
+    #[test]
+    fn a_first_line_of_numbers_and_time_stamps_is_a_row() {
+        let file = read("2024-05-03T11:59:50,1,20.5\n2024-05-03T11:59:51,1,20.6\n");
+        assert_same(values(&file, "1"), &[0.0, 1.0]);
+        assert_same(values(&file, "3"), &[20.5, 20.6]);
+        assert_eq!(file.time_column().as_deref(), Some("1"));
+    }
+
+    #[test]
     fn the_time_is_the_column_of_its_name_not_of_its_first_letter() {
         for (header, time) in [
             ("t,T", Some("t")),

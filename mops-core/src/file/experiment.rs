@@ -10,7 +10,7 @@ use super::entries::Short;
 use super::sections::{ChannelTable, ExperimentSection, InputTable};
 use super::tree::Node;
 use super::{Files, UNIT_HELP, at_key, frequency, read_seconds, read_unit};
-use crate::data::{Column, DataFile, SOURCES, source_of};
+use crate::data::{Column, DataFile, SOURCES, is_since_1970, source_of};
 use crate::diagnostic::{Diagnostic, Source};
 use crate::input::{Hold, Input};
 use crate::study::{CaseBuilder, ChannelBuilder, Free, Measured};
@@ -279,6 +279,7 @@ impl Clock {
             if !(step > 0.0 && step.is_finite()) {
                 return Err(place.diagnostic(format!("`sample-time` must be above 0 s, and is {step} s")));
             }
+            refuse_other_rate(&place, file, step)?;
             let rows = file.column(column).map_or(file.variables[0].rows, |column| column.values.len());
             let times = Arc::new((0..rows).map(|row| row as f64 * step).collect());
             return Ok(Self { column: String::new(), times, zero: 0.0, origin: None });
@@ -298,8 +299,20 @@ impl Clock {
         let unit = match (time_unit, column.unit) {
             (Some(unit), _) => read_unit(node, "time-unit", unit)?,
             (None, Some(unit)) => unit_of_header(&place, file, &time, unit, "time-unit")?,
+            (None, None) if column.values.iter().find(|t| !t.is_nan()).is_some_and(|t| is_since_1970(*t)) => {
+                let fact = format!("the time column `{time}` has no unit, and its values are no dates as s since 1970");
+                return Err(place.diagnostic(fact).with_help("set time-unit = \"ms\", \"us\" or \"ns\""));
+            }
             (None, None) => Unit::known("s"),
         };
+        if let (Some(_), Some(given)) = (time_unit, column.unit)
+            && Unit::parse(given).is_ok_and(|given| given.factor_to(&unit).is_some_and(|factor| factor != 1.0))
+        {
+            let place = node.child("time-unit").unwrap_or(place);
+            return Err(place
+                .diagnostic(format!("the header of `{time}` has the unit `{given}`, not `{unit}`"))
+                .with_help("remove `time-unit`, or correct the header"));
+        }
         let factor = unit.factor_to(&Unit::known("s")).ok_or_else(|| {
             let place = node.child("time-unit").unwrap_or(place);
             place
@@ -319,6 +332,26 @@ impl Clock {
     fn first_from(&self, rows: Range<usize>, t: f64) -> usize {
         rows.start + self.times[rows].partition_point(|time| time - self.zero < t)
     }
+}
+
+/// Refuses a sample time that contradicts the time column of the file, if there is one.
+fn refuse_other_rate(place: &Node<'_>, file: &DataFile, step: f64) -> Result<(), Diagnostic> {
+    let Some(name) = file.time_column() else { return Ok(()) };
+    let column = file.column(&name)?;
+    let unit = column.unit.map_or_else(|| Ok(Unit::known("s")), Unit::parse);
+    let factor = unit.ok().and_then(|unit| unit.factor_to(&Unit::known("s")));
+    let mut steps: Vec<f64> =
+        column.values.windows(2).map(|pair| pair[1] - pair[0]).filter(|s| s.is_finite()).collect();
+    steps.sort_by(f64::total_cmp);
+    let Some((median, factor)) = steps.get(steps.len() / 2).zip(factor) else { return Ok(()) };
+    let found = median * factor;
+    if (found - step).abs() <= 0.01 * step {
+        return Ok(());
+    }
+    // Without the rounding of differences of times.
+    let found = (found / step * 1e9).round() * 1e-9 * step;
+    let fact = format!("the sample time is {step} s, but `{name}` of the file increases by {found} s");
+    Err(place.diagnostic(fact).with_help(format!("remove `sample-time`, to use `{name}`, or correct it")))
 }
 
 /// Keys of a column that is in another file than that of its experiment.

@@ -233,9 +233,9 @@ pub(super) struct ExperimentSection {
     /// Parameter values of this experiment.
     #[serde(default)]
     pub parameters: Entries<Quantity>,
-    /// Start of the used part of the file, as time in the file.
+    /// Start of the used part of the file, as time in the file; a number is in s.
     pub from: Option<Quantity>,
-    /// End of the used part of the file, as time in the file.
+    /// End of the used part of the file, as time in the file; a number is in s.
     pub to: Option<Quantity>,
     /// Number of samples dropped at the start of the file; the first sample of a sensor is often wrong.
     #[serde(default)]
