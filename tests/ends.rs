@@ -300,7 +300,7 @@ fn two_points_that_fit_equally_well_are_not_one_optimum() {
     assert!(!text.contains("all in 1 optimum"), "{text}");
     // The report says that the residuals exceed the noise.
     let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
-    assert!(page.contains("The model does not describe the data"), "a misfit is not green");
+    assert!(page.contains("times the stated noise"), "a misfit is not green");
 }
 
 #[test]

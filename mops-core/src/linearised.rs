@@ -328,6 +328,15 @@ impl Linearised {
         let Local { mut rates, slopes, frictionless, .. } = here;
         let clocks = self.model.clocks(parameters)?;
         let system = self.system(&slopes, &delays, &clocks).map_err(Failure::Undefined)?;
+        if !self.cut.is_empty()
+            && let Some(open) = system.without_path().map_err(Failure::Undefined)?
+        {
+            let variable = &self.interface.inputs[open].name;
+            return Err(Failure::Undefined(format!(
+                "there is no loop through `{variable}` at the operating point: nothing that it acts on acts on it again, or a limit \
+                 is reached there"
+            )));
+        }
         for clock in &clocks {
             rates[clock.memory.clone()].iter_mut().for_each(|change| *change /= clock.period);
         }

@@ -159,7 +159,8 @@ fn doubts_of_fit(outcome: &Outcome) -> String {
         && ratio(channel) > MISFIT
     {
         text += &format!(
-            "The model does not describe the data: the residuals of `{}` in `{}` are {} times the noise. ",
+            "The residuals of `{}` in `{}` are {} times the stated noise: the model does not describe the data, or the noise is \
+             larger. ",
             channel.name,
             experiment.name,
             significant(ratio(channel), 3)

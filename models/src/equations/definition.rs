@@ -425,8 +425,8 @@ impl Definition {
         Ok(())
     }
 
-    /// Cuts the loop at the memory of a clock, which keeps its value under another name. The clock itself uses this value, for example to
-    /// continue from it; all others use the input.
+    /// Cuts the loop at the memory of a clock, which keeps its value under another name. Its own next value is computed from it, for
+    /// example by an increment; all others use the input.
     fn cut_memory(&mut self, state: usize) {
         let declared = &mut self.states[state];
         let (name, unit, path) = (declared.name.clone(), declared.unit.difference(), declared.path.clone());
@@ -439,11 +439,10 @@ impl Definition {
         assigned.filter(|(state, _)| *state == name).for_each(|(state, _)| state.clone_from(&own));
         let clock = self.clocks.iter_mut().find(|clock| clock.memory.contains(&state)).expect("memory of a clock");
         let mut rename = |node: &Node| (node.form == Form::Name(name.clone())).then(|| Form::Name(own.clone()));
-        for text in &mut clock.next {
-            let mut equation = (*text.equation).clone();
-            equation.right.replace(&mut rename);
-            text.equation = Arc::new(equation);
-        }
+        let text = &mut clock.next[state - clock.memory.start];
+        let mut equation = (*text.equation).clone();
+        equation.right.replace(&mut rename);
+        text.equation = Arc::new(equation);
         let right = Node { form: Form::Name(own), span: 0..name.len() };
         self.add_cut(&name, &unit, Text { path, equation: Arc::new(Equation { left: None, right }), index: None });
     }

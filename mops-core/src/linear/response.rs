@@ -3,8 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::sampled::on_axis;
-use super::{Complex, StateSpace};
-use crate::math::complex;
+use super::{Complex, StateSpace, eigenvalues};
+use crate::math::{self, complex};
 
 /// System prepared for evaluation at many frequencies: its states are scaled to similar magnitude.
 ///
@@ -32,6 +32,42 @@ impl StateSpace {
         }
         let Self { a, b, c, d, delay, period, .. } = self.balanced();
         Ok(FrequencyResponse { a, b, c, d, delay, period })
+    }
+}
+
+/// Points of the imaginary axis, relative to the size of the poles, at which a response that is not zero everywhere is not zero.
+const LOOKED_AT: [f64; 3] = [0.37, 1.3, 7.1];
+
+/// Magnitude of a response, relative to its terms, that is a rounding error.
+const ROUNDING: f64 = 1e-13;
+
+impl StateSpace {
+    /// Returns the first output that no input acts on.
+    ///
+    /// # Errors
+    /// If an entry is not finite.
+    pub fn without_path(&self) -> Result<Option<usize>, String> {
+        let sizes = eigenvalues(&self.a)?.into_iter().map(complex::norm).filter(|size| *size > 0.0);
+        let (sum, count) = sizes.fold((0.0, 0.0), |(sum, count), size| (sum + math::ln(size), count + 1.0));
+        let scale = if count > 0.0 { math::exp(sum / count) } else { 1.0 };
+        let acts = |output: usize| -> Result<bool, String> {
+            for input in 0..self.inputs.len() {
+                let response = self.channel(input, output).response()?;
+                for at in LOOKED_AT {
+                    let s = Complex::new(0.0, at * scale);
+                    if complex::norm(response.at(s)[(0, 0)]) > ROUNDING * response.terms(s) {
+                        return Ok(true);
+                    }
+                }
+            }
+            Ok(false)
+        };
+        for output in 0..self.outputs.len() {
+            if !acts(output)? {
+                return Ok(Some(output));
+            }
+        }
+        Ok(None)
     }
 }
 

@@ -352,6 +352,32 @@ fn a_cut_keeps_what_a_clock_remembers_of_its_own_output() {
 }
 
 #[test]
+fn memory_that_delays_a_cut_variable_by_periods_is_in_the_loop() {
+    // u = g x at the integrator x' = -u two periods later.
+    let (gain, period) = (0.2, 0.5);
+    let text = format!(
+        "states = {{ x = 'm' }}
+         parameters = {{ g = '1/s' }}
+         der = {{ x = '-second' }}
+         clocks.c = {{ every = '{period} s', memory = {{ u = 'm/s', first = 'm/s', second = 'm/s' }}, next = {{ u = 'clip(g*x, -1, 1)', first = 'u', second = 'first' }} }}"
+    );
+    for variable in ["u", "first", "second"] {
+        let open = linearised(&text, Some(variable), &[("g", gain)]).unwrap();
+        let response = open.response().unwrap();
+        for omega in [0.1, 1.0, 5.0] {
+            let z = complex::exp(Complex::new(0.0, omega * period));
+            let exact = z.powi(-2) * gain * period / (z - 1.0);
+            let found = response.scalar(omega);
+            assert!(complex::norm(found - exact) < 1e-12 * complex::norm(exact), "{variable} {omega}: {found} {exact}");
+        }
+    }
+    // Beyond a limit, nothing acts on the controller.
+    let limited = text.replace("g*x", "g*x + 3 [m/s]");
+    let refused = linearised(&limited, Some("u"), &[("g", gain)]).unwrap_err();
+    assert!(refused.contains("no loop through `u`"), "{refused}");
+}
+
+#[test]
 fn a_loop_that_is_cut_between_the_instants_is_refused() {
     let text = motor(RATES[0]);
     let text =

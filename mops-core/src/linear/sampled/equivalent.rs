@@ -13,7 +13,7 @@ const SAME_INSTANT: f64 = 1e-9;
 const MOST_PERIODS: u32 = 100;
 
 /// Largest number of values that wait in the queue of a delay.
-const MOST_WAITING: usize = 200;
+const MOST_WAITING: u32 = 200;
 
 /// What happens at an instant, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -248,7 +248,7 @@ impl<'a> Equivalent<'a> {
                 all.extend([(push, Act::Push(l)), (end, Act::Deliver(l))]);
             }
             let most = waiting as usize + pushes.len();
-            if most > MOST_WAITING {
+            if waiting > f64::from(MOST_WAITING) {
                 return Err(format!(
                     "the delay of {delay:e} s is longer than {MOST_WAITING} changes of the delayed quantity"
                 ));
