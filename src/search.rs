@@ -185,10 +185,8 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let end = run.best().map(|best| {
         let is_noise = best.merit.is_feasible() && problem.shape().is_noise(best.merit.objective);
         let end = End::new(point, best.merit, solver.ends(), cause, is_noise);
-        match twin(&run, best) {
-            Some(sentence) if problem.study().task() == Task::Calibration => end.with_twin(sentence),
-            _ => end,
-        }
+        let twin = if problem.study().task() == Task::Calibration { twin(&run, best) } else { None };
+        twin.into_iter().fold(end, End::with_twin)
     });
     let ending = Ending { stop, end, pareto, seconds: started.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);

@@ -96,6 +96,10 @@ const ROUNDING: f64 = 1e-12;
 /// Difference of a tied variable from its computed value that counts as rounding if a step does not halve it.
 const CLOSE: f64 = 1e-6;
 
+/// Way out for a sampled model without a discrete equivalent.
+const WRITE_EQUATIONS: &str =
+    "write its equations, with a clock or a `pid` that has `every`: they have a discrete equivalent";
+
 /// Returns the derivatives of tied variables minus their computed values.
 fn tied(slopes: &DMatrix<f64>, ties: &[Tie]) -> DMatrix<f64> {
     let entry = |k: usize, l: usize| f64::from(u8::from(k == l)) - ties[k].sign * slopes[(ties[k].row, ties[l].column)];
@@ -125,8 +129,7 @@ impl Linearised {
     /// wrong unit.
     pub fn new(model: Arc<dyn Model>, options: &Linearise) -> Result<Self, StudyError> {
         if let Some(why) = model.not_linear() {
-            let help = "write its equations, with a clock or a `pid` that has `every`: they have a discrete equivalent";
-            return Err(StudyError::here(why).with_help(help));
+            return Err(StudyError::here(why).with_help(WRITE_EQUATIONS));
         }
         let states = model.equation_states();
         let of = model.interface();
@@ -214,8 +217,7 @@ impl Linearised {
             return Err(StudyError::new(key.0, fact).with_help("remove it, or `open`").within("linearise"));
         }
         if let Some(why) = model.not_linear() {
-            let help = "write its equations, with a clock or a `pid` that has `every`: they have a discrete equivalent";
-            return Err(StudyError::new("open", why).with_help(help));
+            return Err(StudyError::new("open", why).with_help(WRITE_EQUATIONS));
         }
         let Some(cut) = model.cut(variables) else {
             return Err(StudyError::new("open", "the loop of this kind of model cannot be cut")

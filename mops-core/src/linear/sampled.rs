@@ -82,11 +82,15 @@ impl StateSpace {
         (root * (0.5 * period) + 1.0) / (-root * (0.5 * period) + 1.0)
     }
 
+    /// Returns `ln(z)/T`, 1/s.
+    pub fn logarithm(z: Complex, period: f64) -> Complex {
+        Complex::new(math::ln(complex::norm(z)), complex::arg(z)) / period
+    }
+
     /// Returns poles or zeros of `A`, 1/s; those of a sampled system as `ln(z)/T`, without the poles and zeros at z = 0 or infinity.
     pub fn in_seconds(&self, roots: Vec<Complex>) -> Vec<Complex> {
         let Some(period) = self.period else { return roots };
-        let logarithm = |z: Complex| Complex::new(math::ln(complex::norm(z)), complex::arg(z)) / period;
-        let finite = roots.into_iter().map(|root| logarithm(Self::z(root, period)));
+        let finite = roots.into_iter().map(|root| Self::logarithm(Self::z(root, period), period));
         finite.filter(|s| s.is_finite()).collect()
     }
 

@@ -140,8 +140,7 @@ pub(super) fn undecided_note(system: &StateSpace) -> String {
 /// Formats poles with damping ratio, frequency and time constant, the slowest decay first. With a sampling period, the poles are
 /// those in z, and the others are those of `ln(z)/T`.
 pub(super) fn poles_table(what: &str, poles: &[Complex], period: Option<f64>) -> String {
-    let in_seconds =
-        |z: Complex| period.map_or(z, |period| Complex::new(math::ln(complex::norm(z)), complex::arg(z)) / period);
+    let in_seconds = |z: Complex| period.map_or(z, |period| StateSpace::logarithm(z, period));
     let mut sorted: Vec<(Complex, Complex)> = rounded(poles, poles).into_iter().map(|p| (p, in_seconds(p))).collect();
     sorted.sort_by(|a, b| b.1.re.total_cmp(&a.1.re).then(b.1.im.total_cmp(&a.1.im)));
     let row = |(pole, p): &(Complex, Complex)| {
