@@ -138,8 +138,8 @@ impl<S: Scalar> Plant<S> for Delayed<S> {
         self.remembers()
     }
 
-    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
-        pass_delays(self, |system| &mut system.inputs, |_, _| {}, at, x);
+    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) -> S {
+        pass_delays(self, |system| &mut system.inputs, |_, _| {}, at, x)
     }
 
     fn next_break(&self, t: f64) -> f64 {

@@ -503,11 +503,12 @@ impl<S: Scalar> Plant<S> for Loop<S> {
         self.sampled.is_some()
     }
 
-    fn sample(&mut self, at: &Instant<'_, S>, _: &mut [S]) {
+    fn sample(&mut self, at: &Instant<'_, S>, _: &mut [S]) -> S {
         let (r, y) = (at.u[0], self.output(at.x));
         if let Some(sampled) = &mut self.sampled {
             sampled.pass(at.t, &self.controller, self.limit, r, y);
         }
+        S::from(0.0)
     }
 
     fn settle(&mut self, at: &Instant<'_, S>) {

@@ -126,7 +126,7 @@ pub use study::{
 };
 pub use study_error::StudyError;
 pub use tolerance::{IntegrationMethod, Tolerance};
-pub use trace::{Piece, Trace};
+pub use trace::{Earlier, Piece, Trace};
 pub use trade_offs::{Certified, Exchange, FrontCriterion, FrontPoint, Pareto, TradeOffs};
 pub use tuner::{Grid, Scale, Tuner};
 pub use uncertainty::{BandReport, BootstrapParameter, BootstrapReport, ProfileReport, UncertaintyReport};

@@ -2,15 +2,17 @@
 //! effects.
 
 mod along;
+mod command;
 mod contacts;
 mod dynamics;
+mod edges;
 mod sensors;
 
 use std::sync::Arc;
 
 use mops_core::{
-    Analysis, Case, Dimension, Failure, InitialGrid, Interface, Job, Model, Opening, Parameter, Placement, Port,
-    Scalar, State, StudyError, Unit, Variable, WithTangents,
+    Analysis, Case, Dimension, Earlier, Failure, InitialGrid, Interface, Job, Model, Opening, Parameter, Placement,
+    Port, Scalar, State, StudyError, Unit, Variable, WithTangents,
 };
 
 use crate::kernel::{Recording, Tolerance, record, tangents_of, wanted};
@@ -177,8 +179,12 @@ impl WithEffects {
         let mut dynamics = self.driven(plant, &acting, job, parameters);
         let start = dynamics.start(parameters)?;
         let signals = wanted(job, &self.interface.signals);
-        let recording = record(&mut dynamics, &start, job.horizon, &self.tolerance(open), &signals)?;
-        Ok(dynamics.remembered(recording, &signals.signals))
+        let initial: Vec<S> = job.signals.iter().map(|&signal| dynamics.measured(signal, 0.0, &start)).collect();
+        let mut recording = record(&mut dynamics, &start, job.horizon, &self.tolerance(open), &signals)?;
+        recording.set_initial(&initial);
+        // What a recorded signal was before the record is not known.
+        let earlier = if job.case.experiment.is_some() { Earlier::Extrapolated } else { Earlier::Constant };
+        Ok(dynamics.delayed_sensors(recording, &signals.signals, earlier))
     }
 }
 
