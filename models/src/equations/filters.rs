@@ -138,7 +138,7 @@ fn bilinear(clock: &Clock, filter: &Filter, of: &Polynomials) -> Result<[Vec<Opt
     let factor = match &filter.prewarp {
         None => format!("(2/{period})"),
         Some(frequency) => {
-            let angular = angular(frequency)?;
+            let angular = angular(frequency, clock)?;
             format!("({angular}/tan({angular}*{period}/2))")
         }
     };
@@ -170,14 +170,28 @@ pub(super) fn in_brackets(time: &Formula) -> String {
 }
 
 /// Returns a frequency as an angular frequency in an expression.
-fn angular(frequency: &Quantity) -> Result<String, StudyError> {
+///
+/// The factor of the transform is positive below half of the sampling frequency only. If the period depends on parameters, a
+/// frequency above makes the filter undefined.
+fn angular(frequency: &Quantity, clock: &Clock) -> Result<String, StudyError> {
     let value = frequency.to(&Unit::known("rad/s")).map_err(|why| StudyError::new("prewarp", why))?;
     let value = if frequency.unit.is_none() { std::f64::consts::TAU * frequency.number } else { value };
-    if value.is_finite() && value > 0.0 {
-        Ok(format!("({value:?} [rad/s])"))
-    } else {
-        Err(StudyError::new("prewarp", format!("`prewarp` must be above 0 Hz, and is {} Hz", frequency.number)))
+    let period = Quantity::parse(&clock.every.0).ok().and_then(|period| period.to(&Unit::known("s")).ok());
+    let half = period.map_or(f64::INFINITY, |period| 0.5 / period);
+    let hertz = value / std::f64::consts::TAU;
+    if value.is_nan() || value <= 0.0 || hertz >= half {
+        let range = if half.is_finite() {
+            format!("above 0 Hz and below half of the sampling frequency, {half} Hz")
+        } else {
+            "above 0 Hz".to_owned()
+        };
+        return Err(StudyError::new("prewarp", format!("`prewarp` must be {range}, and is {hertz} Hz"))
+            .with_help("a number without a unit is in Hz"));
     }
+    if value.is_infinite() {
+        return Err(StudyError::new("prewarp", "`prewarp` must be finite"));
+    }
+    Ok(format!("({value:?} [rad/s])"))
 }
 
 /// Returns a coefficient of `s^power`; a number has the unit `s^power`.

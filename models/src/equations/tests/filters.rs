@@ -106,6 +106,7 @@ fn a_filter_that_does_not_exist_is_refused() {
         ("method = 'tustin'", "given in `z` or as `continuous`"),
         ("continuous = { numerator = ['k'], denominator = [1, 1] }, method = 'zero-order-hold'", "needs numbers"),
         ("continuous = { numerator = [1], denominator = [1, 1] }, prewarp = '-1 Hz'", "above 0 Hz"),
+        ("continuous = { numerator = [1], denominator = [1, 1] }, prewarp = '1 MHz'", "half of the sampling frequency"),
         ("continuous = { numerator = [1], denominator = [1, 1] }, prewarp = '1 s'", "expected a quantity in"),
     ] {
         let mistake = read(&sampled(filter, "k = '1'")).err().unwrap().to_string();
