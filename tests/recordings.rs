@@ -101,6 +101,15 @@ fn an_input_that_is_given_as_a_column_or_as_a_constant_is_accepted() {
 }
 
 #[test]
+fn an_offset_with_a_unit_needs_a_column_with_one() {
+    let study = oven("t [s],P,T [degC]", "inputs = { P = { column = \"P\", offset = \"1 kW\" } }");
+    let (code, text) = mops(study.path(), &["check", "study.toml"]);
+    assert!(code == 2 && text.contains("the column `P` has no unit"), "{text}");
+    let study = oven("t [s],P,T [degC]", "inputs = { P = { column = \"P\", unit = \"W\", offset = \"1 kW\" } }");
+    assert_eq!(mops(study.path(), &["check", "study.toml"]).0, 0);
+}
+
+#[test]
 fn an_input_without_a_column_for_it_stays_at_zero() {
     let data: String = (0..30).map(|k| format!("{k},20\n")).collect();
     let study = OVEN.replace("INPUTS", "");
@@ -218,4 +227,26 @@ fn a_time_column_that_cannot_be_read_is_not_called_missing() {
         let (code, text) = mops(place.path(), arguments);
         assert!(code == 2 && text.contains("may be day/month or month/day; write them as year-month-day"), "{text}");
     }
+}
+
+#[test]
+fn gaps_in_a_record_are_reported_once_for_all_signals() {
+    let study = OVEN.replace("INPUTS", "inputs = { P = \"P\" }");
+    let check = |keep: fn(usize) -> bool| {
+        let kept: Vec<String> =
+            rows(",").lines().enumerate().filter(|(k, _)| keep(*k)).map(|(_, row)| row.to_owned()).collect();
+        let data = format!("t [s],P [W],T [degC]\n{}\n", kept.join("\n"));
+        let (code, text) = mops(
+            folder(&[("study.toml", study.as_bytes()), ("oven.csv", data.as_bytes())]).path(),
+            &["check", "study.toml"],
+        );
+        assert_eq!(code, 0, "{text}");
+        text
+    };
+    let one = check(|k| !(30..36).contains(&k));
+    assert!(one.contains("`T` in `e` has a gap of 7 s at 29 s: inputs are continued across it"), "{one}");
+    let two = check(|k| !(30..36).contains(&k) && !(40..50).contains(&k));
+    assert!(two.contains("a gap of 11 s at 39 s, the longer of 2"), "{two}");
+    assert!(!check(|k| k != 30 && k != 40).contains("gap"));
+    assert!(!check(|_| true).contains("gap"));
 }

@@ -450,3 +450,13 @@ fn radiation_has_the_absolute_zero_of_the_scale_of_its_state() {
     let (code, output) = mops(folder.path(), &["check", "study.toml"]);
     assert!(code == 2 && output.contains("has a zero of its own"), "{output}");
 }
+
+#[test]
+fn a_definition_without_a_unit_gets_one_where_it_is_defined() {
+    let text = "[study]\nname = 'm'\n[models.m.equations]\nstates = { x = 'rad' }\nparameters = { k = '1/s' }\nconstants = { th = '20 deg' }\n\
+                let = { g = '3', s = 'g + th' }\nder = { x = 'k*(s - x)' }\nhorizon = '1 s'\n\
+                [tuners]\nk = { start = 1, min = 0.1, max = 2 }\n[criteria]\ny = { final-value = { signal = 'x' }, demand = 1 }\n";
+    let (code, output) = mops(study(text, "").path(), &["check", "study.toml"]);
+    let output = output.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(code == 2 && output.contains("give `g` a unit where it is defined, as in \"3 [rad]\""), "{output}");
+}

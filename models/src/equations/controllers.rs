@@ -4,7 +4,7 @@ use mops_core::file::{Entries, Short};
 use mops_core::{Quantity, StudyError, Unit};
 
 use super::definition::{path, under};
-use super::filters::in_brackets;
+use super::filters::{in_brackets, number_before_formulas};
 use super::options::{Clock, Described, EquationsOptions, Formula, Output, Pid};
 
 /// Returns the options with each controller replaced by what it computes.
@@ -32,8 +32,13 @@ pub(super) fn at_its_key(mistake: StudyError, options: &EquationsOptions) -> Stu
         });
         let filters = clock.into_iter().filter(|_| !is_own).flat_map(|clock| &clock.filter.0);
         let part_of = |of: &str| memory.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('_'));
-        if let Some(name) = filters.map(|(name, _)| name).find(|name| part_of(name)) {
-            return StudyError { path: path(&["clocks", key, "filter", name]), span: None, ..mistake.clone() };
+        if let Some((name, filter)) = filters.into_iter().find(|(name, _)| part_of(name)) {
+            let place = ["clocks", key, "filter", name];
+            if let Some((list, help)) = number_before_formulas(filter) {
+                let place = path(&[&place[..], &["continuous", list]].concat());
+                return StudyError { path: place, span: None, help: Some(help), ..mistake.clone() };
+            }
+            return StudyError { path: path(&place), span: None, ..mistake.clone() };
         }
     }
     let is_own = options.definitions.0.iter().any(|(name, _)| *section == "let" && name == key)

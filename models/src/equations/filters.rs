@@ -202,6 +202,27 @@ fn in_seconds(coefficient: &Formula, power: usize) -> String {
     }
 }
 
+/// Returns the list with a number as coefficient of `s^n`, n above 0, beside formulas, which may have the unit of another convention,
+/// and how to write the number then.
+pub(super) fn number_before_formulas(filter: &Filter) -> Option<(&'static str, String)> {
+    let of = filter.continuous.as_ref()?;
+    let is_number = |coefficient: &Formula| coefficient.0.trim().parse::<f64>().is_ok();
+    let lists = [("denominator", &of.denominator), ("numerator", &of.numerator)];
+    if lists.iter().all(|(_, list)| list.iter().all(is_number)) {
+        return None;
+    }
+    lists.into_iter().find_map(|(key, list)| {
+        let numbers = list.iter().enumerate().filter(|(_, c)| is_number(c) && !is_zero(c));
+        let (index, number) = numbers.map(|(index, c)| (index, c.0.trim())).next()?;
+        let power = list.len() - 1 - index;
+        let help = format!(
+            "the number {number} before s^{power} counts in s^{power}, as each number before s^n in s^n; write \"{number} [1]\" for a \
+             number without a unit, as in s^2 + 2 z w s + w^2"
+        );
+        (power > 0).then_some((key, help))
+    })
+}
+
 /// Returns the filter whose output at the instants is that of the continuous one for an input that is constant in between.
 ///
 /// Source: K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd edition (1997), section 2.3.

@@ -223,40 +223,63 @@ pub(super) fn later_headers(text: &str, first: usize) -> Vec<usize> {
         let Some(next) = first_line(&text[last + end..]) else { break };
         starts.push(last + end + next);
     }
-    let mut found = Vec::new();
-    for k in 1..starts.len() {
-        let separator = separator(text, starts[k]);
-        let line = |k: usize| -> Vec<&str> { cells(text, starts[k], separator).map(|cell| &text[cell]).collect() };
-        let names = line(k);
-        let is_number = |cell: &&str| is_value(cell, separator) && !cell.trim().is_empty();
-        let are_names = names.len() > 1 && !names.iter().any(is_number);
-        let has_numbers = |k: usize| {
-            let cells = line(k);
-            cells.len() == names.len() && cells.iter().any(is_number)
-        };
-        let units = || units_below(text, starts[k] + line_length(text, starts[k]), separator, names.len()).is_some();
-        let is_above_numbers =
-            k + 1 < starts.len() && (has_numbers(k + 1) || (units() && k + 2 < starts.len() && has_numbers(k + 2)));
-        let is_row = |cells: Vec<&str>| cells.len() > 1 && cells.iter().all(|cell| is_value(cell, separator));
-        // A line with as many names directly above may be the header of a file with a damaged row.
-        let looks_like_one = |names: &[&str]| {
-            let tells = |cell: &&str| {
-                let (name, unit) = name_and_unit(cell, 1);
-                unit.is_some() || is_time(&name)
-            };
-            names.iter().any(tells)
-        };
-        let above = line(k - 1);
-        let has_rival = above.len() == names.len()
-            && above.iter().all(|cell| !cell.trim().is_empty() && !is_number(cell))
-            && (looks_like_one(&above) || !looks_like_one(&names));
-        if are_names && is_above_numbers && !has_rival && !(0..k).any(|k| is_row(line(k))) {
-            found.push(starts[k]);
-        }
-    }
-    found
+    let is_header = |&k: &usize| {
+        let lines = Lines { text, starts: &starts, separator: separator(text, starts[k]) };
+        lines.is_above_numbers(k) && !lines.has_rival(k) && !(0..k).any(|k| lines.is_row(k))
+    };
+    (1..starts.len()).filter(is_header).map(|k| starts[k]).collect()
 }
 
-fn line_length(text: &str, start: usize) -> usize {
-    text[start..].find(['\n', '\r']).unwrap_or(text.len() - start)
+/// First lines of a file, without blank lines and comments.
+struct Lines<'t> {
+    text: &'t str,
+    starts: &'t [usize],
+    separator: u8,
+}
+
+impl Lines<'_> {
+    fn cells(&self, line: usize) -> Vec<&str> {
+        let start = self.starts.get(line).copied().unwrap_or(self.text.len());
+        cells(self.text, start, self.separator).map(|cell| &self.text[cell]).collect()
+    }
+
+    fn is_number(&self, cell: &str) -> bool {
+        !cell.trim().is_empty() && is_value(cell, self.separator)
+    }
+
+    /// Returns true for names, as many as there are cells in the line below, or below the units, which has numbers.
+    fn is_above_numbers(&self, line: usize) -> bool {
+        let names = self.cells(line);
+        let has_numbers = |line: usize| {
+            let cells = self.cells(line);
+            cells.len() == names.len() && cells.iter().any(|cell| self.is_number(cell))
+        };
+        let start = self.starts[line];
+        let end = start + self.text[start..].find(['\n', '\r']).unwrap_or(self.text.len() - start);
+        let has_units = || units_below(self.text, end, self.separator, names.len()).is_some();
+        names.len() > 1
+            && !names.iter().any(|cell| self.is_number(cell))
+            && (has_numbers(line + 1) || (has_units() && has_numbers(line + 2)))
+    }
+
+    /// Returns true if the line above has as many names: it may be the header of a file with a damaged row.
+    fn has_rival(&self, line: usize) -> bool {
+        let looks_like_names = |cells: &[&str]| {
+            cells.iter().any(|cell| {
+                let (name, unit) = name_and_unit(cell, 1);
+                unit.is_some() || is_time(&name)
+            })
+        };
+        let (names, above) = (self.cells(line), self.cells(line - 1));
+        above.len() == names.len()
+            && above.iter().all(|cell| !cell.trim().is_empty() && !self.is_number(cell))
+            && (looks_like_names(&above) || !looks_like_names(&names))
+    }
+
+    /// Returns true for a row of numbers.
+    fn is_row(&self, line: usize) -> bool {
+        let cells = self.cells(line);
+        let all = cells.iter().all(|cell| is_value(cell, self.separator));
+        cells.len() > 1 && all && cells.iter().any(|cell| self.is_number(cell))
+    }
 }

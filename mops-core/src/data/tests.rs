@@ -303,6 +303,7 @@ mod csv {
     fn lines_of_an_instrument_before_the_header_are_skipped_and_counted() {
         for text in [
             "Logger 7;;\nStart;2024-05-01;\nInterval;0.5;\n\nt [s];u [V];y\n0;1;2\n1;2;3\n",
+            "Logger 7;;\nStart;2024-05-01;\n;;\nt [s];u [V];y\n0;1;2\n1;2;3\n",
             "Measurement of the rig\nby hand, twice\nat night\nt [s],u [V],y\n0,1,2\n1,2,3\n",
             "sep=;\nmade by a spreadsheet\n2024\nt;u;y\ns;V;-\n0,5;1;2\n1,5;2;3\n",
         ] {

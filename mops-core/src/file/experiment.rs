@@ -788,7 +788,11 @@ impl Table {
             (Some(q), Some(unit)) => q.to(&unit.difference()).map_err(|why| {
                 at_key(place, "offset", why).with_help(format!("a number without a unit is in `{unit}`"))
             })?,
-            (Some(q), None) => q.number,
+            (Some(Quantity { number, unit: None }), None) => *number,
+            (Some(Quantity { unit: Some(given), .. }), None) => {
+                let fact = format!("the offset is in `{given}`, but the column `{name}` has no unit");
+                return Err(at_key(place, "offset", fact).with_help("set `unit` to that of the column"));
+            }
         };
         Ok((column.values.iter().map(|v| scale * v + offset).collect(), unit))
     }
