@@ -294,6 +294,16 @@ impl Bound {
         Self { places: entry.0.names().iter().map(place).collect(), expression: entry.0.clone() }
     }
 
+    /// Binds a delay, which is not negative where it depends on no parameter.
+    pub fn delay(entry: &Entry, names: &mut Vec<String>) -> Result<Self, StudyError> {
+        let bound = Self::new(entry, names);
+        let value: Option<f64> = bound.places.is_empty().then(|| bound.value(&[]));
+        match value.filter(|value| !(*value >= 0.0 && value.is_finite())) {
+            None => Ok(bound),
+            Some(value) => Err(StudyError::new("delay", format!("expected a delay of at least 0 s, found {value} s"))),
+        }
+    }
+
     /// Binds all entries of a list.
     pub fn all(entries: &[Entry], names: &mut Vec<String>) -> Vec<Self> {
         entries.iter().map(|entry| Self::new(entry, names)).collect()

@@ -82,6 +82,14 @@ impl ModelOptions for PidLoopOptions {
         let step = |key: &str, options: &Option<StepOptions>| -> Result<Option<Input>, StudyError> {
             let Some(options) = options else { return Ok(None) };
             let time = options.time.as_ref().map_or(Ok(0.0), |q| seconds("time", q)).map_err(|m| m.within(key))?;
+            if !(time >= 0.0 && time.is_finite()) {
+                let fact = format!("expected a time from 0 s on, found {time} s");
+                return Err(StudyError::new("time", fact).within(key));
+            }
+            if !options.size.is_finite() {
+                let fact = format!("expected a finite size of the step, found {}", options.size);
+                return Err(StudyError::new("size", fact).within(key));
+            }
             Ok(Some(Input::Step { time, before: 0.0, after: options.size }))
         };
         let setpoint = step("setpoint", &self.setpoint)?.unwrap_or(Input::Step { time: 0.0, before: 0.0, after: 1.0 });

@@ -218,6 +218,8 @@ pub enum ParameterKind {
     LowerEdge,
     /// Value above which a stop or an overflow acts: below it, part of the range visited is free of it.
     UpperEdge,
+    /// Absolute temperature at the zero of the scale of the place: 273.15 for degC.
+    Zero,
     /// Damping of a contact divided by its stiffness: shorter than the time in which the place moves, else the contact is a damper.
     Damping,
     /// Angle of a periodic function.
@@ -233,6 +235,12 @@ pub enum ParameterKind {
 }
 
 impl ParameterKind {
+    /// Returns true for a value that the place itself may have, on a temperature scale its temperature.
+    #[must_use]
+    pub fn is_value(self) -> bool {
+        matches!(self, Self::Level | Self::LowerEdge | Self::UpperEdge)
+    }
+
     /// Returns true for an edge, beyond which a stop or an overflow acts.
     #[must_use]
     pub fn is_edge(self) -> bool {
