@@ -133,6 +133,15 @@ impl End {
         self
     }
 
+    /// Returns the end where simulations contradict the derivatives, as a sentence states: what follows from derivatives is not shown.
+    #[must_use]
+    pub fn with_contradiction(mut self, sentence: String) -> Self {
+        let of_point = self.words_of_point();
+        self.words.retain(|words| Some(words) != of_point.as_ref());
+        (self.point, self.doubt) = (Optimality::NotShown, Some(sentence));
+        self
+    }
+
     fn words_of_point(&self) -> Option<String> {
         let words = match self.point {
             Optimality::Stationary => "The point is stationary: to first order, no direction lowers the objective.",

@@ -12,6 +12,7 @@ mod catalogue_study;
 mod conclude;
 mod criterion;
 pub mod data;
+mod derivatives;
 pub mod diagnosis;
 mod diagnostic;
 mod differences;
@@ -72,6 +73,7 @@ pub use criterion::{
     Criterion, CriterionSpec, Demand, Mark, Missed, Other, Scaled, Sense, Side, Tangent, Usage, Value,
 };
 
+pub use derivatives::{Contradiction, DerivativesReport};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use differences::Differences;
 pub use effect::{
