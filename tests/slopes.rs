@@ -1,8 +1,8 @@
 //! Derivatives of criteria with respect to the parameters of effects, compared with differences of simulations.
 //!
 //! Pairs of effects at every place of three plants and across places, with a step, a sloped recording and a sine; every criterion over
-//! time is asked for its slope alone. `MOPS_SLOPES=all cargo test --release --test slopes -- --nocapture` runs all of them; the full
-//! tier runs a tenth.
+//! time is asked for its slope alone. `MOPS_SLOPES=all cargo test --release --features full-tests --test slopes -- --nocapture` runs all of
+//! them; the full tier runs a tenth.
 
 #[path = "slopes/criteria.rs"]
 mod criteria;

@@ -139,7 +139,7 @@ fn the_samples_before_time_0_are_what_a_delay_passes_on() {
     // The input is 4 + t, so that the delayed one is 2.5 + t.
     let at = [0.5, 1.0, 3.0];
     close(&values(&model, &[0.0, 1.5], recorded(Hold::First), &at), &at.map(|t| 2.5 * t + 0.5 * t * t), 1e-9);
-    // Held between samples: 2 until 0.5 s, then 3.
+    // Constant between samples: 2 until 0.5 s, then 3.
     close(&values(&model, &[0.0, 1.5], recorded(Hold::Zero), &[0.5, 1.0]), &[1.0, 2.5], 1e-9);
 }
 
