@@ -37,7 +37,7 @@ const UNDECIDED: f64 = 0.1;
 
 /// Share of the slopes that may be off: those of effects whose law has an infinite derivative at a threshold, or bends where a joint
 /// reverses (see ADR 5).
-const OFF: f64 = 0.002;
+const OFF: f64 = 0.003;
 
 /// One of so many setups is compared in the full tier.
 const TENTH: usize = 10;
