@@ -4,12 +4,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Budget, Cancellation, Contradiction, DerivativesReport, Effect, End, Ending, Evaluation, Linearisation, Objective,
-    Optimality, Oracle, Outcome, Pareto, Patience, Place, Problem, Quiet, Record, Run, Shape, SlopesReport, Solver,
-    SolverChoice, Stop, Store, Study, StudyError, Task, Watch, conclude,
+    Beyond, Budget, Cancellation, Contradiction, DerivativesReport, Effect, End, Ending, Evaluation, Linearisation,
+    Objective, Optimality, Oracle, Outcome, Pareto, Patience, Place, Problem, Quiet, Record, Role, Run, Shape,
+    SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task, Watch, conclude,
 };
 
-use crate::numbers::significant;
+use crate::numbers::{counted, significant};
 
 /// Options of [`crate::solve()`].
 #[derive(Clone)]
@@ -137,20 +137,48 @@ pub(crate) fn solves(study: &Study) -> bool {
     }
 }
 
-/// Runs the solver and returns its outcome.
+/// Share of the budget kept for checks of the reported point: one part of so many.
+const CHECKS: usize = 10;
+
+/// Limits of a search, in evaluated points.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    /// Points on which the solver counts.
+    pub planned: usize,
+    /// Points after which the search ends.
+    pub searched: usize,
+    /// Points of the search and of the checks of its result.
+    pub all: usize,
+}
+
+/// Runs the solver and returns its outcome. A part of the budget is kept for checks of the reported point.
 ///
 /// # Errors
 /// If the solver does not accept the problem.
 pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
+    let planned = options.max_evaluations.max(1);
+    let limits = Limits { planned, searched: planned - planned / CHECKS, all: planned };
+    search_within(limits, study, options, watch)
+}
+
+/// Runs the solver within the limits and returns its outcome.
+///
+/// # Errors
+/// If the solver does not accept the problem.
+pub(crate) fn search_within(
+    limits: Limits,
+    study: Study,
+    options: &Options,
+    watch: &dyn Watch,
+) -> Result<Solved, SolveError> {
     let started = Instant::now();
     let problem = Problem::new(Arc::new(study));
     let mut solver = options.solver.make();
     accepts(&options.solver, solver.as_ref(), problem.shape())?;
     let (store, begin) = (options.store(&problem), options.begin(&problem));
-    let planned = options.max_evaluations.max(1);
-    let evaluations = options.replayed.unwrap_or(planned).max(1);
-    let mut run =
-        Run::new(&problem, Budget { evaluations }, watch).planned(planned).patient(options.patience).keeping(store);
+    let evaluations = options.replayed.unwrap_or(limits.searched).max(1);
+    let run = Run::new(&problem, Budget { evaluations }, watch).planned(limits.planned);
+    let mut run = run.patient(options.patience).keeping(store);
     let start = begin.map_or_else(|| problem.start(), <[f64]>::to_vec);
     let stop = run.solve(solver.as_mut(), &start);
     if run.archive().is_empty() {
@@ -169,7 +197,8 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
         run.settle(run.evaluation(nearest).clone());
     }
     let quiet = Quiet(watch);
-    let mut probe = Run::new(&problem, Budget { evaluations: usize::MAX }, &quiet).keeping(store);
+    let left = Budget { evaluations: limits.all.saturating_sub(run.archive().len()) };
+    let mut probe = Run::new(&problem, left, &quiet).keeping(store);
     let (mut point, mut pareto) = shown(&run, &mut probe, watch);
     let has_slack = pareto == Pareto::No && problem.shape().objective == Objective::Max;
     if has_slack && stop != Stop::Interrupted && remove_slack(&mut run) {
@@ -184,27 +213,44 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let derivatives = near.as_ref().filter(|(_, is_exact)| *is_exact);
     let derivatives = derivatives.map(|(found, _)| DerivativesReport::of(&problem, &mut probe, found));
     let contradiction = derivatives.as_ref().and_then(contradiction);
+    let is_design = problem.study().task() == Task::Design;
+    let mut slopes = near.filter(|_| is_design).map(|(found, _)| SlopesReport::of(&problem, &found));
+    if let (Some(slopes), Some(best), false) = (&mut slopes, run.best(), point == Optimality::Stationary) {
+        slopes.add_sides(&problem, &mut probe, best);
+    }
+    let pareto = if contradiction.is_some() { Pareto::NotShown } else { pareto };
+    let ending = Ending { stop, end: None, pareto, seconds: started.elapsed().as_secs_f64() };
+    let (mut outcome, best) = conclude(&run, &options.solver, ending);
     // A replay ends where the run was interrupted, not at a budget.
     let cause = if options.replayed.is_some() { Stop::Interrupted } else { stop };
     let end = run.best().map(|best| {
-        let is_noise = best.merit.is_feasible() && problem.shape().is_noise(best.merit.objective);
+        let is_noise = best.merit.is_feasible() && problem.shape().is_noise(best.merit.objective) && is_white(&outcome);
         let end = End::new(point, best.merit, solver.ends(), cause, is_noise);
         let twin = if problem.study().task() == Task::Calibration { twin(&run, best) } else { None };
         let end = twin.into_iter().fold(end, End::with_twin);
-        contradiction.clone().into_iter().fold(end, End::with_contradiction)
+        let mut end = contradiction.clone().into_iter().fold(end, End::with_contradiction);
+        end.words.extend(derivatives.iter().flat_map(|found| found.beyond.iter().map(beyond)));
+        end.words.extend(derivatives.as_ref().and_then(not_compared));
+        end
     });
-    let pareto = if contradiction.is_some() { Pareto::NotShown } else { pareto };
-    let ending = Ending { stop, end, pareto, seconds: started.elapsed().as_secs_f64() };
-    let (mut outcome, best) = conclude(&run, &options.solver, ending);
+    outcome.end = end;
     outcome.methods = solver.methods().to_vec();
-    let is_design = problem.study().task() == Task::Design;
-    outcome.found.slopes = near.filter(|_| is_design).map(|(found, _)| SlopesReport::of(&problem, &found));
+    outcome.evaluations += probe.archive().len();
+    outcome.simulations += (probe.archive().len() + probe.linearisations()) * problem.simulations();
+    outcome.found.slopes = slopes;
     outcome.found.derivatives = derivatives;
     outcome.seconds = started.elapsed().as_secs_f64();
     outcome.reused = begin.map(|_| run.reused());
     let archive = run.archive().to_vec();
     drop((run, probe));
     Ok(Solved { outcome, problem, best, archive, front: Vec::new() })
+}
+
+/// Returns true if no test of the residuals of calibration data rejects that they are white.
+fn is_white(outcome: &Outcome) -> bool {
+    let experiments = outcome.calibration.iter().flat_map(|calibration| &calibration.experiments);
+    let fitted = experiments.filter(|experiment| experiment.role == Role::Calibration);
+    fitted.flat_map(|experiment| &experiment.channels).all(|channel| channel.whiteness.is_none_or(|w| w.is_white()))
 }
 
 /// Difference of the objective, relative to its value, that is rounding and the tolerance of a search.
@@ -280,7 +326,7 @@ pub(crate) fn evaluate_start(study: Study, options: &Options, watch: &dyn Watch)
 
 /// Difference step of the derivatives at the reported point, in the unit box. Equal to that of the Pareto certificate, whose
 /// derivatives are then reused.
-const NEAR: f64 = 1e-4;
+pub(crate) const NEAR: f64 = 1e-4;
 
 /// Returns values and derivatives at the best point, and whether these are exact; `None` if a simulation near it fails, if no tuner can
 /// be changed, or after a stop request.
@@ -292,7 +338,7 @@ fn linearised(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> Option<(
 }
 
 /// Returns a sentence on the first derivative that simulations contradict.
-fn contradiction(found: &DerivativesReport) -> Option<String> {
+pub(crate) fn contradiction(found: &DerivativesReport) -> Option<String> {
     let Contradiction { key, tuner, derivative, differences } = found.contradictions.first()?;
     let along =
         tuner.as_ref().map_or_else(|| "in a direction".to_owned(), |tuner| format!("with respect to `{tuner}`"));
@@ -307,8 +353,31 @@ fn contradiction(found: &DerivativesReport) -> Option<String> {
     ))
 }
 
+/// Returns a sentence on a tuner that has an effect only at a distance.
+fn beyond(found: &Beyond) -> String {
+    let [here, there] = found.scaled.map(|scaled| significant(scaled, 4));
+    format!(
+        "`{}` has no effect near the point, but moved by a tenth of its range it changes the scaled value of `{}` from {here} to {there}.",
+        found.tuner, found.key
+    )
+}
+
+/// Returns a sentence on the comparisons that the budget did not cover, if any.
+fn not_compared(found: &DerivativesReport) -> Option<String> {
+    let all = found.directions + found.left_out;
+    (found.left_out > 0).then(|| {
+        format!(
+            "{} of {} of the derivatives with simulations {} left out: the budget was spent.",
+            found.left_out,
+            counted(all, "comparison"),
+            if found.left_out == 1 { "was" } else { "were" }
+        )
+    })
+}
+
 /// Returns what is shown of the best point: its classification for the objective, and its Pareto optimality.
 fn shown(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> (Optimality, Pareto) {
+    run.best().cloned().into_iter().for_each(|best| probe.learn(best));
     let point = optimality(run, probe, watch);
     (point, pareto(run, point, probe, watch))
 }

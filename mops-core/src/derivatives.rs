@@ -6,13 +6,16 @@ use serde::Serialize;
 
 use crate::criterion::Usage;
 use crate::end::SMALL_OBJECTIVE;
-use crate::evaluation::Objective;
+use crate::evaluation::{Evaluation, Objective};
 use crate::problem::Problem;
 use crate::solver::{Linearisation, Oracle};
 
 /// Distances of the compared points, in the unit box, of ratio 10: a change that does not shrink with the distance is a jump. At the
 /// smaller one, differences of values that repeat to 1e-9 are accurate to 1e-5.
 const STEPS: [f64; 2] = [2e-4, 2e-3];
+
+/// Distance, in the unit box, at which a tuner without derivatives is also moved.
+const TENTH: f64 = 0.1;
 
 /// Deviation of a derivative from the differences on both sides, relative to the largest of them, up to which it is theirs.
 const DEVIATION: f64 = 0.02;
@@ -37,8 +40,21 @@ pub struct DerivativesReport {
     pub left_out: usize,
     /// Derivatives that contradict the differences.
     pub contradictions: Vec<Contradiction>,
+    /// Tuners that have no effect near the point, but at a distance.
+    pub beyond: Vec<Beyond>,
     /// Keys, `case/criterion`, of criteria that jump within a thousandth of the ranges of the tuners.
     pub jumps: Vec<String>,
+}
+
+/// Tuner whose derivatives are all 0, but that changes a criterion when it moves by a tenth of its range.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Beyond {
+    /// Tuner.
+    pub tuner: String,
+    /// Key, `case/criterion`, of the criterion that changes most.
+    pub key: String,
+    /// Its scaled value at the point, and a tenth of the range away; null without a value.
+    pub scaled: [f64; 2],
 }
 
 /// Derivative that contradicts the differences on both sides.
@@ -156,6 +172,9 @@ impl DerivativesReport {
             };
             report.directions += 1;
             report.evaluations += points.len();
+            if let Some(j) = direction.axis {
+                report.move_far(problem, oracle, &found.at, &rows, j);
+            }
             let mut values =
                 evaluations.chunks(2).map(|pair| pair.iter().map(|at| at.scaled.as_ref()).collect::<Vec<_>>());
             let sides = sides.map(|side| side.and_then(|_| values.next()));
@@ -180,6 +199,32 @@ impl DerivativesReport {
             }
         }
         report
+    }
+}
+
+impl DerivativesReport {
+    /// Moves a tuner without derivatives by a tenth of its range, and notes the criterion that changes most, if one does.
+    fn move_far(&mut self, problem: &Problem, oracle: &mut dyn Oracle, at: &Evaluation, rows: &[usize], j: usize) {
+        let mut point = at.point.clone();
+        point[j] += if point[j] > 0.5 { -TENTH } else { TENTH };
+        let Ok(there) = oracle.evaluate(&[point]) else { return };
+        self.evaluations += 1;
+        let scaled = |of: &Evaluation, i: usize| of.scaled.as_ref().map_or(f64::NAN, |scaled| scaled[i]);
+        // Without a value, the change is the largest.
+        let change = |i: usize| {
+            let [here, there] = [at, &there[0]].map(|of| scaled(of, i));
+            let change = (there - here).abs() / (here.abs() + SMALL_OBJECTIVE);
+            if change.is_nan() { f64::INFINITY } else { change }
+        };
+        let most = rows.iter().copied().max_by(|&a, &b| change(a).total_cmp(&change(b)));
+        if let Some(i) = most.filter(|&i| change(i) > NEGLIGIBLE) {
+            let study = problem.study();
+            self.beyond.push(Beyond {
+                tuner: study.tuners()[problem.active()[j]].name.clone(),
+                key: study.key(&study.rows()[i]),
+                scaled: [at, &there[0]].map(|of| scaled(of, i)),
+            });
+        }
     }
 }
 

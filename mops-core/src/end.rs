@@ -55,6 +55,10 @@ const SAME: f64 = 1e-3;
 /// demand.
 pub const SMALL_OBJECTIVE: f64 = 1e-3;
 
+/// Decrease within a step of a thousandth of the box, relative to the value plus [`SMALL_OBJECTIVE`], that the tests of optimality
+/// neglect: 0.005 %, far below what a demand is known to.
+pub const NEGLIGIBLE_DECREASE: f64 = 5e-5;
+
 /// Expected share of starting points that lead to an unseen optimum, below which another basin is unlikely: 1 optimum in 4
 /// searches, 2 in 7.
 const UNLIKELY: f64 = 0.2;
@@ -112,6 +116,10 @@ pub struct End {
 const NOISE: &str = "The residuals are noise of the stated level: no other point fits significantly better. Whether others fit \
                      as well was not searched.";
 
+/// Doubt about a point beside a discontinuity.
+const AT_JUMP: &str = "At a jump: a criterion is discontinuous beside the point, so that derivatives do not show an optimum; compare \
+                       with another solver or seed.";
+
 impl End {
     /// Returns what is known of a point with this merit and classification, after local searches that ended with the given
     /// merits. `is_noise`: the residuals are noise, see [`crate::Shape::is_noise`].
@@ -142,11 +150,36 @@ impl End {
         self
     }
 
+    /// Returns the end of a search whose point lies beside a jump: first-order conditions show nothing there.
+    #[must_use]
+    pub fn beside_jump(mut self) -> Self {
+        let of_point = self.words_of_point();
+        self.words.retain(|words| Some(words) != of_point.as_ref());
+        if self.point.is_stationary() {
+            self.point = Optimality::Jump;
+        }
+        self.words.splice(0..0, self.words_of_point());
+        self
+    }
+
+    /// Returns the end with a jump near the point, as a sentence states: a reason to doubt the point.
+    #[must_use]
+    pub fn with_jump(mut self, sentence: String) -> Self {
+        self.doubt = Some(match self.doubt {
+            Some(doubt) if doubt != AT_JUMP => format!("{doubt} {sentence}"),
+            _ => sentence,
+        });
+        self
+    }
+
     fn words_of_point(&self) -> Option<String> {
         let words = match self.point {
-            Optimality::Stationary => "The point is stationary: to first order, no direction lowers the objective.",
+            Optimality::Stationary => {
+                "The point is stationary: to first order, no step of a thousandth of the box lowers the objective by more than 0.005 %."
+            }
             Optimality::Kink => {
-                "The point is stationary at a kink: by the derivatives around it, no direction lowers the objective."
+                "The point is stationary at a kink: by the derivatives around it, no step of a thousandth of the box lowers the \
+                 objective by more than 0.005 %."
             }
             Optimality::Plateau => "The objective is constant around the point.",
             Optimality::Jump => "A criterion is discontinuous beside the point.",
@@ -202,11 +235,7 @@ impl End {
                     of_optima(optima)
                 ))
             }
-            Optimality::Jump if !is_found_again => Some(
-                "At a jump: a criterion is discontinuous beside the point, so that derivatives do not show an optimum; compare \
-                 with another solver or seed."
-                    .to_owned(),
-            ),
+            Optimality::Jump if !is_found_again => Some(AT_JUMP.to_owned()),
             Optimality::NotShown if stop == Stop::Budget => Some(
                 "The budget was spent before an optimum was shown: raise --max-evaluations, or continue with another solver \
                  (--reuse)."

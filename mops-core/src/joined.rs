@@ -10,11 +10,13 @@ use crate::study_error::StudyError;
 
 /// Models that are simulated side by side. The signal `y` of the model `loop` is `loop_y`; characters that cannot be part of a name
 /// in a formula become `_`. Parameters and initial values of the same name are one, and so are inputs that the case gives.
+#[derive(Clone)]
 pub struct Joined {
     parts: Vec<Part>,
     interface: Interface,
 }
 
+#[derive(Clone)]
 struct Part {
     /// Beginning of the names of its signals.
     prefix: String,
@@ -141,6 +143,28 @@ fn merged(parts: Vec<(&Part, Analysis)>) -> Analysis {
 impl Model for Joined {
     fn interface(&self) -> &Interface {
         &self.interface
+    }
+
+    fn constants(&self) -> Vec<(Variable, f64)> {
+        let mut all: Vec<(Variable, f64)> = Vec::new();
+        for constant in self.parts.iter().flat_map(|part| part.model.constants()) {
+            if all.iter().all(|(known, _)| known.name != constant.0.name) {
+                all.push(constant);
+            }
+        }
+        all
+    }
+
+    fn with_constant(&self, name: &str, value: f64) -> Option<Arc<dyn Model>> {
+        let mut moved = self.clone();
+        let mut is_known = false;
+        for part in &mut moved.parts {
+            if part.model.constants().iter().any(|(constant, _)| constant.name == name) {
+                part.model = part.model.with_constant(name, value)?;
+                is_known = true;
+            }
+        }
+        is_known.then(|| Arc::new(moved) as Arc<dyn Model>)
     }
 
     fn notes(&self) -> Vec<String> {

@@ -29,6 +29,7 @@ pub mod front;
 pub mod identification;
 mod input;
 mod joined;
+mod jumps;
 mod known;
 mod least_squares;
 pub mod linear;
@@ -73,14 +74,14 @@ pub use criterion::{
     Criterion, CriterionSpec, Demand, Mark, Missed, Other, Scaled, Sense, Side, Tangent, Usage, Value,
 };
 
-pub use derivatives::{Contradiction, DerivativesReport};
+pub use derivatives::{Beyond, Contradiction, DerivativesReport};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use differences::Differences;
 pub use effect::{
     BoundEffect, Characteristic, DeclaredTerm, Dimension, DryFriction, Effect, EffectClass, EffectParameter,
     InitialGrid, ParameterKind, Placement, PortKind, PortState, Scope,
 };
-pub use end::{Basins, End, Optimality, SMALL_OBJECTIVE};
+pub use end::{Basins, End, NEGLIGIBLE_DECREASE, Optimality, SMALL_OBJECTIVE};
 pub use evaluation::{Evaluation, FEASIBLE, Merit, Objective, Reading};
 pub use evaluator::Evaluator;
 pub use experiment::{Channel, Experiment, ResponseData, Role};
@@ -88,6 +89,7 @@ pub use expression::{Expression, SyntaxError};
 pub use failure::Failure;
 pub use input::{Chirp, Hold, Input, PRBS_STAGES};
 pub use joined::Joined;
+pub use jumps::{AwayReport, JumpReport, JumpsReport, MovedKind, ON_JUMP, WITHIN as JUMPS_WITHIN};
 pub use known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes, RowValue, Store};
 pub use least_squares::{LeastSquares, LeastSquaresStep};
 pub use linear::StateSpace;

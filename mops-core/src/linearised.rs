@@ -32,6 +32,7 @@ pub struct Linearise {
 }
 
 /// Linearisation of a model: for given parameters, the linear system of the deviations from the operating point.
+#[derive(Clone)]
 pub struct Linearised {
     model: Arc<dyn Model>,
     interface: Interface,
@@ -431,6 +432,14 @@ impl Linearised {
 impl Model for Linearised {
     fn interface(&self) -> &Interface {
         &self.interface
+    }
+
+    fn constants(&self) -> Vec<(Variable, f64)> {
+        self.model.constants()
+    }
+
+    fn with_constant(&self, name: &str, value: f64) -> Option<Arc<dyn Model>> {
+        Some(Arc::new(Self { model: self.model.with_constant(name, value)?, ..self.clone() }))
     }
 
     fn notes(&self) -> Vec<String> {

@@ -232,6 +232,17 @@ pub trait Model: Send + Sync {
         None
     }
 
+    /// Returns the constants of the model that [`Model::with_constant`] can change, with their values in their units.
+    fn constants(&self) -> Vec<(Variable, f64)> {
+        Vec::new()
+    }
+
+    /// Returns the model with another value of a constant, in its unit; `None` without such a constant, or if the model is not
+    /// defined for the value.
+    fn with_constant(&self, _name: &str, _value: f64) -> Option<Arc<dyn Model>> {
+        None
+    }
+
     /// Returns the open model, for access at its ports; `None` if the model has no ports.
     fn ported(&self) -> Option<&dyn Open> {
         None

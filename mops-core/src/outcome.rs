@@ -16,6 +16,7 @@ use crate::end::End;
 use crate::evaluation::{Evaluation, Objective};
 use crate::experiment::Role;
 use crate::identification::{ExcitationReport, RegressionReport, SensitivityReport, Whiteness};
+use crate::jumps::JumpsReport;
 use crate::objectives::FrontObjective;
 use crate::problem::Problem;
 use crate::robustness::{GlobalSensitivityReport, MonteCarloReport, RobustReport, WorstCaseReport};
@@ -106,6 +107,9 @@ pub struct Findings {
     /// Derivatives at the reported point, compared with differences; null if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub derivatives: Option<DerivativesReport>,
+    /// Jumps of the criteria near a design.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jumps: Option<JumpsReport>,
     /// Objective over one or two tuners.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweep: Option<SweepReport>,
@@ -246,8 +250,8 @@ pub struct CriterionReport {
     pub scaled: f64,
     /// Unit of the value.
     pub unit: String,
-    /// True if the demand is met, or if there is none; false if the condition was not reached.
-    pub met: bool,
+    /// True if the demand is met, false if it is not or if the criterion has no value; null without a demand.
+    pub met: Option<bool>,
     /// True if the demand is a lower limit.
     #[serde(skip)]
     pub at_least: bool,

@@ -43,6 +43,8 @@ pub struct Past<'a, S> {
     pub roughness: &'a [f64],
     /// True if the part is not halved any more.
     pub is_last: bool,
+    /// True if the quantities may jump at the start of the part, before the simulation.
+    pub restarts: bool,
 }
 
 /// Bounds on the time, states, inputs and forces of a plant over a time interval, see [`Instant`].
@@ -158,7 +160,8 @@ pub trait Plant<S: Scalar> {
     /// Takes the past as constant, with these values of the quantities.
     fn hold(&mut self, _past: &[S]) {}
 
-    /// Takes the past as constant: `at` is the start, with the inputs just before it.
+    /// Takes the past as constant: `at` is the start, with the inputs just before it; for inputs that are known before, the beginning of
+    /// what is known. [`Plant::remember`] then stores the rest of the past, with the states at rest.
     fn begin(&mut self, _at: &Instant<'_, S>) {}
 
     /// Stores the quantities of [`Plant::past`] over a part of an accepted step, or returns false if the quartic through their

@@ -251,6 +251,11 @@ impl<'a, E: Evaluator> Run<'a, E> {
         self.keep(key, answer);
     }
 
+    /// Takes over an evaluation of another run of the same problem. It does not count.
+    pub fn learn(&mut self, evaluation: Evaluation) {
+        self.cache.insert(bits(&evaluation.tuners), evaluation);
+    }
+
     /// Sets the reported point to an evaluated one with the same objective, such as one that dominates the best point.
     pub fn settle(&mut self, evaluation: Evaluation) {
         self.best = Some(evaluation);

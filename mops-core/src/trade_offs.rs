@@ -65,6 +65,10 @@ pub struct FrontPoint {
     /// first order. The price of a unit of criterion `i`, in units of criterion `j`, is `weights_i / weights_j`. Normalised
     /// so that the weights times the ranges sum to 1; null if the point was not certified.
     pub weights: Option<Vec<f64>>,
+    /// True if a criterion jumps beside the point, so that it cannot be certified.
+    pub is_beside_jump: bool,
+    /// Reason to doubt an end of the front as the optimum of its criterion; null for other points, and if there is none.
+    pub doubt: Option<String>,
 }
 
 /// Trade-off between two neighbours of a front.
@@ -85,6 +89,10 @@ pub struct Certified {
     pub pareto: Pareto,
     /// Price weight of each weighted scaled value.
     pub weights: Option<Vec<f64>>,
+    /// True if a criterion jumps beside the point.
+    pub is_beside_jump: bool,
+    /// Reason to doubt an end of the front.
+    pub doubt: Option<String>,
 }
 
 impl TradeOffs {
@@ -144,6 +152,8 @@ impl TradeOffs {
                     worst_scaled: worst(i),
                     pareto: p.pareto,
                     weights: p.weights.as_deref().map(weights).filter(|w| w.iter().all(|w| w.is_finite())),
+                    is_beside_jump: p.is_beside_jump,
+                    doubt: p.doubt.clone(),
                 })
                 .collect(),
             neighbours: (0..if m == 2 { points.len() - 1 } else { 0 })

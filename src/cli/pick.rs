@@ -13,6 +13,7 @@ use mops_core::{
 use serde_json::Value;
 
 use super::study::{StudyArguments, open_as};
+use super::tables::met_text;
 use crate::files;
 use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 use crate::toml_text::{self, TomlText, key, quoted};
@@ -188,7 +189,6 @@ fn comparison(study: &Study, (index, of): (usize, usize), at: &Evaluation, refin
         let last = now.as_ref().map_or(&report, |now| &now[k]);
         let demand = report.demand.or(report.bad).map_or_else(String::new, number);
         let refined = now.as_ref().map_or_else(String::new, |_| number(last.value));
-        let met = if last.met { "yes" } else { "no" };
         vec![
             report.case.clone(),
             report.name.clone(),
@@ -197,7 +197,7 @@ fn comparison(study: &Study, (index, of): (usize, usize), at: &Evaluation, refin
             refined,
             report.unit.clone(),
             number(last.scaled),
-            met.to_owned(),
+            met_text(last).to_owned(),
         ]
     });
     let second = if refined.is_some() { "refined" } else { "" };

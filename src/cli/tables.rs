@@ -29,13 +29,7 @@ fn criteria_without(
             (None, Some(good), Some(bad)) => format!("{} .. {}", number(good), number(bad)),
             _ => String::new(),
         };
-        let met = if best.usage == Usage::Monitor {
-            ""
-        } else if best.met {
-            "yes"
-        } else {
-            "no"
-        };
+        let met = if best.usage == Usage::Monitor { "" } else { met_text(best) };
         let scaled =
             |report: &CriterionReport| if best.usage == Usage::Monitor { String::new() } else { number(report.scaled) };
         vec![
@@ -60,9 +54,18 @@ fn criteria_without(
     }
 }
 
+/// Returns whether the demand is met, in a word; empty without a demand.
+pub(super) fn met_text(criterion: &CriterionReport) -> &'static str {
+    match criterion.met {
+        Some(true) => "yes",
+        Some(false) => "no",
+        None => "",
+    }
+}
+
 /// Formats the value of a criterion, with enough digits to distinguish it from a demand that it misses.
 fn value_text(criterion: &CriterionReport) -> String {
-    let limit = criterion.demand.or(criterion.bad).filter(|_| !criterion.met);
+    let limit = criterion.demand.or(criterion.bad).filter(|_| criterion.met == Some(false));
     crate::numbers::apart(criterion.value, limit, 6)
 }
 
@@ -166,7 +169,7 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
         Stop::Interrupted => "interrupted",
     };
     let counts = |usage: &[Usage], missed: bool| {
-        outcome.criteria.iter().filter(|c| usage.contains(&c.usage) && (!missed || !c.met)).count()
+        outcome.criteria.iter().filter(|c| usage.contains(&c.usage) && (!missed || c.met == Some(false))).count()
     };
     let constraints = match (outcome.feasible, counts(&[Usage::Inequality, Usage::Equality], false)) {
         (true, 0) => String::new(),

@@ -85,7 +85,7 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
 
 /// Returns the value of a criterion, with enough digits to distinguish it from a missed demand.
 fn distinct_from_demand(criterion: &CriterionReport) -> String {
-    let limit = criterion.demand.or(criterion.bad).filter(|_| !criterion.met);
+    let limit = criterion.demand.or(criterion.bad).filter(|_| criterion.met == Some(false));
     apart(criterion.value, limit, 5)
 }
 
@@ -124,8 +124,9 @@ fn scaled(criterion: &CriterionReport) -> Markup {
 
 fn met(criterion: &CriterionReport) -> Markup {
     match (criterion.scaled.is_nan(), criterion.met) {
+        (_, None) => html! {},
         (true, _) => html! { span class="missed" { "no value" } },
-        (_, met) => html! { span class=(tone(criterion)) { @if met { "met" } @else { "not met" } } },
+        (_, Some(met)) => html! { span class=(tone(criterion)) { @if met { "met" } @else { "not met" } } },
     }
 }
 
@@ -137,7 +138,7 @@ fn scaled_number(scaled: f64) -> String {
 /// Returns the CSS class of a criterion: a missed demand is an error only for a constraint.
 fn tone(criterion: &CriterionReport) -> &'static str {
     match (criterion.met, criterion.usage) {
-        (true, _) => "met",
+        (Some(true) | None, _) => "met",
         (_, Usage::Inequality | Usage::Equality) => "missed",
         _ => "above",
     }

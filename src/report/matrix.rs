@@ -70,11 +70,11 @@ fn cell(criterion: Option<&CriterionReport>) -> Markup {
     }
     let beyond = severity(criterion) - 1.0;
     let (tone, share) = match criterion.met {
-        true => ("number shade good", 40.0 * beyond.abs().min(1.0)),
-        false if matches!(criterion.usage, Usage::Inequality | Usage::Equality) => {
+        Some(true) | None => ("number shade good", 40.0 * beyond.abs().min(1.0)),
+        _ if matches!(criterion.usage, Usage::Inequality | Usage::Equality) => {
             ("number shade bad missed", 10.0 + 35.0 * beyond.min(1.0))
         }
-        false => ("number shade mixed above", 10.0 + 35.0 * beyond.min(1.0)),
+        _ => ("number shade mixed above", 10.0 + 35.0 * beyond.min(1.0)),
     };
     let of = format!("{} in {}: {}", criterion.name, criterion.case, with_unit(criterion.value, &criterion.unit));
     html! {

@@ -13,6 +13,7 @@ mod diagnosis;
 mod excitation;
 mod figures;
 mod front;
+mod jumps;
 mod legend;
 mod matrix;
 mod nyquist;

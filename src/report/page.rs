@@ -8,7 +8,7 @@ use super::Report;
 use super::figures::{Figure, Group};
 use super::verdict::{self, Tone};
 use super::{
-    calibration, chart, criteria, diagnosis, excitation, front, matrix, robustness, sensitivity, slopes, tuners,
+    calibration, chart, criteria, diagnosis, excitation, front, jumps, matrix, robustness, sensitivity, slopes, tuners,
     uncertainty,
 };
 use crate::numbers::significant;
@@ -95,6 +95,9 @@ pub(super) fn of(report: &Report<'_>, plots: &Plots) -> Markup {
             @if let Some(found) = &outcome.found.slopes {
                 @let one_case = report.problem.study().cases().len() == 1;
                 (section("Sensitivities", slopes::section(found, report.best_name(), one_case)))
+            }
+            @if let Some(found) = &outcome.found.jumps {
+                (section("Jumps near the design", jumps::section(found)))
             }
             @if !plots.responses.is_empty() {
                 (section("Responses", html! {

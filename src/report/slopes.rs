@@ -28,7 +28,12 @@ pub(super) fn section(found: &SlopesReport, best: &str, one_case: bool) -> Marku
                     tr {
                         th scope="row" { (name) }
                         @if let Some(case) = case { td { (case) } }
-                        @for slope in &criterion.slopes { (cell(*slope, steepest(&criterion.slopes))) }
+                        @for (j, slope) in criterion.slopes.iter().enumerate() {
+                            @match criterion.sides.as_ref().and_then(|sides| sides[j]) {
+                                Some(sides) => (both(sides)),
+                                None => (cell(*slope, steepest(&criterion.slopes))),
+                            }
+                        }
                     }
                 }
             }
@@ -38,10 +43,21 @@ pub(super) fn section(found: &SlopesReport, best: &str, one_case: bool) -> Marku
         p {
             "First-order change of each scaled value at the " (best) " when a tuner is increased by 1 % of its range (1 % of its "
             "log range for logarithmic tuners). Negative means better. Darker shades mark the tuners with the largest influence "
-            "on a criterion. At a non-differentiable point the value is one-sided; very large values indicate a discontinuity, "
-            "such as that of a settling time if the response just touches the band."
+            "on a criterion."
+            @if found.criteria.iter().any(|criterion| criterion.sides.is_some()) {
+                " At a kink of a criterion its change is given for an increase (\u{2191}) and for a decrease (\u{2193}) of the tuner; very large "
+                "values indicate a jump, such as that of a settling time if the response just touches the band."
+            }
         }
         (scrolling("Sensitivities", table))
+    }
+}
+
+/// Returns the changes for an increase and for a decrease.
+fn both([left, right]: [f64; 2]) -> Markup {
+    let signed = |change: f64| format!("{}{}", if change > 0.0 { "+" } else { "" }, significant(0.01 * change, 3));
+    html! {
+        td class="number" data-value=(right) { "\u{2191} " (signed(right)) br; "\u{2193} " (signed(-left)) }
     }
 }
 

@@ -218,14 +218,16 @@ fn empty_and_constant_plots_are_drawn() {
 #[test]
 fn cases_and_sensitivities_are_shown_as_shaded_tables() {
     let (problem, best, mut outcome, archive) = study("lag", 5.0, Usage::Minimise);
-    let slope = |key: &str, slope| CriterionSlopes { key: key.into(), slopes: vec![slope] };
-    let criteria = vec![slope("nominal & more/end", 25.0), slope("step/1/end", f64::NAN)];
+    let slope = |key: &str, slope| CriterionSlopes { key: key.into(), slopes: vec![slope], sides: None };
+    let kink = CriterionSlopes { sides: Some(vec![Some([-3.0, 7.0])]), ..slope("step/1/peak", 2.0) };
+    let criteria = vec![slope("nominal & more/end", 25.0), slope("step/1/end", f64::NAN), kink];
     outcome.found.slopes = Some(SlopesReport { tuners: vec!["T".into()], criteria });
     let (_folder, page) = page_of(&problem, &best, &outcome, &archive, "");
     // Both cases at 1 - exp(-5/2) = 0.9179 for a demand of 0.5.
     assert_eq!(page.matches("data-value=\"1.83").count(), 2 + 2 + 2, "two cells, their worsts, and the worst of all");
     assert!(page.contains("Criteria by case") && page.contains("number shade mixed above"));
     assert!(page.contains(">+0.25</td>") && page.contains("--share:45%"), "a hundredth of the derivative");
+    assert!(page.contains("\u{2191} +0.07<br>\u{2193} +0.03</td>"), "both sides of a kink");
     assert!(page.contains(">n/a</td>"), "an unknown derivative is shown as n/a");
 }
 

@@ -30,7 +30,7 @@ pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
         return (Tone::Bad, text.to_owned());
     }
     if !outcome.feasible {
-        let violated = |c: &&CriterionReport| !c.met;
+        let violated = |c: &&CriterionReport| c.met == Some(false);
         let violated: Vec<_> =
             [Usage::Inequality, Usage::Equality].iter().flat_map(|u| used_as(report, *u)).filter(violated).collect();
         let worst = violated.iter().max_by(|a, b| violation(a).total_cmp(&violation(b)));
@@ -53,7 +53,15 @@ fn solved(report: &Report<'_>) -> (Tone, String) {
     match outcome.task {
         Task::Design => design(report),
         Task::Pareto => match outcome.found.trade_offs.iter().flat_map(|found| &found.words).next() {
-            Some(words) => (Tone::Good, words.clone()),
+            Some(words) => {
+                let points = outcome.found.trade_offs.iter().flat_map(|found| found.points.iter().enumerate());
+                let doubts =
+                    points.filter_map(|(i, point)| Some(format!("Point {}: {} ", i + 1, point.doubt.as_ref()?)));
+                let doubts: String = doubts.collect();
+                let is_cut_off = matches!(outcome.stop, Stop::Budget | Stop::Interrupted);
+                let tone = if is_cut_off || !doubts.is_empty() { Tone::Mixed } else { Tone::Good };
+                (tone, doubts + words)
+            }
             None => (Tone::Bad, "No Pareto front found.".to_owned()),
         },
         Task::Calibration => calibration(outcome, report.archive),
@@ -110,10 +118,10 @@ fn design(report: &Report<'_>) -> (Tone, String) {
         return (Tone::Good, text + "All constraints are satisfied; no criterion is minimised.");
     }
     text.push_str(&changed("The worst scaled value", outcome.start.worst_scaled, outcome.worst_scaled));
-    match minimised.iter().filter(|c| !c.met).max_by(|a, b| a.scaled.total_cmp(&b.scaled)) {
+    match minimised.iter().filter(|c| c.met == Some(false)).max_by(|a, b| a.scaled.total_cmp(&b.scaled)) {
         None => (Tone::Good, text + "; all demands are met."),
         Some(worst) => {
-            let others = minimised.iter().filter(|c| !c.met).count() - 1;
+            let others = minimised.iter().filter(|c| c.met == Some(false)).count() - 1;
             let more = if others > 0 { format!("; {} missed", counted(others, "other demand")) } else { String::new() };
             (Tone::Mixed, format!("{text}. {}{more}.", missed(worst)))
         }
@@ -247,7 +255,9 @@ pub(super) fn pareto(pareto: Pareto) -> &'static str {
     match pareto {
         Pareto::CertifiedLocal => "Locally Pareto-optimal to first order",
         Pareto::NotShown => "Not certified as Pareto-optimal",
-        Pareto::No => "Not Pareto-optimal: one criterion can be improved without worsening the others",
+        Pareto::No => {
+            "Not Pareto-optimal: a step of a thousandth of the box improves one criterion by more than 0.005 % and worsens no other"
+        }
     }
 }
 

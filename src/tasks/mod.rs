@@ -5,6 +5,7 @@ mod copies;
 pub(crate) mod diagnosis;
 mod excitation;
 mod global_sensitivity;
+mod jumps;
 mod monte_carlo;
 mod pareto;
 mod robust;
@@ -26,8 +27,12 @@ use crate::search::{Options, SolveError, Solved, evaluate_start, search};
 pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let started = Instant::now();
     let mut solved = match study.task() {
-        Task::Design if study.tasks().robust.is_some() => robust::perform(study, options, watch)?,
-        Task::Design => search(study, options, watch)?,
+        Task::Design => {
+            let perform = if study.tasks().robust.is_some() { robust::perform } else { search };
+            let mut solved = perform(study.clone(), options, watch)?;
+            jumps::add(&mut solved, study, options, watch);
+            solved
+        }
         Task::Calibration => {
             let mut solved = search(study, options, watch)?;
             uncertainty::add(&mut solved, watch);

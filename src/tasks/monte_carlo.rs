@@ -74,7 +74,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 
 /// Returns true if a sample meets the demand of a row; false if it has no value.
 fn met(row: &Row, at: &Evaluation, index: usize) -> bool {
-    at.readings[index].is_some_and(|reading| row.is_met(reading.scaled))
+    at.readings[index].is_some_and(|reading| row.is_met(reading.scaled) != Some(false))
 }
 
 #[allow(clippy::cast_precision_loss)]

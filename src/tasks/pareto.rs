@@ -1,43 +1,48 @@
 //! `task = "pareto"`: Pareto front of a design.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::math;
 use mops_core::{
-    Budget, Certified, Design, FrontPoint, Outcome, Pareto, Problem, Quiet, Run, Stop, Study, TradeOffs, Watch,
+    Budget, Certified, DerivativesReport, Design, End, FrontPoint, Oracle, Outcome, Pareto, Problem, Quiet, Run, Stop,
+    Study, TradeOffs, Watch,
 };
-use mops_solvers::certificate;
+use mops_solvers::{Certificate, certificate, optimality};
 
-use crate::numbers::significant;
-use crate::search::{Options, SolveError, Solved, search};
+use crate::numbers::{counted, significant};
+use crate::search::{Limits, NEAR, Options, SolveError, Solved, contradiction, search_within};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let started = Instant::now();
     // The rest of the budget is for the certificates.
     let searched = options.max_evaluations - options.max_evaluations / CERTIFICATES;
-    let mut solved = search(study, &Options { max_evaluations: searched, ..options.clone() }, watch)?;
+    let limits = Limits { planned: searched, searched, all: options.max_evaluations };
+    let mut solved = search_within(limits, study, options, watch)?;
     let problem = &solved.problem;
     // The points of the certificates are not part of the observed search.
     let quiet = Quiet(watch);
-    let left = options.max_evaluations.saturating_sub(solved.outcome.evaluations);
+    let before = solved.outcome.evaluations;
+    let left = options.max_evaluations.saturating_sub(before);
     let mut run = Run::new(problem, Budget { evaluations: left }, &quiet);
     let concluding = problem.concluding();
     let certified = |point: &Design| {
         let at = concluding.evaluate_at(&tuners(problem, point));
-        let (pareto, weights) = match watch.wants_stop() {
-            true => (Pareto::NotShown, None),
-            false => {
-                let shown = certificate(&mut run, &at.point);
-                (shown.pareto, shown.weights)
-            }
-        };
-        Certified { at, pareto, weights }
+        if watch.wants_stop() {
+            return Certified { at, pareto: Pareto::NotShown, weights: None, is_beside_jump: false, doubt: None };
+        }
+        let Certificate { pareto, weights, is_beside_jump } = certificate(&mut run, &at.point);
+        Certified { at, pareto, weights, is_beside_jump, doubt: None }
     };
-    let front: Vec<Certified> =
+    let mut front: Vec<Certified> =
         if solved.outcome.feasible { solved.outcome.front.iter().map(certified).collect() } else { Vec::new() };
     solved.outcome.evaluations += run.archive().len();
     solved.outcome.simulations += (run.archive().len() + run.linearisations()) * problem.simulations();
     drop(run);
+    let left = left.saturating_sub(solved.outcome.evaluations - before);
+    let spent = doubt_ends(problem, &mut front, left, watch);
+    solved.outcome.evaluations += spent;
+    solved.outcome.simulations += spent * problem.simulations();
     if front.iter().any(|point| point.at.is_cancelled()) {
         return Ok(solved);
     }
@@ -47,7 +52,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         let is_reported =
             |&i: &usize| front[i].at.tuners == solved.best.tuners && found.points[i].worst_scaled <= worst;
         found.nearest = (0..front.len()).find(is_reported).unwrap_or(found.nearest);
-        found.words = words(problem, &front, &found);
+        found.words = words(problem, &front, &found, solved.outcome.stop);
         solved.outcome.pareto = found.points[found.nearest].pareto;
         solved.outcome.warnings.extend(missing_points(problem, &solved.outcome, front.len()));
         solved.outcome.found.trade_offs = Some(found);
@@ -55,6 +60,33 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     solved.front = front.into_iter().map(|point| point.at).collect();
     solved.outcome.seconds = started.elapsed().as_secs_f64();
     Ok(solved)
+}
+
+/// Notes the reasons to doubt the ends of a front as the optima of their criteria: each is examined as the result of a search for the
+/// minimum of its criterion alone. Returns the number of evaluated points, at most `budget`.
+fn doubt_ends(problem: &Problem, front: &mut [Certified], budget: usize, watch: &dyn Watch) -> usize {
+    let quiet = Quiet(watch);
+    let shape = problem.shape();
+    let mut spent = 0;
+    for (k, objective) in problem.objectives().iter().enumerate() {
+        let value =
+            |point: &Certified| point.at.scaled.as_ref().map_or(f64::INFINITY, |scaled| shape.objectives(scaled)[k]);
+        let end = (0..front.len()).min_by(|&a, &b| value(&front[a]).total_cmp(&value(&front[b])));
+        let Some(end) = end.filter(|_| !watch.wants_stop()) else { return spent };
+        let alone = Problem::new(Arc::new(problem.study().minimising(&objective.rows)));
+        let at = alone.concluding().evaluate_at(&front[end].at.tuners);
+        let mut probe = Run::new(&alone, Budget { evaluations: budget.saturating_sub(spent) }, &quiet);
+        probe.learn(at.clone());
+        let point = optimality(&mut probe, &at.point);
+        let found = probe.linearise(&at.point, NEAR).ok().flatten();
+        let derivatives = found.map(|found| DerivativesReport::of(&alone, &mut probe, &found));
+        let end_of_search = End::new(point, at.merit, &[], Stop::Converged, false);
+        let contradicted = derivatives.as_ref().and_then(contradiction);
+        let doubt = contradicted.into_iter().fold(end_of_search, End::with_contradiction).doubt;
+        spent += probe.archive().len();
+        front[end].doubt = doubt.or(front[end].doubt.take());
+    }
+    spent
 }
 
 /// Share of the budget kept for the certificates of the points: one part of so many.
@@ -81,15 +113,20 @@ fn tuners(problem: &Problem, point: &Design) -> Vec<f64> {
 }
 
 /// Formats the Pareto front as sentences.
-fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<String> {
+fn words(problem: &Problem, front: &[Certified], found: &TradeOffs, stop: Stop) -> Vec<String> {
     let ends = found.criteria.iter().enumerate().map(|(k, criterion)| {
         let [best, worst] = [criterion.best, criterion.worst].map(|value| amount(value, &criterion.unit));
         format!("{} from {best} to {worst}", name(found, k))
     });
     let mut words = vec![format!(
-        "The Pareto front has {} points: {}. No point of the front dominates another.",
-        front.len(),
-        ends.collect::<Vec<_>>().join(", ")
+        "The Pareto front has {}: {}.{}",
+        counted(front.len(), "point"),
+        ends.collect::<Vec<_>>().join(", "),
+        match stop {
+            Stop::Budget => " The search was cut off by the budget: other points may dominate these.",
+            Stop::Interrupted => " The search was interrupted: other points may dominate these.",
+            Stop::Converged | Stop::Stalled => "",
+        }
     )];
     let place = |i: usize| {
         let at = &front[i].at;
@@ -130,9 +167,12 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs) -> Vec<Strin
         None => words.push("The front is concave and has no knee.".to_owned()),
     }
     let of = |pareto: Pareto| found.points.iter().filter(|point: &&FrontPoint| point.pareto == pareto).count();
+    let at_jumps = found.points.iter().filter(|point| point.is_beside_jump).count();
+    let why =
+        if at_jumps > 0 { format!(", {at_jumps} of them as a criterion jumps beside them") } else { String::new() };
     words.push(format!(
-        "{} of {} points satisfy the first-order Pareto conditions; {} could not be checked; {} have a known improving \
-         direction.",
+        "{} of {} points satisfy the first-order Pareto conditions; {} could not be checked{why}; at {} a step of a thousandth of the \
+         box improves one criterion by more than 0.005 % and worsens no other.",
         of(Pareto::CertifiedLocal),
         found.points.len(),
         of(Pareto::NotShown),

@@ -77,7 +77,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     }
     let last = last.expect("there is a first round");
     let mut solved = rounds.conclude(last, options, stop);
-    (solved.outcome.evaluations, solved.outcome.simulations) = (archive.len(), simulations);
+    (solved.outcome.evaluations, solved.outcome.simulations) = (options.max_evaluations - left, simulations);
     solved.outcome.reused = options.keeping.as_ref().and_then(|keeping| keeping.begin.as_ref()).map(|_| reused);
     // Cases are appended: rows added after a round have no value in its points.
     let rows = solved.problem.study().rows().len();

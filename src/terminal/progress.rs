@@ -194,7 +194,7 @@ fn lines(criteria: &[CriterionReport]) -> String {
         let _ = write!(text, "\n  {:width$}  {:>10} {unit:<6}", name(criterion), number(criterion.value));
         if criterion.usage != Usage::Monitor {
             let limit = criterion.demand.or(criterion.bad).map(number).unwrap_or_default();
-            let word = if criterion.met { "met" } else { "not met" };
+            let word = if criterion.met == Some(true) { "met" } else { "not met" };
             let _ = write!(text, "  demand {limit:>8}  {}  {word}", bar(criterion.scaled));
         }
     }

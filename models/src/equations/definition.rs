@@ -62,6 +62,13 @@ pub struct Constant {
     pub path: Vec<String>,
 }
 
+impl Constant {
+    /// Returns true for a constant of the section `constants`; the others stand for numbers of other sections.
+    pub fn is_declared(&self) -> bool {
+        self.path.first().is_some_and(|section| section == "constants")
+    }
+}
+
 /// Friction of a joint.
 #[derive(Debug, Clone)]
 pub struct Friction {

@@ -231,6 +231,25 @@ impl PlantModel for Equations {
         }))
     }
 
+    fn constants(&self) -> Vec<(Variable, f64)> {
+        let declared = self.definition.constants.iter().filter(|constant| constant.is_declared());
+        let variable = |constant: &definition::Constant| {
+            let unit = constant.unit.clone().unwrap_or_else(Unit::one);
+            let value = (constant.value - unit.zero()) / unit.factor();
+            (Variable { name: constant.name.clone(), unit, about: String::new() }, value)
+        };
+        declared.map(variable).collect()
+    }
+
+    fn with_constant(&self, name: &str, value: f64) -> Option<Arc<dyn Model>> {
+        let mut definition = self.definition.clone();
+        let mut declared = definition.constants.iter_mut().filter(|constant| constant.is_declared());
+        let constant = declared.find(|constant| constant.name == name)?;
+        constant.value = constant.unit.as_ref().map_or(value, |unit| value * unit.factor() + unit.zero());
+        let model = Self::compile(definition, self.interface.horizon, self.tolerance).ok()?;
+        Some(Arc::new(Simulated::new(model)))
+    }
+
     fn plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
         Ok(self.running(&self.compiled, parameters))
     }

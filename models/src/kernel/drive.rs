@@ -112,6 +112,11 @@ impl<'a, S: Scalar> Drive<'a, S> {
         }
     }
 
+    /// Returns the earliest time from which on the value is known, at most 0 s.
+    pub fn first_known(&self) -> f64 {
+        self.input.map_or(0.0, Input::first_known)
+    }
+
     /// Returns true if the value jumps at time 0.
     pub fn jumps_at_start(&self) -> bool {
         self.input.is_some_and(|input| input.at(-f64::MIN_POSITIVE) != input.at(0.0))

@@ -50,6 +50,26 @@ impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
         }
     }
 
+    /// Passes on what is known of the inputs before the start at `t`, as far back as the delays of the plant reach; the states rest.
+    fn recall(&mut self, t: f64, x: &[S]) {
+        let reach: f64 = self.plant.delays().iter().sum();
+        let known = self.drives.iter().map(Drive::first_known).fold(t, f64::min);
+        let mut from = known.max(t - reach);
+        if from >= t || !from.is_finite() {
+            return;
+        }
+        self.constant = None;
+        self.drives.iter_mut().for_each(|drive| drive.pass_break(from));
+        let u: Vec<S> = self.drives.iter().map(|drive| drive.at(from)).collect();
+        self.plant.begin(&Instant { t: from, x, u: &u, w: &self.forces });
+        while from < t {
+            let to = next_of(self.drives.iter().map(|drive| drive.next_break(from))).min(t);
+            self.accepted(&Step::resting(x, [from, to]));
+            self.drives.iter_mut().for_each(|drive| drive.pass_break(to));
+            from = to;
+        }
+    }
+
     /// Evaluates a function of the plant at a time and a state.
     #[inline(always)]
     fn look<R>(&self, t: f64, x: &[S], at: impl FnOnce(&P, &Instant<'_, S>) -> R) -> R {
@@ -211,6 +231,7 @@ impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
         if !std::mem::replace(&mut self.has_started, true) && self.plant.remembers() {
             let u: Vec<S> = self.drives.iter().map(Drive::before).collect();
             self.plant.begin(&Instant { t, x, u: &u, w: &self.forces });
+            self.recall(t, x);
         }
         self.drives.iter_mut().for_each(|drive| drive.pass_break(t));
         let mut inputs = self.inputs.borrow_mut();

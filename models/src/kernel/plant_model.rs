@@ -1,5 +1,7 @@
 //! Models given by their plants.
 
+use std::sync::Arc;
+
 use mops_core::linear::Clock;
 use mops_core::{
     Analysis, Cut, Dual7, Failure, Input, Interface, Job, Local, Model, Open, OperatingPoint, Plant, Scalar,
@@ -58,6 +60,16 @@ pub trait PlantModel: Send + Sync {
 
     /// Returns the model with its loops cut at variables; see [`Model::cut`].
     fn cut(&self, _variables: &[String]) -> Option<Result<Cut, StudyError>> {
+        None
+    }
+
+    /// Returns the constants that can be changed; see [`Model::constants`].
+    fn constants(&self) -> Vec<(Variable, f64)> {
+        Vec::new()
+    }
+
+    /// Returns the model with another value of a constant; see [`Model::with_constant`].
+    fn with_constant(&self, _name: &str, _value: f64) -> Option<Arc<dyn Model>> {
         None
     }
 
@@ -242,6 +254,14 @@ impl<M: PlantModel> Model for Simulated<M> {
 
     fn cut(&self, variables: &[String]) -> Option<Result<Cut, StudyError>> {
         self.of.cut(variables)
+    }
+
+    fn constants(&self) -> Vec<(Variable, f64)> {
+        self.of.constants()
+    }
+
+    fn with_constant(&self, name: &str, value: f64) -> Option<Arc<dyn Model>> {
+        self.of.with_constant(name, value)
     }
 
     fn ported(&self) -> Option<&dyn Open> {

@@ -128,8 +128,14 @@ fn remember_part<S: Scalar, D>(
         past(of, time(s), &step.state_at(s))
     };
     let (values, checks) = (Trace::NODES.map(at), Trace::CHECKS.map(at));
-    let over =
-        Past { time: [time(from), time(to)], values: &values, checks: &checks, roughness: &[], is_last: halvings == 0 };
+    let over = Past {
+        time: [time(from), time(to)],
+        values: &values,
+        checks: &checks,
+        roughness: &[],
+        is_last: halvings == 0,
+        restarts: step.restarts && from == 0.0,
+    };
     if store(of, &over) {
         return;
     }

@@ -15,11 +15,28 @@ pub struct Step<S> {
     pub(super) share: f64,
     /// Coefficients `r0 .. r4` of [`Step::at`], each for all states.
     pub(super) dense: [Vec<S>; 5],
+    /// True if inputs may jump at the start of a step before the simulation.
+    pub(super) restarts: bool,
 }
 
 impl<S: Scalar> Step<S> {
     pub(super) fn new(x: &[S]) -> Self {
-        Self { start: 0.0, length: 0.0, taken: 0.0, share: 1.0, dense: std::array::from_fn(|_| x.to_vec()) }
+        Self {
+            start: 0.0,
+            length: 0.0,
+            taken: 0.0,
+            share: 1.0,
+            dense: std::array::from_fn(|_| x.to_vec()),
+            restarts: false,
+        }
+    }
+
+    /// Creates a step before the simulation, at whose start inputs may jump: the state rests.
+    pub(super) fn resting(x: &[S], [start, end]: [f64; 2]) -> Self {
+        let mut step = Self::new(x);
+        step.dense[1..].iter_mut().flatten().for_each(|coefficient| *coefficient = S::from(0.0));
+        step.begin(start, end - start);
+        Self { restarts: true, ..step }
     }
 
     /// Starts a new step, valid over its full length.

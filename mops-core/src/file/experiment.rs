@@ -212,7 +212,8 @@ pub(super) fn recorded(
     let clock = Clock::new(place, &file, keys.time, keys.unit, keys.sample_time, &column.column)?;
     file.increases(&clock.column, &clock.times, 0)?;
     let rows = 0..clock.times.len();
-    let table = Table { file, driving: rows.clone(), rows, clock, end: f64::INFINITY, is_other: true };
+    let table =
+        Table { file, driving: rows.clone(), rows, clock, end: f64::INFINITY, past: f64::INFINITY, is_other: true };
     let shift = read_shift(place, column.shift.as_ref())?;
     let last = table.clock.at(table.rows.end - 1) + shift;
     if last < 0.0 {
@@ -491,7 +492,7 @@ impl<'a> Elsewhere<'a> {
                 .diagnostic(fact)
                 .with_help("the times of all files are on one clock: correct the time column, or `from` and `to`"));
         }
-        Ok(Some(Table { file, rows: first..last, driving: all, clock, end: main.end, is_other: true }))
+        Ok(Some(Table { file, rows: first..last, driving: all, clock, end: main.end, past: main.past, is_other: true }))
     }
 }
 
@@ -565,9 +566,14 @@ struct Table {
     driving: Range<usize>,
     /// Time of the last measurement in the study, s: inputs are needed until then.
     end: f64,
+    /// Time before the start for which inputs are kept, s.
+    past: f64,
     /// True if the file or its time axis is not that of the experiment.
     is_other: bool,
 }
+
+/// Time before a window for which inputs are kept, relative to its length.
+const PAST: f64 = 2.0;
 
 impl Table {
     fn new(node: &Node<'_>, section: &ExperimentSection, file: Arc<DataFile>) -> Result<Self, Diagnostic> {
@@ -605,7 +611,15 @@ impl Table {
         }
         clock.zero = if section.reset_time == Some(false) { 0.0 } else { times[first] };
         let end = clock.at(last - 1) + ahead(node, section)?;
-        Ok(Self { file, clock, rows: first..last, driving: skip..times.len(), end, is_other: false })
+        Ok(Self {
+            file,
+            clock,
+            rows: first..last,
+            driving: skip..times.len(),
+            end,
+            past: f64::INFINITY,
+            is_other: false,
+        })
     }
 
     /// Returns the windows into which an experiment is divided, each from its own time 0 on; the whole table without windows.
@@ -648,7 +662,8 @@ impl Table {
                 let clock = Clock { zero: self.clock.times[first], ..self.clock.clone() };
                 let (file, driving) = (Arc::clone(&self.file), self.driving.clone());
                 let end_time = covers + ahead;
-                windows.push(Self { file, clock, rows: first..end, driving, end: end_time, is_other: false });
+                let past = PAST * length;
+                windows.push(Self { file, clock, rows: first..end, driving, end: end_time, past, is_other: false });
             }
             // The last sample of a window is the first of the next one, but for a pause.
             first = if is_paused { end } else { next };
@@ -739,7 +754,15 @@ impl Table {
             }
         }
         let is_missing = |&row: &usize| !values[row].is_finite();
-        if let Some(row) = rows.clone().find(is_missing).filter(|&row| hold != Hold::Zero || row == rows.start) {
+        let needed = rows.clone();
+        // Samples before the start count for what remembers them; a gap ends what is known.
+        if hold != Hold::BandLimited {
+            let earlier = self.clock.first_from(self.driving.clone(), -self.past - shift).min(rows.start);
+            let gap = (earlier..rows.start).rev().find(|row| hold != Hold::Zero && is_missing(row));
+            rows.start = gap.map_or(earlier, |gap| gap + 1);
+            rows.start += (rows.start..needed.start).take_while(is_missing).count();
+        }
+        if let Some(row) = needed.clone().find(is_missing).filter(|&row| hold != Hold::Zero || row == rows.start) {
             let fact = format!("the input column `{}` has a missing sample at {} s", table.column, self.clock.at(row));
             let help = match hold {
                 Hold::Zero => "the first sample is needed: cut the record with `from`, or drop samples with `skip`",
@@ -749,7 +772,7 @@ impl Table {
         }
         let kept = rows.clone().filter(|row| !is_missing(row));
         let (times, kept): (Vec<f64>, Vec<f64>) = kept.map(|row| (self.clock.at(row) + shift, values[row])).unzip();
-        let missing = rows.len() - times.len();
+        let missing = needed.filter(is_missing).count();
         Ok((Input::Sampled { times, values: kept, hold }, unit, missing))
     }
 

@@ -59,6 +59,30 @@ pub fn thinned(objectives: &[f64], m: usize, count: usize) -> Vec<usize> {
     taken
 }
 
+/// Difference of every objective, relative to its range over the front, up to which two points of the front are one: less matters
+/// to no designer.
+pub const SAME: f64 = 1e-3;
+
+/// Returns the points of a front of which no two are the same to within [`SAME`], in their order. The best point in every objective
+/// stays.
+pub fn distinct(objectives: &[f64], m: usize) -> Vec<usize> {
+    let row = |i: usize| &objectives[i * m..(i + 1) * m];
+    let ranges = ranges(objectives, m);
+    let is_same = |a: usize, b: usize| {
+        row(a).iter().zip(row(b)).zip(&ranges).all(|((a, b), [low, high])| (a - b).abs() <= SAME * (high - low))
+    };
+    let points = objectives.len() / m.max(1);
+    let best = (0..m).filter_map(|k| (0..points).min_by(|&a, &b| row(a)[k].total_cmp(&row(b)[k])));
+    let mut kept: Vec<usize> = Vec::new();
+    for i in best.chain(0..points).collect::<Vec<_>>() {
+        if !kept.iter().any(|&j| is_same(i, j)) {
+            kept.push(i);
+        }
+    }
+    kept.sort_unstable();
+    kept
+}
+
 /// Returns the inverted generational distance: the mean distance of the points of a reference front to their nearest
 /// point.
 ///

@@ -273,12 +273,12 @@ impl Row {
         Reading { value: number, scaled: sign * scaled, slope: sign * slope, note: value.note }
     }
 
-    /// Returns true if a scaled value meets the demand.
-    pub fn is_met(&self, scaled: f64) -> bool {
+    /// Returns true if a scaled value meets the demand, false if it is NaN; `None` without a demand.
+    pub fn is_met(&self, scaled: f64) -> Option<bool> {
         match self.usage {
-            _ if self.demand == Demand::None => true,
-            Usage::Equality => (scaled - 1.0).abs() <= FEASIBLE,
-            _ => scaled <= 1.0 + FEASIBLE,
+            _ if self.demand == Demand::None => None,
+            Usage::Equality => Some((scaled - 1.0).abs() <= FEASIBLE),
+            _ => Some(scaled <= 1.0 + FEASIBLE),
         }
     }
 }

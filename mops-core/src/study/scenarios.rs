@@ -2,6 +2,7 @@
 
 use super::distribution::Uncertain;
 use super::{JobPlan, ParameterSource, Study};
+use crate::criterion::Usage;
 use crate::evaluation::Objective;
 use crate::tuner::{Grid, Scale, Tuner};
 
@@ -84,6 +85,18 @@ impl Study {
         for row in &mut self.rows {
             row.job = read.iter().position(|&j| j == row.job).expect("it is read");
         }
+    }
+
+    /// Returns the study that minimises only some of the minimised rows, by index; the others are monitored.
+    pub fn minimising(&self, rows: &[usize]) -> Self {
+        let mut study = self.clone();
+        study.objective = Objective::Max;
+        for (_, row) in study.rows.iter_mut().enumerate().filter(|(i, _)| !rows.contains(i)) {
+            if row.usage == Usage::Minimise {
+                row.usage = Usage::Monitor;
+            }
+        }
+        study
     }
 
     /// Returns the study with additional cases: values of the uncertain parameters in a case, see [`Scenario::values`].

@@ -1,8 +1,8 @@
 //! Directions along which no objective increases.
 
-use mops_core::{FEASIBLE, Linearisation, Objective, Shape};
+use mops_core::{FEASIBLE, Linearisation, Objective, SMALL_OBJECTIVE, Shape};
 
-use super::{IMPROVEMENT, MAX_CUT_VALUE, Model, Step, TRIAL_STEP, steepest_step};
+use super::{IMPROVEMENT, MAX_CUT_VALUE, Model, NEGLIGIBLE, Step, TRIAL_STEP, steepest_step};
 use crate::active_set::dot;
 use crate::linearised_criteria::{LinearModel, LinearisedCriteria};
 
@@ -108,6 +108,11 @@ impl DescentCone {
         Some((direction.step[..n].to_vec(), weights))
     }
 
+    /// Returns true if a decrease of an objective is more than [`NEGLIGIBLE`].
+    fn is_considerable(&self, objective: usize, decrease: f64) -> bool {
+        decrease > NEGLIGIBLE * (self.values[objective].abs() + SMALL_OBJECTIVE)
+    }
+
     /// Returns the decrease of an objective along a step in units of the trial step, according to all of its cuts.
     fn decrease(&self, objective: usize, step: &[f64]) -> f64 {
         let cuts = self.cuts.iter().filter(|(k, _)| *k == objective);
@@ -119,17 +124,23 @@ impl Model for DescentCone {
     fn direction(&self, point: &[f64]) -> Option<Step> {
         let (step, _) = self.solve(point)?;
         let with_slope = (0..self.values.len()).filter(|&k| self.steepest[k].is_some());
-        let predicted: f64 = with_slope.map(|k| self.decrease(k, &step)).sum();
-        Some(Step { step: step.iter().map(|d| TRIAL_STEP * d).collect(), is_negligible: predicted <= IMPROVEMENT })
+        let predicted: Vec<(usize, f64)> = with_slope.map(|k| (k, self.decrease(k, &step))).collect();
+        let total: f64 = predicted.iter().map(|(_, decrease)| decrease).sum();
+        let counts = |(k, decrease): &(usize, f64)| {
+            self.steepest[*k].is_some_and(|unit| self.is_considerable(*k, decrease * unit * TRIAL_STEP))
+        };
+        let is_negligible = total <= IMPROVEMENT || !predicted.iter().any(counts);
+        Some(Step { step: step.iter().map(|d| TRIAL_STEP * d).collect(), is_negligible })
     }
 
-    /// No objective is worse, at least one is better, and all constraints are satisfied.
+    /// No objective is worse, at least one is considerably better, and all constraints are satisfied.
     fn is_improvement(&self, shape: &Shape, trial: &[f64]) -> bool {
         let after = shape.objectives(trial);
         let none_worse = self.values.iter().zip(&after).all(|(b, a)| a <= b);
         let feasible = shape.inequalities(trial).iter().all(|c| *c <= FEASIBLE)
             && shape.equalities(trial).iter().all(|c| c.abs() <= FEASIBLE);
-        none_worse && feasible && self.values != after
+        let one_better = self.values.iter().zip(&after).enumerate().any(|(k, (b, a))| self.is_considerable(k, b - a));
+        none_worse && feasible && one_better
     }
 
     /// Models above the value at the point are lowered to it.

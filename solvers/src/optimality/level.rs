@@ -2,12 +2,9 @@
 
 use mops_core::{Linearisation, SMALL_OBJECTIVE, Shape};
 
-use super::{MAX_CUT_VALUE, Model, Step, TRIAL_STEP, steepest_step};
+use super::{MAX_CUT_VALUE, Model, NEGLIGIBLE, Step, TRIAL_STEP, steepest_step};
 use crate::active_set::dot;
 use crate::linearised_criteria::{LinearModel, LinearisedCriteria};
-
-/// Decrease of the objective within a trial step that is regarded as zero, relative to the objective plus [`SMALL_OBJECTIVE`].
-const NEGLIGIBLE: f64 = 1e-5;
 
 /// Change of the objective within a trial step that is a rounding error, relative as above.
 const ROUNDING: f64 = 1e-11;

@@ -15,6 +15,10 @@ use level::Level;
 /// count as a descent direction. Corresponds to the accuracy of finite-difference gradients.
 const IMPROVEMENT: f64 = 1e-3;
 
+/// Decrease within a trial step that is regarded as zero, of the objective or, in the test of Pareto optimality, of every criterion,
+/// relative to its value plus [`mops_core::SMALL_OBJECTIVE`]: the sentences on both tests state it.
+const NEGLIGIBLE: f64 = mops_core::NEGLIGIBLE_DECREASE;
+
 /// Length of a trial step, in the unit box.
 const TRIAL_STEP: f64 = 1e-3;
 
@@ -198,6 +202,8 @@ pub struct Certificate {
     /// changes of these values multiplied by the weights sum to 0, to first order. The weights follow from the
     /// multipliers and are positive.
     pub weights: Option<Vec<f64>>,
+    /// True if a criterion jumps beside the point, so that the test shows nothing.
+    pub is_beside_jump: bool,
 }
 
 /// Searches for a direction that lowers one criterion and raises none, within the bounds and the active constraints.
@@ -205,7 +211,7 @@ pub struct Certificate {
 /// Returns `certified-local` if there is none for all sampled gradients, and `no` if a small step in such a direction is an
 /// actual improvement. Returns `not-shown` without gradients, or if only the linear models improve.
 pub fn certificate(oracle: &mut dyn Oracle, point: &[f64]) -> Certificate {
-    let unknown = Certificate { pareto: Pareto::NotShown, weights: None };
+    let unknown = Certificate { pareto: Pareto::NotShown, weights: None, is_beside_jump: false };
     let shape = oracle.shape().clone();
     if point.is_empty() || !shape.rows.iter().any(|(usage, _)| *usage == Usage::Minimise) {
         return unknown;
@@ -214,9 +220,10 @@ pub fn certificate(oracle: &mut dyn Oracle, point: &[f64]) -> Certificate {
     let Some(mut cone) = DescentCone::new(&shape, &at) else { return unknown };
     match answer(oracle, point, &mut cone) {
         Answer::None | Answer::NoneAround if cone.is_whole() => {
-            Certificate { pareto: Pareto::CertifiedLocal, weights: cone.trade_offs(point) }
+            Certificate { pareto: Pareto::CertifiedLocal, weights: cone.trade_offs(point), ..unknown }
         }
-        Answer::One => Certificate { pareto: Pareto::No, weights: None },
+        Answer::One => Certificate { pareto: Pareto::No, ..unknown },
+        Answer::Jump => Certificate { is_beside_jump: true, ..unknown },
         _ => unknown,
     }
 }

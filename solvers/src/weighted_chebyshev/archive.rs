@@ -22,6 +22,13 @@ impl Candidate {
         gains().all(|gain| gain >= 0.0) && gains().any(|gain| gain > margin)
     }
 
+    /// Returns the maximum-norm distance of the objectives of two points, in units of `range`.
+    pub fn separation(&self, other: &Self, range: &[f64]) -> f64 {
+        let gaps =
+            self.objectives.iter().zip(&other.objectives).zip(range).map(|((a, b), range)| (a - b).abs() / range);
+        gaps.fold(0.0, f64::max)
+    }
+
     /// Returns the maximum-norm distance of two points.
     pub fn distance(&self, other: &Self) -> f64 {
         self.point.iter().zip(&other.point).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)

@@ -6,6 +6,7 @@ mod reference_directions;
 mod scalarisation;
 mod subproblem;
 
+use mops_core::front::SAME;
 use mops_core::{Evaluation, Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -33,7 +34,9 @@ use subproblem::Subproblems;
 /// is a gap in the front and is closed.
 ///
 /// Three and more criteria: `min max_i (f_i - ideal_i) / (range_i w_i)` for weights `w` spread evenly over the simplex,
-/// each from the nearest known point. While points are missing, weights in the largest gaps of the front follow.
+/// each from the nearest known point. Weights that end at a known point, within a thousandth of the range of every criterion, give no
+/// new one. While points are missing, the weights of the evaluated points farthest from the front follow, then those in its largest
+/// gaps.
 ///
 /// One more point minimises the largest scaled value, as in a single design; it meets the demands best.
 ///
@@ -173,7 +176,7 @@ impl Solver for WeightedChebyshev {
                 let k = *k;
                 if k < objectives {
                     let candidate = state.subproblems.opposite(oracle, k)?;
-                    insert(&mut state.front, candidate);
+                    insert(&mut state.front, candidate, &state.subproblems.range);
                     state.stage = Stage::Opposites(k + 1);
                     return Ok(Progress::Continue);
                 }
@@ -196,7 +199,7 @@ impl Solver for WeightedChebyshev {
             }
             Stage::MeetDemands => {
                 let candidate = state.subproblems.solve_for_demands(oracle, objectives)?;
-                insert(&mut state.front, candidate);
+                insert(&mut state.front, candidate, &state.subproblems.range);
                 state.stage = Stage::ReplaceDominated(0);
                 Ok(Progress::Continue)
             }
@@ -230,7 +233,7 @@ impl State {
     /// Removes dominated points of the front, and sets the ranges of the objectives to those of the others.
     fn keep_non_dominated(&mut self) {
         for candidate in std::mem::take(&mut self.front) {
-            insert(&mut self.front, candidate);
+            insert(&mut self.front, candidate, &[]);
         }
         self.subproblems.set_ranges(&self.front);
     }
@@ -255,15 +258,19 @@ pub fn remove_slack(oracle: &mut dyn Oracle, point: &[f64]) -> Result<Option<Eva
 /// Maximum number of rounds that replace dominated points.
 const MAX_ROUNDS: usize = 5;
 
-/// Inserts a point into the front and removes points that it dominates; returns false if the point is dominated itself.
-fn insert(front: &mut Vec<Candidate>, candidate: Candidate) -> bool {
-    let range = vec![1.0; candidate.objectives.len()];
+/// Inserts a point into the front and removes points that it dominates; returns false if the point is dominated itself, or if it is
+/// the same as one of the front. `range`: the range of every objective over the front, empty while it is not known.
+fn insert(front: &mut Vec<Candidate>, candidate: Candidate, range: &[f64]) -> bool {
+    let one = vec![1.0; candidate.objectives.len()];
     let is_dominated =
-        |other: &Candidate| other.objectives == candidate.objectives || other.dominates(&candidate, &range, 0.0);
+        |other: &Candidate| other.objectives == candidate.objectives || other.dominates(&candidate, &one, 0.0);
     if front.iter().any(is_dominated) {
         return false;
     }
-    front.retain(|other| !candidate.dominates(other, &range, 0.0));
+    front.retain(|other| !candidate.dominates(other, &one, 0.0));
+    if !range.is_empty() && front.iter().any(|other| other.separation(&candidate, range) <= SAME) {
+        return false;
+    }
     front.push(candidate);
     true
 }

@@ -39,7 +39,7 @@ impl Rectangles {
     ) -> Result<bool, Halt> {
         let all = std::mem::take(front);
         for candidate in all {
-            insert(front, candidate);
+            insert(front, candidate, &[]);
         }
         front.sort_by(|a, b| a.objectives[0].total_cmp(&b.objectives[0]));
         if front.len() >= points || self.solved >= 3 * points {
@@ -68,7 +68,7 @@ impl Rectangles {
             let new_failures = if length(a, b) > MIN_DIVISION * length(&p, &q) { failures + 1 } else { 0 };
             self.failures.push((a.objectives.clone(), b.objectives.clone(), new_failures));
         }
-        if !insert(front, found) {
+        if !insert(front, found, &range) {
             self.failures.push((p.objectives, q.objectives, MAX_FAILURES));
         }
         Ok(true)

@@ -1,6 +1,7 @@
 //! Search for three and more objectives: evenly spread reference directions from the ideal point, then those in the gaps of
 //! the front.
 
+use mops_core::front::SAME;
 use mops_core::math;
 use mops_core::{Halt, Oracle};
 
@@ -18,6 +19,8 @@ pub struct ReferenceDirections {
     solved: Vec<(Vec<f64>, Candidate)>,
     /// Directions for gaps of the front.
     fine: Vec<Vec<f64>>,
+    /// Evaluated points whose directions were solved.
+    tried: Vec<Candidate>,
 }
 
 /// Offset of every weight, which turns directions on the boundary of the simplex inwards.
@@ -25,6 +28,9 @@ pub const MIN_WEIGHT: f64 = 0.01;
 
 /// Number of directions for gaps, per requested point.
 const FINE: usize = 8;
+
+/// Separation from the front, in units of the ranges, from which an evaluated point shows a gap.
+const GAP: f64 = 10.0 * SAME;
 
 /// Largest number of solved directions, per requested point.
 const MAX_SOLVED: usize = 3;
@@ -36,7 +42,20 @@ impl ReferenceDirections {
             let directions = simplex_lattice(objectives, max_divisions(objectives, points));
             directions.into_iter().map(|direction| direction.into_iter().map(shift_inwards).collect()).collect()
         };
-        Self { pending: lattice(points), solved: Vec::new(), fine: lattice(FINE * points) }
+        Self { pending: lattice(points), solved: Vec::new(), fine: lattice(FINE * points), tried: Vec::new() }
+    }
+
+    /// Returns the evaluated point farthest from the front, as far as none of the front dominates it.
+    fn off_the_front(&self, subproblems: &Subproblems, front: &[Candidate]) -> Option<Candidate> {
+        let range = &subproblems.range;
+        let separation = |candidate: &Candidate| {
+            let of = front.iter().chain(&self.tried).map(|known| known.separation(candidate, range));
+            of.fold(f64::INFINITY, f64::min)
+        };
+        let is_open = |candidate: &&Candidate| front.iter().all(|known| !known.dominates(candidate, range, 0.0));
+        let open = subproblems.archive.candidates().iter().filter(is_open);
+        let farthest = open.map(|candidate| (separation(candidate), candidate)).max_by(|a, b| a.0.total_cmp(&b.0));
+        farthest.filter(|(separation, _)| *separation > GAP).map(|(_, candidate)| candidate.clone())
     }
 
     /// Returns the direction in the largest gap: the farthest one from the points of the front and from the solved directions.
@@ -72,15 +91,23 @@ impl ReferenceDirections {
         let middle = |direction: &[f64]| square(direction, &vec![1.0 / direction.len() as f64; direction.len()]);
         let key = |direction: &[f64]| nearest(direction).map_or_else(|| middle(direction), |(distance, _)| distance);
         let next = (0..self.pending.len()).min_by(|&a, &b| key(&self.pending[a]).total_cmp(&key(&self.pending[b])));
+        let mut neighbour = None;
         let direction = match next {
             Some(next) => self.pending[next].clone(),
             None if front.len() >= points || self.solved.len() >= MAX_SOLVED * points => return Ok(false),
-            None => match self.in_gap(subproblems, front) {
-                Some(direction) => direction,
-                None => return Ok(false),
+            None => match (self.off_the_front(subproblems, front), self.in_gap(subproblems, front)) {
+                (Some(candidate), _) => {
+                    let of = candidate.objectives.iter().zip(&subproblems.ideal).zip(&subproblems.range);
+                    let image = of.map(|((f, ideal), range)| MIN_WEIGHT + ((f - ideal) / range).max(0.0)).collect();
+                    self.tried.push(candidate.clone());
+                    neighbour = Some(candidate);
+                    direction_of(image)
+                }
+                (None, Some(direction)) => direction,
+                (None, None) => return Ok(false),
             },
         };
-        let neighbour = nearest(&direction).map(|(_, candidate)| candidate);
+        let neighbour = neighbour.or_else(|| nearest(&direction).map(|(_, candidate)| candidate));
         if let Some(next) = next {
             self.pending.swap_remove(next);
         }
@@ -92,7 +119,7 @@ impl ReferenceDirections {
         let found = subproblems.solve(oracle, &scalarisation, &starts, radius)?;
         let found = subproblems.remove_slack(oracle, &scalarisation, found)?;
         self.solved.push((direction, found.clone()));
-        insert(front, found);
+        insert(front, found, &subproblems.range);
         Ok(true)
     }
 }

@@ -216,7 +216,7 @@ impl Subproblems {
         if changed {
             let all = std::mem::take(front);
             for candidate in all {
-                super::insert(front, candidate);
+                super::insert(front, candidate, &self.range);
             }
         }
         Ok(changed)

@@ -210,14 +210,22 @@ impl Cases<'_> {
     }
 }
 
-/// Returns the caption of a criterion: the value with the largest scaled value of all cases, and the demand.
+/// Returns the caption of a criterion: the value with the largest scaled value of all cases, and the demand; without a demand, the range
+/// of its values.
 fn caption<'c>(of_cases: impl Iterator<Item = &'c CriterionReport> + Clone) -> Option<String> {
     let count = of_cases.clone().count();
     // A criterion without a value is the worst.
     let rank = |criterion: &CriterionReport| {
         if criterion.scaled.is_nan() && criterion.value.is_nan() { f64::INFINITY } else { criterion.scaled }
     };
-    let worst = of_cases.max_by(|a, b| rank(a).total_cmp(&rank(b)))?;
+    let worst = of_cases.clone().max_by(|a, b| rank(a).total_cmp(&rank(b)))?;
+    if count > 1 && worst.met.is_none() {
+        // Without a demand, no case is the worst.
+        let values = || of_cases.clone().map(|criterion| criterion.value).filter(|value| value.is_finite());
+        let [low, high] = [values().reduce(f64::min)?, values().reduce(f64::max)?];
+        let [low, high] = [crate::numbers::number(low), with_unit(high, &worst.unit)];
+        return Some(format!("`{}`: {low} to {high} in {}", worst.name, counted(count, "case")));
+    }
     let mut text = format!("`{}`: {}", worst.name, with_unit(worst.value, &worst.unit));
     if count > 1 {
         text.push_str(&format!(" in `{}`, the worst of {}", worst.case, counted(count, "case")));

@@ -270,6 +270,9 @@ pub(crate) fn remember_delays<S: Scalar>(delays: &mut [Delay<S>], tolerance: &To
         return false;
     }
     for (k, delay) in delays.iter_mut().enumerate() {
+        if over.restarts {
+            delay.restart(Restart::fixed());
+        }
         let values = quartic(k);
         let size = values.iter().fold(delay.size(), |most, value| most.max(value.value().abs()));
         delay.push(over.time, values, allowed(tolerance, size, size));

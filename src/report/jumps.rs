@@ -1,0 +1,58 @@
+//! Table of the jumps of criteria near a design.
+
+use maud::{Markup, html};
+use mops_core::{JumpReport, JumpsReport, MovedKind};
+
+use super::page::scrolling;
+use crate::numbers::{counted, percent, significant, with_unit};
+
+/// Returns the table of jumps, the nearest first; a sentence if there are none.
+pub(super) fn section(found: &JumpsReport) -> Markup {
+    let table = html! {
+        table {
+            thead {
+                tr {
+                    th scope="col" { "quantity" }
+                    th scope="col" class="number" { "at the design" }
+                    th scope="col" class="number" { "beyond the jump" }
+                    th scope="col" class="number" { "distance" }
+                    th scope="col" { "criterion" }
+                    th scope="col" class="number" { "at the design" }
+                    th scope="col" class="number" { "beyond the jump" }
+                    th scope="col" { "demand" }
+                }
+            }
+            tbody { @for jump in &found.found { (row(jump)) } }
+        }
+    };
+    html! {
+        p {
+            "Each tuner was moved by 1 % of its range, each constant and initial value by 1 % of itself (where that is 0, of the scale "
+            "of its state), and criteria that then rise by at least 2 % were followed back to where they jump. "
+            "Looked at: " (found.quantities) " of " (found.quantities + found.left_out.len()) ", with "
+            (counted(found.evaluations, "evaluation")) "."
+            @if found.found.is_empty() { " No jump was found." }
+        }
+        @if !found.found.is_empty() { (scrolling("Jumps near the design", table)) }
+    }
+}
+
+fn row(jump: &JumpReport) -> Markup {
+    let digits =
+        (5..12).find(|&digits| significant(jump.value, digits) != significant(jump.beyond, digits)).unwrap_or(12);
+    let unit = if jump.unit == "1" { String::new() } else { format!(" {}", jump.unit) };
+    let quantity = |value: f64| format!("{}{unit}", significant(value, digits));
+    let distance = if jump.distance <= mops_core::ON_JUMP { "none".to_owned() } else { percent(jump.distance) };
+    html! {
+        tr {
+            th scope="row" { (jump.name) @if jump.kind == MovedKind::Initial { " (initial value)" } }
+            td class="number" { (quantity(jump.value)) }
+            td class="number" { (quantity(jump.beyond)) }
+            td class="number" { (distance) }
+            td { (jump.key) }
+            td class="number" { (with_unit(jump.here, &jump.criterion_unit)) }
+            td class="number" { (with_unit(jump.there, &jump.criterion_unit)) }
+            td { @if jump.misses { "missed beyond" } }
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! Look for jumps of the criteria near the design: how near, in what, what comes beyond, and how to design against it.
+
+use std::sync::Arc;
+
+use mops_core::{
+    Budget, JUMPS_WITHIN, JumpReport, JumpsReport, MovedKind, ON_JUMP, Pareto, Problem, Quiet, Run, Stop, Study, Tuner,
+    Watch,
+};
+
+use crate::numbers::{percent, significant, with_unit};
+use crate::search::{Options, Solved};
+
+/// Share of the evaluations of a run that the look for jumps may add: one part of so many.
+const SHARE: usize = 20;
+
+/// Distance along a tuner, in the unit box, within which the design counts as beside a jump: that of the tests of optimality.
+const BESIDE: f64 = 1e-3;
+
+/// Adds what is known of jumps near the design of a study to its result. A design against worst cases is looked at in the cases of the
+/// study: those that were added lie on the edge of the box.
+pub(super) fn add(solved: &mut Solved, study: Study, options: &Options, watch: &dyn Watch) {
+    let spent = solved.outcome.evaluations;
+    let budget = (spent / SHARE).min(options.max_evaluations.saturating_sub(spent));
+    if watch.wants_stop() || solved.outcome.stop == Stop::Interrupted || solved.best.scaled.is_none() {
+        return;
+    }
+    watch.stage("looking for jumps near the design", 0.0);
+    let is_robust = study.tasks().robust.is_some();
+    let problem = Problem::new(Arc::new(study));
+    let at = problem.evaluate_at(&solved.best.tuners);
+    let quiet = Quiet(watch);
+    let mut probe = Run::new(&problem, Budget { evaluations: budget }, &quiet).keeping(options.store(&problem));
+    probe.learn(at.clone());
+    // The points of earlier rounds were rated without the worst cases of later ones.
+    let archive = if is_robust { &[][..] } else { &solved.archive };
+    let found = JumpsReport::of(&problem, &mut probe, &at, archive, budget);
+    drop(probe);
+    let outcome = &mut solved.outcome;
+    outcome.evaluations += found.evaluations;
+    outcome.simulations += found.evaluations * problem.simulations();
+    if let Some(end) = outcome.end.take() {
+        let is_beside = found.is_beside(BESIDE);
+        let end = if is_beside { end.beside_jump() } else { end };
+        if is_beside && outcome.pareto == Pareto::CertifiedLocal {
+            outcome.pareto = Pareto::NotShown;
+        }
+        let cliff = found.cliff().map(|jump| sentence(jump, &found, problem.study().tuners()));
+        let mut end = cliff.into_iter().fold(end, mops_core::End::with_jump);
+        end.words.extend(not_looked_at(&found));
+        outcome.end = Some(end);
+    }
+    outcome.found.jumps = Some(found);
+}
+
+/// Returns a sentence on a jump beyond which a demand is missed, with the way out.
+fn sentence(jump: &JumpReport, found: &JumpsReport, tuners: &[Tuner]) -> String {
+    let (case, criterion) = jump.key.split_once('/').unwrap_or(("", &jump.key));
+    let quantity = match jump.kind {
+        MovedKind::Tuner => format!("tuner `{}`", jump.name),
+        MovedKind::Constant => format!("`{}`", jump.name),
+        MovedKind::Initial => format!("initial value `{}`", jump.name),
+    };
+    let of = match jump.kind {
+        MovedKind::Tuner => "of its range ",
+        MovedKind::Constant | MovedKind::Initial => "",
+    };
+    let digits = digits(jump.value, jump.beyond);
+    let [here, there] = [jump.value, jump.beyond].map(|value| significant(value, digits));
+    let unit = if jump.unit == "1" { String::new() } else { format!(" {}", jump.unit) };
+    let beyond =
+        if jump.there.is_nan() { "has no value".to_owned() } else { format!("is {}", amount(jump.there, jump)) };
+    let mut text = format!(
+        "Beside a jump: with {quantity} at {there}{unit} instead of {here}{unit} ({}{of}away), `{criterion}` in case `{case}` {beyond} \
+         instead of {}, and its demand is missed.",
+        if jump.distance <= ON_JUMP { "less than 0.001 % ".to_owned() } else { percent(jump.distance) + " " },
+        amount(jump.here, jump),
+    );
+    if let Some(away) = &found.away {
+        let values: Vec<String> =
+            away.tuners.iter().map(|(name, value)| format!("`{name}` = {}", significant(*value, 5))).collect();
+        text += &format!(
+            " Of the evaluated points that meet it 1 % farther as well, the best has the objective {}: {}.",
+            significant(away.objective, 4),
+            values.join(", ")
+        );
+    }
+    let other = found.found.iter().filter(|of| of.misses && of.key == jump.key && of.name != jump.name);
+    let mut others: Vec<String> = Vec::new();
+    for name in other.map(|of| format!("`{}`", of.name)) {
+        if !others.contains(&name) {
+            others.push(name);
+        }
+    }
+    if !others.is_empty() {
+        text += &format!(" It jumps along {} as well.", listed(&others));
+    }
+    let first = if jump.is_fixed {
+        format!(
+            "declare `{} = {{ unit = \"{}\", default = {} }}` under `parameters` instead of `constants`, ",
+            jump.name,
+            jump.unit,
+            significant(jump.value, 6)
+        )
+    } else {
+        String::new()
+    };
+    text += &format!(" To design against it, {first}add `[robust]` and, under [uncertain], `{}`.", line(jump, tuners));
+    text
+}
+
+/// Returns the line of a study that makes a quantity uncertain by 1 %.
+fn line(jump: &JumpReport, tuners: &[Tuner]) -> String {
+    if jump.kind == MovedKind::Tuner {
+        let tuner = tuners.iter().find(|tuner| tuner.name == jump.name);
+        let change = tuner.map_or(0.0, |tuner| JUMPS_WITHIN * tuner.slope_at(jump.value).abs());
+        return format!("{} = {{ tolerance = {} }}", jump.name, significant(change / jump.value.abs(), 2));
+    }
+    let size = (jump.beyond - jump.value).abs() / jump.distance;
+    let quantity = |value: f64| {
+        let number = significant(value, 6);
+        if jump.unit == "1" { number } else { format!("\"{number} {}\"", jump.unit) }
+    };
+    let [low, high] = [-JUMPS_WITHIN, JUMPS_WITHIN].map(|part| quantity(jump.value + part * size));
+    format!("{} = {{ min = {low}, max = {high} }}", jump.name)
+}
+
+/// Returns a line on what was not looked at; `None` if all was.
+fn not_looked_at(found: &JumpsReport) -> Option<String> {
+    let names: Vec<String> = found.left_out.iter().map(|name| format!("`{name}`")).collect();
+    let all = (!names.is_empty()).then(|| listed(&names))?;
+    Some(format!("Jumps along {all} were not looked for: the look has a twentieth of the evaluations."))
+}
+
+/// Lists names, at most four of them.
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] if first.len() < 4 => format!("{} and {last}", first.join(", ")),
+        _ => format!("{} and {} others", names[..3].join(", "), names.len() - 3),
+    }
+}
+
+/// Returns the number of digits that distinguish two values.
+fn digits(a: f64, b: f64) -> usize {
+    (4..12).find(|&digits| significant(a, digits) != significant(b, digits)).unwrap_or(12)
+}
+
+fn amount(value: f64, jump: &JumpReport) -> String {
+    with_unit(value, &jump.criterion_unit)
+}

@@ -1,0 +1,101 @@
+//! Jumps of criteria near a design: found where they are, told with what comes beyond, and designed against with the line that is told.
+
+use assert_cmd::cargo::cargo_bin_cmd;
+use serde_json::Value;
+
+/// Runs a study of one model; returns the result.
+fn run(model: &str, more: &str) -> Value {
+    let text = format!(
+        "[study]\nname = 'jump'\n[models.m.equations]\nstates = {{ x = {{ unit = 'm', scale = '2 m' }} }}\nder = {{ x = '0 m/s' }}\n\
+         {model}\nhorizon = 1.0\n[tuners]\nk = {{ start = 2.0, min = 1.0, max = 5.0 }}\n[criteria]\n\
+         c = {{ final-value = {{ signal = 'y' }}, demand = 1.5 }}\n{more}\n[solver.genetic]\n"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study.toml");
+    std::fs::write(&study, &text).unwrap();
+    let out = folder.path().join("out");
+    let arguments =
+        ["run", study.to_str().unwrap(), "--json", "--max-evaluations", "3000", "--out", out.to_str().unwrap()];
+    let output = cargo_bin_cmd!("mops").args(arguments).output().unwrap();
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
+}
+
+/// A study with the constant `m` = 4.
+fn with_output(y: &str) -> Value {
+    run(&format!("parameters = {{ k = '1' }}\nconstants = {{ m = 4.0 }}\noutputs = {{ y = '{y}' }}"), "")
+}
+
+fn doubt(result: &Value) -> &str {
+    result["end"]["doubt"].as_str().unwrap_or_default()
+}
+
+#[test]
+fn an_optimum_on_a_jump_is_told_with_what_comes_beyond() {
+    // The least value is 1 at k m = 12; beyond, y is 3.
+    let result = with_output("1 + 0.1*(3 - k) + if(k*m > 12.0, 2, 0)");
+    assert!((result["objective"].as_f64().unwrap() - 1.0 / 1.5).abs() < 1e-3, "{result}");
+    assert_eq!(result["end"]["point"], "jump");
+    let found = result["jumps"]["found"].as_array().unwrap();
+    for name in ["k", "m"] {
+        let jump = found.iter().find(|jump| jump["name"] == name).unwrap_or_else(|| panic!("{name}: {found:?}"));
+        assert!(jump["distance"].as_f64().unwrap() < 1e-3 && jump["misses"] == true, "{jump}");
+        assert!((jump["there"].as_f64().unwrap() - 3.0).abs() < 0.01, "{jump}");
+    }
+    let text = doubt(&result);
+    assert!(text.contains("Beside a jump: with tuner `k` at 3") && text.contains("its demand is missed"), "{text}");
+    // A point of the search that keeps its demand with 1 % more: k m < 12/1.01.
+    let away = &result["jumps"]["away"]["tuners"][0][1];
+    assert!(away.as_f64().unwrap() < 3.0 - 0.03, "{away}");
+}
+
+#[test]
+fn the_line_that_is_told_designs_against_the_jump() {
+    let parts =
+        "parameters = { k = '1' }\nconstants = { m = 4.0 }\noutputs = { y = '1 + 0.1*(3 - k) + if(k*m > 12.0, 2, 0)' }";
+    let first = run(parts, "");
+    let text = doubt(&first);
+    let line = text.split("under [uncertain], `").nth(1).and_then(|rest| rest.split('`').next()).unwrap();
+    let second = run(parts, &format!("[uncertain]\n{line}\n[robust]"));
+    assert_eq!(second["jumps"]["found"].as_array().unwrap().len(), 0, "{line}: {second}");
+    let k = second["tuners"][0]["value"].as_f64().unwrap();
+    assert!(k < 3.0 - 0.03 && k > 2.9, "{line}: {k}");
+}
+
+#[test]
+fn a_jump_of_a_constant_or_an_initial_value_is_located() {
+    // At 0.5 % of m, and at 0.5 % of the scale of x, whose initial value is 0.
+    for (condition, name, value) in [("m > 4.02", "m", 4.02), ("x > 0.01 [m]", "x0", 0.01), ("m < 3.98", "m", 3.98)] {
+        let result = with_output(&format!("1 + (k - 3)^2 + if({condition}, 2, 0)"));
+        let jump = &result["jumps"]["found"][0];
+        assert_eq!(jump["name"], name, "{condition}: {result}");
+        let [distance, beyond] = [&jump["distance"], &jump["beyond"]].map(|number| number.as_f64().unwrap());
+        assert!((0.005..0.005 * 1.06).contains(&distance), "{condition}: {jump}");
+        assert!((beyond - value).abs() < 0.05 * 0.02, "{condition}: {jump}");
+        assert!(doubt(&result).contains("instead of"), "{condition}: {}", doubt(&result));
+    }
+}
+
+#[test]
+fn a_steep_change_and_a_kink_are_no_jumps() {
+    for y in ["(k - 3)^2 + exp(50*(m - 4))", "(k - 3)^2 + 1 + 40*max(m - 4, 0)", "(k - 3)^2 + 1 + 3*sqrt(abs(m - 4))"] {
+        let result = with_output(y);
+        assert_eq!(result["jumps"]["found"].as_array().unwrap().len(), 0, "{y}: {}", result["jumps"]);
+    }
+}
+
+#[test]
+fn a_jump_to_a_better_value_or_within_the_demand_raises_no_doubt() {
+    for (jump, found) in [("if(m > 4.02, -0.5, 0)", 0), ("if(m > 4.02, 0.3, 0)", 1)] {
+        let result = with_output(&format!("1 + (k - 3)^2 + {jump}"));
+        assert_eq!(result["jumps"]["found"].as_array().unwrap().len(), found, "{jump}");
+        assert_eq!(doubt(&result), "", "{jump}");
+    }
+}
+
+#[test]
+fn the_look_takes_at_most_a_twentieth_of_the_evaluations() {
+    let result = with_output("1 + (k - 3)^2 + if(m > 4.02, 2, 0)");
+    let [look, all] = [&result["jumps"]["evaluations"], &result["evaluations"]].map(|n| n.as_u64().unwrap());
+    assert!(look > 0 && 20 * look <= all, "{look} of {all}");
+}
