@@ -605,3 +605,50 @@ fn a_window_after_the_end_of_the_simulation_is_refused() {
     let message = check(folder.path(), &text);
     assert!(message.contains("`from` at 7 s is not before the end of the simulation at 5 s in case `a`"), "{message}");
 }
+
+#[test]
+fn a_recorded_input_before_the_start_of_an_experiment_reaches_its_delays() {
+    // y' = u(t - 2 s) - y; u steps at 3 s and y follows from 5 s on.
+    let folder = tempfile::tempdir().unwrap();
+    let row = |i: u32| {
+        let t = f64::from(i) * 0.1;
+        let y = if t > 5.0 { 1.0 - math::exp(5.0 - t) } else { 0.0 };
+        format!("{t},{},{y}\n", f64::from(u8::from(i >= 30)))
+    };
+    let rows: String = (0..=100).map(row).collect();
+    std::fs::write(folder.path().join("rec.csv"), format!("t,u,y\n{rows}")).unwrap();
+    let equations = |der: &str, more: &str| {
+        format!(
+            "[models.m.equations]\nstates = {{ y = '1' }}\ninputs = {{ u = '1' }}\nparameters = {{ k = '1/s', T = 's' }}\n\
+             der = {{ y = '{der}' }}\n{more}\n[tuners]\nk = {{ start = 1.0, min = 0.1, max = 10.0 }}\n\
+             T = {{ start = 2.0, min = 0.1, max = 5.0 }}"
+        )
+    };
+    let models = [
+        equations("k*(delay(u, T) - y)", ""),
+        equations("k*(delay(delay(u, 0.75*T), 0.25*T) - y)", ""),
+        equations("k*(delay(u - y, T) + delay(y, T) - y)", ""),
+        equations(
+            "k*(u - y) + 0*T",
+            "[models.m.effects]\nd = { input-delay = { place = 'actuator:u', delay = '2 s' } }",
+        ),
+    ];
+    for model in &models {
+        for part in ["from = 2.0", "from = 3.0", "from = 3.5", "from = 4.5", "windows = '2 s'\nfree = ['y']"] {
+            let text = format!(
+                "[study]\nname = 'past'\ntask = 'calibration'\n{model}\n[experiments.e]\nfile = 'rec.csv'\ntime = 't'\n\
+                 channels = {{ y = {{ column = 'y', noise = 0.001 }} }}\ninputs = {{ u = {{ column = 'u', hold = 'zero' }} }}\n{part}\n\
+                 [criteria]\nf = {{ normalised-error = {{ signal = 'y' }} }}\n"
+            );
+            std::fs::write(folder.path().join("study.toml"), text).unwrap();
+            let arguments = ["run", "study.toml", "--json", "--max-evaluations", "1"];
+            let output = cargo_bin_cmd!("mops").current_dir(folder.path()).args(arguments).output().unwrap();
+            let result: Value = serde_json::from_slice(&output.stdout)
+                .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)));
+            for experiment in result["calibration"]["experiments"].as_array().unwrap() {
+                let rmse = experiment["channels"][0]["rmse"].as_f64().unwrap();
+                assert!(rmse < 1e-5, "{part}: {rmse} in {} of {model}", experiment["name"]);
+            }
+        }
+    }
+}

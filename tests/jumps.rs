@@ -51,8 +51,7 @@ fn an_optimum_on_a_jump_is_told_with_what_comes_beyond() {
 
 #[test]
 fn the_line_that_is_told_designs_against_the_jump() {
-    let parts =
-        "parameters = { k = '1' }\nconstants = { m = 4.0 }\noutputs = { y = '1 + 0.1*(3 - k) + if(k*m > 12.0, 2, 0)' }";
+    let parts = "parameters = { k = '1' }\nconstants = { m = 4.0 }\noutputs = { y = '1 + 0.1*(3 - k) + if(k*m > 12.0, 2 + (k*m - 12), 0)' }";
     let first = run(parts, "");
     let text = doubt(&first);
     let line = text.split("under [uncertain], `").nth(1).and_then(|rest| rest.split('`').next()).unwrap();

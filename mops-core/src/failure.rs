@@ -10,8 +10,8 @@ use serde::Serialize;
 pub enum Failure {
     /// A state or a derivative became non-finite at this time, s.
     Diverged(f64),
-    /// The maximum number of steps was reached at this time, s.
-    StepLimit(f64),
+    /// The maximum number of steps was reached at this time, s. The text names what limited most of the steps, and a remedy.
+    StepLimit(f64, String),
     /// The step size underflowed at this time, s: the equations are stiff or singular there.
     StepTooSmall(f64),
     /// Events accumulate, or switching conditions never become consistent, at this time, s. The text names them and a
@@ -32,7 +32,7 @@ impl Failure {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Diverged(_) => "diverged",
-            Self::StepLimit(_) => "step limit",
+            Self::StepLimit(..) => "step limit",
             Self::StepTooSmall(_) => "step too small",
             Self::EventsAccumulate(..) => "events accumulate",
             Self::Undefined(_) => "model undefined",
@@ -47,9 +47,7 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Diverged(t) => write!(f, "diverged at {t:.4} s"),
-            Self::StepLimit(t) => {
-                write!(f, "step limit reached at t = {t:.4} s: the equations are stiff or the tolerance is too tight")
-            }
+            Self::StepLimit(t, why) => write!(f, "step limit reached at t = {t:.4} s: {why}"),
             Self::StepTooSmall(t) => {
                 write!(f, "step size underflow at t = {t:.4} s: the solution diverges or is very stiff")
             }

@@ -19,7 +19,7 @@ pub(super) fn columns(known: &Known, rows: usize) -> Columns {
             Err(failure) => {
                 let (kind, at, why) = match failure {
                     Failure::Diverged(t) => ("diverged", Some(t), None),
-                    Failure::StepLimit(t) => ("step-limit", Some(t), None),
+                    Failure::StepLimit(t, why) => ("step-limit", Some(t), Some(why)),
                     Failure::StepTooSmall(t) => ("step-too-small", Some(t), None),
                     Failure::EventsAccumulate(t, why) => ("events-accumulate", Some(t), Some(why)),
                     Failure::Undefined(why) => ("undefined", None, Some(why)),
@@ -105,7 +105,7 @@ fn failure_of(written: &serde_json::Value) -> Failure {
     let why = written["why"].as_str().unwrap_or_default().to_owned();
     match written["kind"].as_str() {
         Some("diverged") => Failure::Diverged(at),
-        Some("step-limit") => Failure::StepLimit(at),
+        Some("step-limit") => Failure::StepLimit(at, why),
         Some("step-too-small") => Failure::StepTooSmall(at),
         Some("events-accumulate") => Failure::EventsAccumulate(at, why),
         Some("record-limit") => Failure::RecordLimit(at),

@@ -116,7 +116,7 @@ fn points_are_read_as_written_bit_by_bit() {
     };
     let failures = [
         Failure::Diverged(1.0 / 3.0),
-        Failure::StepLimit(f64::INFINITY),
+        Failure::StepLimit(f64::INFINITY, "many instants".into()),
         Failure::StepTooSmall(0.1),
         Failure::EventsAccumulate(0.3, "they come closer".into()),
         Failure::Undefined("a \"word\"".into()),

@@ -524,7 +524,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
     fn explain(&self, failure: Failure) -> Failure {
         let mut jumping = self.model.switches.iter().zip(&self.flips);
         match failure {
-            Failure::StepLimit(t) if jumping.any(|(switch, &flips)| switch.jumps && flips >= FLIPS) => {
+            Failure::StepLimit(t, _) if jumping.any(|(switch, &flips)| switch.jumps && flips >= FLIPS) => {
                 Failure::EventsAccumulate(t, TO_AND_FRO.to_owned())
             }
             failure => failure,

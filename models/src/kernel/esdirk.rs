@@ -388,7 +388,7 @@ mod tests {
         assert!((x[0] - 1.706_167_732_170_483).abs() < 1e-6, "{x:?} {work:?}");
         let explicit = Tolerance { method: IntegrationMethod::Explicit, ..stiff(1e-8) };
         let failure = integrate(&mut VanDerPol(1000.0), 0.0, 2000.0, &[2.0, 0.0], &explicit, &mut ());
-        assert!(matches!(failure, Err(Failure::StepLimit(_))));
+        assert!(matches!(failure, Err(Failure::StepLimit(..))));
     }
 
     #[test]

@@ -52,6 +52,35 @@ pub(super) trait Method<S: Scalar> {
     fn dense(&self, h: f64, x: &[S], next: &[S], dense: &mut [Vec<S>; 5]);
 }
 
+/// What limits the steps of an integration.
+#[derive(Debug, Default)]
+struct Limits {
+    /// Number of steps that end at a break.
+    breaks: usize,
+    /// Number of steps as long as the dynamics or the tolerance allow.
+    longest: usize,
+}
+
+impl Limits {
+    fn count(&mut self, ends_at_break: bool, is_longest: bool) {
+        self.breaks += usize::from(ends_at_break);
+        self.longest += usize::from(is_longest && !ends_at_break);
+    }
+
+    /// Returns what limits most of the steps, with a remedy.
+    fn cause(&self, steps: usize) -> &'static str {
+        if 2 * self.breaks > steps {
+            "most steps end at an instant of a clock, at a sample of an input, or where a jump arrives after a delay; raise \
+             `max-steps` of `tolerance`, or shorten the horizon"
+        } else if 2 * self.longest > steps {
+            "most steps are as long as `max-step`, a delay (half of it) or the sine of an input (a sixteenth of its period) allows; \
+             raise `max-steps` of `tolerance`, or shorten the horizon"
+        } else {
+            "the equations are stiff or the tolerance is too tight; try `method = \"stiff\"` of `tolerance`, or raise its `max-steps`"
+        }
+    }
+}
+
 /// Integrates from `t` to `end` and reports every step and event to `sink`.
 ///
 /// # Errors
@@ -101,13 +130,14 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
     let mut stable = f64::INFINITY;
     let longest = dynamics.longest_step().min(damped).min(tolerance.max_step.unwrap_or(f64::INFINITY));
 
+    let mut limits = Limits::default();
     let remembers = dynamics.remembers();
     // The next break changes only at an event or at the break itself, unless accepted steps move it.
     let mut stop = dynamics.next_break(t).min(end);
 
     while t < end {
         if work.steps + work.rejected >= tolerance.max_steps {
-            return Err(Failure::StepLimit(t));
+            return Err(Failure::StepLimit(t, limits.cause(work.steps + work.rejected).to_owned()));
         }
         if let Some(failure) = sink.ends(t) {
             return Err(failure);
@@ -120,6 +150,7 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
         // the proposed step size.
         let reaches = t + 1.01 * proposed >= stop;
         let h = if reaches { stop - t } else { proposed };
+        limits.count(reaches && stop < end, proposed >= longest);
         if !reaches && h <= 16.0 * f64::EPSILON * t.abs() {
             return Err(Failure::StepTooSmall(t));
         }
@@ -262,7 +293,7 @@ mod tests {
     fn steps_are_limited() {
         let tolerance = Tolerance { max_steps: 10, ..TIGHT };
         let failure = integrate(&mut Oscillator, 0.0, 100.0, &[1.0, 0.0], &tolerance, &mut ()).unwrap_err();
-        assert!(matches!(failure, Failure::StepLimit(_)), "{failure:?}");
+        assert!(matches!(failure, Failure::StepLimit(..)), "{failure:?}");
     }
 
     /// Ball that bounces on the floor and keeps the fraction `rebound` of its speed.
