@@ -39,13 +39,12 @@ mod tuners;
 mod uncertainty;
 mod verdict;
 
-use std::fs;
 use std::io;
 use std::path::Path;
 
 use mops_core::{Evaluation, Outcome, Problem, Record, Stop, Task};
 
-use crate::files;
+use crate::files::Outputs;
 use crate::numbers::FileNames;
 
 pub(crate) use bode::{FrequencyCurve, bode};
@@ -84,8 +83,13 @@ impl Report<'_> {
     /// # Errors
     /// If a file cannot be written.
     pub fn write(&self, folder: &Path) -> io::Result<()> {
+        self.write_by(folder, &Outputs::default())
+    }
+
+    /// Writes as [`Report::write`], but no file that is an input of the command.
+    pub(crate) fn write_by(&self, folder: &Path, outputs: &Outputs) -> io::Result<()> {
         let plots = folder.join("plots");
-        fs::create_dir_all(&plots)?;
+        outputs.folder(&plots)?;
         let (responses, omitted) = responses::groups(self);
         let convergence = self.searched().then(|| convergence::group(self.problem.study(), self.archive));
         let front = front::group(self);
@@ -118,14 +122,14 @@ impl Report<'_> {
         let figures = groups.flat_map(|group| &group.figures).filter(|figure| figure.on_request.is_none());
         let figures = figures.flat_map(|figure| &figure.plots);
         let all: Vec<(String, &Plot)> = figures.map(|(name, plot)| (names.unique(name), plot)).collect();
-        let earlier = PlotFiles::of(&plots);
+        let earlier = PlotFiles::of(&plots, outputs);
         earlier.note(all.iter().map(|(name, _)| name.as_str()))?;
         for (name, plot) in &all {
-            files::write(&plots.join(format!("{name}.svg")), plot.svg())?;
-            plot.write_png(&plots.join(format!("{name}.png")))?;
+            outputs.write(&plots.join(format!("{name}.svg")), plot.svg())?;
+            outputs.write(&plots.join(format!("{name}.png")), plot.png()?)?;
         }
         earlier.remove_others(all.iter().map(|(name, _)| name.as_str()))?;
-        files::write(&folder.join("report.html"), page::of(self, &sections).into_string())
+        outputs.write(&folder.join("report.html"), page::of(self, &sections).into_string())
     }
 
     /// Returns true if the result is that of a single search, so that its convergence can be plotted.
