@@ -99,7 +99,7 @@ impl Run {
     }
 
     #[track_caller]
-    fn is_refused_for(self, word: &str) {
+    fn refused_for(self, word: &str) {
         let said = self.ends_with(2);
         assert!(said.contains(word), "{said}");
     }
@@ -125,7 +125,7 @@ fn no_command_overwrites_the_study_that_it_reads() {
         place.calibration("data.csv");
         let text = place.text("study.toml");
         fs::rename(place.at("study.toml"), place.at(file)).unwrap();
-        place.mops(&[command, &[file, "--out", "."]].concat()).is_refused_for("would overwrite the study");
+        place.mops(&[command, &[file, "--out", "."]].concat()).refused_for("would overwrite the study");
         assert_eq!(place.text(file), text, "{file}");
         // In another folder nothing is in the way.
         let again = place.mops(&["check", file]);
@@ -152,7 +152,7 @@ fn no_command_overwrites_the_data_of_its_study() {
         let place = Place::new();
         place.calibration(file);
         let command = command.split(' ').chain(["study.toml", "--out", "."]).collect::<Vec<_>>();
-        place.mops(&command).is_refused_for(&format!("the data file `{file}`"));
+        place.mops(&command).refused_for(&format!("the data file `{file}`"));
         assert_eq!(place.text(file), RECORDING, "{file}");
         assert!(!place.at("evaluations.sqlite").exists() || file == "evaluations.sqlite", "{file}");
     }
@@ -170,15 +170,15 @@ fn reports_comparisons_and_plots_of_data_overwrite_no_input() {
     place.mops(&[&["run", "study.toml", "--out", "r"], &FEW[..]].concat()).ends_with(0);
     fs::rename(place.at("r/evaluations.sqlite"), place.at("evaluations.sqlite")).unwrap();
     fs::rename(place.at("r/result.json"), place.at("result.json")).unwrap();
-    place.mops(&["report", "."]).is_refused_for("the data file `plots/a.svg`");
+    place.mops(&["report", "."]).refused_for("the data file `plots/a.svg`");
     for out in ["result.json", "evaluations.sqlite", "study.toml", "plots/a.svg"] {
         let before = fs::read(place.at(out)).unwrap();
-        place.mops(&["compare", ".", ".", "--out", out]).is_refused_for("would overwrite");
+        place.mops(&["compare", ".", ".", "--out", out]).refused_for("would overwrite");
         assert!(fs::read(place.at(out)).unwrap() == before, "{out}");
     }
     place.mops(&["data", "plots/a.svg", "--plot", "plots/a.svg"]).ends_with(0);
     place.write("columns-x.svg", RECORDING);
-    place.mops(&["data", "columns-x.svg", "--plot", "columns.svg"]).is_refused_for("would overwrite the data file");
+    place.mops(&["data", "columns-x.svg", "--plot", "columns.svg"]).refused_for("would overwrite the data file");
     assert_eq!(place.text("columns-x.svg"), RECORDING);
 }
 
@@ -204,14 +204,14 @@ mod links {
                 fs::rename(place.at(link), place.at(target)).unwrap();
             }
             symlink(target, place.at(link)).unwrap();
-            place.mops(&[&["run", "study.toml", "--out", out], &FEW[..]].concat()).is_refused_for("would overwrite");
+            place.mops(&[&["run", "study.toml", "--out", out], &FEW[..]].concat()).refused_for("would overwrite");
             assert!(place.at(link).is_symlink());
         }
         let place = Place::new();
         place.calibration("plots/data.csv");
         fs::rename(place.at("plots"), place.at("real")).unwrap();
         symlink("real", place.at("plots")).unwrap();
-        place.mops(&[&["run", "study.toml", "--out", "."], &FEW[..]].concat()).is_refused_for("would overwrite");
+        place.mops(&[&["run", "study.toml", "--out", "."], &FEW[..]].concat()).refused_for("would overwrite");
     }
 
     #[test]
@@ -244,7 +244,7 @@ mod links {
             fs::create_dir_all(place.at(link).parent().unwrap()).unwrap();
             symlink(place.at("elsewhere"), place.at(link)).unwrap();
             let command = [&["run", "study.toml"], &FEW[..]].concat();
-            place.mops(&command).is_refused_for("--out results/rig");
+            place.mops(&command).refused_for("--out results/rig");
             assert_eq!(fs::read_dir(place.at("elsewhere")).unwrap().count(), 0);
             place.mops(&[&command[..], &["--out", "results/rig"]].concat()).ends_with(0);
         }
@@ -261,8 +261,8 @@ fn two_studies_never_share_the_default_folder() {
     for name in ["日本", "中国", "Übung", "bung", "Δx", "x", "a b"] {
         assert_ne!(run(name, "s.toml").status, 2, "{name}");
     }
-    run("a-b", "s.toml").is_refused_for("has a run of another study, `a b`");
-    run("a b", "t.toml").is_refused_for("another study of this name");
+    run("a-b", "s.toml").refused_for("has a run of another study, `a b`");
+    run("a b", "t.toml").refused_for("another study of this name");
     // The same study runs again, also where its file was moved.
     assert_ne!(run("a b", "s.toml").status, 2);
     fs::remove_file(place.at("s.toml")).unwrap();
@@ -311,7 +311,7 @@ fn a_study_reads_files_outside_of_its_folder_only_where_the_command_line_allows_
     place.mops(&["--allow-read", "other", "check", "study/study.toml", "--allow-read", "shared"]).ends_with(0);
     let command = ["run", "study/study.toml", "--out", "r", "--allow-read", "shared"];
     place.mops(&[&command, &FEW[..]].concat()).ends_with(0);
-    place.mops(&["report", "r"]).is_refused_for("--allow-read");
+    place.mops(&["report", "r"]).refused_for("--allow-read");
     place.mops(&["report", "r", "--allow-read", "shared"]).ends_with(0);
 }
 
@@ -346,7 +346,7 @@ fn a_study_that_mops_wrote_below_its_study_reads_the_data_of_that_study() {
     place.write("secret.csv", RECORDING);
     let text = place.text("moved/results/rig/picked.toml").replace("../../data/step.csv", "../../../secret.csv");
     place.write("moved/results/rig/picked.toml", &text);
-    place.mops(&["check", "moved/results/rig/picked.toml"]).is_refused_for("--allow-read");
+    place.mops(&["check", "moved/results/rig/picked.toml"]).refused_for("--allow-read");
 }
 
 #[test]
@@ -356,7 +356,7 @@ fn a_study_that_mops_wrote_elsewhere_needs_the_option_that_the_run_prints() {
     let folder = place.at("project").canonicalize().unwrap().display().to_string();
     assert!(said.contains(&format!("use it with --allow-read {folder}")), "{said}");
     for study in ["elsewhere/rig/study.toml", "elsewhere/rig/picked.toml"] {
-        place.mops(&["check", study]).is_refused_for("--allow-read");
+        place.mops(&["check", study]).refused_for("--allow-read");
         place.mops(&["check", study, "--allow-read", &folder]).ends_with(0);
     }
     // A picked study in another folder finds the data, too.
@@ -375,13 +375,13 @@ fn no_file_of_a_study_opens_the_folders_above_it() {
     fs::create_dir_all(place.at("home/results")).unwrap();
     fs::rename(place.at("project/results/rig"), place.at("home/results/rig")).unwrap();
     fs::remove_dir_all(place.at("project")).unwrap();
-    place.mops(&["check", "home/results/rig/picked.toml"]).is_refused_for("--allow-read");
+    place.mops(&["check", "home/results/rig/picked.toml"]).refused_for("--allow-read");
     // A name alone does not make it the study of the run.
     place.write("home/rig.toml", "# no study\n");
-    place.mops(&["check", "home/results/rig/picked.toml"]).is_refused_for("--allow-read");
+    place.mops(&["check", "home/results/rig/picked.toml"]).refused_for("--allow-read");
     let named = CALIBRATION.replace("FILE", "data/step.csv");
     place.write("home/rig.toml", &named.replace("\"rig\"", "\"other\""));
-    place.mops(&["check", "home/results/rig/picked.toml"]).is_refused_for("--allow-read");
+    place.mops(&["check", "home/results/rig/picked.toml"]).refused_for("--allow-read");
     place.write("home/rig.toml", &named);
     place.mops(&["check", "home/results/rig/picked.toml"]).ends_with(0);
 }
@@ -399,4 +399,108 @@ fn a_link_out_of_the_folder_of_a_study_is_not_read() {
     std::os::unix::fs::symlink(Path::new("other/real.csv"), place.at("study/data.csv")).unwrap();
     place.write("study/other/real.csv", RECORDING);
     place.mops(&["check", "study"]).ends_with(0);
+}
+
+#[test]
+fn a_damaged_database_is_renamed_by_a_fresh_run_and_named_by_a_resumed_one() {
+    let place = Place::new();
+    place.calibration("data.csv");
+    let run = [&["run", "study.toml", "--out", "r"], &FEW[..]].concat();
+    place.mops(&run).ends_with(0);
+    let whole = fs::read(place.at("r/evaluations.sqlite")).unwrap();
+    let schema = whole.windows(19).position(|text| text == b"CREATE TABLE points").unwrap();
+    type Damage<'a> = &'a dyn Fn(&mut Vec<u8>);
+    let damages: [Damage; 5] = [
+        &|bytes| bytes[schema..schema + 6].fill(0),
+        &|bytes| bytes[100] ^= 0xff,
+        &|bytes| bytes[101..108].fill(0xff),
+        &|bytes| bytes[schema..schema + 19].copy_from_slice(b"CREATE TABLE pointz"),
+        &|bytes| bytes[16..100].fill(0x5a),
+    ];
+    for (i, damage) in damages.into_iter().enumerate() {
+        let mut bytes = whole.clone();
+        damage(&mut bytes);
+        fs::write(place.at("r/evaluations.sqlite"), &bytes).unwrap();
+        let resumed = place.mops(&[&run[..], &["--resume"]].concat());
+        assert!(resumed.status == 2 || resumed.status == 0, "{i}: {}", resumed.said);
+        fs::write(place.at("r/evaluations.sqlite"), &bytes).unwrap();
+        place.mops(&run).ends_with(0);
+        place.mops(&["report", "r"]).ends_with(0);
+    }
+    fs::write(place.at("r/evaluations.sqlite"), {
+        let mut bytes = whole.clone();
+        bytes[schema..schema + 6].fill(0);
+        bytes
+    })
+    .unwrap();
+    place.mops(&[&run[..], &["--resume"]].concat()).refused_for("is damaged");
+    place.mops(&["run", "study.toml", "--out", "other", "--reuse", "r", "--quiet"]).refused_for("is damaged");
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_are_neither_databases_nor_locks() {
+    let pipe = |path: &Path| assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
+    let place = Place::new();
+    place.calibration("data.csv");
+    fs::create_dir(place.at("r")).unwrap();
+    pipe(&place.at("r/evaluations.sqlite"));
+    let run = [&["run", "study.toml", "--out", "r"], &FEW[..]].concat();
+    place.mops(&[&run[..], &["--resume"]].concat()).refused_for("not a database");
+    place.mops(&["report", "r"]).ends_with(2);
+    place.mops(&["history", "r"]);
+    place.mops(&["run", "study.toml", "--out", "other", "--reuse", "r", "--quiet"]).ends_with(2);
+    place.mops(&run).ends_with(0);
+    assert!(place.at("r/evaluations.previous.sqlite").exists() && place.at("r/evaluations.sqlite").is_file());
+    pipe(&place.at("r/evaluations.lock"));
+    assert!(place.mops(&run).ends_with(3).contains("evaluations.lock is not a file"));
+    place.mops(&["history", "r"]).ends_with(0);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_writes_through_no_link_to_a_database() {
+    let place = Place::new();
+    place.calibration("data.csv");
+    let run = [&["run", "study.toml", "--out", "r"], &FEW[..]].concat();
+    place.mops(&run).ends_with(0);
+    fs::rename(place.at("r/evaluations.sqlite"), place.at("mine.sqlite")).unwrap();
+    std::os::unix::fs::symlink("../mine.sqlite", place.at("r/evaluations.sqlite")).unwrap();
+    let before = fs::read(place.at("mine.sqlite")).unwrap();
+    place.mops(&[&run[..], &["--resume"]].concat()).refused_for("is a symbolic link");
+    place.mops(&["report", "r"]).ends_with(0);
+    place.mops(&run).ends_with(0);
+    assert!(fs::read(place.at("mine.sqlite")).unwrap() == before);
+    assert!(!place.at("r/evaluations.sqlite").is_symlink());
+}
+
+#[test]
+fn a_constant_that_is_no_finite_number_is_a_mistake_of_the_study() {
+    let place = Place::new();
+    for (expression, word) in [
+        ("sqrt(-9.81)", "not a number"),
+        ("-k*x + l*sqrt(-9.81)", "not a number"),
+        ("l/0", "infinite"),
+        ("1/0", "infinite"),
+        ("l + ln(0)", "infinite"),
+        ("asin(2)*l", "not a number"),
+    ] {
+        place.write("study.toml", &DESIGN.replace("NAME", "n").replace("-k*x + l", expression));
+        let run = place.mops(&["check", "study.toml"]);
+        let is_of_parameter = expression == "l/0";
+        assert!(is_of_parameter || run.status == 2 && run.said.contains(word), "{expression}: {}", run.said);
+    }
+}
+
+#[test]
+fn names_like_formulas_are_text_in_csv_files_and_are_read_back_unchanged() {
+    let place = Place::new();
+    let study = DESIGN.replace("NAME", "n").replace("\na = {", "\n\"=a\" = {").replace("\nb = {", "\n\"'-b\" = {");
+    place.write("study.toml", &(study + "[cases.\"@c\"]\n[cases.\"+d\"]\n"));
+    let run = place.mops(&[&["run", "study.toml", "--out", "r"], &FEW[..]].concat());
+    assert!(run.status < 2, "{}", run.said);
+    let header = place.text("r/evaluations.csv").lines().next().unwrap().to_owned();
+    assert!(header.contains("'@c/=a") && header.contains("'+d/=a") && !header.contains(",@"), "{header}");
+    let said = place.mops(&["data", "r/evaluations.csv"]).ends_with(0);
+    assert!(said.contains(" @c/=a ") && said.contains(" +d/'-b "), "{said}");
 }

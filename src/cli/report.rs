@@ -116,6 +116,7 @@ fn stop(state: RunState) -> Stop {
     match state {
         RunState::Converged => Stop::Converged,
         RunState::Budget => Stop::Budget,
+        RunState::TimeLimit => Stop::TimeLimit,
         RunState::Stalled => Stop::Stalled,
         RunState::Interrupted | RunState::Running => Stop::Interrupted,
     }

@@ -113,6 +113,7 @@ pub(super) fn state(stop: Stop) -> RunState {
     match stop {
         Stop::Converged => RunState::Converged,
         Stop::Budget => RunState::Budget,
+        Stop::TimeLimit => RunState::TimeLimit,
         Stop::Stalled => RunState::Stalled,
         Stop::Interrupted => RunState::Interrupted,
     }

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, Halt, SolverChoice, Stop, Study, StudyError, Task, Watch, suggestion};
+use mops_core::{Catalogue, Diagnostic, SolverChoice, Stop, Study, StudyError, Task, Watch, suggestion};
 
 use super::run_files::{DISK_TIMEOUT, RunFiles, check_run};
 use super::study::{StudyArguments, home, open_as, outputs, without_settings};
@@ -229,9 +229,7 @@ pub(super) fn execute(
     };
     solved.outcome.run = Some(id);
     let stopped_early = options.cancellation.requested();
-    if let (Stop::Budget, Some(limit), Some(Halt::Budget)) =
-        (solved.outcome.stop, arguments.limit.time_limit, stopped_early)
-    {
+    if let (Stop::TimeLimit, Some(limit)) = (solved.outcome.stop, arguments.limit.time_limit) {
         let help = if resume::stores_points(&file.study) { "; --resume continues the run" } else { "" };
         let warning = format!("stopped at the time limit of {} s{help}", limit.as_secs_f64());
         solved.outcome.warnings.push(warning);

@@ -14,9 +14,10 @@ use mops_core::{Diagnostic, Effect, MonteCarloReport, Shipped, Task};
 use super::study::Home;
 use crate::diagnosis::{Original, predictions, repaired, source};
 use crate::files::{self, Outputs, write_header};
+use crate::numbers::counted;
 use crate::report::Report;
 use crate::search::Solved;
-use crate::terminal::CommandError;
+use crate::terminal::{CommandError, eprint_line};
 use crate::toml_text::settled;
 
 /// Time to wait for space on a full disk.
@@ -137,9 +138,16 @@ impl RunFiles<'_> {
             write_samples(outputs, &samples, found).map_err(CommandError::cannot_write(&samples))?;
         }
         let Solved { outcome, problem, best, archive, front } = solved;
-        Report { outcome, problem, best, archive, front, text: self.text }
+        let missing = Report { outcome, problem, best, archive, front, text: self.text }
             .write_by(folder, outputs)
             .map_err(CommandError::cannot_write(folder))?;
+        if missing > 0 {
+            let plots = counted(missing, "plot");
+            eprint_line(&format!(
+                "warning: {plots} not written in time; `mops report {}` writes them",
+                folder.display()
+            ));
+        }
         if let Some(diagnosis) = &outcome.found.diagnosis {
             let (text, settings, study) = (self.plain, self.own, problem.study());
             let original = Original { text, settings, study, effects: self.effects };

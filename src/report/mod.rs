@@ -83,11 +83,12 @@ impl Report<'_> {
     /// # Errors
     /// If a file cannot be written.
     pub fn write(&self, folder: &Path) -> io::Result<()> {
-        self.write_by(folder, &Outputs::default())
+        self.write_by(folder, &Outputs::default()).map(|_| ())
     }
 
-    /// Writes as [`Report::write`], but no file that is an input of the command.
-    pub(crate) fn write_by(&self, folder: &Path, outputs: &Outputs) -> io::Result<()> {
+    /// Writes as [`Report::write`], but no file that is an input of the command. Returns the number of plots that were not written,
+    /// as the run was asked to stop; it is asked before every plot.
+    pub(crate) fn write_by(&self, folder: &Path, outputs: &Outputs) -> io::Result<usize> {
         let plots = folder.join("plots");
         outputs.folder(&plots)?;
         let (responses, omitted) = responses::groups(self);
@@ -124,12 +125,18 @@ impl Report<'_> {
         let all: Vec<(String, &Plot)> = figures.map(|(name, plot)| (names.unique(name), plot)).collect();
         let earlier = PlotFiles::of(&plots, outputs);
         earlier.note(all.iter().map(|(name, _)| name.as_str()))?;
-        for (name, plot) in &all {
+        let mut missing = 0;
+        for (i, (name, plot)) in all.iter().enumerate() {
+            if self.problem.is_cancelled() {
+                missing = all.len() - i;
+                break;
+            }
             outputs.write(&plots.join(format!("{name}.svg")), plot.svg())?;
             outputs.write(&plots.join(format!("{name}.png")), plot.png()?)?;
         }
-        earlier.remove_others(all.iter().map(|(name, _)| name.as_str()))?;
-        outputs.write(&folder.join("report.html"), page::of(self, &sections).into_string())
+        earlier.remove_others(all.iter().take(all.len() - missing).map(|(name, _)| name.as_str()))?;
+        outputs.write(&folder.join("report.html"), page::of(self, &sections).into_string())?;
+        Ok(missing)
     }
 
     /// Returns true if the result is that of a single search, so that its convergence can be plotted.

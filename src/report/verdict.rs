@@ -223,6 +223,7 @@ pub(super) fn stop(outcome: &Outcome) -> &'static str {
         Stop::Converged if outcome.solver == "none" => "Not solved: the initial guess was evaluated",
         Stop::Converged => "Converged (solver tolerance reached)",
         Stop::Budget => "Budget exhausted; a larger budget may find a better point",
+        Stop::TimeLimit => "Time limit reached; more time (--resume) may find a better point",
         Stop::Stalled => "Stalled: no further improvement found, convergence not reached",
         Stop::Interrupted => "Interrupted by the user",
     }

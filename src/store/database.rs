@@ -23,7 +23,7 @@ CREATE TABLE runs (
     id INTEGER PRIMARY KEY,
     begun INTEGER NOT NULL,            -- seconds since 1970-01-01 UTC
     ended INTEGER,                     -- seconds since 1970-01-01 UTC; NULL while it runs, or after a kill
-    state TEXT NOT NULL,               -- running, converged, budget, stalled, interrupted
+    state TEXT NOT NULL,               -- running, converged, budget, time-limit, stalled, interrupted
     mops TEXT NOT NULL,                -- version of the program
     command TEXT NOT NULL,             -- command line
     home TEXT NOT NULL,                -- the study file, or the name of a shipped study

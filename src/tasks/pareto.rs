@@ -66,6 +66,7 @@ fn missing_points(problem: &Problem, outcome: &Outcome, found: usize) -> Option<
     let why = match outcome.stop {
         _ if found >= asked => return None,
         Stop::Budget => "the budget was spent before; raise --max-evaluations",
+        Stop::TimeLimit => "the time limit was reached before; raise --time-limit, or continue the run (--resume)",
         Stop::Interrupted => "the search was interrupted; continue it (--resume)",
         Stop::Converged | Stop::Stalled => {
             "every further search ended at one of these points, or in a gap of the front"
