@@ -1,12 +1,105 @@
-//! Atomic file writes: each file is written under a temporary name in the same folder and then renamed.
+//! Output files: each is written under a temporary name in the same folder and then renamed, and none replaces an input of
+//! the same command.
 
+mod inputs;
+
+use std::fmt;
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+pub(crate) use inputs::Inputs;
+use mops_core::data::as_text;
+
 /// Prefix of a file name during writing. The name is fixed, so that the next process replaces the remains of a killed one;
 /// only one process at a time writes in the folder of a run.
 const TEMPORARY_PREFIX: &str = ".new-";
+
+/// Writer of all output files of a command. It refuses to replace a file that the command reads, and follows no symbolic link
+/// below the folder of the outputs: a link is replaced.
+#[derive(Debug, Default)]
+pub(crate) struct Outputs {
+    inputs: Inputs,
+}
+
+/// Refusal to replace an input.
+#[derive(Debug)]
+pub(crate) struct Overwrites {
+    path: PathBuf,
+    what: String,
+}
+
+impl fmt::Display for Overwrites {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "`{}` would overwrite {}", self.path.display(), self.what)
+    }
+}
+
+impl std::error::Error for Overwrites {}
+
+impl Outputs {
+    /// Creates the writer of a command that reads `inputs`.
+    pub(crate) fn besides(inputs: Inputs) -> Self {
+        Self { inputs }
+    }
+
+    /// Checks that no input has a path, or the temporary path of its file.
+    ///
+    /// # Errors
+    /// If writing the path would replace an input ([`Overwrites`]).
+    pub(crate) fn check(&self, path: &Path) -> io::Result<()> {
+        let what = self.inputs.at(path).or_else(|| self.inputs.at(&temporary_path(path)));
+        match what {
+            None => Ok(()),
+            Some(what) => Err(io::Error::other(Overwrites { path: path.to_owned(), what: what.to_owned() })),
+        }
+    }
+
+    /// Creates the temporary file for `path`.
+    ///
+    /// # Errors
+    /// If the path is that of an input, or the folder is not writable.
+    pub(crate) fn create(&self, path: &Path) -> io::Result<AtomicFile> {
+        self.check(path)?;
+        AtomicFile::create(path)
+    }
+
+    /// Writes a whole file.
+    ///
+    /// # Errors
+    /// As [`Outputs::create`]; an existing file then remains unchanged.
+    pub(crate) fn write(&self, path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
+        let mut file = self.create(path)?;
+        file.write_all(content.as_ref())?;
+        file.commit()
+    }
+
+    /// Writes a CSV file.
+    ///
+    /// # Errors
+    /// As [`Outputs::write`].
+    pub(crate) fn write_csv(
+        &self,
+        path: &Path,
+        fill: impl FnOnce(&mut csv::Writer<AtomicFile>) -> Result<(), csv::Error>,
+    ) -> io::Result<()> {
+        let mut writer = csv::Writer::from_writer(self.create(path)?);
+        fill(&mut writer)?;
+        writer.into_inner().map_err(csv::IntoInnerError::into_error)?.commit()
+    }
+
+    /// Creates a folder in the folder of the outputs. A symbolic link of its name is replaced.
+    ///
+    /// # Errors
+    /// If an input is read through such a link, or the folder cannot be created.
+    pub(crate) fn folder(&self, path: &Path) -> io::Result<()> {
+        if path.is_symlink() {
+            self.check(path)?;
+            fs::remove_file(path)?;
+        }
+        fs::create_dir_all(path)
+    }
+}
 
 /// File being written. If dropped before [`AtomicFile::commit`], an existing file remains unchanged.
 ///
@@ -18,11 +111,7 @@ pub(crate) struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Creates the temporary file for `path`.
-    ///
-    /// # Errors
-    /// If the folder is not writable.
-    pub(crate) fn create(path: &Path) -> io::Result<Self> {
+    fn create(path: &Path) -> io::Result<Self> {
         let temporary = cleared_temporary_path(path)?;
         let file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
         Ok(Self { file: Some(BufWriter::new(file)), temporary, path: path.to_owned() })
@@ -69,6 +158,17 @@ impl Drop for AtomicFile {
     }
 }
 
+/// Writes the names of the columns of a CSV file; a spreadsheet takes none for a formula.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(crate) fn write_header<W: Write>(
+    writer: &mut csv::Writer<W>,
+    names: impl IntoIterator<Item = String>,
+) -> Result<(), csv::Error> {
+    writer.write_record(names.into_iter().map(|name| as_text(&name).into_owned()))
+}
+
 /// Returns the temporary path of a file during writing.
 pub(crate) fn temporary_path(path: &Path) -> PathBuf {
     let mut name = std::ffi::OsString::from(TEMPORARY_PREFIX);
@@ -83,42 +183,6 @@ fn cleared_temporary_path(path: &Path) -> io::Result<PathBuf> {
         Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
         _ => Ok(temporary),
     }
-}
-
-/// Lets `write` create a file at a temporary path and renames it, for writers that need a path.
-///
-/// # Errors
-/// If the file cannot be written or renamed.
-pub(crate) fn make(path: &Path, write: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
-    let temporary = cleared_temporary_path(path)?;
-    let made = write(&temporary).and_then(|()| fs::rename(&temporary, path));
-    if made.is_err() {
-        let _ = fs::remove_file(&temporary);
-    }
-    made
-}
-
-/// Writes a CSV file.
-///
-/// # Errors
-/// If the file cannot be written.
-pub(crate) fn write_csv(
-    path: &Path,
-    fill: impl FnOnce(&mut csv::Writer<AtomicFile>) -> Result<(), csv::Error>,
-) -> io::Result<()> {
-    let mut writer = csv::Writer::from_writer(AtomicFile::create(path)?);
-    fill(&mut writer)?;
-    writer.into_inner().map_err(csv::IntoInnerError::into_error)?.commit()
-}
-
-/// Writes a whole file.
-///
-/// # Errors
-/// If the file cannot be written; an existing file then remains unchanged.
-pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
-    let mut file = AtomicFile::create(path)?;
-    file.write_all(content.as_ref())?;
-    file.commit()
 }
 
 /// Returns true if `path` names the given file.
@@ -148,31 +212,31 @@ mod tests {
 
     #[test]
     fn a_file_is_replaced_whole_or_stays() {
-        let folder = tempfile::tempdir().unwrap();
+        let (folder, outputs) = (tempfile::tempdir().unwrap(), Outputs::default());
         let path = folder.path().join("a.json");
-        write(&path, "old").unwrap();
-        let mut file = AtomicFile::create(&path).unwrap();
+        outputs.write(&path, "old").unwrap();
+        let mut file = outputs.create(&path).unwrap();
         file.write_all(b"half").unwrap();
         drop(file);
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
         // The leftover of a killed process is replaced.
         fs::write(temporary_path(&path), "left").unwrap();
-        write(&path, "new").unwrap();
+        outputs.write(&path, "new").unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "new");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-        assert!(write(&folder.path().join("none/a"), "").is_err());
+        assert!(outputs.write(&folder.path().join("none/a"), "").is_err());
     }
 
     #[cfg(unix)]
     #[test]
     fn links_are_replaced_and_their_targets_stay() {
         use std::os::unix::fs::symlink;
-        let folder = tempfile::tempdir().unwrap();
+        let (folder, outputs) = (tempfile::tempdir().unwrap(), Outputs::default());
         let at = |name: &str| folder.path().join(name);
         fs::write(at("precious"), "mine").unwrap();
         symlink(at("precious"), at("result.json")).unwrap();
         symlink(at("precious"), at(".new-result.json")).unwrap();
-        write(&at("result.json"), "new").unwrap();
+        outputs.write(&at("result.json"), "new").unwrap();
         assert_eq!(fs::read_to_string(at("precious")).unwrap(), "mine");
         assert!(!at("result.json").is_symlink() && !at(".new-result.json").exists());
         assert_eq!(fs::read_to_string(at("result.json")).unwrap(), "new");

@@ -92,6 +92,7 @@ pub fn catalogue() -> Catalogue {
         augment: Some(|model, effects| Ok(Box::new(mops_models::WithEffects::new(model, effects)?))),
         studies: mops_studies::shipped().into_iter().map(Into::into).collect(),
         program: None,
+        readable: Vec::new(),
     }
 }
 

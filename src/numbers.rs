@@ -1,5 +1,7 @@
 //! Formats of numbers and names for a reader: significant digits, units, percent, and portable file names.
 
+use std::collections::HashMap;
+
 /// Formats a number to five significant digits without trailing zeros: `0.86341`, `12`, `1.2e-7`.
 pub(crate) fn number(value: f64) -> String {
     significant(value, 5)
@@ -61,11 +63,12 @@ pub(crate) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Returns a portable file name: ASCII letters, digits, `_` and `.` stay, each run of other characters becomes one `-`.
+/// Returns a portable file name: letters and digits of all scripts, `_` and `.` stay, each run of other characters becomes one
+/// `-`.
 pub(crate) fn file_name(name: &str) -> String {
     let mut safe = String::new();
     for c in name.chars() {
-        if c.is_ascii_alphanumeric() || c == '_' || c == '.' {
+        if c.is_alphanumeric() || c == '_' || c == '.' {
             safe.push(c);
         } else if !safe.ends_with('-') {
             safe.push('-');
@@ -81,17 +84,22 @@ pub(crate) fn file_name(name: &str) -> String {
 /// Generator of unique file names, also for file systems that ignore case.
 #[derive(Debug, Default)]
 pub(crate) struct FileNames {
-    taken: Vec<String>,
+    /// Names in lower case, each with the number to be tried next.
+    taken: HashMap<String, usize>,
 }
 
 impl FileNames {
     /// Returns a portable file name for `name` that was not returned before.
     pub(crate) fn unique(&mut self, name: &str) -> String {
         let safe = file_name(name);
-        let candidates = (1..).map(|i| if i == 1 { safe.clone() } else { format!("{safe}-{i}") });
-        let free = |candidate: &String| !self.taken.contains(&candidate.to_lowercase());
-        let chosen = candidates.into_iter().find(free).expect("there is always a next number");
-        self.taken.push(chosen.to_lowercase());
+        let mut number = self.taken.get(&safe.to_lowercase()).copied().unwrap_or(1);
+        let mut chosen = if number == 1 { safe.clone() } else { format!("{safe}-{number}") };
+        while self.taken.contains_key(&chosen.to_lowercase()) {
+            number += 1;
+            chosen = format!("{safe}-{number}");
+        }
+        self.taken.insert(safe.to_lowercase(), number + 1);
+        self.taken.entry(chosen.to_lowercase()).or_insert(2);
         chosen
     }
 }
@@ -124,7 +132,8 @@ mod tests {
     #[test]
     fn file_names_are_safe_and_unique() {
         assert_eq!(file_name("../../etc/passwd"), "etc-passwd");
-        assert_eq!(file_name("fit-d\u{e9}part:1-\u{3c6}\\x"), "fit-d-part-1-x");
+        assert_eq!(file_name("fit-d\u{e9}part:1-\u{3c6}\\x"), "fit-d\u{e9}part-1-\u{3c6}-x");
+        assert_eq!(file_name("\u{65e5}\u{672c} 2"), "\u{65e5}\u{672c}-2");
         assert_eq!(file_name("///"), "unnamed");
         let mut names = FileNames::default();
         assert_eq!([names.unique("a/b"), names.unique("A-b"), names.unique("a b")], ["a-b", "A-b-2", "a-b-3"]);

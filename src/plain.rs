@@ -24,11 +24,13 @@ pub(crate) fn escaped(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, st
     Cow::Owned(plain)
 }
 
-/// Returns true if a terminal acts on a character instead of showing it: controls and changes of the text direction.
-/// Source: Unicode 16.0, general category Cc; Unicode Standard Annex 9, section 2.
+/// Returns true if a terminal acts on a character instead of showing it, or if XML does not admit it: controls, changes of the text
+/// direction, and two code points that are no characters.
+/// Source: Unicode 16.0, general category Cc; Unicode Standard Annex 9, section 2; XML 1.0, section 2.2.
 pub(crate) fn acts(c: char) -> bool {
     (c.is_control() && !matches!(c, '\n' | '\t'))
         || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{200e}' | '\u{200f}' | '\u{61c}')
+        || matches!(c, '\u{fffe}' | '\u{ffff}')
 }
 
 #[cfg(test)]
@@ -46,6 +48,7 @@ mod tests {
             ("\u{202e}cod.exe", "\\u{202e}cod.exe"),
             ("\u{2067}\u{200f}", "\\u{2067}\\u{200f}"),
             ("line\n\tΩ m² 温度 é", "line\n\tΩ m² 温度 é"),
+            ("\u{fffe}\u{ffff}\u{fffd}", "\\u{fffe}\\u{ffff}\u{fffd}"),
             ("", ""),
         ] {
             assert_eq!(plain(text), shown);

@@ -288,12 +288,12 @@ fn a_diagnosis_has_no_scaled_values_in_the_history() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
     assert!(mops(&["diagnose", "furuta-swing", "--quiet", "--time-limit", "0.001"], &out).status.success());
-    assert_eq!((&result(&out)["stop"], &result(&out)["diagnosis"]), (&"budget".into(), &Value::Null));
+    assert_eq!((&result(&out)["stop"], &result(&out)["diagnosis"]), (&"time-limit".into(), &Value::Null));
     let listed = &history(&out)[0];
     for key in ["worst_scaled", "feasible", "evaluations"] {
         assert_eq!(listed[key], Value::Null, "{key}");
     }
-    assert_eq!([&listed["task"], &listed["state"]], ["diagnosis", "budget"]);
+    assert_eq!([&listed["task"], &listed["state"]], ["diagnosis", "time-limit"]);
 }
 
 #[test]
@@ -319,7 +319,7 @@ fn a_report_evaluates_no_points_beyond_the_stored_ones() {
     let change = |sql: &str| Connection::open(&database).unwrap().execute(sql, []).unwrap();
     let kept = points(&database);
     let page = fs::read_to_string(out.join("report.html")).unwrap();
-    for state in ["budget", "converged", "stalled", "interrupted", "running"] {
+    for state in ["budget", "time-limit", "converged", "stalled", "interrupted", "running"] {
         change(&format!("UPDATE runs SET max_evaluations = 100000000, state = '{state}'"));
         let report = look("report", &out);
         assert!(report.status.success() && said(&report).contains("60 evaluations"), "{state}: {}", said(&report));

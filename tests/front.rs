@@ -121,13 +121,17 @@ fn knee_nearest_point_and_exchange_rates_agree_with_the_points_of_the_front() {
 #[test]
 fn a_front_of_few_evaluations_has_points_with_improving_directions_but_none_that_dominates_another() {
     let folder = tempfile::tempdir().unwrap();
-    let result = pareto(folder.path(), &["pid-pareto", "--max-evaluations", "40"]);
+    let result = pareto(folder.path(), &["pid-pareto", "--max-evaluations", "100"]);
     let found = &result["trade_offs"];
     let improvable = found["points"].as_array().unwrap().iter().filter(|point| point["pareto"] == "no").count();
     let words = found["words"].as_array().unwrap().iter().map(|line| line.as_str().unwrap()).collect::<Vec<_>>();
-    assert!(words[0].ends_with("No point of the front dominates another."), "{words:?}");
+    assert!(words[0].contains("The search was cut off by the budget: other points may dominate these."), "{words:?}");
     let last = words.last().unwrap();
-    assert!(improvable > 0 && last.ends_with(&format!("; {improvable} have a known improving direction.")), "{last}");
+    assert!(
+        improvable > 0
+            && last.contains(&format!("; at {improvable} a step of a thousandth of the box improves one criterion")),
+        "{last}"
+    );
 }
 
 /// For demands equal to a point of the reference front, the optimal worst scaled value is 1.

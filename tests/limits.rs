@@ -122,7 +122,7 @@ fn a_time_limit_ends_every_task_like_a_spent_budget() {
         let output = mops(&[task, &["--quiet", "--out", &out, "--time-limit", "0.5 s"]].concat(), root.path());
         assert!(matches!(output.status.code(), Some(0 | 1 | 3)), "{task:?}: {}", said(&output));
         let result = result(&root.path().join(&out));
-        assert_eq!(result["stop"], "budget", "{task:?}");
+        assert_eq!(result["stop"], "time-limit", "{task:?}");
         assert_eq!(result["evaluations"].as_u64().unwrap() > 0, known, "{task:?}");
         let warnings = result["warnings"].to_string();
         assert!(warnings.contains("stopped at the time limit of 0.5 s"), "{task:?}: {warnings}");

@@ -345,7 +345,7 @@ fn is_listed(list: &[(&str, &str)], path: &[String], sign: char) -> bool {
 fn every_number_of_a_study_is_checked_at_both_ends() {
     let catalogue = mops::catalogue();
     let leaves = numbers(&catalogue);
-    let folder = Folder("tests/ranges".into());
+    let folder = Folder::new("tests/ranges");
     let mut accepted = BTreeSet::new();
     for study in studies(&leaves) {
         let mut all = Vec::new();
@@ -376,7 +376,7 @@ fn every_number_of_a_study_is_checked_at_both_ends() {
 fn the_studies_of_this_test_are_valid() {
     for name in STUDIES {
         let text = std::fs::read_to_string(format!("tests/ranges/{name}.toml")).unwrap();
-        let read = file::read(&mops::catalogue(), name, &text, &[], &Folder("tests/ranges".into()));
+        let read = file::read(&mops::catalogue(), name, &text, &[], &Folder::new("tests/ranges"));
         assert!(read.is_ok(), "{}", read.err().unwrap());
     }
 }

@@ -6,8 +6,10 @@ use std::sync::atomic::{AtomicU8, Ordering};
 /// Reason why a run ends before its solver finishes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Halt {
-    /// Budget of evaluations or of time spent.
+    /// Budget of evaluations spent.
     Budget,
+    /// Time limit reached.
+    TimeLimit,
     /// Interrupted by the user.
     Interrupted,
 }
@@ -26,12 +28,14 @@ pub struct Cancellation {
 const BUDGET: u8 = 1;
 const INTERRUPTED: u8 = 2;
 const INSISTED: u8 = 4;
+const TIME_LIMIT: u8 = 8;
 
 impl Cancellation {
-    /// Requests the end of searches. An interruption takes precedence over a spent budget.
+    /// Requests the end of searches. An interruption takes precedence over the time limit, and that over a spent budget.
     pub fn request(&self, why: Halt) {
         let bit = match why {
             Halt::Budget => BUDGET,
+            Halt::TimeLimit => TIME_LIMIT,
             Halt::Interrupted => INTERRUPTED,
         };
         self.requests.fetch_or(bit, Ordering::Relaxed);
@@ -56,6 +60,7 @@ impl Cancellation {
         }
         match requests {
             requests if requests & INTERRUPTED != 0 => Some(Halt::Interrupted),
+            requests if requests & TIME_LIMIT != 0 => Some(Halt::TimeLimit),
             requests if requests & BUDGET != 0 => Some(Halt::Budget),
             _ => None,
         }

@@ -1,5 +1,6 @@
 //! Catalogue of all kinds of models, criteria and solvers that a study file can name, and of the shipped studies.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use schemars::generate::SchemaSettings;
@@ -169,9 +170,16 @@ pub struct Catalogue {
     pub studies: Vec<CatalogueStudy>,
     /// Digest of the program, if its own code computes values or builds studies; part of the identity of runs.
     pub program: Option<String>,
+    /// Folders whose files studies may read, besides those in their own folder.
+    pub readable: Vec<PathBuf>,
 }
 
 impl Catalogue {
+    /// Returns the source of the data files of a study in a folder.
+    pub fn folder(&self, path: impl Into<PathBuf>) -> Folder {
+        Folder::new(path).reading(self.readable.iter().cloned())
+    }
+
     /// Adds a kind of model.
     #[must_use]
     pub fn with_model(mut self, kind: ModelKind) -> Self {

@@ -241,6 +241,10 @@ impl End {
                  (--reuse)."
                     .to_owned(),
             ),
+            Optimality::NotShown if stop == Stop::TimeLimit => Some(
+                "The time limit was reached before an optimum was shown: continue the run (--resume) with a larger --time-limit."
+                    .to_owned(),
+            ),
             _ => None,
         }
     }

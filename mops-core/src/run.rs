@@ -526,6 +526,10 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
         self.best.as_ref()
     }
 
+    fn is_over(&self) -> bool {
+        self.watch.wants_stop()
+    }
+
     fn remaining(&self) -> usize {
         self.planned.unwrap_or(self.budget.evaluations).saturating_sub(self.archive.len())
     }

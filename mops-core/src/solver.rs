@@ -162,6 +162,11 @@ pub trait Oracle {
     /// Returns the best point so far, of this solver or of an earlier one in the same run.
     fn best(&self) -> Option<&Evaluation>;
 
+    /// Returns true if the run was asked to stop. Long computations without evaluations ask between their steps, and end.
+    fn is_over(&self) -> bool {
+        false
+    }
+
     /// Returns the number of points that may still be evaluated.
     fn remaining(&self) -> usize;
 
@@ -171,12 +176,14 @@ pub trait Oracle {
 
 /// Why a run stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Stop {
     /// Solver tolerance reached.
     Converged,
-    /// The budget is spent.
+    /// The budget of evaluations is spent.
     Budget,
+    /// The time limit is reached.
+    TimeLimit,
     /// The solver could not improve any more and reached no tolerance of an optimum.
     Stalled,
     /// The user interrupted the run.
@@ -187,6 +194,7 @@ impl From<Halt> for Stop {
     fn from(halt: Halt) -> Self {
         match halt {
             Halt::Budget => Self::Budget,
+            Halt::TimeLimit => Self::TimeLimit,
             Halt::Interrupted => Self::Interrupted,
         }
     }

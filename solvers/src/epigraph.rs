@@ -58,6 +58,21 @@ impl Subproblem {
         penalty: f64,
         into: &mut Direction,
     ) -> Option<()> {
+        self.solve_while(&|| true, criteria, hessian, [low, high], penalty, into)
+    }
+
+    /// Computes the step as [`Subproblem::solve`] does; returns `None` as soon as `goes_on` returns false, which is asked before
+    /// every step of the active-set method.
+    #[must_use]
+    pub fn solve_while(
+        &mut self,
+        goes_on: &dyn Fn() -> bool,
+        criteria: &LinearisedCriteria,
+        hessian: &DMatrix<f64>,
+        [low, high]: [&[f64]; 2],
+        penalty: f64,
+        into: &mut Direction,
+    ) -> Option<()> {
         let n = low.len();
         let level = criteria.objective();
         let first = self.assemble_constraints(criteria, level, low, high);
@@ -66,7 +81,7 @@ impl Subproblem {
         self.linear.resize(n, 0.0);
         self.linear.extend([1.0, penalty]);
         let no_violation = self.constraints.bounds.len() - 1;
-        if !self.method.solve(&self.factor, &self.linear, &self.constraints, &[first, no_violation]) {
+        if !self.method.solve(goes_on, &self.factor, &self.linear, &self.constraints, &[first, no_violation]) {
             return None;
         }
         into.step.clear();

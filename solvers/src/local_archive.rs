@@ -33,6 +33,10 @@ impl Oracle for LocalArchive<'_> {
         self.best.as_ref()
     }
 
+    fn is_over(&self) -> bool {
+        self.oracle.is_over()
+    }
+
     fn remaining(&self) -> usize {
         self.oracle.remaining()
     }

@@ -191,6 +191,10 @@ impl Oracle for Remembering<'_> {
         self.oracle.best()
     }
 
+    fn is_over(&self) -> bool {
+        self.oracle.is_over()
+    }
+
     fn remaining(&self) -> usize {
         self.oracle.remaining()
     }

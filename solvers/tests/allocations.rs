@@ -28,6 +28,10 @@ impl Oracle for UncountedOracle<'_> {
         self.0.best()
     }
 
+    fn is_over(&self) -> bool {
+        self.0.is_over()
+    }
+
     fn remaining(&self) -> usize {
         self.0.remaining()
     }

@@ -8,10 +8,11 @@ use maud::{PreEscaped, html};
 use mops_core::{Catalogue, Diagnostic, Halt, SMALL_OBJECTIVE, Stop, Task};
 use serde::Serialize;
 
+use super::default_folder;
 use super::run::{refused, solver_named};
-use super::study::{StudyArguments, open};
-use crate::files;
-use crate::numbers::{file_name, number, significant};
+use super::study::{StudyArguments, home, open, outputs};
+use crate::files::Outputs;
+use crate::numbers::{number, significant};
 use crate::report::{Color, Curve, Plot, page};
 use crate::search::{DEFAULT_EVALUATIONS, Options, Solved, suits};
 use crate::solve::solve;
@@ -101,6 +102,15 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     }
     let most = arguments.max_evaluations.map(|n| usize::try_from(n).unwrap_or(usize::MAX));
     let max_evaluations = most.or(file.max_evaluations).unwrap_or(DEFAULT_EVALUATIONS);
+    let outputs = outputs(&home(catalogue, &arguments.study), &file);
+    let folder = match &arguments.out {
+        Some(folder) => folder.clone(),
+        None => default_folder::named(&format!("{}-bench", file.study.name()))?,
+    };
+    for name in FILES {
+        let path = folder.join(name);
+        outputs.check(&path).map_err(CommandError::cannot_write(&path))?;
+    }
     let cancellation = cancel_on_signal(arguments.limit, "interrupted: writing the finished runs");
     let mut runs = Vec::new();
     let solvers =
@@ -146,9 +156,7 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         run.arrived = first.map(|(evaluations, _)| *evaluations).filter(|_| run.success);
     }
     let bench = Bench { study: file.study.name().to_owned(), known, within: arguments.within, max_evaluations, runs };
-    let folder = arguments.out.clone();
-    let folder = folder.unwrap_or_else(|| Path::new("results").join(format!("{}-bench", file_name(&bench.study))));
-    bench.write(&folder)?;
+    bench.write(&folder, &outputs)?;
     if arguments.json {
         print_json(&bench)?;
     } else {
@@ -259,19 +267,20 @@ impl Bench {
         }
     }
 
-    fn write(&self, folder: &Path) -> Result<(), CommandError> {
+    fn write(&self, folder: &Path, outputs: &Outputs) -> Result<(), CommandError> {
         std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
         let csv = folder.join("runs.csv");
-        files::write_csv(&csv, |writer| self.runs.iter().try_for_each(|run| writer.serialize(run)))
+        outputs
+            .write_csv(&csv, |writer| self.runs.iter().try_for_each(|run| writer.serialize(run)))
             .map_err(CommandError::cannot_write(&csv))?;
         let write = |name: &str, content: String| {
             let path = folder.join(name);
-            files::write(&path, content).map_err(CommandError::cannot_write(&path))
+            outputs.write(&path, content).map_err(CommandError::cannot_write(&path))
         };
         let profile = self.profile();
         write("profile.svg", profile.svg())?;
         let png = folder.join("profile.png");
-        profile.write_png(&png).map_err(CommandError::cannot_write(&png))?;
+        profile.png().and_then(|bytes| outputs.write(&png, bytes)).map_err(CommandError::cannot_write(&png))?;
         let body = html! {
             h1 { (self.study) }
             p { (self.introduction()) }
@@ -286,6 +295,9 @@ impl Bench {
         write("bench.html", page(&format!("{}: solvers", self.study), &body.into_string()))
     }
 }
+
+/// Output files.
+const FILES: [&str; 4] = ["runs.csv", "profile.svg", "profile.png", "bench.html"];
 
 /// Columns of the table.
 const HEADER: [&str; 8] =

@@ -9,7 +9,7 @@ use mops_core::{Catalogue, Diagnostic, Problem};
 use serde_json::{Value, json};
 
 use super::past_run::PastRun;
-use crate::files;
+use crate::files::{Inputs, Outputs};
 use crate::numbers::significant;
 use crate::report::{Responses, Rows, comparison_page};
 use crate::terminal::{CommandError, number, print, print_json, table};
@@ -61,10 +61,12 @@ pub(super) fn compare(catalogue: &Catalogue, arguments: &Arguments) -> Result<Ex
         print(&tables.iter().fold(legend(&names, &states, &results), |text, rows| text + "\n" + &text_table(rows)))?;
     }
     if let Some(path) = &arguments.out {
-        let (responses, missing_responses) = responses(catalogue, &runs, &results);
+        let mut inputs = Inputs::default();
+        runs.iter().for_each(|run| run.add_to(&mut inputs));
+        let (responses, missing_responses) = responses(catalogue, &runs, &results, &mut inputs);
         let names: Vec<(String, String)> = names.into_iter().enumerate().map(|(i, name)| (letter(i), name)).collect();
         let page = comparison_page(&names, &tables, &responses, &missing_responses);
-        files::write(path, page).map_err(CommandError::cannot_write(path))?;
+        Outputs::besides(inputs).write(path, page).map_err(CommandError::cannot_write(path))?;
         if !arguments.json {
             print(&format!("\nthe responses are plotted in {}\n", path.display()))?;
         }
@@ -149,11 +151,17 @@ fn text_table(rows: &Rows) -> String {
     table(&header, &numeric, rows.lines.clone())
 }
 
-/// Returns the responses of the runs at their results, and one sentence for each run without responses.
-fn responses(catalogue: &Catalogue, runs: &[PastRun], results: &[&Value]) -> (Vec<Responses>, Vec<String>) {
+/// Returns the responses of the runs at their results, and one sentence for each run without responses; adds the data of the
+/// runs to the inputs.
+fn responses(
+    catalogue: &Catalogue,
+    runs: &[PastRun],
+    results: &[&Value],
+    inputs: &mut Inputs,
+) -> (Vec<Responses>, Vec<String>) {
     let (mut found, mut missing_responses) = (Vec::new(), Vec::new());
     for (i, (run, result)) in runs.iter().zip(results).enumerate() {
-        match problem_at_result(catalogue, run, result) {
+        match problem_at_result(catalogue, run, result, inputs) {
             Ok((problem, tuners)) => found.push(Responses { name: letter(i), problem, tuners }),
             Err(why) => missing_responses.push(format!("No responses for {}: {}.", letter(i), why.message)),
         }
@@ -161,12 +169,19 @@ fn responses(catalogue: &Catalogue, runs: &[PastRun], results: &[&Value]) -> (Ve
     (found, missing_responses)
 }
 
-/// Returns the problem of a run and the tuners of its result.
-fn problem_at_result(catalogue: &Catalogue, run: &PastRun, result: &Value) -> Result<(Problem, Vec<f64>), Diagnostic> {
+/// Returns the problem of a run and the tuners of its result; adds its data to the inputs.
+fn problem_at_result(
+    catalogue: &Catalogue,
+    run: &PastRun,
+    result: &Value,
+    inputs: &mut Inputs,
+) -> Result<(Problem, Vec<f64>), Diagnostic> {
     if result.is_null() {
         return Err(Diagnostic::new(format!("the run in {} is {}", run.folder.display(), run.state())));
     }
-    let study = run.study(catalogue)?.study;
+    let file = run.study(catalogue)?;
+    run.add_data_to(inputs, &file);
+    let study = file.study;
     let of = |name: &str| {
         let tuner = result["tuners"].as_array()?.iter().find(|tuner| tuner["name"] == name)?;
         tuner["value"].as_f64()

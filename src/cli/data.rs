@@ -10,7 +10,7 @@ use mops_core::identification::{excitation_report, spacing};
 use mops_discrepancy::noise_of;
 
 use super::findings;
-use crate::files;
+use crate::files::{Inputs, Outputs};
 use crate::numbers::FileNames;
 use crate::report::{Color, Curve, Plot, thinned};
 use crate::terminal::{CommandError, number, print, table};
@@ -54,7 +54,9 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(path) = &arguments.plot {
-        for written in plot(&file, time, path)? {
+        let mut inputs = Inputs::default();
+        inputs.add(&arguments.file, "the data file");
+        for written in plot(&file, time, (path, &Outputs::besides(inputs)))? {
             print(&format!("wrote {}\n", written.display()))?;
         }
         return Ok(ExitCode::SUCCESS);
@@ -198,7 +200,11 @@ fn at_rest(file: &DataFile, time: Option<String>, [from, to]: [f64; 2]) -> Resul
 }
 
 /// Plots every column over time, each in a file of its own if there are several, and returns the files.
-fn plot(file: &DataFile, time: Option<String>, path: &Path) -> Result<Vec<PathBuf>, CommandError> {
+fn plot(
+    file: &DataFile,
+    time: Option<String>,
+    (path, outputs): (&Path, &Outputs),
+) -> Result<Vec<PathBuf>, CommandError> {
     let end = path.extension().and_then(|end| end.to_str()).unwrap_or_default();
     if !["svg", "png"].contains(&end) {
         return Err(Diagnostic::new(format!("`{}` is neither .svg nor .png", path.display()))
@@ -239,8 +245,8 @@ fn plot(file: &DataFile, time: Option<String>, path: &Path) -> Result<Vec<PathBu
             false => path.to_owned(),
         };
         match end {
-            "svg" => files::write(&place, plot.svg()),
-            _ => plot.write_png(&place),
+            "svg" => outputs.write(&place, plot.svg()),
+            _ => plot.png().and_then(|bytes| outputs.write(&place, bytes)),
         }
         .map_err(CommandError::cannot_write(&place))?;
         written.push(place);

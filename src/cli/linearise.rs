@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 
 use self::feedback::Wanted;
 use self::text::MANY;
-use super::study::{StudyArguments, open};
+use super::study::{StudyArguments, home, open, outputs};
 use crate::terminal::{CommandError, Limit, exit_after, print};
 
 /// Arguments of `mops linearise`.
@@ -63,7 +63,9 @@ pub(super) struct Arguments {
 
 pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     exit_after(arguments.limit);
-    let study = open(catalogue, &arguments.study)?.study;
+    let file = open(catalogue, &arguments.study)?;
+    let outputs = outputs(&home(catalogue, &arguments.study), &file);
+    let study = file.study;
     let plan = chosen(&study, arguments)?;
     let model = plan.model;
     let (name, case) = (&study.models()[model].0, &study.cases()[plan.case]);
@@ -113,7 +115,7 @@ pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<
             "at": { "states": found.states, "inputs": found.inputs, "rates": found.rates },
             "poles": poles.ok().map(|poles| complex(&poles)), "channels": channels, "feedback": feedback,
         });
-        print(&files::write(folder, &system, &content)?)?;
+        print(&files::write((folder, &outputs), &system, &content)?)?;
     }
     // A failed design is reported after all other output.
     feedback.transpose()?;

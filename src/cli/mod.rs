@@ -4,6 +4,7 @@ mod bench;
 mod check;
 mod compare;
 mod data;
+mod default_folder;
 mod describe;
 mod diagnose;
 mod diagnosis;
@@ -19,6 +20,7 @@ mod pareto;
 mod past_run;
 mod pick;
 mod places;
+mod reading;
 #[cfg(test)]
 mod reference;
 mod report;
@@ -64,6 +66,10 @@ struct Arguments {
     /// Folder that contains studies, one subfolder with study.toml each; adds to the folders in MOPS_STUDIES.
     #[arg(long = "studies", value_name = "DIR", global = true, help_heading = "Global options")]
     studies: Vec<PathBuf>,
+    /// Let studies read data files in this folder and below. Without it a study reads its own folder and below, which makes it
+    /// safe to open one from an untrusted source.
+    #[arg(long = "allow-read", value_name = "DIR", global = true, help_heading = "Global options")]
+    readable: Vec<PathBuf>,
 }
 
 #[derive(Subcommand)]
@@ -127,13 +133,14 @@ pub(crate) fn main(mut catalogue: Catalogue, [package, name]: [&'static str; 2],
         program = program.version(format!("{version} (mops {})", env!("CARGO_PKG_VERSION")).leak() as &str);
     }
     let arguments = Arguments::from_arg_matches(&program.clone().get_matches());
-    let Arguments { command, studies } = arguments.unwrap_or_else(|error| error.exit());
+    let Arguments { command, studies, readable } = arguments.unwrap_or_else(|error| error.exit());
     if has_own_code {
         catalogue.program = match study::digest_of_program() {
             Ok(digest) => Some(digest),
             Err(mistake) => return CommandError::from(mistake).report(),
         };
     }
+    catalogue.readable.extend(readable);
     let of_environment = std::env::var_os("MOPS_STUDIES").unwrap_or_default();
     let folders = std::env::split_paths(&of_environment).filter(|path| !path.as_os_str().is_empty()).chain(studies);
     match study::with_folders(catalogue, &folders.collect::<Vec<_>>()) {

@@ -8,8 +8,9 @@ use mops_core::file::StudyFile;
 use mops_core::{Catalogue, Diagnostic};
 use serde_json::Value;
 
+use super::run_files::DIAGNOSIS;
 use super::study::{read_at, without_settings};
-use crate::files;
+use crate::files::{self, Inputs};
 use crate::store::{self, RunRow, RunState};
 
 /// Run in a folder.
@@ -55,6 +56,32 @@ impl PastRun {
             Diagnostic::new(format!("{} {what}", folder.display()))
                 .with_help("name the output folder (--out) of a run; `mops history` lists them")
         })
+    }
+
+    /// Adds the files of the run that are read, and its study, to the inputs of a command.
+    pub fn add_to(&self, inputs: &mut Inputs) {
+        let shown = self.folder.display();
+        inputs.add(&self.folder.join("result.json"), &format!("the result of the run in {shown}"));
+        inputs.add(&store::file(&self.folder), &format!("the evaluations of the run in {shown}"));
+        inputs.add(&self.folder.join(DIAGNOSIS), &format!("the diagnosis in {shown}"));
+        if let Some((run, _)) = &self.run {
+            inputs.add(&run.home, &format!("the study of the run in {shown}"));
+        }
+    }
+
+    /// Adds the data of the study of the run to the inputs of a command.
+    pub fn add_data_to(&self, inputs: &mut Inputs, file: &StudyFile) {
+        let Some((run, _)) = &self.run else { return };
+        for (name, _) in &file.data {
+            let path = run.home.with_file_name("").join(name);
+            inputs.add(&path, &format!("the data file `{name}` of the run in {}", self.folder.display()));
+        }
+    }
+
+    /// Returns the name of the study.
+    pub fn name(&self) -> Option<&str> {
+        let of_result = || self.result.as_ref().and_then(|result| result["study"].as_str());
+        self.run.as_ref().map(|(run, _)| run.name.as_str()).or_else(of_result)
     }
 
     /// Returns the state of the run in one word.

@@ -12,9 +12,11 @@ use mops_core::{
 };
 use serde_json::Value;
 
-use super::study::{StudyArguments, open_as};
+use super::reading;
+use super::run_files::relative_path;
+use super::study::{Home, StudyArguments, inputs, open_as};
 use super::tables::met_text;
-use crate::files;
+use crate::files::Outputs;
 use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 use crate::toml_text::{self, TomlText, key, quoted};
 
@@ -91,20 +93,34 @@ pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     let chosen = refined.as_ref().unwrap_or(&at);
     let text =
         fs::read_to_string(&path).map_err(|error| CommandError::Failure(format!("{}: {error}", path.display())))?;
-    files::write(&out, picked(&text, &file, chosen, &demands)).map_err(CommandError::cannot_write(&out))?;
+    let home = Home::File(path.clone());
+    let mut inputs = inputs(&home, &file);
+    inputs.add(&arguments.folder.join("result.json"), "the front");
+    let outputs = Outputs::besides(inputs);
+    let folder = match out.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let text = toml_text::settled(&text, &[], &|data| relative_path(folder, &path, data)).into_text();
+    outputs.write(&out, picked(&text, &file, chosen, &demands)).map_err(CommandError::cannot_write(&out))?;
     print(&format!("\na study that starts there is in {}\n", out.display()))?;
+    if let Some(note) = reading::note(catalogue, &home, &file, &out) {
+        print(&note)?;
+    }
     Ok(if chosen.merit.is_feasible() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 /// Returns the path of the new study file, which must not exist.
 fn output_path(arguments: &Arguments) -> Result<PathBuf, Diagnostic> {
     match &arguments.out {
-        Some(out) if out.exists() => Err(Diagnostic::new(format!("`{}` already exists", out.display()))
-            .with_help("remove it, or choose another file with --out; nothing was written")),
+        Some(out) if out.symlink_metadata().is_ok() => {
+            Err(Diagnostic::new(format!("`{}` already exists", out.display()))
+                .with_help("remove it, or choose another file with --out; nothing was written"))
+        }
         Some(out) => Ok(out.clone()),
         None => {
             let names = std::iter::once("picked.toml".to_owned()).chain((2..).map(|i| format!("picked-{i}.toml")));
-            let free = names.map(|name| arguments.folder.join(name)).find(|path| !path.exists());
+            let free = names.map(|name| arguments.folder.join(name)).find(|path| path.symlink_metadata().is_err());
             Ok(free.expect("some number is free"))
         }
     }

@@ -8,7 +8,8 @@ use mops_core::{Catalogue, Diagnostic, Stop, Task, suggestion};
 
 use super::past_run::PastRun;
 use super::resume;
-use super::run_files::read_diagnosis;
+use super::run_files::{REPORT, check_outputs, read_diagnosis};
+use crate::files::{Inputs, Outputs};
 use crate::report::Report;
 use crate::search::{Options, Solved};
 use crate::store::{self, Identity, Recorder, RunRow, RunState};
@@ -31,11 +32,16 @@ pub(super) struct Restored {
 pub(super) fn report(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let folder = &arguments.folder;
     let past = PastRun::open(folder)?;
+    let mut inputs = Inputs::default();
+    past.add_to(&mut inputs);
+    past.add_data_to(&mut inputs, &past.study(catalogue)?);
+    let outputs = Outputs::besides(inputs);
+    check_outputs(&outputs, folder, REPORT)?;
     let Restored { solved, text } = replay(catalogue, &past)?;
     let _lock = store::lock_folder(folder)?;
     let Solved { outcome, problem, best, archive, front, .. } = &solved;
     let report = Report { outcome, problem, best, archive, front, text: &text };
-    report.write(folder).map_err(CommandError::cannot_write(folder))?;
+    report.write_by(folder, &outputs).map_err(CommandError::cannot_write(folder))?;
     let from = match outcome.found.diagnosis {
         Some(_) => "the diagnosis".to_owned(),
         None => format!("{} evaluations", outcome.evaluations),
@@ -110,6 +116,7 @@ fn stop(state: RunState) -> Stop {
     match state {
         RunState::Converged => Stop::Converged,
         RunState::Budget => Stop::Budget,
+        RunState::TimeLimit => Stop::TimeLimit,
         RunState::Stalled => Stop::Stalled,
         RunState::Interrupted | RunState::Running => Stop::Interrupted,
     }

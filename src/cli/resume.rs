@@ -77,14 +77,9 @@ pub(super) fn open(
             .into());
     }
     let identity = Identity::of(file, &file.study, options.solver.kind);
-    let home = match home {
-        Home::Shipped(shipped) => PathBuf::from(shipped.name),
-        Home::Built(built) => PathBuf::from(built.name()),
-        Home::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
-    };
     let task = serde_json::to_value(file.study.task()).expect("a task is a word");
     let run = RunRow {
-        home,
+        home: home.recorded(),
         settings: study.settings.clone(),
         name: file.study.name().to_owned(),
         task: task.as_str().unwrap_or_default().to_owned(),
@@ -118,6 +113,7 @@ pub(super) fn state(stop: Stop) -> RunState {
     match stop {
         Stop::Converged => RunState::Converged,
         Stop::Budget => RunState::Budget,
+        Stop::TimeLimit => RunState::TimeLimit,
         Stop::Stalled => RunState::Stalled,
         Stop::Interrupted => RunState::Interrupted,
     }

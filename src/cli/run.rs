@@ -7,12 +7,11 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, Halt, SolverChoice, Stop, Study, StudyError, Task, Watch, suggestion};
+use mops_core::{Catalogue, Diagnostic, SolverChoice, Stop, Study, StudyError, Task, Watch, suggestion};
 
-use super::run_files::{DISK_TIMEOUT, RunFiles};
-use super::study::{StudyArguments, home, open_as, without_settings};
-use super::{diagnosis, findings, resume, tables};
-use crate::numbers::file_name;
+use super::run_files::{DISK_TIMEOUT, RunFiles, check_run};
+use super::study::{StudyArguments, home, open_as, outputs, without_settings};
+use super::{default_folder, diagnosis, findings, reading, resume, tables};
 use crate::search::{DEFAULT_EVALUATIONS, Options, Solved, solves, suits};
 use crate::store::Start;
 use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, eprint_line, print, print_json};
@@ -188,8 +187,13 @@ pub(super) fn execute(
     // Before any file of an earlier run is changed.
     suits(&file.study, &options.solver).map_err(|why| refused(&why.0, &file, options.solver.kind))?;
     let talks = !arguments.quiet && !arguments.json;
-    // N.B.: the name of a study is never used as a path.
-    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(file_name(file.study.name())));
+    let home = home(catalogue, &arguments.study);
+    let folder = match &arguments.out {
+        Some(folder) => folder.clone(),
+        None => default_folder::of_study(catalogue, &home, file.study.name())?,
+    };
+    let outputs = outputs(&home, &file);
+    check_run(&outputs, &folder, file.study.task())?;
     let mut progress = Progress::new(talks, options.max_evaluations, &options.cancellation);
     if arguments.dashboard && !std::io::stderr().is_terminal() {
         eprint_line("note: --dashboard needs a terminal: progress is printed as lines");
@@ -203,7 +207,6 @@ pub(super) fn execute(
     }
     let mut first_error = FirstError::default();
     first_error.record(if talks { print(&introduction(&file.study, &options)) } else { Ok(()) });
-    let home = home(catalogue, &arguments.study);
     let settings: Vec<String> = arguments.study.settings.iter().cloned().chain(search.settings()).collect();
     // `mops report` needs the settings of the command, too.
     let asked = StudyArguments { study: arguments.study.study.clone(), settings: settings.clone() };
@@ -226,9 +229,7 @@ pub(super) fn execute(
     };
     solved.outcome.run = Some(id);
     let stopped_early = options.cancellation.requested();
-    if let (Stop::Budget, Some(limit), Some(Halt::Budget)) =
-        (solved.outcome.stop, arguments.limit.time_limit, stopped_early)
-    {
+    if let (Stop::TimeLimit, Some(limit)) = (solved.outcome.stop, arguments.limit.time_limit) {
         let help = if resume::stores_points(&file.study) { "; --resume continues the run" } else { "" };
         let warning = format!("stopped at the time limit of {} s{help}", limit.as_secs_f64());
         solved.outcome.warnings.push(warning);
@@ -236,6 +237,7 @@ pub(super) fn execute(
     let cache_summary = resume::cache_summary(&start, known, &finished);
     let files = RunFiles {
         folder: &folder,
+        outputs: &outputs,
         solved: &solved,
         text: &file.source.text,
         plain: without_settings(&file.source.text, &settings),
@@ -271,7 +273,9 @@ pub(super) fn execute(
     if talks && written.is_ok() {
         first_error.record(print(&format!("\nresult, report and plots are in {}\n", folder.display())));
     }
-    written?;
+    if let Some(note) = written?.and_then(|study| reading::note(catalogue, &home, &file, &study)).filter(|_| talks) {
+        first_error.record(print(&note));
+    }
     first_error.0?;
     status(&solved, &folder, stopped_early.is_some())
 }

@@ -13,18 +13,84 @@ use mops_core::{Diagnostic, Effect, MonteCarloReport, Shipped, Task};
 
 use super::study::Home;
 use crate::diagnosis::{Original, predictions, repaired, source};
-use crate::files::{self, AtomicFile};
+use crate::files::{self, Outputs, write_header};
+use crate::numbers::counted;
 use crate::report::Report;
 use crate::search::Solved;
-use crate::terminal::CommandError;
+use crate::terminal::{CommandError, eprint_line};
 use crate::toml_text::settled;
 
 /// Time to wait for space on a full disk.
 pub(super) const DISK_TIMEOUT: Duration = Duration::from_secs(10);
 
+/// Outputs in the folder of every run.
+const RUN: Names = Names {
+    files: &[
+        "result.json",
+        "evaluations.csv",
+        "evaluations.sqlite",
+        "evaluations.sqlite-wal",
+        "evaluations.sqlite-shm",
+        "evaluations.sqlite-journal",
+        "evaluations.ended.json",
+    ],
+    folders: &[],
+};
+
+/// Outputs of every report.
+pub(super) const REPORT: Names =
+    Names { files: &["report.html", "evaluations.lock"], folders: &[("plots", &["svg", "png"])] };
+
+/// Names of outputs that a command may write: files, and folders with the extensions of the files in them.
+#[derive(Clone, Copy)]
+pub(super) struct Names {
+    files: &'static [&'static str],
+    folders: &'static [(&'static str, &'static [&'static str])],
+}
+
+/// Returns the further outputs of a task.
+fn names_of(task: Task) -> Names {
+    match task {
+        Task::MonteCarlo => Names { files: &["samples.csv"], folders: &[] },
+        Task::Pareto => Names { files: &["study.toml"], folders: &[] },
+        Task::Diagnosis => {
+            Names { files: &[DIAGNOSIS, "repaired.toml", "repaired.rs"], folders: &[("predictions", &["csv"])] }
+        }
+        _ => Names { files: &[], folders: &[] },
+    }
+}
+
+/// Checks before a run that none of its outputs would replace an input.
+///
+/// # Errors
+/// If one would; the error names the input.
+pub(super) fn check_run(outputs: &Outputs, folder: &Path, task: Task) -> Result<(), CommandError> {
+    [RUN, REPORT, names_of(task)].into_iter().try_for_each(|names| check_outputs(outputs, folder, names))
+}
+
+/// Checks that no output of these names would replace an input.
+///
+/// # Errors
+/// If one would; the error names the input.
+pub(super) fn check_outputs(outputs: &Outputs, folder: &Path, names: Names) -> Result<(), CommandError> {
+    let files = names.files.iter().map(|name| folder.join(name));
+    let folders = names.folders.iter().map(|(name, ends)| (folder.join(name), ends));
+    let below = folders.flat_map(|(folder, ends)| {
+        let entries = fs::read_dir(&folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        let written = entries.filter(|path| path.extension().is_some_and(|end| ends.iter().any(|known| end == *known)));
+        let written: Vec<PathBuf> = written.collect();
+        std::iter::once(folder).chain(written)
+    });
+    for path in files.chain(below) {
+        outputs.check(&path).map_err(CommandError::cannot_write(&path))?;
+    }
+    Ok(())
+}
+
 /// Output files of a run.
 pub(super) struct RunFiles<'a> {
     pub folder: &'a Path,
+    pub outputs: &'a Outputs,
     pub solved: &'a Solved,
     /// Text of the study with all settings.
     pub text: &'a str,
@@ -50,7 +116,7 @@ impl RunFiles<'_> {
         let until = Instant::now() + timeout;
         let is_full = |error: &io::Error| matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded);
         loop {
-            let written = AtomicFile::create(&path).and_then(|mut file| {
+            let written = self.outputs.create(&path).and_then(|mut file| {
                 file.write_all(json.as_bytes())?;
                 file.commit_synced()
             });
@@ -61,37 +127,50 @@ impl RunFiles<'_> {
         }
     }
 
-    /// Writes the other files: evaluations, samples, report and plots, and those of the task.
-    pub(super) fn write_others(&self) -> Result<(), CommandError> {
-        let (folder, solved) = (self.folder, self.solved);
+    /// Writes the other files: evaluations, samples, report and plots, and those of the task. Returns the path of the study
+    /// that the task wrote, if any.
+    pub(super) fn write_others(&self) -> Result<Option<PathBuf>, CommandError> {
+        let Self { folder, outputs, solved, .. } = *self;
         let evaluations = folder.join("evaluations.csv");
-        write_evaluations(&evaluations, solved).map_err(CommandError::cannot_write(&evaluations))?;
+        write_evaluations(outputs, &evaluations, solved).map_err(CommandError::cannot_write(&evaluations))?;
         if let Some(found) = &solved.outcome.found.monte_carlo {
             let samples = folder.join("samples.csv");
-            write_samples(&samples, found).map_err(CommandError::cannot_write(&samples))?;
+            write_samples(outputs, &samples, found).map_err(CommandError::cannot_write(&samples))?;
         }
         let Solved { outcome, problem, best, archive, front } = solved;
-        Report { outcome, problem, best, archive, front, text: self.text }
-            .write(folder)
+        let missing = Report { outcome, problem, best, archive, front, text: self.text }
+            .write_by(folder, outputs)
             .map_err(CommandError::cannot_write(folder))?;
+        if missing > 0 {
+            let plots = counted(missing, "plot");
+            eprint_line(&format!(
+                "warning: {plots} not written in time; `mops report {}` writes them",
+                folder.display()
+            ));
+        }
         if let Some(diagnosis) = &outcome.found.diagnosis {
             let (text, settings, study) = (self.plain, self.own, problem.study());
             let original = Original { text, settings, study, effects: self.effects };
-            write_diagnosis(folder, diagnosis, &original, self.home, self.export)?;
+            write_diagnosis((folder, outputs), diagnosis, &original, self.home, self.export)?;
         }
         if outcome.task == Task::Pareto {
-            write_study(folder, self.plain, self.settings, self.home)?;
+            write_study((folder, outputs), self.plain, self.settings, self.home)?;
         }
-        Ok(())
+        let written = match outcome.task {
+            Task::Pareto => Some("study.toml"),
+            Task::Diagnosis => Some("repaired.toml"),
+            _ => None,
+        };
+        Ok(written.map(|name| folder.join(name)).filter(|path| path.is_file()))
     }
 }
 
 /// Writes one line per sample: uncertain parameters, criteria.
-fn write_samples(path: &Path, found: &MonteCarloReport) -> io::Result<()> {
-    files::write_csv(path, |writer| {
+fn write_samples(outputs: &Outputs, path: &Path, found: &MonteCarloReport) -> io::Result<()> {
+    outputs.write_csv(path, |writer| {
         let parameters = found.parameters.iter().map(|p| format!("{}[{}]", p.name, p.unit));
         let criteria = found.criteria.iter().map(|c| format!("{}/{}[{}]", c.of.case, c.of.criterion, c.of.unit));
-        writer.write_record(parameters.chain(criteria))?;
+        write_header(writer, parameters.chain(criteria))?;
         for (parameters, values) in &found.table {
             writer.write_record(parameters.iter().chain(values).map(f64::to_string))?;
         }
@@ -100,12 +179,12 @@ fn write_samples(path: &Path, found: &MonteCarloReport) -> io::Result<()> {
 }
 
 /// Writes one line per point: tuners, criteria, objective, violation.
-fn write_evaluations(path: &Path, solved: &Solved) -> io::Result<()> {
+fn write_evaluations(outputs: &Outputs, path: &Path, solved: &Solved) -> io::Result<()> {
     let study = solved.problem.study();
-    files::write_csv(path, |writer| {
+    outputs.write_csv(path, |writer| {
         let tuners = study.tuners().iter().map(|t| format!("{}[{}]", t.name, t.unit));
         let rows = study.rows().iter().map(|row| format!("{}[{}]", study.key(row), row.unit));
-        writer.write_record(tuners.chain(rows).chain(["objective".into(), "violation".into()]))?;
+        write_header(writer, tuners.chain(rows).chain(["objective".into(), "violation".into()]))?;
         for record in &solved.archive {
             let merit = [&record.merit.objective, &record.merit.violation];
             writer.write_record(record.tuners.iter().chain(&record.values).chain(merit).map(f64::to_string))?;
@@ -115,7 +194,7 @@ fn write_evaluations(path: &Path, solved: &Solved) -> io::Result<()> {
 }
 
 /// File with everything that a diagnosis found, from which `mops report` writes its page again.
-const DIAGNOSIS: &str = "diagnosis.toml";
+pub(super) const DIAGNOSIS: &str = "diagnosis.toml";
 
 /// Returns the text of [`DIAGNOSIS`]: TOML has numbers that are not finite, JSON has not.
 fn diagnosis_toml(diagnosis: &Diagnosis) -> String {
@@ -139,17 +218,17 @@ pub(super) fn read_diagnosis(folder: &Path) -> Result<Diagnosis, Diagnostic> {
 
 /// Writes `predictions/<experiment>.csv`; if the model was changed, also `repaired.toml` and, with `export`, `repaired.rs`.
 fn write_diagnosis(
-    folder: &Path,
+    (folder, outputs): (&Path, &Outputs),
     diagnosis: &Diagnosis,
     original: &Original<'_>,
     home: &Home,
     export: bool,
 ) -> Result<(), CommandError> {
-    write(&folder.join(DIAGNOSIS), diagnosis_toml(diagnosis).as_bytes())?;
+    write(outputs, &folder.join(DIAGNOSIS), diagnosis_toml(diagnosis).as_bytes())?;
     let predicted = folder.join("predictions");
-    fs::create_dir_all(&predicted).map_err(CommandError::cannot_write(&predicted))?;
+    outputs.folder(&predicted).map_err(CommandError::cannot_write(&predicted))?;
     for (name, table) in predictions(diagnosis) {
-        write(&predicted.join(format!("{name}.csv")), table.as_bytes())?;
+        write(outputs, &predicted.join(format!("{name}.csv")), table.as_bytes())?;
     }
     if !diagnosis.changes_study() {
         return Ok(());
@@ -157,50 +236,61 @@ fn write_diagnosis(
     let text = match home {
         Home::File(study) => repaired(original, diagnosis, &|path| relative_path(folder, study, path)),
         Home::Shipped(shipped) => {
-            copy_data(folder, shipped)?;
+            copy_data((folder, outputs), shipped)?;
             repaired(original, diagnosis, &str::to_owned)
         }
         // A study built in Rust has no text to be repaired.
         Home::Built(_) => return Ok(()),
     };
-    write(&folder.join("repaired.toml"), text.as_bytes())?;
+    write(outputs, &folder.join("repaired.toml"), text.as_bytes())?;
     if export {
-        write(&folder.join("repaired.rs"), source(&text, diagnosis, &folder.display().to_string()).as_bytes())?;
+        write(
+            outputs,
+            &folder.join("repaired.rs"),
+            source(&text, diagnosis, &folder.display().to_string()).as_bytes(),
+        )?;
     }
     Ok(())
 }
 
 /// Writes `study.toml`, the study of a Pareto front with its settings, for `mops pick`.
-fn write_study(folder: &Path, text: &str, settings: &[String], home: &Home) -> Result<(), CommandError> {
+fn write_study(
+    (folder, outputs): (&Path, &Outputs),
+    text: &str,
+    settings: &[String],
+    home: &Home,
+) -> Result<(), CommandError> {
     let text = match home {
         Home::File(study) => settled(text, settings, &|path| relative_path(folder, study, path)),
         Home::Shipped(shipped) => {
-            copy_data(folder, shipped)?;
+            copy_data((folder, outputs), shipped)?;
             settled(text, settings, &str::to_owned)
         }
         Home::Built(_) => return Ok(()),
     };
-    write(&folder.join("study.toml"), text.into_text().as_bytes())
+    write(outputs, &folder.join("study.toml"), text.into_text().as_bytes())
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<(), CommandError> {
-    files::write(path, bytes).map_err(CommandError::cannot_write(path))
+fn write(outputs: &Outputs, path: &Path, bytes: &[u8]) -> Result<(), CommandError> {
+    outputs.write(path, bytes).map_err(CommandError::cannot_write(path))
 }
 
 /// Copies the data of a shipped study into the folder of the repaired study, which reads them there.
-fn copy_data(folder: &Path, shipped: &Shipped) -> Result<(), CommandError> {
+fn copy_data((folder, outputs): (&Path, &Outputs), shipped: &Shipped) -> Result<(), CommandError> {
     let is_data = |name: &str| ["csv", "mat"].iter().any(|end| Path::new(name).extension().is_some_and(|e| e == *end));
     for (name, bytes) in shipped.files.iter().filter(|(name, _)| is_data(name)) {
         let path = folder.join(name);
         let parent = path.parent().unwrap_or(folder);
-        fs::create_dir_all(parent).map_err(CommandError::cannot_write(parent))?;
-        write(&path, bytes)?;
+        if parent != folder {
+            outputs.folder(parent).map_err(CommandError::cannot_write(parent))?;
+        }
+        write(outputs, &path, bytes)?;
     }
     Ok(())
 }
 
 /// Converts the path of a data file from relative to the study to relative to `folder`.
-fn relative_path(folder: &Path, study: &Path, path: &str) -> String {
+pub(super) fn relative_path(folder: &Path, study: &Path, path: &str) -> String {
     if Path::new(path).is_absolute() {
         return path.to_owned();
     }
@@ -225,6 +315,7 @@ fn relative(folder: &Path, file: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use mops_core::Catalogue;
     use mops_core::diagnosis::Removed;
 
     use super::super::study::{StudyArguments, home, open};
@@ -247,7 +338,7 @@ mod tests {
     #[test]
     fn the_repaired_study_of_a_shipped_study_can_be_run_in_its_folder() {
         let catalogue = crate::catalogue();
-        let folder = tempfile::tempdir().unwrap();
+        let (folder, outputs) = (tempfile::tempdir().unwrap(), Outputs::default());
         let arguments = |study: &str| StudyArguments { study: study.into(), settings: Vec::new() };
         let removed = vec![Removed { term: "bp".into(), place: "joint:theta".into() }];
         let mut diagnosis = made_up::coulomb();
@@ -257,7 +348,8 @@ mod tests {
         let file = open(&catalogue, &shipped).unwrap();
         let (text, study, effects) = (file.source.text.as_str(), &file.study, catalogue.effects.as_slice());
         let original = Original { text, settings: &[], study, effects };
-        let result = write_diagnosis(folder.path(), &diagnosis, &original, &home(&catalogue, &shipped), true);
+        let result =
+            write_diagnosis((folder.path(), &outputs), &diagnosis, &original, &home(&catalogue, &shipped), true);
         assert!(result.is_ok());
         for name in ["predictions/swing.csv", "predictions/push.csv", "repaired.rs", "data/upright.csv"] {
             assert!(folder.path().join(name).is_file(), "{name}");
@@ -268,9 +360,13 @@ mod tests {
         let below = folder.path().join("below");
         fs::create_dir(&below).unwrap();
         let own = arguments(folder.path().join("repaired.toml").to_str().unwrap());
-        assert!(write_diagnosis(&below, &diagnosis, &original, &home(&catalogue, &own), false).is_ok());
+        assert!(write_diagnosis((&below, &outputs), &diagnosis, &original, &home(&catalogue, &own), false).is_ok());
         assert!(!below.join("data").exists() && !below.join("repaired.rs").exists());
-        assert!(open(&catalogue, &arguments(below.join("repaired.toml").to_str().unwrap())).is_ok());
+        // No run has its database there.
+        let again = arguments(below.join("repaired.toml").to_str().unwrap());
+        assert!(open(&catalogue, &again).is_err());
+        let reading = Catalogue { readable: vec![folder.path().to_owned()], ..catalogue };
+        assert!(open(&reading, &again).is_ok());
     }
 
     #[test]

@@ -5,12 +5,14 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use mops_core::{Analysis, Catalogue, Diagnostic, Failure, Problem, Quantity, Response, Study, Usage, suggestion};
+use mops_core::{
+    Analysis, Catalogue, Diagnostic, Failure, JobPlan, Problem, Quantity, Response, Study, Usage, suggestion,
+};
 
 use super::families::{folded, runs, spelled};
-use super::study::{StudyArguments, open};
+use super::study::{StudyArguments, home, open, outputs};
 use super::tables::criteria;
-use crate::files;
+use crate::files::{Outputs, write_header};
 use crate::numbers::FileNames;
 use crate::report::{Color, Curve, Plot, points};
 use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
@@ -37,7 +39,9 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    let mut study = open(catalogue, &arguments.study)?.study;
+    let file = open(catalogue, &arguments.study)?;
+    let outputs = outputs(&home(catalogue, &arguments.study), &file);
+    let mut study = file.study;
     study.cancelled_by(&cancel_after(arguments.limit));
     let tuners = values(&study, &arguments.at)?;
     if let Some(case) = &arguments.case {
@@ -50,9 +54,15 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     }
     let problem = Problem::new(Arc::new(study));
     let study = problem.study();
+    let wanted = |case: &str| arguments.case.as_ref().is_none_or(|only| only == case);
+    let (names, mut taken) = names(study, &wanted);
+    if let Some(folder) = &arguments.out {
+        for path in names.iter().flatten().map(|name| folder.join(format!("{name}.csv"))) {
+            outputs.check(&path).map_err(CommandError::cannot_write(&path))?;
+        }
+    }
     let start = problem.evaluate_at(&study.start());
     let here = problem.evaluate_at(&tuners);
-    let wanted = |case: &str| arguments.case.as_ref().is_none_or(|only| only == case);
     let pick = |evaluation| {
         let mut reports = mops_core::criterion_reports(study, evaluation);
         reports.retain(|report| wanted(&report.case));
@@ -66,15 +76,12 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     let of_wanted = |row: usize| wanted(&study.cases()[study.jobs()[study.rows()[row].job].case].name);
     let mut failed = failures().any(|(_, why)| !matches!(why, Failure::Criterion(_)))
         || (0..study.rows().len()).any(|row| of_wanted(row) && lacks(row));
-    let mut names = FileNames::default();
     for (job, why) in criteria {
         print(&format!("no value in case {}: {why}\n", study.cases()[study.jobs()[*job].case].name))?;
     }
     for (job, plan) in study.jobs().iter().enumerate() {
         let (model, case) = (&study.models()[plan.model].0, &study.cases()[plan.case].name);
-        if !wanted(case) {
-            continue;
-        }
+        let Some(name) = &names[job] else { continue };
         match problem.analyse_all(job, &tuners, None) {
             Err(failure) => {
                 failed = true;
@@ -86,9 +93,8 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
             Ok(Analysis::Time(response)) => {
                 print(&format!("\n{model} in case {case}\n\n{}", summary(study, plan.model, &response)))?;
                 if let Some(folder) = &arguments.out {
-                    let run =
-                        Simulated { name: format!("{model}-{case}"), study, model: plan.model, response: &response };
-                    run.write(folder, arguments.samples, &mut names)?;
+                    let run = Simulated { name, study, model: plan.model, response: &response };
+                    run.write((folder, &outputs), arguments.samples, &mut taken)?;
                 }
             }
         }
@@ -169,27 +175,42 @@ fn summary(study: &Study, model: usize, response: &Response) -> String {
     text
 }
 
-/// Simulation with the prefix of its file names.
+/// Returns the names of the CSV files of the wanted simulations, one for every job, and the generator of further names.
+fn names(study: &Study, wanted: &dyn Fn(&str) -> bool) -> (Vec<Option<String>>, FileNames) {
+    let mut names = FileNames::default();
+    let of = |plan: &JobPlan| {
+        let (model, case) = (&study.models()[plan.model].0, &study.cases()[plan.case].name);
+        wanted(case).then(|| names.unique(&format!("{model}-{case}")))
+    };
+    (study.jobs().iter().map(of).collect(), names)
+}
+
+/// Simulation with the name of its CSV file.
 struct Simulated<'a> {
-    name: String,
+    name: &'a str,
     study: &'a Study,
     model: usize,
     response: &'a Response,
 }
 
 impl Simulated<'_> {
-    /// Writes samples and plots, under names that are unique among all simulations.
-    fn write(&self, folder: &Path, samples: u32, names: &mut FileNames) -> Result<(), CommandError> {
+    /// Writes samples and plots; the plots have names that are not `taken`.
+    fn write(
+        &self,
+        (folder, outputs): (&Path, &Outputs),
+        samples: u32,
+        taken: &mut FileNames,
+    ) -> Result<(), CommandError> {
         let Self { name, study, model, response } = self;
         std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
         let end = response.traces.first().map_or(0.0, |(_, trace)| trace.end());
         let times: Vec<f64> = (0..samples).map(|i| end * f64::from(i) / f64::from(samples - 1)).collect();
         let units = &study.models()[*model].1.interface().signals;
         let columns: Vec<Vec<f64>> = response.traces.iter().map(|(_, trace)| trace.sample(&times)).collect();
-        let path = folder.join(names.unique(name) + ".csv");
-        let written = files::write_csv(&path, |writer| {
+        let path = folder.join(format!("{name}.csv"));
+        let written = outputs.write_csv(&path, |writer| {
             let names = response.traces.iter().zip(units).map(|((name, _), s)| format!("{name}[{}]", s.unit));
-            writer.write_record(["t[s]".to_owned()].into_iter().chain(names))?;
+            write_header(writer, ["t[s]".to_owned()].into_iter().chain(names))?;
             for (i, t) in times.iter().enumerate() {
                 writer.write_record([t].into_iter().chain(columns.iter().map(|c| &c[i])).map(f64::to_string))?;
             }
@@ -215,10 +236,10 @@ impl Simulated<'_> {
             };
             let file =
                 if first == last { signal } else { signals[first].split('[').next().unwrap_or_default().to_owned() };
-            let file = names.unique(&format!("{name}-{file}"));
+            let file = taken.unique(&format!("{name}-{file}"));
             let [svg, png] = ["svg", "png"].map(|end| folder.join(format!("{file}.{end}")));
-            files::write(&svg, plot.svg()).map_err(CommandError::cannot_write(&svg))?;
-            plot.write_png(&png).map_err(CommandError::cannot_write(&png))?;
+            outputs.write(&svg, plot.svg()).map_err(CommandError::cannot_write(&svg))?;
+            plot.png().and_then(|bytes| outputs.write(&png, bytes)).map_err(CommandError::cannot_write(&png))?;
         }
         Ok(())
     }

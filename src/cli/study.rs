@@ -5,9 +5,11 @@ use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use mops_core::file::{Folder, StudyFile};
+use mops_core::file::StudyFile;
 use mops_core::{BuiltStudy, Catalogue, CatalogueStudy, Diagnostic, Shipped, Source, StudyFolder, suggestion};
 
+use super::reading;
+use crate::files::{Inputs, Outputs};
 use crate::toml_text::quoted;
 
 /// Study and settings that override it.
@@ -41,6 +43,15 @@ pub(super) fn home(catalogue: &Catalogue, arguments: &StudyArguments) -> Home {
 }
 
 impl Home {
+    /// Returns the location as a database records it: an absolute path, or the name of a study of the catalogue.
+    pub(super) fn recorded(&self) -> PathBuf {
+        match self {
+            Self::Shipped(shipped) => PathBuf::from(shipped.name),
+            Self::Built(built) => PathBuf::from(built.name()),
+            Self::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
+        }
+    }
+
     /// Returns the location of a study of the catalogue.
     fn of(known: &CatalogueStudy) -> Self {
         match known {
@@ -50,6 +61,23 @@ impl Home {
             other => unreachable!("`{}` is an unknown sort of study", other.name()),
         }
     }
+}
+
+/// Returns the writer of a command that reads this study: it replaces neither the study nor its data.
+pub(super) fn outputs(home: &Home, file: &StudyFile) -> Outputs {
+    Outputs::besides(inputs(home, file))
+}
+
+/// Returns the files that a study consists of; those in the program need no protection.
+pub(super) fn inputs(home: &Home, file: &StudyFile) -> Inputs {
+    let mut inputs = Inputs::default();
+    if let Home::File(path) = home {
+        inputs.add(path, "the study");
+        for (name, _) in &file.data {
+            inputs.add(&path.with_file_name("").join(name), &format!("the data file `{name}` of the study"));
+        }
+    }
+    inputs
 }
 
 /// Reads and checks a study.
@@ -86,8 +114,7 @@ pub(super) fn open_as(
     };
     let bytes = read_text(&path).map_err(|error| no_study(catalogue, study, &error))?;
     let source = Source::from_bytes(&path.display().to_string(), bytes)?;
-    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    mops_core::file::read(catalogue, &source.name, &source.text, settings, &Folder(folder))
+    mops_core::file::read(catalogue, &source.name, &source.text, settings, &reading::folder(catalogue, &path))
 }
 
 /// Returns the text of a file of a shipped study or of a study folder.
@@ -174,8 +201,7 @@ pub(super) fn read_at(
         }
         _ => {}
     }
-    let folder = home.parent().unwrap_or(Path::new("")).to_owned();
-    mops_core::file::read(catalogue, &name, text, settings, &Folder(folder))
+    mops_core::file::read(catalogue, &name, text, settings, &reading::folder(catalogue, home))
 }
 
 /// Returns the text of a study file without the settings of the command line that were appended to it.

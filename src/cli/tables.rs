@@ -165,6 +165,7 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
     let stop = match outcome.stop {
         Stop::Converged => "converged",
         Stop::Budget => "stopped at the budget",
+        Stop::TimeLimit => "stopped at the time limit",
         Stop::Stalled => "stalled",
         Stop::Interrupted => "interrupted",
     };

@@ -2,6 +2,7 @@
 
 use mops_core::diagnosis::{Diagnosis, Prediction};
 
+use crate::files::write_header;
 use crate::numbers::{FileNames, significant};
 
 /// Returns NAME and content of `predictions/NAME.csv` for every experiment: the time, then a column per measured output.
@@ -16,8 +17,8 @@ pub(crate) fn predictions(diagnosis: &Diagnosis) -> Vec<(String, String)> {
 fn table(channels: &[Prediction]) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let header = channels.iter().map(|c| format!("{}[{}]", c.signal, if c.unit.is_empty() { "1" } else { &c.unit }));
+    write_header(&mut writer, std::iter::once("t[s]".to_owned()).chain(header)).expect("memory can be written to");
     let mut write = |row: Vec<String>| writer.write_record(row).expect("memory can be written to");
-    write(std::iter::once("t[s]".to_owned()).chain(header).collect());
     // N.B.: channels from one file have bitwise equal times.
     let mut next = vec![0; channels.len()];
     for &time in &channels[0].times {

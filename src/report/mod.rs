@@ -40,13 +40,12 @@ mod tuners;
 mod uncertainty;
 mod verdict;
 
-use std::fs;
 use std::io;
 use std::path::Path;
 
 use mops_core::{Evaluation, Outcome, Problem, Record, Stop, Task};
 
-use crate::files;
+use crate::files::Outputs;
 use crate::numbers::FileNames;
 
 pub(crate) use bode::{FrequencyCurve, bode};
@@ -85,8 +84,14 @@ impl Report<'_> {
     /// # Errors
     /// If a file cannot be written.
     pub fn write(&self, folder: &Path) -> io::Result<()> {
+        self.write_by(folder, &Outputs::default()).map(|_| ())
+    }
+
+    /// Writes as [`Report::write`], but no file that is an input of the command. Returns the number of plots that were not written,
+    /// as the run was asked to stop; it is asked before every plot.
+    pub(crate) fn write_by(&self, folder: &Path, outputs: &Outputs) -> io::Result<usize> {
         let plots = folder.join("plots");
-        fs::create_dir_all(&plots)?;
+        outputs.folder(&plots)?;
         let (responses, omitted) = responses::groups(self);
         let convergence = self.searched().then(|| convergence::group(self.problem.study(), self.archive));
         let front = front::group(self);
@@ -119,14 +124,20 @@ impl Report<'_> {
         let figures = groups.flat_map(|group| &group.figures).filter(|figure| figure.on_request.is_none());
         let figures = figures.flat_map(|figure| &figure.plots);
         let all: Vec<(String, &Plot)> = figures.map(|(name, plot)| (names.unique(name), plot)).collect();
-        let earlier = PlotFiles::of(&plots);
+        let earlier = PlotFiles::of(&plots, outputs);
         earlier.note(all.iter().map(|(name, _)| name.as_str()))?;
-        for (name, plot) in &all {
-            files::write(&plots.join(format!("{name}.svg")), plot.svg())?;
-            plot.write_png(&plots.join(format!("{name}.png")))?;
+        let mut missing = 0;
+        for (i, (name, plot)) in all.iter().enumerate() {
+            if self.problem.is_cancelled() {
+                missing = all.len() - i;
+                break;
+            }
+            outputs.write(&plots.join(format!("{name}.svg")), plot.svg())?;
+            outputs.write(&plots.join(format!("{name}.png")), plot.png()?)?;
         }
-        earlier.remove_others(all.iter().map(|(name, _)| name.as_str()))?;
-        files::write(&folder.join("report.html"), page::of(self, &sections).into_string())
+        earlier.remove_others(all.iter().take(all.len() - missing).map(|(name, _)| name.as_str()))?;
+        outputs.write(&folder.join("report.html"), page::of(self, &sections).into_string())?;
+        Ok(missing)
     }
 
     /// Returns true if the result is that of a single search, so that its convergence can be plotted.

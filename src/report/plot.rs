@@ -1,7 +1,6 @@
 //! Plots: curves, levels, bands and surfaces, drawn as SVG and as PNG.
 
 use std::io;
-use std::path::Path;
 
 use mops_core::Side;
 
@@ -186,12 +185,12 @@ impl Plot {
         svg::document(&Scene::of(self), &self.title, &self.description())
     }
 
-    /// Writes the plot as a PNG, with two pixels per unit of the SVG.
+    /// Returns the plot as a PNG file, with two pixels per unit of the SVG.
     ///
     /// # Errors
-    /// If the file cannot be written.
-    pub fn write_png(&self, path: &Path) -> io::Result<()> {
-        png::write(&Scene::of(self), path)
+    /// If a mark cannot be drawn.
+    pub fn png(&self) -> io::Result<Vec<u8>> {
+        png::document(&Scene::of(self))
     }
 
     /// Returns the curves that are not hidden.

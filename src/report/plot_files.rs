@@ -6,26 +6,27 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::files;
+use crate::files::{self, Outputs};
 use crate::numbers::file_name;
 
 /// File that lists the plots of a folder, one name without extension per line.
 const LIST: &str = ".pictures";
 
 /// Plot files of an earlier report.
-pub(super) struct PlotFiles {
+pub(super) struct PlotFiles<'o> {
     folder: PathBuf,
+    outputs: &'o Outputs,
     names: BTreeSet<String>,
 }
 
-impl PlotFiles {
+impl<'o> PlotFiles<'o> {
     /// Reads the list of a folder; empty without a list.
-    pub(super) fn of(folder: &Path) -> Self {
+    pub(super) fn of(folder: &Path, outputs: &'o Outputs) -> Self {
         let list = files::read(&folder.join(LIST)).unwrap_or_default();
         let list = String::from_utf8_lossy(&list);
         // A name that leads out of the folder is not ours.
         let names = list.lines().filter(|name| file_name(name) == **name).map(str::to_owned).collect();
-        Self { folder: folder.to_owned(), names }
+        Self { folder: folder.to_owned(), outputs, names }
     }
 
     /// Adds names to the list before the files are written, so that an interruption leaves no unlisted file.
@@ -39,12 +40,14 @@ impl PlotFiles {
     /// Removes the earlier files that are not among `names`.
     ///
     /// # Errors
-    /// If a file cannot be removed, or the list cannot be written.
+    /// If a file cannot be removed or is an input, or the list cannot be written.
     pub(super) fn remove_others<'n>(&self, names: impl Iterator<Item = &'n str>) -> io::Result<()> {
         let names: BTreeSet<&str> = names.collect();
         for name in self.names.iter().filter(|name| !names.contains(name.as_str())) {
             for end in ["svg", "png"] {
-                match fs::remove_file(self.folder.join(format!("{name}.{end}"))) {
+                let path = self.folder.join(format!("{name}.{end}"));
+                self.outputs.check(&path)?;
+                match fs::remove_file(path) {
                     Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
                     _ => {}
                 }
@@ -55,7 +58,7 @@ impl PlotFiles {
 
     fn write(&self, names: BTreeSet<&str>) -> io::Result<()> {
         let list: String = names.iter().map(|name| format!("{name}\n")).collect();
-        files::write(&self.folder.join(LIST), list)
+        self.outputs.write(&self.folder.join(LIST), list)
     }
 }
 
@@ -65,12 +68,12 @@ mod tests {
 
     #[test]
     fn plots_of_an_earlier_report_are_removed_and_other_files_stay() {
-        let folder = tempfile::tempdir().unwrap();
+        let (folder, outputs) = (tempfile::tempdir().unwrap(), Outputs::default());
         let (plots, at) = (folder.path().join("plots"), |name: &str| folder.path().join("plots").join(name));
         fs::create_dir(&plots).unwrap();
         fs::write(folder.path().join("outside.svg"), "").unwrap();
         let draw = |names: &[&str]| {
-            let earlier = PlotFiles::of(&plots);
+            let earlier = PlotFiles::of(&plots, &outputs);
             earlier.note(names.iter().copied()).unwrap();
             for name in names {
                 ["svg", "png"].iter().for_each(|end| fs::write(at(&format!("{name}.{end}")), "").unwrap());
@@ -92,7 +95,7 @@ mod tests {
             assert_eq!(at(name).exists(), exists, "{name}");
         }
         // The next report removes the files of one that was killed.
-        PlotFiles::of(&plots).note(["d"].into_iter()).unwrap();
+        PlotFiles::of(&plots, &outputs).note(["d"].into_iter()).unwrap();
         fs::write(at("d.svg"), "").unwrap();
         fs::write(at(LIST), fs::read_to_string(at(LIST)).unwrap() + "../outside\n/etc/passwd\n").unwrap();
         draw(&["c"]);

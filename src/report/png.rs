@@ -1,8 +1,6 @@
 //! Scene as a PNG: strokes with anti-aliasing by distance, letters in the bundled font, so that no system font is needed.
 
-use std::fs::File;
-use std::io::{self, BufWriter};
-use std::path::Path;
+use std::io;
 use std::sync::Once;
 
 use plotters::backend::{BitMapBackend, DrawingBackend};
@@ -13,7 +11,6 @@ use super::clip::{Point, distance};
 use super::plot::Color;
 use super::scene::{Anchor, Mark, SIZE, Scene};
 use super::svg::rgb;
-use crate::files;
 use mops_core::math;
 
 /// Pixels per unit of the scene.
@@ -22,8 +19,8 @@ const FONT: &str = "DejaVu Sans";
 /// Line height of DejaVu Sans (ascender to descender), which plotters calls the size of a font, in units of the em.
 const LINE: f64 = 1.164;
 
-/// Writes the scene into a file.
-pub(super) fn write(scene: &Scene, path: &Path) -> io::Result<()> {
+/// Returns the bytes of the file.
+pub(super) fn document(scene: &Scene) -> io::Result<Vec<u8>> {
     static FONT_ONCE: Once = Once::new();
     FONT_ONCE.call_once(|| {
         // Fails only if the bytes are not a font.
@@ -38,14 +35,14 @@ pub(super) fn write(scene: &Scene, path: &Path) -> io::Result<()> {
     }
     paper.present().map_err(failed)?;
     drop(paper);
-    files::make(path, |path| {
-        let mut encoder = png::Encoder::new(BufWriter::new(File::create(path)?), width, height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        let mut image = encoder.write_header()?;
-        image.write_image_data(&pixels)?;
-        Ok(image.finish()?)
-    })
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    let mut image = encoder.write_header()?;
+    image.write_image_data(&pixels)?;
+    image.finish()?;
+    Ok(bytes)
 }
 
 fn failed(error: impl std::error::Error) -> io::Error {

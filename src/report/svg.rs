@@ -8,16 +8,17 @@ use super::clip::Point;
 use super::plot::Color;
 use super::scene::{Anchor, Mark, SIZE, Scene};
 use super::space::View;
+use crate::plain::plain;
 
 /// Returns the document, with a title and a description for screen readers.
 pub(super) fn document(scene: &Scene, title: &str, description: &str) -> String {
     let [width, height] = SIZE;
     let markup = html! {
         svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox={ "0 0 " (width) " " (height) } width=(width)
-            height=(height) data-view=[view(scene)] role="img" aria-label=(title) font-family="DejaVu Sans, Verdana, Arial, sans-serif"
+            height=(height) data-view=[view(scene)] role="img" aria-label=(plain(title)) font-family="DejaVu Sans, Verdana, Arial, sans-serif"
             stroke-linecap="round" stroke-linejoin="round" {
-            title { (title) }
-            desc { (description) }
+            title { (plain(title)) }
+            desc { (plain(description)) }
             rect class="paper" width=(width) height=(height) fill="#ffffff" {}
             @for mark in &scene.marks { (element(mark)) }
         }
@@ -79,7 +80,7 @@ fn element(mark: &Mark) -> Markup {
                 Anchor::End => "end",
             };
             html! {
-                text class=(class(*color)) transform=(place) text-anchor=(anchor) font-size=(size) fill=(hex(*color)) { (text) }
+                text class=(class(*color)) transform=(place) text-anchor=(anchor) font-size=(size) fill=(hex(*color)) { (plain(text)) }
             }
         }
     }

@@ -208,8 +208,7 @@ fn empty_and_constant_plots_are_drawn() {
                 svg.starts_with("<svg") && !svg.contains("NaN") && !svg.contains("inf\""),
                 "{values:?} {log_y} {svg}"
             );
-            let folder = tempfile::tempdir().unwrap();
-            plot.write_png(&folder.path().join("plot.png")).unwrap();
+            assert!(plot.png().unwrap().starts_with(b"\x89PNG"));
         }
     }
     assert_eq!(numbers::labelled("y", "1"), "y");
@@ -242,4 +241,18 @@ fn a_z_axis_keeps_the_points_that_a_page_rotates() {
     assert_eq!(svg.matches("class=\"dot\" data-point=\"0\"").count(), 2);
     let of_all_signs = |sign: f64| svg.contains(&format!("data-space=\"{sign:.4} {sign:.4} {sign:.4}\""));
     assert!(of_all_signs(-1.0) && of_all_signs(1.0), "the ends of the ranges lie in opposite corners: {svg}");
+}
+
+#[test]
+fn control_characters_never_make_an_svg_invalid() {
+    let odd: String = (0..0x20).chain([0x7f, 0x85, 0x202e, 0xfffe, 0xffff]).filter_map(char::from_u32).collect();
+    let curves = vec![Curve { name: odd.clone(), points: vec![(0.0, 1.0), (1.0, 2.0)], ..Curve::default() }];
+    let levels = vec![Level { name: odd.clone(), value: 1.5 }];
+    let (title, x_label, y_label) = (odd.clone(), odd.clone(), odd);
+    let svg = Plot { title, x_label, y_label, curves, levels, ..Plot::default() }.svg();
+    // XML 1.0, section 2.2.
+    let is_valid =
+        |c: char| matches!(c, '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..);
+    assert!(svg.chars().all(is_valid), "{svg}");
+    assert!(svg.contains("\\u{1}") && svg.contains("\\u{ffff}"));
 }

@@ -58,7 +58,7 @@ fn solved(report: &Report<'_>) -> (Tone, String) {
                 let doubts =
                     points.filter_map(|(i, point)| Some(format!("Point {}: {} ", i + 1, point.doubt.as_ref()?)));
                 let doubts: String = doubts.collect();
-                let is_cut_off = matches!(outcome.stop, Stop::Budget | Stop::Interrupted);
+                let is_cut_off = matches!(outcome.stop, Stop::Budget | Stop::TimeLimit | Stop::Interrupted);
                 let tone = if is_cut_off || !doubts.is_empty() { Tone::Mixed } else { Tone::Good };
                 (tone, doubts + words)
             }
@@ -231,6 +231,7 @@ pub(super) fn stop(outcome: &Outcome) -> &'static str {
         Stop::Converged if outcome.solver == "none" => "Not solved: the initial guess was evaluated",
         Stop::Converged => "Converged (solver tolerance reached)",
         Stop::Budget => "Budget exhausted; a larger budget may find a better point",
+        Stop::TimeLimit => "Time limit reached; more time (--resume) may find a better point",
         Stop::Stalled => "Stalled: no further improvement found, convergence not reached",
         Stop::Interrupted => "Interrupted by the user",
     }

@@ -29,7 +29,7 @@ impl Model for Watched {
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
         // The simulation at whose end the request comes has an answer, for which the criteria come too late.
         if self.simulations.fetch_add(1, Ordering::Relaxed) == self.last {
-            self.cancellation.request(Halt::Budget);
+            self.cancellation.request(Halt::TimeLimit);
         } else if job.case.cancellation.requested().is_some() {
             return Err(Failure::Cancelled);
         }
@@ -110,7 +110,7 @@ fn what_is_cut_off_is_no_evaluation_no_failure_and_kept_nowhere() {
                 let what = format!("{kind}, {last} of {cases}: {:?} after {}", outcome.stop, outcome.evaluations);
                 // A start that was cut off is simulated once more, to have something to report.
                 let most = last.max(cases) / cases;
-                assert!(outcome.stop == Stop::Budget && (1..=most).contains(&outcome.evaluations), "{what}");
+                assert!(outcome.stop == Stop::TimeLimit && (1..=most).contains(&outcome.evaluations), "{what}");
                 assert!(outcome.failures.is_empty() && solved.best.scaled.is_some(), "{what}: {:?}", outcome.failures);
                 assert!(solved.archive.iter().all(|record| record.merit.objective.is_finite()), "{what}");
                 let told = told.0.lock().unwrap();
@@ -130,6 +130,6 @@ fn a_conclusion_that_is_ended_too_reports_what_is_known() {
         let solver = mops_solvers::kinds().into_iter().find(|kind| kind.name == "genetic").unwrap().default_choice();
         let solved = solve(study, &Options { solver, cancellation, ..Options::default() }, &()).unwrap();
         assert_eq!((solved.best.scaled.is_some(), solved.outcome.evaluations > 0), (known, known));
-        assert!(solved.outcome.failures.is_empty() && solved.outcome.stop == Stop::Budget);
+        assert!(solved.outcome.failures.is_empty() && solved.outcome.stop == Stop::TimeLimit);
     }
 }

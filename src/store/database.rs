@@ -23,7 +23,7 @@ CREATE TABLE runs (
     id INTEGER PRIMARY KEY,
     begun INTEGER NOT NULL,            -- seconds since 1970-01-01 UTC
     ended INTEGER,                     -- seconds since 1970-01-01 UTC; NULL while it runs, or after a kill
-    state TEXT NOT NULL,               -- running, converged, budget, stalled, interrupted
+    state TEXT NOT NULL,               -- running, converged, budget, time-limit, stalled, interrupted
     mops TEXT NOT NULL,                -- version of the program
     command TEXT NOT NULL,             -- command line
     home TEXT NOT NULL,                -- the study file, or the name of a shipped study
@@ -100,6 +100,10 @@ impl Database {
     }
 
     fn read(path: &Path, writes: bool) -> rusqlite::Result<Option<Self>> {
+        // A pipe would be waited for, and a device may have no end.
+        if fs::metadata(path).is_ok_and(|file| !file.is_file()) {
+            return Ok(None);
+        }
         let mode = if writes { OpenFlags::SQLITE_OPEN_READ_WRITE } else { OpenFlags::SQLITE_OPEN_READ_ONLY };
         let connection = Connection::open_with_flags(path, mode | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
         connection.busy_timeout(WAITS)?;
@@ -258,6 +262,19 @@ pub(super) const WAITS: Duration = Duration::from_secs(5);
 pub(super) fn is_temporary(error: &rusqlite::Error) -> bool {
     let passing = [ErrorCode::DatabaseBusy, ErrorCode::DatabaseLocked, ErrorCode::DiskFull];
     error.sqlite_error_code().is_some_and(|code| passing.contains(&code))
+}
+
+/// Returns true for an error that says nothing about the content of a database: of the disk, of its permissions, or temporary.
+pub(super) fn is_of_machine(error: &rusqlite::Error) -> bool {
+    let of_machine = [
+        ErrorCode::SystemIoFailure,
+        ErrorCode::PermissionDenied,
+        ErrorCode::ReadOnly,
+        ErrorCode::CannotOpen,
+        ErrorCode::OutOfMemory,
+        ErrorCode::FileLockingProtocolFailed,
+    ];
+    is_temporary(error) || error.sqlite_error_code().is_some_and(|code| of_machine.contains(&code))
 }
 
 /// Creates the tables.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::runs::{RunRow, RunState};
-use crate::files;
+use crate::files::{self, Outputs};
 
 /// End of a run, for the row with the same start time.
 #[derive(Serialize, Deserialize)]
@@ -26,7 +26,8 @@ impl Ending {
     pub(super) fn note(folder: &Path, started: i64, state: RunState, evaluations: usize) {
         let ending = Self { started, state: state.name().to_owned(), evaluations };
         let text = serde_json::to_string(&ending).expect("numbers and words are JSON") + "\n";
-        let _ = files::write(&Self::path(folder), text);
+        // A run that reads this file is refused before it starts.
+        let _ = Outputs::default().write(&Self::path(folder), text);
     }
 
     /// Completes the row of the last run from the note, if there is one.

@@ -70,22 +70,30 @@ impl FolderLock {
 
     /// Returns true if a run has locked the folder.
     pub fn is_locked(folder: &Path) -> bool {
-        let file = OpenOptions::new().read(true).open(folder.join(FILE));
-        file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+        let path = folder.join(FILE);
+        // To open a pipe would wait for its writer.
+        let file = fs::symlink_metadata(&path).ok().filter(fs::Metadata::is_file).map(|_| File::open(&path));
+        file.is_some_and(|file| file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))))
     }
 }
 
-/// Opens or creates the lock file; a symbolic link of its name is not followed to create a file elsewhere.
+/// Opens or creates the lock file. A symbolic link of its name is replaced; a pipe, which would be waited for, is refused.
 fn open(path: &Path) -> io::Result<File> {
     loop {
         match OpenOptions::new().write(true).create_new(true).open(path) {
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
             created => return created,
         }
-        match OpenOptions::new().write(true).open(path) {
-            // The file was removed in between.
-            Err(error) if error.kind() == ErrorKind::NotFound && !path.is_symlink() => {}
-            opened => return opened,
+        match fs::symlink_metadata(path) {
+            Ok(entry) if entry.is_symlink() => fs::remove_file(path)?,
+            Ok(entry) if !entry.is_file() => {
+                return Err(io::Error::new(ErrorKind::InvalidInput, format!("{} is not a file", path.display())));
+            }
+            _ => match OpenOptions::new().write(true).open(path) {
+                // The file was removed in between.
+                Err(error) if error.kind() == ErrorKind::NotFound => {}
+                opened => return opened,
+            },
         }
     }
 }

@@ -13,7 +13,7 @@ use mops_core::{Cancellation, Diagnostic, Problem, Store, Study, Watch};
 use rusqlite::ErrorCode;
 
 use super::best::best;
-use super::database::{Database, Points, Slopes, is_temporary};
+use super::database::{Database, Points, Slopes, is_of_machine, is_temporary};
 use super::ending::Ending;
 use super::identity::Identity;
 use super::lock::FolderLock;
@@ -388,6 +388,11 @@ fn stored_identity(database: &Database, folder: &Path) -> Result<Identity, OpenE
 
 fn open_database(folder: &Path, writes: bool) -> Result<Database, OpenError> {
     let path = file(folder);
+    if writes && path.is_symlink() {
+        return Err(Diagnostic::new(format!("{} is a symbolic link, which a run does not follow", path.display()))
+            .with_help("copy the database to its place, or choose its folder with --out")
+            .into());
+    }
     Database::open(&path, writes).map_err(|error| database_error(folder, &error))?.ok_or_else(|| {
         Diagnostic::new(format!("{} is not a database of this version of mops", path.display()))
             .with_help("choose another folder with --out")
@@ -404,5 +409,12 @@ fn database_error(folder: &Path, error: &rusqlite::Error) -> OpenError {
         let fact = format!("{} is locked by another program", file(folder).display());
         return Diagnostic::new(fact).with_help("close it there, or choose another folder with --out").into();
     }
-    OpenError::Failure(format!("{}: {error}", file(folder).display()))
+    let shown = file(folder);
+    let shown = shown.display();
+    if is_of_machine(error) {
+        return OpenError::Failure(format!("{shown}: {error}"));
+    }
+    Diagnostic::new(format!("{shown} is damaged: {error}"))
+        .with_help("a run without --resume begins anew, and renames the damaged file")
+        .into()
 }

@@ -55,6 +55,9 @@ impl Database {
     /// Returns true if the database contains no run. Earlier versions created the database in several steps and left such a
     /// file when killed at the start.
     pub(super) fn is_blank(path: &Path) -> bool {
+        if fs::symlink_metadata(path).is_ok_and(|entry| !entry.is_file()) {
+            return false;
+        }
         let count = |connection: &Connection, sql: &str| connection.query_row(sql, [], |row| row.get::<_, i64>(0));
         let Ok(connection) = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE) else { return false };
         match count(&connection, "SELECT count(*) FROM sqlite_schema") {

@@ -8,7 +8,7 @@ use std::time::Duration;
 use mops_core::Diagnostic;
 use rusqlite::{Connection, OpenFlags};
 
-use super::database::{Database, is_temporary};
+use super::database::{Database, is_of_machine, is_temporary};
 use super::file;
 use super::recorder::OpenError;
 use super::relocate::with_companions;
@@ -21,10 +21,17 @@ use super::runs::RunState;
 /// (<https://sqlite.org/howtocorrupt.html>, section 1.4).
 pub(super) fn make_room(folder: &Path) -> Result<Option<String>, OpenError> {
     let path = file(folder);
-    if fs::symlink_metadata(&path).is_err() {
+    let Ok(entry) = fs::symlink_metadata(&path) else {
         // SQLite would read the leftover log of a removed database as part of the new one.
         set_aside(folder)?;
         return Ok(None);
+    };
+    let renamed = |fact: &str| {
+        let aside = set_aside(folder)?;
+        Ok(Some(format!("{} {fact}; renamed to {}", path.display(), aside.display())))
+    };
+    if !entry.is_file() {
+        return renamed("is not a database of this version of mops");
     }
     let in_use = |what: &str| {
         OpenError::Mistake(
@@ -44,9 +51,7 @@ pub(super) fn make_room(folder: &Path) -> Result<Option<String>, OpenError> {
         if !is_alone(&path) {
             return Err(in_use("cannot be renamed; it is not a database of this version of mops"));
         }
-        let aside = set_aside(folder)?;
-        let aside = aside.display();
-        return Ok(Some(format!("{} is not a database of this version of mops; renamed to {aside}", path.display())));
+        return renamed("is not a database of this version of mops");
     };
     let gathered = old.gather();
     let (run, count) = (old.last_run(), old.count());
@@ -54,7 +59,9 @@ pub(super) fn make_room(folder: &Path) -> Result<Option<String>, OpenError> {
     match gathered {
         Ok(true) => {}
         Ok(false) => return Err(in_use("cannot be replaced")),
-        Err(error) => return Err(OpenError::Failure(format!("{}: {error}", path.display()))),
+        Err(error) if is_of_machine(&error) => return Err(OpenError::Failure(format!("{}: {error}", path.display()))),
+        Err(_) if !is_alone(&path) => return Err(in_use("cannot be renamed; it is damaged")),
+        Err(_) => return renamed("is damaged"),
     }
     let unfinished = match (run, count) {
         (_, Ok(0)) => None,

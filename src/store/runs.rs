@@ -19,8 +19,10 @@ pub(crate) enum RunState {
     Running,
     /// Converged.
     Converged,
-    /// Budget spent.
+    /// Budget of evaluations spent.
     Budget,
+    /// Time limit reached.
+    TimeLimit,
     /// No further improvement.
     Stalled,
     /// Stopped by the user.
@@ -28,10 +30,11 @@ pub(crate) enum RunState {
 }
 
 impl RunState {
-    const ALL: [(Self, &'static str); 5] = [
+    const ALL: [(Self, &'static str); 6] = [
         (Self::Running, "running"),
         (Self::Converged, "converged"),
         (Self::Budget, "budget"),
+        (Self::TimeLimit, "time-limit"),
         (Self::Stalled, "stalled"),
         (Self::Interrupted, "interrupted"),
     ];

@@ -21,7 +21,8 @@ const BESIDE: f64 = 1e-3;
 pub(super) fn add(solved: &mut Solved, study: Study, options: &Options, watch: &dyn Watch) {
     let spent = solved.outcome.evaluations;
     let budget = (spent / SHARE).min(options.max_evaluations.saturating_sub(spent));
-    if watch.wants_stop() || solved.outcome.stop == Stop::Interrupted || solved.best.scaled.is_none() {
+    let is_cut_off = matches!(solved.outcome.stop, Stop::Interrupted | Stop::TimeLimit);
+    if watch.wants_stop() || is_cut_off || solved.best.scaled.is_none() {
         return;
     }
     watch.stage("looking for jumps near the design", 0.0);

@@ -17,7 +17,9 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     let started = Instant::now();
     // The rest of the budget is for the certificates.
     let searched = options.max_evaluations - options.max_evaluations / CERTIFICATES;
-    let limits = Limits { planned: searched, searched, all: options.max_evaluations };
+    // Half of it is for the checks of the nearest point, the other half for those of every point.
+    let all = searched + (options.max_evaluations - searched) / 2;
+    let limits = Limits { planned: searched, searched, all };
     let mut solved = search_within(limits, study, options, watch)?;
     let problem = &solved.problem;
     // The points of the certificates are not part of the observed search.
@@ -98,6 +100,7 @@ fn missing_points(problem: &Problem, outcome: &Outcome, found: usize) -> Option<
     let why = match outcome.stop {
         _ if found >= asked => return None,
         Stop::Budget => "the budget was spent before; raise --max-evaluations",
+        Stop::TimeLimit => "the time limit was reached before; raise --time-limit, or continue the run (--resume)",
         Stop::Interrupted => "the search was interrupted; continue it (--resume)",
         Stop::Converged | Stop::Stalled => {
             "every further search ended at one of these points, or in a gap of the front"
@@ -124,6 +127,7 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs, stop: Stop) 
         ends.collect::<Vec<_>>().join(", "),
         match stop {
             Stop::Budget => " The search was cut off by the budget: other points may dominate these.",
+            Stop::TimeLimit => " The search was cut off by the time limit: other points may dominate these.",
             Stop::Interrupted => " The search was interrupted: other points may dominate these.",
             Stop::Converged | Stop::Stalled => "",
         }

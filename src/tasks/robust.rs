@@ -328,6 +328,7 @@ enum End {
     CutOff,
     Interrupted,
     Budget,
+    TimeLimit,
     Rounds,
 }
 
@@ -336,6 +337,7 @@ impl End {
         match stop {
             Stop::Interrupted => Self::Interrupted,
             Stop::Budget => Self::Budget,
+            Stop::TimeLimit => Self::TimeLimit,
             Stop::Converged | Stop::Stalled => Self::Rounds,
         }
     }
@@ -357,6 +359,7 @@ fn words(report: &RobustReport, over_all: f64, end: End) -> Vec<String> {
         (false, End::CutOff) => format!("{still}, and the search for worst cases of the last round was cut off"),
         (false, End::Interrupted) => format!("interrupted while {still}"),
         (false, End::Budget) => format!("the budget was spent while {still}"),
+        (false, End::TimeLimit) => format!("the time limit was reached while {still}"),
         (false, End::Rounds) => format!("{still} after {after}"),
     };
     let were = if added == 1 { "was" } else { "were" };

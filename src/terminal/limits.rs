@@ -65,7 +65,7 @@ fn wait(limit: Limit, cancellation: &Cancellation) {
     let on_timeout = cancellation.clone();
     let _ = thread::Builder::new().spawn(move || {
         thread::sleep(limit);
-        on_timeout.request(Halt::Budget);
+        on_timeout.request(Halt::TimeLimit);
         insist(&on_timeout, limit);
     });
 }

@@ -14,6 +14,8 @@ use std::process::ExitCode;
 
 use mops_core::Diagnostic;
 
+use crate::files::Overwrites;
+
 pub use date::date;
 pub(crate) use limits::{Limit, cancel_after, cancel_on_signal, exit_after};
 pub(crate) use panics::show_each_panic_once;
@@ -39,10 +41,13 @@ impl From<Diagnostic> for CommandError {
 }
 
 impl CommandError {
-    /// Returns a conversion of write errors at `path`, for `map_err`.
+    /// Returns a conversion of write errors at `path`, for `map_err`. To overwrite an input is a mistake of the user.
     pub fn cannot_write(path: &Path) -> impl FnOnce(std::io::Error) -> Self + use<> {
         let path: PathBuf = path.to_owned();
-        move |error| Self::Failure(format!("cannot write {}: {error}", path.display()))
+        move |error| match error.get_ref().and_then(|error| error.downcast_ref::<Overwrites>()) {
+            Some(refusal) => Diagnostic::new(refusal.to_string()).with_help("write to another place with --out").into(),
+            None => Self::Failure(format!("cannot write {}: {error}", path.display())),
+        }
     }
 
     /// Writes the error to standard error, a mistake with its source line, and returns the exit status.

@@ -328,7 +328,17 @@ impl<'d> Lowering<'d> {
         self.depth += 1;
         let found = self.form(text, node, kinks);
         self.depth -= 1;
-        found
+        let found = found?;
+        match self.graph.constant(found.rest).filter(|value| !value.is_finite()) {
+            None => Ok(found),
+            Some(value) => {
+                let what = if value.is_nan() { "not a number" } else { "infinite" };
+                let mistake = StudyError::here(format!("this constant is {what}"));
+                let mistake =
+                    mistake.with_help("correct it; its value does not depend on the state, the time or a parameter");
+                Err(under(&text.path, mistake.at(node.span.clone())))
+            }
+        }
     }
 
     fn form(&mut self, text: &Text, node: &Node, kinks: Kinks) -> Result<Affine, StudyError> {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::data::{DataFile, Files};
+use mops_core::data::{DataFile, Files, OutsideFolder};
 use mops_core::expression::{Comparison, Equation, Form, Function, Node, Operator, unknown_function};
 use mops_core::{Quantity, StudyError, Unit};
 
@@ -255,8 +255,11 @@ fn coherent(unit: &Unit) -> Unit {
 fn open(path: &str, files: &dyn Files) -> Result<DataFile, StudyError> {
     let shown = files.show(path);
     let bytes = files.read(path).map_err(|error| {
-        StudyError::new("file", format!("the data file `{shown}` cannot be read: {error}"))
-            .with_help("paths are relative to the folder of the study file")
+        let help = match OutsideFolder::is_reason_of(&error) {
+            true => OutsideFolder::HELP,
+            false => "paths are relative to the folder of the study file",
+        };
+        StudyError::new("file", format!("the data file `{shown}` cannot be read: {error}")).with_help(help)
     })?;
     DataFile::parse(&shown, bytes).map_err(|diagnostic| {
         let mistake = StudyError::new("file", format!("in `{shown}`: {}", diagnostic.message));

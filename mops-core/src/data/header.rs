@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::csv::{cells, first_line, is_value, number, refuse_long_quotes, separator};
+use super::formulas::from_text;
 use crate::diagnostic::{Diagnostic, Source};
 use crate::unit::Unit;
 
@@ -90,7 +91,8 @@ fn unquoted(cell: &str) -> String {
 /// Splits a cell of the header into name and unit; an unnamed column gets its number as name.
 fn name_and_unit(cell: &str, k: usize) -> (String, Option<String>) {
     let cell = unquoted(cell);
-    let (name, unit) = label(&cell).unwrap_or((&cell, ""));
+    let cell = from_text(&cell);
+    let (name, unit) = label(cell).unwrap_or((cell, ""));
     let (name, unit) = (name.trim(), unit.trim());
     let name = if name.is_empty() { k.to_string() } else { name.to_owned() };
     (name, (!unit.is_empty()).then(|| unit.to_owned()))

@@ -3,6 +3,7 @@
 mod csv;
 mod encoding;
 mod files;
+mod formulas;
 mod header;
 mod mat4;
 mod mat5;
@@ -24,7 +25,8 @@ use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::unit::Unit;
 
 pub use encoding::Encoding;
-pub use files::{Files, Folder};
+pub use files::{Files, Folder, OutsideFolder};
+pub use formulas::as_text;
 pub(crate) use sources::{FILE as SOURCES, source_of};
 pub use stamps::{Origin, Reference};
 

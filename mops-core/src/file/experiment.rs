@@ -10,7 +10,7 @@ use super::entries::Short;
 use super::sections::{ChannelTable, ExperimentSection, InputTable, RecordedInput};
 use super::tree::Node;
 use super::{Files, UNIT_HELP, at_key, frequency, read_seconds, read_unit};
-use crate::data::{Column, DataFile, Origin, Reference, SOURCES, is_since_1970, source_of};
+use crate::data::{Column, DataFile, Origin, OutsideFolder, Reference, SOURCES, is_since_1970, source_of};
 use crate::diagnostic::Diagnostic;
 use crate::input::{Hold, Input};
 use crate::study::{CaseBuilder, ChannelBuilder, Free, Measured};
@@ -94,9 +94,13 @@ fn paths(
     let place = node.child("files").expect("it was just read");
     let mut names = files.list(folder).map_err(|error| {
         let shown = files.show(folder);
-        place.diagnostic(format!("the folder `{shown}` cannot be read: {error}")).with_help(
-            "paths are relative to the folder of the study file; `*` stands for text in the name of a file only",
-        )
+        let help = match OutsideFolder::is_reason_of(&error) {
+            true => OutsideFolder::HELP,
+            false => {
+                "paths are relative to the folder of the study file; `*` stands for text in the name of a file only"
+            }
+        };
+        place.diagnostic(format!("the folder `{shown}` cannot be read: {error}")).with_help(help)
     })?;
     names.retain(|name| wildcard::matches(wanted, name));
     names.sort();
@@ -309,6 +313,10 @@ fn open(node: &Node<'_>, key: &str, path: &str, files: &dyn Files) -> Result<Dat
             format!("no data file `{shown}`")
         }
         ErrorKind::IsADirectory => format!("`{shown}` is a folder, not a data file"),
+        _ if OutsideFolder::is_reason_of(&error) => {
+            way_out = Some(OutsideFolder::HELP.to_owned());
+            format!("the data file `{shown}` cannot be read: {error}")
+        }
         _ => format!("the data file `{shown}` cannot be read: {error}"),
     };
     let place = node.child(key).expect("it was just read");

@@ -20,10 +20,10 @@ mod tasks;
 mod tree;
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
-pub use crate::data::{Files, Folder};
+pub use crate::data::{Files, Folder, OutsideFolder};
 pub use built::built;
 pub use content::digest;
 pub use entries::{Entries, Short};
@@ -73,7 +73,8 @@ impl Shipped {
 }
 
 impl Study {
-    /// Reads the study file at `path`; data files are relative to its folder.
+    /// Reads the study file at `path`. Data files are in its folder and below, or in a folder that the catalogue names as
+    /// readable.
     ///
     /// # Errors
     /// The file cannot be read, or its first mistake with line and column.
@@ -82,16 +83,17 @@ impl Study {
         let name = path.display().to_string();
         let bytes = read_regular(path).map_err(|error| Diagnostic::new(format!("{name} cannot be read: {error}")))?;
         let source = Source::from_bytes(&name, bytes)?;
-        let folder = Folder(path.parent().unwrap_or(Path::new("")).to_owned());
+        let folder = catalogue.folder(path.parent().unwrap_or(Path::new("")));
         Ok(read(catalogue, &name, &source.text, &[], &folder)?.study)
     }
 
-    /// Reads a study from the text of a study file; data files are relative to the working directory.
+    /// Reads a study from the text of a study file. Data files are in the working directory and below, or in a folder that the
+    /// catalogue names as readable.
     ///
     /// # Errors
     /// The first mistake with line and column.
     pub fn from_str(catalogue: &Catalogue, text: &str) -> Result<Self, Diagnostic> {
-        Ok(read(catalogue, "study", text, &[], &Folder(PathBuf::new()))?.study)
+        Ok(read(catalogue, "study", text, &[], &catalogue.folder(""))?.study)
     }
 }
 

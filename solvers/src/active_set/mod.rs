@@ -63,8 +63,16 @@ impl ActiveSet {
     ///
     /// `first` lists constraints that are active with positive multipliers at the minimum over them; it may be empty.
     /// Constraints active in the previous program are tested for violation before all others. Returns false if the
-    /// constraints are inconsistent or if rounding errors prevent convergence.
-    pub fn solve(&mut self, l: &[f64], c: &[f64], constraints: &Constraints, first: &[usize]) -> bool {
+    /// constraints are inconsistent, if rounding errors prevent convergence, or as soon as `goes_on` does, which is asked before every
+    /// step.
+    pub fn solve(
+        &mut self,
+        goes_on: &dyn Fn() -> bool,
+        l: &[f64],
+        c: &[f64],
+        constraints: &Constraints,
+        first: &[usize],
+    ) -> bool {
         self.previous_active.clone_from(&self.active);
         self.previous_active.retain(|p| *p < constraints.bounds.len());
         self.reset(l, c.len());
@@ -81,7 +89,7 @@ impl ActiveSet {
             let mut multiplier = 0.0;
             loop {
                 steps += 1;
-                if steps > max_steps {
+                if steps > max_steps || !goes_on() {
                     return false;
                 }
                 let normal = row(constraints, p, self.n);
@@ -141,10 +149,13 @@ impl ActiveSet {
         self.multiplier_step.clear();
         self.r.clear();
         self.r.resize(n * n, 0.0);
+        // Last entry of every column of L that is not 0.
+        let last: Vec<usize> = (0..n).map(|i| (i..n).rev().find(|&m| l[i * n + m] != 0.0).unwrap_or(i)).collect();
         // Column k of L^-T by back substitution: L' J = I.
         for k in 0..n {
             for i in (0..=k).rev() {
-                let known: f64 = (i + 1..=k).map(|m| l[i * n + m] * self.j[k * n + m]).sum();
+                // A diagonal factor has nothing below the diagonal.
+                let known: f64 = (i + 1..=k.min(last[i])).map(|m| l[i * n + m] * self.j[k * n + m]).sum();
                 self.j[k * n + i] = (if i == k { 1.0 } else { 0.0 } - known) / l[i * n + i];
             }
         }

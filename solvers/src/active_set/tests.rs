@@ -44,7 +44,7 @@ fn random_programs_are_solved_to_rounding() {
             constraints.bounds.push(normal.dot(&inside) - slack);
             constraints.normals.extend(normal.iter());
         }
-        assert!(method.solve(&factor(&hessian), &c, &constraints, &[]), "{n} {m}");
+        assert!(method.solve(&|| true, &factor(&hessian), &c, &constraints, &[]), "{n} {m}");
         let error = error(&method, &hessian, &c, &constraints);
         assert!(error < 1e-10, "{n} {m}: {error:e}");
     }
@@ -54,7 +54,7 @@ fn random_programs_are_solved_to_rounding() {
 fn inconsistent_constraints_are_detected() {
     let hessian = DMatrix::identity(1, 1);
     let constraints = Constraints { normals: vec![1.0, -1.0], bounds: vec![1.0, 0.0] };
-    assert!(!ActiveSet::default().solve(&factor(&hessian), &[0.0], &constraints, &[]));
+    assert!(!ActiveSet::default().solve(&|| true, &factor(&hessian), &[0.0], &constraints, &[]));
 }
 
 #[test]
@@ -62,6 +62,6 @@ fn duplicate_constraints_do_no_harm() {
     let hessian = DMatrix::identity(2, 2);
     let constraints = Constraints { normals: [1.0, 1.0].repeat(6), bounds: vec![2.0; 6] };
     let mut method = ActiveSet::default();
-    assert!(method.solve(&factor(&hessian), &[0.0, 0.0], &constraints, &[]));
+    assert!(method.solve(&|| true, &factor(&hessian), &[0.0, 0.0], &constraints, &[]));
     assert!(method.x().iter().all(|x| (x - 1.0).abs() < 1e-14), "{:?}", method.x());
 }

@@ -2,7 +2,7 @@
 
 use mops_core::{Linearisation, SMALL_OBJECTIVE, Shape};
 
-use super::{MAX_CUT_VALUE, Model, NEGLIGIBLE, Step, TRIAL_STEP, steepest_step};
+use super::{CURVATURE, MAX_CUT_VALUE, Model, NEGLIGIBLE, Step, TRIAL_STEP, steepest_step};
 use crate::active_set::dot;
 use crate::linearised_criteria::{LinearModel, LinearisedCriteria};
 
@@ -64,7 +64,7 @@ impl Level {
 }
 
 impl Model for Level {
-    fn direction(&self, point: &[f64]) -> Option<Step> {
+    fn direction(&self, point: &[f64], goes_on: &dyn Fn() -> bool) -> Option<Step> {
         let n = point.len();
         let unit = self.steepest.max(f64::MIN_POSITIVE);
         #[allow(clippy::cast_precision_loss)]
@@ -88,7 +88,7 @@ impl Model for Level {
                 .collect(),
             equalities: self.at.equalities.iter().map(|row| scaled(row, 0.0, unit)).collect(),
         };
-        let direction = steepest_step(&criteria, point, 0)?;
+        let direction = steepest_step(&criteria, point, (0, CURVATURE), goes_on)?;
         let predicted = -direction.level * unit * TRIAL_STEP;
         Some(Step {
             step: direction.step.iter().map(|d| TRIAL_STEP * d).collect(),

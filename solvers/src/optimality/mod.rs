@@ -11,6 +11,9 @@ use crate::linearised_criteria::LinearisedCriteria;
 use cone::DescentCone;
 use level::Level;
 
+/// Curvature of the model of a direction, in units of the trial step.
+const CURVATURE: f64 = 1e-6;
+
 /// Improvement per unit of step, relative to the largest derivative of the criterion, below which a direction does not
 /// count as a descent direction. Corresponds to the accuracy of finite-difference gradients.
 const IMPROVEMENT: f64 = 1e-3;
@@ -31,6 +34,10 @@ const MAX_CUTS: usize = 12;
 /// Number of cuts after which gradients are sampled around the point.
 const CUTS_BEFORE_SAMPLING: usize = 2;
 
+/// Largest number of coordinates along which gradients are sampled. Time and memory grow with its square; with more coordinates, a
+/// point at a kink is not shown to be optimal.
+const MOST_SAMPLED: usize = 100;
+
 /// Distance of the sampled gradients from the point, in the unit box.
 const SAMPLING_RADIUS: f64 = 0.5 * TRIAL_STEP;
 
@@ -45,8 +52,8 @@ const PLATEAU_REACH: [f64; 2] = [1e-3, 1e-2];
 /// Cutting-plane model of what a direction would improve.
 trait Model {
     /// Returns the step of at most [`TRIAL_STEP`] that improves most, and the predicted improvement; `None` if rounding errors
-    /// prevent its computation.
-    fn direction(&self, point: &[f64]) -> Option<Step>;
+    /// prevent its computation, or as soon as `goes_on` returns false.
+    fn direction(&self, point: &[f64], goes_on: &dyn Fn() -> bool) -> Option<Step>;
 
     /// Returns true if the scaled values of a trial are an improvement.
     fn is_improvement(&self, shape: &Shape, trial: &[f64]) -> bool;
@@ -92,7 +99,9 @@ enum Answer {
 fn answer(oracle: &mut dyn Oracle, point: &[f64], model: &mut impl Model) -> Answer {
     let shape = oracle.shape().clone();
     for added in 0..MAX_CUTS {
-        let Some(Step { step, is_negligible }) = model.direction(point) else { return Answer::Unknown };
+        let Some(Step { step, is_negligible }) = model.direction(point, &|| !oracle.is_over()) else {
+            return Answer::Unknown;
+        };
         if is_negligible {
             return if added == 0 { Answer::None } else { Answer::NoneAround };
         }
@@ -108,7 +117,7 @@ fn answer(oracle: &mut dyn Oracle, point: &[f64], model: &mut impl Model) -> Ans
         if model.add(&shape, point, &beyond) {
             return Answer::Jump;
         }
-        if added + 1 == CUTS_BEFORE_SAMPLING {
+        if added + 1 == CUTS_BEFORE_SAMPLING && point.len() <= MOST_SAMPLED {
             for beside in sampling_points(point) {
                 // A failed simulation gives no information.
                 match oracle.linearise(&beside, 0.1 * TRIAL_STEP) {
@@ -136,19 +145,27 @@ fn beside(point: &[f64], distance: f64) -> impl Iterator<Item = Vec<f64>> {
     (0..point.len()).flat_map(move |j| [distance, -distance].into_iter().filter_map(move |step| moved(j, step)))
 }
 
-/// Returns the step within the box, in trial steps, that lowers criteria in units of the trial step most, followed by the changes
-/// of `changing` objectives, none of which is positive; `None` if rounding errors prevent the computation.
+/// Returns the step within the box, in trial steps, that lowers criteria in units of the trial step most, followed by `changing`
+/// further unknowns, the changes of objectives or of means of objectives, none of which is positive. Returns `None` if rounding
+/// errors prevent the computation, or as soon as `goes_on` returns false.
+///
+/// `curvature` makes the step unique; it is small compared with the improvements that count.
 #[allow(clippy::cast_precision_loss)]
-fn steepest_step(criteria: &LinearisedCriteria, point: &[f64], changing: usize) -> Option<Direction> {
+fn steepest_step(
+    criteria: &LinearisedCriteria,
+    point: &[f64],
+    (changing, curvature): (usize, f64),
+    goes_on: &dyn Fn() -> bool,
+) -> Option<Direction> {
     let mut low: Vec<f64> = point.iter().map(|&u| if u < 1e-6 { 0.0 } else { -1.0 }).collect();
     let mut high: Vec<f64> = point.iter().map(|&u| if u > 1.0 - 1e-6 { 0.0 } else { 1.0 }).collect();
     // With derivatives of at most 1, no objective changes by more.
     low.extend(std::iter::repeat_n(-(point.len() as f64), changing));
     high.extend(std::iter::repeat_n(0.0, changing));
-    let hessian = DMatrix::identity(low.len(), low.len()) * 1e-6;
+    let hessian = DMatrix::identity(low.len(), low.len()) * curvature;
     let mut direction = Direction::default();
     // A penalty above every multiplier keeps the step within the constraints.
-    Subproblem::default().solve(criteria, &hessian, [&low, &high], 1e4, &mut direction)?;
+    Subproblem::default().solve_while(goes_on, criteria, &hessian, [&low, &high], 1e4, &mut direction)?;
     Some(direction)
 }
 
@@ -219,9 +236,11 @@ pub fn certificate(oracle: &mut dyn Oracle, point: &[f64]) -> Certificate {
     let Ok(Some(at)) = oracle.linearise(point, 0.1 * TRIAL_STEP) else { return unknown };
     let Some(mut cone) = DescentCone::new(&shape, &at) else { return unknown };
     match answer(oracle, point, &mut cone) {
-        Answer::None | Answer::NoneAround if cone.is_whole() => {
-            Certificate { pareto: Pareto::CertifiedLocal, weights: cone.trade_offs(point), ..unknown }
-        }
+        Answer::None | Answer::NoneAround if cone.is_whole() => Certificate {
+            pareto: Pareto::CertifiedLocal,
+            weights: cone.trade_offs(point, &|| !oracle.is_over()),
+            ..unknown
+        },
         Answer::One => Certificate { pareto: Pareto::No, ..unknown },
         Answer::Jump => Certificate { is_beside_jump: true, ..unknown },
         _ => unknown,

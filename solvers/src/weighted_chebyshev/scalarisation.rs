@@ -176,6 +176,10 @@ impl Oracle for ScalarisedProblem<'_> {
         self.best.as_ref()
     }
 
+    fn is_over(&self) -> bool {
+        self.oracle.is_over()
+    }
+
     fn remaining(&self) -> usize {
         self.oracle.remaining()
     }

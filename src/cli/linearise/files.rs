@@ -6,6 +6,7 @@ use mops_core::StateSpace;
 use serde_json::Value;
 
 use crate::cli::linear_plots;
+use crate::files::Outputs;
 use crate::numbers::FileNames;
 use crate::terminal::CommandError;
 
@@ -13,11 +14,15 @@ use crate::terminal::CommandError;
 ///
 /// # Errors
 /// If a file cannot be written.
-pub(super) fn write(folder: &Path, system: &StateSpace, content: &Value) -> Result<String, CommandError> {
+pub(super) fn write(
+    (folder, outputs): (&Path, &Outputs),
+    system: &StateSpace,
+    content: &Value,
+) -> Result<String, CommandError> {
     std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
     let path = folder.join("linearised.json");
     let text = serde_json::to_string_pretty(content).expect("numbers and names are JSON") + "\n";
-    crate::files::write(&path, text).map_err(CommandError::cannot_write(&path))?;
+    outputs.write(&path, text).map_err(CommandError::cannot_write(&path))?;
     let (mut written, mut notes, mut names) = (0, String::new(), FileNames::default());
     for i in 0..system.inputs.len() {
         for o in 0..system.outputs.len() {
@@ -33,8 +38,9 @@ pub(super) fn write(folder: &Path, system: &StateSpace, content: &Value) -> Resu
                 };
                 let file = names.unique(&format!("{kind}-{}-{}", channel.outputs[0], channel.inputs[0]));
                 let [svg, png] = ["svg", "png"].map(|end| folder.join(format!("{file}.{end}")));
-                crate::files::write(&svg, plot.svg()).map_err(CommandError::cannot_write(&svg))?;
-                plot.write_png(&png).map_err(CommandError::cannot_write(&png))?;
+                outputs.write(&svg, plot.svg()).map_err(CommandError::cannot_write(&svg))?;
+                let drawn = plot.png().and_then(|bytes| outputs.write(&png, bytes));
+                drawn.map_err(CommandError::cannot_write(&png))?;
                 written += 1;
             }
         }

@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use mops_core::{Catalogue, CatalogueStudy, Diagnostic, suggestion};
 
 use super::schema;
-use crate::files;
+use crate::files::Outputs;
 use crate::terminal::{CommandError, print};
 
 /// Arguments of `mops new`.
@@ -61,7 +61,7 @@ impl Template {
 
 pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let Arguments { folder, template, from, from_data, time, inputs, outputs } = arguments;
-    if folder.exists() {
+    if folder.symlink_metadata().is_ok() {
         return Err(Diagnostic::new(format!("`{}` already exists", folder.display()))
             .with_help("name a new folder; nothing was written")
             .into());
@@ -101,12 +101,14 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
             vec![(Path::new("study.toml"), template.text().replace("{name}", &called).into_bytes())]
         }
     };
+    // N.B.: the folder is new, and no file that was read lies there.
+    let outputs = Outputs::default();
     let schema = (Path::new("study.schema.json"), schema::text(schema::File::Study, catalogue).into_bytes());
     for (path, bytes) in files.into_iter().chain([schema]) {
         let path = folder.join(path);
         let parent = path.parent().expect("it lies in the folder");
         std::fs::create_dir_all(parent).map_err(CommandError::cannot_write(parent))?;
-        files::write(&path, bytes).map_err(CommandError::cannot_write(&path))?;
+        outputs.write(&path, bytes).map_err(CommandError::cannot_write(&path))?;
     }
     let study = folder.join("study.toml");
     print(&format!("wrote {}; try: mops run {}\n", study.display(), study.display()))?;

@@ -17,6 +17,9 @@ use crate::numbers::significant;
 const MOST_TUNERS: usize = 6;
 /// Number of values of a tuner in a plot of the poles.
 const VALUES: u32 = 120;
+
+/// Number of values without poles after which a sweep ends: a search for an equilibrium that does not exist takes long.
+const MOST_FAILURES: u32 = 3;
 /// Gain, relative to the largest one, below which a corner frequency is not shown: -60 dB.
 const SMALL: f64 = 1e-3;
 
@@ -254,7 +257,17 @@ fn poles(cases: &Cases<'_>, tuner: usize) -> Option<(String, Plot)> {
     if first == last {
         return None;
     }
-    let cloud = (0..=VALUES).filter_map(|i| at(f64::from(i) / f64::from(VALUES))).flatten();
+    let mut failures = 0;
+    let mut cloud = Vec::new();
+    for i in 0..=VALUES {
+        if failures == MOST_FAILURES || problem.is_cancelled() {
+            break;
+        }
+        match at(f64::from(i) / f64::from(VALUES)) {
+            Some(poles) => cloud.extend(poles),
+            None => failures += 1,
+        }
+    }
     // Far poles would compress the others.
     let size = 3.0 * here.iter().map(|z| complex::norm(*z)).fold(0.0, f64::max);
     let points = |all: &mut dyn Iterator<Item = Complex>| -> Vec<(f64, f64)> {

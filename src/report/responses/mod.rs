@@ -69,16 +69,22 @@ pub(super) fn groups(report: &Report<'_>) -> (Vec<Group>, Option<String>) {
 fn shown(report: &Report<'_>) -> Vec<usize> {
     let mut jobs: Vec<usize> = (0..report.problem.study().jobs().len()).collect();
     if jobs.len() > MOST_JOBS {
-        jobs.sort_by(|&a, &b| worst(report, b).total_cmp(&worst(report, a)));
+        let worst = worst(report);
+        jobs.sort_by(|&a, &b| worst[b].total_cmp(&worst[a]));
         jobs.truncate(MOST_JOBS);
         jobs.sort_unstable();
     }
     jobs
 }
 
-/// Returns the largest scaled value of a job at the reported point; infinity if a criterion has no value.
-fn worst(report: &Report<'_>, job: usize) -> f64 {
-    let of_job = report.problem.study().rows().iter().zip(&report.best.readings).filter(|(row, _)| row.job == job);
-    let scaled = of_job.map(|(_, reading)| reading.map_or(f64::INFINITY, |reading| reading.scaled));
-    scaled.filter(|scaled| !scaled.is_nan()).fold(f64::NEG_INFINITY, f64::max)
+/// Returns the largest scaled value of every job at the reported point; infinity if a criterion has no value.
+fn worst(report: &Report<'_>) -> Vec<f64> {
+    let study = report.problem.study();
+    let mut worst = vec![f64::NEG_INFINITY; study.jobs().len()];
+    for (row, reading) in study.rows().iter().zip(&report.best.readings) {
+        let scaled = reading.map_or(f64::INFINITY, |reading| reading.scaled);
+        // N.B.: `max` ignores NaN.
+        worst[row.job] = worst[row.job].max(scaled);
+    }
+    worst
 }

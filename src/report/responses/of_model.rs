@@ -86,7 +86,8 @@ fn colors(report: &Report<'_>, ones: &[&Simulated]) -> Vec<Color> {
         return vec![Color::Result];
     }
     let mut order: Vec<usize> = (0..ones.len()).collect();
-    order.sort_by(|&a, &b| worst(report, ones[b].job).total_cmp(&worst(report, ones[a].job)));
+    let worst = worst(report);
+    order.sort_by(|&a, &b| worst[ones[b].job].total_cmp(&worst[ones[a].job]));
     let mut coloured = order[..order.len().min(COLOURED)].to_vec();
     coloured.sort_unstable();
     let color = |i: usize| coloured.iter().position(|&c| c == i).map_or(Color::Start, Color::Series);
