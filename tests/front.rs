@@ -187,7 +187,7 @@ g = { final-value = { signal = "g" }, demand = 1.0 }
 #[test]
 fn the_worst_case_of_a_criterion_is_its_objective() {
     let folder = tempfile::tempdir().unwrap();
-    let study = folder.path().join("study.toml");
+    let study = folder.path().join("own.toml");
     std::fs::write(&study, CASES).unwrap();
     let arguments = [study.to_str().unwrap(), "--points", "10"];
     let result = pareto(folder.path(), &arguments);
@@ -230,7 +230,7 @@ fn a_front_keeps_its_budget_and_says_why_points_are_missing() {
 #[test]
 fn a_criterion_that_does_not_decide_the_maximum_is_lowered_at_no_cost() {
     let folder = tempfile::tempdir().unwrap();
-    let study = folder.path().join("study.toml");
+    let study = folder.path().join("own.toml");
     let text = r#"
 [study]
 name = "slack"
@@ -284,7 +284,7 @@ fn a_front_of_six_criteria_lies_on_the_sphere() {
             "\n",
         ),
     ];
-    let study = folder.path().join("study.toml");
+    let study = folder.path().join("own.toml");
     std::fs::write(&study, text.join("\n")).unwrap();
     let result = pareto(folder.path(), &[study.to_str().unwrap(), "--points", "30"]);
     let front = result["front"].as_array().unwrap();
