@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Beyond, Budget, Cancellation, Contradiction, DerivativesReport, Effect, End, Ending, Evaluation, Linearisation,
-    Objective, Optimality, Oracle, Outcome, Pareto, Patience, Place, Problem, Quiet, Record, Role, Run, Shape,
-    SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task, Watch, conclude,
+    Beyond, Budget, Cancellation, Contradiction, DerivativesReport, Effect, End, Ending, Evaluation, Halt,
+    Linearisation, Objective, Optimality, Oracle, Outcome, Pareto, Patience, Place, Problem, Quiet, Record, Role, Run,
+    RunState, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task, Watch, conclude,
 };
 
 use crate::numbers::{counted, significant};
@@ -151,6 +151,38 @@ pub(crate) struct Limits {
     pub all: usize,
 }
 
+/// Observer of a search, to which the whole budget is reported.
+struct Within<'a> {
+    watch: &'a dyn Watch,
+    budget: usize,
+}
+
+impl Watch for Within<'_> {
+    fn wants_stop(&self) -> bool {
+        self.watch.wants_stop()
+    }
+
+    fn halt(&self) -> Halt {
+        self.watch.halt()
+    }
+
+    fn evaluated(&self, state: &RunState) {
+        self.watch.evaluated(&RunState { budget: self.budget, ..*state });
+    }
+
+    fn improved(&self, best: &Evaluation) {
+        self.watch.improved(best);
+    }
+
+    fn stage(&self, what: &str, done: f64) {
+        self.watch.stage(what, done);
+    }
+
+    fn keeping(&self, trouble: Option<&str>) {
+        self.watch.keeping(trouble);
+    }
+}
+
 /// Runs the solver and returns its outcome. A part of the budget is kept for checks of the reported point.
 ///
 /// # Errors
@@ -176,6 +208,7 @@ pub(crate) fn search_within(
     let mut solver = options.solver.make();
     accepts(&options.solver, solver.as_ref(), problem.shape())?;
     let (store, begin) = (options.store(&problem), options.begin(&problem));
+    let watch = &Within { watch, budget: limits.all };
     let evaluations = options.replayed.unwrap_or(limits.searched).max(1);
     let run = Run::new(&problem, Budget { evaluations }, watch).planned(limits.planned);
     let mut run = run.patient(options.patience).keeping(store);

@@ -630,7 +630,7 @@ fn a_recorded_input_before_the_start_of_an_experiment_reaches_its_delays() {
         equations("k*(delay(u - y, T) + delay(y, T) - y)", ""),
         equations(
             "k*(u - y) + 0*T",
-            "[models.m.effects]\nd = { input-delay = { place = 'actuator:u', delay = '2 s' } }",
+            "[models.m.effects]\nd = { input-delay = { place = 'actuator:u' } }\n[models.m.parameters]\n'd.delay' = '2 s'",
         ),
     ];
     for model in &models {

@@ -182,7 +182,7 @@ fn a_run_killed_at_any_system_call_in_the_folder_of_another_run_resumes() {
         };
         let kills = killed(&STUDY, root.path(), [&unfinished, &kept], 6);
         eprintln!("{kills} kills in the folder of an unfinished run");
-        assert!(points >= 20 && kills >= 3);
+        assert!(points >= 18 && kills >= 3);
     }
 }
 

@@ -112,7 +112,7 @@ fn killed_again_and_again(kills: usize, seed: u64) {
     if most > 0 {
         let [known, met, simulated] = counts(&said);
         assert_eq!(known, most);
-        assert!(met + simulated >= 2500 && simulated <= 2600 - known.min(2500), "{said}");
+        assert!(met + simulated >= 2250 && simulated <= 2600 - known.min(2250), "{said}");
     }
 }
 
@@ -168,7 +168,7 @@ fn after_a_change_of_a_demand_no_stored_point_is_simulated_again() {
     assert!(met >= 1 && simulated >= 1, "{said}");
     // Points evaluated twice (by the search, then by the certificate) are written once.
     assert!(points(&second) <= met + simulated && points(&second) > simulated, "every point once: {said}");
-    assert_eq!(found["reused"].as_u64().map(|reused| 200 - reused as usize <= simulated), Some(true), "{said}");
+    assert_eq!(found["reused"].as_u64().map(|reused| 180 - reused as usize <= simulated), Some(true), "{said}");
     assert!(found["worst_scaled"].as_f64().unwrap() <= best);
 }
 

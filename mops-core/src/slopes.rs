@@ -32,14 +32,14 @@ pub struct CriterionSlopes {
     pub sides: Option<Vec<Option<[f64; 2]>>>,
 }
 
-/// Distance of the points that tell the derivatives of both sides, in the unit box: differences of values that repeat to 1e-9 are
+/// Distance of the points that separate the derivatives of both sides, in the unit box: differences of values that repeat to 1e-9 are
 /// accurate to 1e-5.
 const BESIDE: f64 = 2e-4;
 
-/// Difference of the derivatives of both sides, relative to the larger one, from which they are told apart.
+/// Difference of the derivatives of both sides, relative to the larger one, from which they are reported apart.
 const APART: f64 = 0.1;
 
-/// Change over the whole range of a tuner, in scaled values, whose sides are not told apart.
+/// Change over the whole range of a tuner, in scaled values, whose sides are not reported apart.
 const SMALL: f64 = 1e-3;
 
 impl SlopesReport {

@@ -93,9 +93,9 @@ fn replay(catalogue: &Catalogue, past: &PastRun) -> Result<Restored, CommandErro
     let recorder = Recorder::replay(folder, &file.study, &identity, &options.cancellation)?;
     let (solved, _) = resume::solve_recorded(&file.study, &options, recorder, &());
     let mut solved = solved.map_err(|why| Diagnostic::new(why.to_string()))?;
-    let (outcome, result) = (&mut solved.outcome, past.finished_result());
-    let ended_with = result.and_then(|result| result["evaluations"].as_u64()).unwrap_or(0);
-    if (outcome.evaluations as u64) < ended_with {
+    let outcome = &mut solved.outcome;
+    let ended_with = if past.finished_result().is_some() { run.evaluations } else { 0 };
+    if outcome.evaluations < ended_with {
         let (there, folder) = (outcome.evaluations, folder.display());
         return Err(Diagnostic::new(format!(
             "the database in {folder} has {there} of the run's {ended_with} evaluations"
