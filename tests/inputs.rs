@@ -629,7 +629,7 @@ fn a_recorded_input_before_the_start_of_an_experiment_reaches_its_delays() {
         equations("k*(delay(delay(u, 0.75*T), 0.25*T) - y)", ""),
         equations("k*(delay(u - y, T) + delay(y, T) - y)", ""),
         equations(
-            "k*(u - y) + 0*T",
+            "k*(u - y) + 0*T*k^2",
             "[models.m.effects]\nd = { input-delay = { place = 'actuator:u' } }\n[models.m.parameters]\n'd.delay' = '2 s'",
         ),
     ];
