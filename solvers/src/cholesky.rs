@@ -27,13 +27,11 @@ pub fn with_cholesky<T>(
 /// Replaces the lower triangle of a matrix of size `n` by its Cholesky factor; `stride` is the distance between
 /// columns. Returns false if the matrix is not positive definite.
 pub fn factorise(l: &mut [f64], n: usize, stride: usize) -> bool {
-    let mut filled = Vec::new();
     for k in 0..n {
-        // Columns before that reach row k; of a diagonal matrix none.
-        filled.clear();
-        filled.extend((0..k).filter(|&m| l[m * stride + k] != 0.0));
+        // First column that reaches row k; of a diagonal matrix none does.
+        let first = (0..k).find(|&m| l[m * stride + k] != 0.0).unwrap_or(k);
         for i in k..n {
-            let sum: f64 = filled.iter().map(|&m| l[m * stride + i] * l[m * stride + k]).sum();
+            let sum: f64 = (first..k).map(|m| l[m * stride + i] * l[m * stride + k]).sum();
             let rest = l[k * stride + i] - sum;
             l[k * stride + i] = if i > k { rest / l[k * stride + k] } else { rest.sqrt() };
         }

@@ -53,6 +53,8 @@ pub struct ActiveSet {
     step: Vec<f64>,
     /// Step of the multipliers.
     multiplier_step: Vec<f64>,
+    /// Last entry of every column of `L` that is not 0.
+    last: Vec<usize>,
 }
 
 /// Relative norm of the projected normal below which the normal is linearly dependent on the active ones.
@@ -150,12 +152,13 @@ impl ActiveSet {
         self.r.clear();
         self.r.resize(n * n, 0.0);
         // Last entry of every column of L that is not 0.
-        let last: Vec<usize> = (0..n).map(|i| (i..n).rev().find(|&m| l[i * n + m] != 0.0).unwrap_or(i)).collect();
+        self.last.clear();
+        self.last.extend((0..n).map(|i| (i..n).rev().find(|&m| l[i * n + m] != 0.0).unwrap_or(i)));
         // Column k of L^-T by back substitution: L' J = I.
         for k in 0..n {
             for i in (0..=k).rev() {
                 // A diagonal factor has nothing below the diagonal.
-                let known: f64 = (i + 1..=k.min(last[i])).map(|m| l[i * n + m] * self.j[k * n + m]).sum();
+                let known: f64 = (i + 1..=k.min(self.last[i])).map(|m| l[i * n + m] * self.j[k * n + m]).sum();
                 self.j[k * n + i] = (if i == k { 1.0 } else { 0.0 } - known) / l[i * n + i];
             }
         }
