@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Beyond, Budget, Cancellation, Contradiction, DerivativesReport, Effect, End, Ending, Evaluation, Halt,
-    Linearisation, Objective, Optimality, Oracle, Outcome, Pareto, Patience, Place, Problem, Quiet, Record, Role, Run,
-    RunState, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task, Watch, conclude,
+    Beyond, Budget, Cancellation, Contradiction, DerivativesReport, Effect, End, Ending, Evaluation, Linearisation,
+    Objective, Optimality, Oracle, Outcome, Pareto, Patience, Place, Problem, Quiet, Record, Role, Run, Shape,
+    SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task, Watch, conclude,
 };
 
 use crate::numbers::{counted, significant};
@@ -151,38 +151,6 @@ pub(crate) struct Limits {
     pub all: usize,
 }
 
-/// Observer of a search, to which the whole budget is reported.
-struct Within<'a> {
-    watch: &'a dyn Watch,
-    budget: usize,
-}
-
-impl Watch for Within<'_> {
-    fn wants_stop(&self) -> bool {
-        self.watch.wants_stop()
-    }
-
-    fn halt(&self) -> Halt {
-        self.watch.halt()
-    }
-
-    fn evaluated(&self, state: &RunState) {
-        self.watch.evaluated(&RunState { budget: self.budget, ..*state });
-    }
-
-    fn improved(&self, best: &Evaluation) {
-        self.watch.improved(best);
-    }
-
-    fn stage(&self, what: &str, done: f64) {
-        self.watch.stage(what, done);
-    }
-
-    fn keeping(&self, trouble: Option<&str>) {
-        self.watch.keeping(trouble);
-    }
-}
-
 /// Runs the solver and returns its outcome. A part of the budget is kept for checks of the reported point.
 ///
 /// # Errors
@@ -208,7 +176,6 @@ pub(crate) fn search_within(
     let mut solver = options.solver.make();
     accepts(&options.solver, solver.as_ref(), problem.shape())?;
     let (store, begin) = (options.store(&problem), options.begin(&problem));
-    let watch = &Within { watch, budget: limits.all };
     let evaluations = options.replayed.unwrap_or(limits.searched).max(1);
     let run = Run::new(&problem, Budget { evaluations }, watch).planned(limits.planned);
     let mut run = run.patient(options.patience).keeping(store);
@@ -242,7 +209,7 @@ pub(crate) fn search_within(
     } else {
         stop
     };
-    let near = linearised(&run, &mut probe, watch);
+    let near = run.best().and_then(|best| linearised(best, &mut probe, watch));
     let derivatives = near.as_ref().filter(|(_, is_exact)| *is_exact);
     let derivatives = derivatives.map(|(found, _)| DerivativesReport::of(&problem, &mut probe, found));
     let contradiction = derivatives.as_ref().and_then(contradiction);
@@ -359,14 +326,16 @@ pub(crate) fn evaluate_start(study: Study, options: &Options, watch: &dyn Watch)
 
 /// Difference step of the derivatives at the reported point, in the unit box. Equal to that of the Pareto certificate, whose
 /// derivatives are then reused.
-pub(crate) const NEAR: f64 = 1e-4;
+const NEAR: f64 = 1e-4;
 
-/// Returns values and derivatives at the best point, and whether these are exact; `None` if a simulation near it fails, if no tuner can
-/// be changed, or after a stop request.
-fn linearised(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> Option<(Linearisation, bool)> {
-    let best = run.best().filter(|best| best.scaled.is_some() && !best.point.is_empty() && !watch.wants_stop())?;
+/// Returns values and derivatives at a point, and whether these are exact; `None` if a simulation near it fails, if no tuner can be
+/// changed, or after a stop request.
+pub(crate) fn linearised(at: &Evaluation, probe: &mut Run<'_>, watch: &dyn Watch) -> Option<(Linearisation, bool)> {
+    if at.scaled.is_none() || at.point.is_empty() || watch.wants_stop() {
+        return None;
+    }
     let before = probe.linearisations();
-    let found = probe.linearise(&best.point, NEAR).ok()??;
+    let found = probe.linearise(&at.point, NEAR).ok()??;
     Some((found, probe.linearisations() > before))
 }
 

@@ -229,9 +229,9 @@ mod links {
         place.write("elsewhere/upright.csv", "mine");
         fs::create_dir(place.at("front")).unwrap();
         symlink("../elsewhere", place.at("front/data")).unwrap();
-        let shipped = ["pareto", "furuta-calibration", "--points", "2", "--max-evaluations", "2", "--out", "front"];
+        let shipped = ["pareto", "furuta-calibration", "--points", "3", "--max-evaluations", "30", "--out", "front"];
         let run = place.mops(&shipped);
-        assert!(run.status != 0 || !place.at("front/data").is_symlink(), "{}", run.said);
+        assert!(!place.at("front/data").is_symlink() && place.at("front/data/upright.csv").exists(), "{}", run.said);
         assert_eq!(place.text("elsewhere/upright.csv"), "mine");
     }
 

@@ -1,4 +1,4 @@
-//! Jumps of criteria near a design: found where they are, told with what comes beyond, and designed against with the line that is told.
+//! Jumps of criteria near a design: where they are found, what is reported beyond them, and whether the suggested line avoids them.
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use serde_json::Value;

@@ -44,6 +44,7 @@ const UNLIMITED: &[(&str, &str)] = &[
     ("friction.*.viscous", "+-"),
     ("friction.*.peak", "+"),
     ("states.*.scale", "+"),
+    ("parameters.*.default", "+-"),
     ("parameters.*.min", "-"),
     ("parameters.*.max", "+"),
     // Controllers.

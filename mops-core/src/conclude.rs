@@ -170,15 +170,15 @@ fn front_points(run: &Run<'_>, best: &Evaluation) -> Vec<Design> {
         return vec![outcome::design(problem, best)];
     };
     let row = |i: usize| run.archive()[i].objectives.as_slice();
-    let all_of_front = front.clone();
-    let all: Vec<f64> = front.iter().flat_map(|&i| row(i).iter().copied()).collect();
-    let front: Vec<usize> = front::distinct(&all, m).into_iter().map(|i| front[i]).collect();
-    let objectives: Vec<f64> = front.iter().flat_map(|&i| row(i).iter().copied()).collect();
+    let objectives_of =
+        |points: &[usize]| -> Vec<f64> { points.iter().flat_map(|&i| row(i).iter().copied()).collect() };
+    let distinct: Vec<usize> = front::distinct(&objectives_of(&front), m).into_iter().map(|i| front[i]).collect();
+    let objectives = objectives_of(&distinct);
     let most = if run.shape().points > 0 { run.shape().points + m + 1 } else { LONGEST_FRONT };
-    let mut kept: Vec<usize> = front::thinned(&objectives, m, most).into_iter().map(|i| front[i]).collect();
+    let mut kept: Vec<usize> = front::thinned(&objectives, m, most).into_iter().map(|i| distinct[i]).collect();
     // The reported point is part of the front.
     let reported = run.archive().iter().position(|record| record.tuners == best.tuners);
-    kept.extend(reported.filter(|i| all_of_front.contains(i) && !kept.contains(i)));
+    kept.extend(reported.filter(|i| front.contains(i) && !kept.contains(i)));
     kept.sort_by(|&a, &b| front::compare(row(a), row(b)));
     kept.into_iter().map(|i| outcome::design(problem, run.evaluation(i))).collect()
 }

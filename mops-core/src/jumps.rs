@@ -50,7 +50,8 @@ pub struct JumpsReport {
     pub left_out: Vec<String>,
     /// Jumps found within 1 %, the nearest first; those that miss a demand come before the others.
     pub found: Vec<JumpReport>,
-    /// Best evaluated point at which the first jump is not found within 1 %; null if none was found or looked for.
+    /// Best evaluated point at which the criterion of the first jump still meets its demand 1 % farther; null if none was found or
+    /// looked for.
     pub away: Option<AwayReport>,
 }
 
@@ -283,7 +284,8 @@ fn with_constant(study: &Study, quantity: &Moved, distance: f64) -> Option<Study
     Some(moved)
 }
 
-/// Returns the tuners and the problem with a quantity moved from a point, and the value of the quantity; `None` outside of its range.
+/// Returns the point with a tuner moved by a distance, or the point and the problem with a constant moved; `None` outside of the range
+/// of the quantity.
 fn place(problem: &Problem, quantity: &Moved, distance: f64, point: &[f64]) -> Option<(Vec<f64>, Option<Problem>)> {
     let mut point = point.to_vec();
     if quantity.kind != MovedKind::Tuner {
@@ -429,8 +431,8 @@ impl Look<'_> {
         }
     }
 
-    /// Returns the best evaluated point at which a jump is farther than [`WITHIN`]: moved by it, the criterion rises by less than half
-    /// of the jump, and stays within its demand.
+    /// Returns the best of the evaluated points at which the criterion that jumps still meets its demand when the quantity is moved by
+    /// [`WITHIN`].
     fn away(&mut self, quantity: &Moved, jump: &JumpReport, at: &Evaluation, archive: &[Record]) -> Option<AwayReport> {
         let mut best: Vec<&Record> = archive.iter().filter(|record| record.merit.is_feasible()).collect();
         best.sort_by(|a, b| a.merit.objective.total_cmp(&b.merit.objective));

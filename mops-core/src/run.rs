@@ -82,7 +82,7 @@ impl Watch for Quiet<'_> {
 pub struct State {
     /// Number of evaluated points.
     pub evaluations: usize,
-    /// Maximum number of points.
+    /// Number of points that the solver counts on; a run may end before.
     pub budget: usize,
     /// Number of failed points.
     pub failed: usize,
@@ -388,7 +388,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
     fn state(&self) -> State {
         State {
             evaluations: self.archive.len(),
-            budget: self.budget.evaluations,
+            budget: self.planned.unwrap_or(self.budget.evaluations),
             failed: self.failed,
             best: self.best.as_ref().map_or(Merit::FAILED, |b| b.merit),
         }

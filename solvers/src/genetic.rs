@@ -36,7 +36,7 @@ pub struct GeneticOptions {
     #[schemars(range(min = 0, max = 1000))]
     pub mutation_index: f64,
     /// The population has converged when the values of its members differ by less than this, relative to the objective.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Number of generations without improvement after which the population is resampled.
     #[schemars(range(min = 1))]

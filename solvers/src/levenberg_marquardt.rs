@@ -28,7 +28,7 @@ use crate::start::usable_start;
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct LevenbergMarquardtOptions {
     /// Predicted relative decrease of the sum of squares below which the iteration stops.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Largest number of starting points, including the initial guess of the study.
     #[schemars(range(min = 1, max = 10_000))]

@@ -22,7 +22,7 @@ pub struct NelderMeadOptions {
     #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub size: f64,
     /// Standard deviation of the values at the vertices below which a simplex ends.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Maximum number of iterations per simplex.
     #[schemars(range(min = 1))]

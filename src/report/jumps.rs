@@ -4,7 +4,7 @@ use maud::{Markup, html};
 use mops_core::{JumpReport, JumpsReport, MovedKind};
 
 use super::page::scrolling;
-use crate::numbers::{counted, percent, significant, with_unit};
+use crate::numbers::{apart, counted, percent, with_unit};
 
 /// Returns the table of jumps, the nearest first; a sentence if there are none.
 pub(super) fn section(found: &JumpsReport) -> Markup {
@@ -38,16 +38,14 @@ pub(super) fn section(found: &JumpsReport) -> Markup {
 }
 
 fn row(jump: &JumpReport) -> Markup {
-    let digits =
-        (5..12).find(|&digits| significant(jump.value, digits) != significant(jump.beyond, digits)).unwrap_or(12);
     let unit = if jump.unit == "1" { String::new() } else { format!(" {}", jump.unit) };
-    let quantity = |value: f64| format!("{}{unit}", significant(value, digits));
+    let quantity = |value: f64, other: f64| format!("{}{unit}", apart(value, Some(other), 5));
     let distance = if jump.distance <= mops_core::ON_JUMP { "none".to_owned() } else { percent(jump.distance) };
     html! {
         tr {
             th scope="row" { (jump.name) @if jump.kind == MovedKind::Initial { " (initial value)" } }
-            td class="number" { (quantity(jump.value)) }
-            td class="number" { (quantity(jump.beyond)) }
+            td class="number" { (quantity(jump.value, jump.beyond)) }
+            td class="number" { (quantity(jump.beyond, jump.value)) }
             td class="number" { (distance) }
             td { (jump.key) }
             td class="number" { (with_unit(jump.here, &jump.criterion_unit)) }

@@ -7,7 +7,7 @@ use mops_core::{
     Watch,
 };
 
-use crate::numbers::{percent, significant, with_unit};
+use crate::numbers::{apart, percent, significant, with_unit};
 use crate::search::{Options, Solved};
 
 /// Share of the evaluations of a run that the look for jumps may add: one part of so many.
@@ -65,8 +65,8 @@ fn sentence(jump: &JumpReport, found: &JumpsReport, tuners: &[Tuner]) -> String 
         MovedKind::Tuner => "of its range ",
         MovedKind::Constant | MovedKind::Initial => "",
     };
-    let digits = digits(jump.value, jump.beyond);
-    let [here, there] = [jump.value, jump.beyond].map(|value| significant(value, digits));
+    let here = apart(jump.value, Some(jump.beyond), 4);
+    let there = apart(jump.beyond, Some(jump.value), 4);
     let unit = if jump.unit == "1" { String::new() } else { format!(" {}", jump.unit) };
     let beyond =
         if jump.there.is_nan() { "has no value".to_owned() } else { format!("is {}", amount(jump.there, jump)) };
@@ -140,11 +140,6 @@ fn listed(names: &[String]) -> String {
         [first @ .., last] if first.len() < 4 => format!("{} and {last}", first.join(", ")),
         _ => format!("{} and {} others", names[..3].join(", "), names.len() - 3),
     }
-}
-
-/// Returns the number of digits that distinguish two values.
-fn digits(a: f64, b: f64) -> usize {
-    (4..12).find(|&digits| significant(a, digits) != significant(b, digits)).unwrap_or(12)
 }
 
 fn amount(value: f64, jump: &JumpReport) -> String {

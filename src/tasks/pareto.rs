@@ -5,13 +5,13 @@ use std::time::Instant;
 
 use mops_core::math;
 use mops_core::{
-    Budget, Certified, DerivativesReport, Design, End, FrontPoint, Oracle, Outcome, Pareto, Problem, Quiet, Run, Stop,
-    Study, TradeOffs, Watch,
+    Budget, Certified, DerivativesReport, Design, End, FrontPoint, Outcome, Pareto, Problem, Quiet, Run, Stop, Study,
+    TradeOffs, Watch,
 };
 use mops_solvers::{Certificate, certificate, optimality};
 
 use crate::numbers::{counted, significant};
-use crate::search::{Limits, NEAR, Options, SolveError, Solved, contradiction, search_within};
+use crate::search::{Limits, Options, SolveError, Solved, contradiction, linearised, search_within};
 
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let started = Instant::now();
@@ -80,8 +80,8 @@ fn doubt_ends(problem: &Problem, front: &mut [Certified], budget: usize, watch: 
         let mut probe = Run::new(&alone, Budget { evaluations: budget.saturating_sub(spent) }, &quiet);
         probe.learn(at.clone());
         let point = optimality(&mut probe, &at.point);
-        let found = probe.linearise(&at.point, NEAR).ok().flatten();
-        let derivatives = found.map(|found| DerivativesReport::of(&alone, &mut probe, &found));
+        let near = linearised(&at, &mut probe, watch).filter(|(_, is_exact)| *is_exact);
+        let derivatives = near.map(|(found, _)| DerivativesReport::of(&alone, &mut probe, &found));
         let end_of_search = End::new(point, at.merit, &[], Stop::Converged, false);
         let contradicted = derivatives.as_ref().and_then(contradiction);
         let doubt = contradicted.into_iter().fold(end_of_search, End::with_contradiction).doubt;

@@ -50,12 +50,15 @@ impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
         }
     }
 
-    /// Passes on what is known of the inputs before the start at `t`, as far back as the delays of the plant reach; the states rest.
+    /// Passes on the past before the start at `t`: what is known of the inputs, as far back as the delays of the plant reach, with the
+    /// states at rest.
     fn recall(&mut self, t: f64, x: &[S]) {
         let reach: f64 = self.plant.delays().iter().sum();
         let known = self.drives.iter().map(Drive::first_known).fold(t, f64::min);
         let mut from = known.max(t - reach);
         if from >= t || !from.is_finite() {
+            let u: Vec<S> = self.drives.iter().map(Drive::before).collect();
+            self.plant.begin(&Instant { t, x, u: &u, w: &self.forces });
             return;
         }
         self.constant = None;
@@ -229,8 +232,6 @@ impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
 
     fn pass_break(&mut self, t: f64, x: &mut [S]) -> S {
         if !std::mem::replace(&mut self.has_started, true) && self.plant.remembers() {
-            let u: Vec<S> = self.drives.iter().map(Drive::before).collect();
-            self.plant.begin(&Instant { t, x, u: &u, w: &self.forces });
             self.recall(t, x);
         }
         self.drives.iter_mut().for_each(|drive| drive.pass_break(t));

@@ -45,7 +45,7 @@ pub struct CmaEsOptions {
     #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub size: f64,
     /// A run ends when the best values of its last generations differ by less than this, relative to the objective.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Number of restarts with a doubled population. Runs with small populations use as many evaluations in total.
     #[schemars(range(max = 30))]

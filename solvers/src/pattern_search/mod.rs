@@ -55,7 +55,7 @@ pub struct PatternSearchOptions {
     #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub size: f64,
     /// Pattern size at which the search ends, in the unit box.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Factor of the pattern size after an unsuccessful poll. Smaller values end the search sooner; larger values poll
     /// more often.

@@ -38,7 +38,7 @@ use state::{FEASIBILITY_TOLERANCE, State};
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct SqpOptions {
     /// Predicted decrease below which the iteration stops, relative to 1 + |objective|.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Initial radius of the trust region, in the unit box.
     #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]

@@ -259,7 +259,8 @@ pub fn remove_slack(oracle: &mut dyn Oracle, point: &[f64]) -> Result<Option<Eva
 const MAX_ROUNDS: usize = 5;
 
 /// Inserts a point into the front and removes points that it dominates; returns false if the point is dominated itself, or if it is
-/// the same as one of the front. `range`: the range of every objective over the front, empty while it is not known.
+/// the same as one of the front. `range` holds the range of every objective over the front; it is empty until the ends of the front are
+/// known.
 fn insert(front: &mut Vec<Candidate>, candidate: Candidate, range: &[f64]) -> bool {
     let one = vec![1.0; candidate.objectives.len()];
     let is_dominated =
