@@ -50,7 +50,7 @@ fn found(diagnosis: &Diagnosis) -> Vec<(&str, &str)> {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn a_missing_effect_is_found_with_its_place_and_its_parameter() {
     for (plant, effect, [name, told]) in [
         ("servo", "coulomb-friction", ["c", "torque"]),
@@ -74,7 +74,7 @@ fn a_missing_effect_is_found_with_its_place_and_its_parameter() {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn a_simple_friction_is_refitted_from_the_optimum_of_a_more_general_one() {
     // The pendulum comes to rest. A fit of Coulomb friction alone ends in a local minimum with 25 times the sum of squares.
     let missing = Missing::Effects(&["coulomb-friction"]);
@@ -85,7 +85,7 @@ fn a_simple_friction_is_refitted_from_the_optimum_of_a_more_general_one() {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn a_constant_heat_gain_is_not_mistaken_for_another_loss() {
     // `k (around - T)` with the declared loss at zero explains the data equally well.
     let missing = Missing::Effects(&["constant-heat-gain"]);
@@ -96,7 +96,7 @@ fn a_constant_heat_gain_is_not_mistaken_for_another_loss() {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn a_friction_fit_in_a_local_minimum_near_zero_is_restarted() {
     // In windows the residual of the baseline model is 10 times the noise. From zero the fit ended at a quarter of the
     // friction, with 9 times the noise.
@@ -111,7 +111,7 @@ fn a_friction_fit_in_a_local_minimum_near_zero_is_restarted() {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn a_break_away_force_is_found_although_the_residuals_are_discontinuous_in_it() {
     // The mass sticks and slips. A fit by gradients alone ended at 2.1 times the noise, with a third too much friction.
     let case =
@@ -132,7 +132,7 @@ fn a_break_away_force_is_found_although_the_residuals_are_discontinuous_in_it() 
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn no_effect_is_found_in_data_of_a_complete_model() {
     for plant in ["pendulum", "servo"] {
         let case = case(plant, Missing::Nothing, 0.0);
@@ -143,7 +143,7 @@ fn no_effect_is_found_in_data_of_a_complete_model() {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn neither_the_order_of_the_catalogue_nor_the_seed_changes_the_verdict() {
     let friction = case("servo", Missing::Effects(&["coulomb-friction"]), 5.0);
     assert_eq!(found(&diagnosis(&friction, true)), [("coulomb-friction", "joint:q")]);

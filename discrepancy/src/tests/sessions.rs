@@ -21,7 +21,7 @@ fn swing(label: &str, k: f64, b: f64) -> Record {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn a_session_with_twice_the_friction_is_judged_over_the_whole_record_and_in_windows() {
     let records = vec![swing("first", 40.0, 0.05), swing("months later", 40.4, 0.1)];
     let mut subject = subject(PENDULUM, &[41.0, 0.06, 1.0, 0.0], 2, records);

@@ -48,7 +48,7 @@ fn diagnosis(records: Vec<Record>) -> Diagnosis {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn a_stiff_stop_is_found_where_it_is() {
     let often = [(0.5, 20.0), (2.0, 25.0), (3.5, 22.0), (4.8, 24.0)];
     let told = diagnosis(vec![run("often", &often), run("now and then", &[(1.0, 22.0), (3.2, 20.0)])]);

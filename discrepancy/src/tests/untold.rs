@@ -77,7 +77,7 @@ fn where_the_motion_never_ends_a_break_away_is_as_likely_as_before() {
 }
 
 #[test]
-#[cfg_attr(not(feature = "full-tests"), ignore = "full tier")]
+#[ignore = "full tier"]
 fn a_break_away_that_the_data_tell_costs_the_whole() {
     // It breaks away at every reversal of the push.
     let diagnosis = pushed();

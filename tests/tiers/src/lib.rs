@@ -1,21 +1,21 @@
 //! Tiers of property tests: the quick tier runs a tenth of the cases of a property, the full tier all of them.
 //!
-//! `cargo test --workspace` runs the quick tier, `cargo test --workspace --features full-tests` the full tier. A property
-//! test states the number of cases of the full tier.
+//! `cargo test --workspace` runs the quick tier, `MOPS_TESTS=full cargo test --workspace -- --include-ignored` the full tier. A
+//! property test states the number of cases of the full tier.
 
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::RngSeed;
 
 /// Returns the number of cases of a property: `full` in the full tier, a tenth of it, rounded up, in the quick tier.
 #[must_use]
-pub const fn cases(full: u32) -> u32 {
+pub fn cases(full: u32) -> u32 {
     if is_full() { full } else { full.div_ceil(10) }
 }
 
-/// Returns true if the tests run in the full tier.
+/// Returns true if the tests run in the full tier: the environment has `MOPS_TESTS=full`.
 #[must_use]
-pub const fn is_full() -> bool {
-    cfg!(feature = "full-tests")
+pub fn is_full() -> bool {
+    std::env::var_os("MOPS_TESTS").is_some_and(|tier| tier == "full")
 }
 
 /// Returns the configuration of a property with `full` cases in the full tier. Every run has the same cases, and failures are
