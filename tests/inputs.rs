@@ -340,6 +340,9 @@ fn a_robust_loss_keeps_a_gain_that_single_wrong_samples_would_bend() {
     assert!((of("squares") - 2.0).abs() > 0.1);
     assert!((of("huber") - 2.0).abs() < 0.01, "{}", of("huber"));
     assert!((of("student") - 2.0).abs() < 0.002, "{}", of("student"));
+    let robust = gain(experiment)
+        .replace("fit = { signal = 'x' }, demand = 1e-3", "normalised-error = { signal = 'x', loss = 'huber' }");
+    assert!(!check(folder, &robust).contains("outliers"), "its loss is robust already");
     let printed = check(folder, &gain(experiment));
     assert!(printed.contains("3 samples of `x` in `e` (the first at 0.7000000000000001 s) are outliers"), "{printed}");
 }

@@ -1,8 +1,8 @@
 //! Fit to a measurement: the integral of the squared residual.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Samples, Sense, StudyError, Tangent, Unit,
-    Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Loss, Samples, Sense, StudyError, Tangent,
+    Unit, Value, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -106,7 +106,7 @@ impl Criterion for Bound {
     fn samples(&self, case: &Case) -> Option<Samples> {
         let channel = case.experiment.as_ref()?.channel(&self.signal.name)?;
         let weights = (0..channel.times.len()).map(|i| self.root_weight(&channel.times, i)).collect();
-        Some(Samples { signal: self.signal.name.clone(), first: 0, weights, noise: channel.noise })
+        Some(Samples { signal: self.signal.name.clone(), first: 0, weights, noise: channel.noise, loss: Loss::Squares })
     }
 }
 

@@ -1,13 +1,13 @@
 //! Fit to a measurement, in units of its noise level.
 
 use mops_core::{
-    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Samples, Sense,
+    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Loss, Quantity, Samples, Sense,
     StudyError, Tangent, Unit, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::common::{Loss, NOT_NEGATIVE, compare, compared_slopes, positive};
+use crate::common::{NOT_NEGATIVE, compare, compared_slopes, positive};
 
 /// Normalised error `mean_i ((y_simulated - y_measured)(t_i)/noise)^2`, dimensionless: 1 if the residual is pure noise.
 ///
@@ -16,7 +16,8 @@ use crate::common::{Loss, NOT_NEGATIVE, compare, compared_slopes, positive};
 /// `r_i = (y_simulated - y_measured)(t_i)/(noise sqrt(N))`, N samples, that least-squares solvers use.
 ///
 /// With a robust `loss`, the squares are replaced by Huber's loss or that of Student's distribution with 4 degrees of freedom; pure
-/// normal noise then has the value 0.93 or 0.97. Standard errors of a calibration then assume residuals of equal variance.
+/// normal noise then has the value 0.93 or 0.97. Standard errors and profiles are those of M-estimates, and the bootstrap resamples
+/// the residuals with their outliers.
 ///
 /// The criterion is evaluated in the experiments that measure the signal. Less is better. Range: from 0 up. A value
 /// well below 1 means that the noise level is too high or that the model fits the noise. A value well above 1 means
@@ -126,14 +127,11 @@ impl Criterion for Bound {
     }
 
     fn samples(&self, case: &Case) -> Option<Samples> {
-        // With a robust loss, residuals are not proportional to deviations.
-        if self.loss != Loss::Squares {
-            return None;
-        }
         let channel = case.experiment.as_ref()?.channel(&self.signal)?;
         let [noise, share] = self.noise_and_share(channel).ok()?;
         let weights = vec![share / noise; channel.times.len()];
-        Some(Samples { signal: self.signal.clone(), first: 0, weights, noise: self.noise.or(channel.noise) })
+        let (signal, loss) = (self.signal.clone(), self.loss);
+        Some(Samples { signal, first: 0, weights, noise: Some(noise), loss })
     }
 }
 
@@ -173,7 +171,6 @@ mod tests {
         let case = measured(&[0.0, 1.0, 2.0, 3.0], &[0.1, 0.9, 2.1, 103.0], Some(0.1));
         let of = |loss: Loss| value_in(&case, &NormalisedError { loss, ..error(None) }, &simulated(3.0, |t| t)).number;
         assert!(of(Loss::Squares) > 2e5 && of(Loss::Huber) < 700.0 && of(Loss::Student) < 20.0);
-        assert!(bound(&NormalisedError { loss: Loss::Huber, ..error(None) }).samples(&case).is_none());
     }
 
     #[test]

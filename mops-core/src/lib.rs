@@ -34,6 +34,7 @@ mod known;
 mod least_squares;
 pub mod linear;
 mod linearised;
+mod loss;
 mod model;
 mod objectives;
 mod outcome;
@@ -94,6 +95,7 @@ pub use known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes, RowVa
 pub use least_squares::{LeastSquares, LeastSquaresStep};
 pub use linear::StateSpace;
 pub use linearised::{Linearise, Linearised, Resting, Rough};
+pub use loss::Loss;
 pub use model::{
     Analysis, AnalysisKind, Cut, Event, Interface, Job, Local, Model, OperatingPoint, Parameter, Response, State,
     Variable, WithTangents, Work,

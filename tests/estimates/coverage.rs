@@ -1,6 +1,8 @@
 //! Coverage of 95 % intervals over simulated calibrations with the seeds 0, 1, 2, ...
 
 use mops::core::statistics::share_interval;
+use mops::core::{Chosen, Loss, UncertaintyTask};
+use mops::criteria::normalised_error::NormalisedError;
 use mops::{CriterionBuilder, TunerBuilder};
 
 use super::models::{Calibration, Channel, Curve, fit, lines, normalised, parameters, words};
@@ -115,4 +117,84 @@ fn intervals_with_correlated_noise_are_reported_as_such() {
     }
     let words = words(&calibration.run(0));
     assert!(words.contains("not white") && words.contains("cover the truth less often than stated"), "{words}");
+}
+
+/// A decay to an offset: 150 samples with spikes, of which `share` have one.
+fn with_spikes(loss: Loss, share: f64, upwards: bool) -> Calibration {
+    let channel = Channel::new("rig", "y", 150, 6.0, |t| 2.0 * math::exp(-0.9 * t) + 0.4, 0.05).declared();
+    let criterion = move || NormalisedError { signal: "y".into(), loss, ..NormalisedError::default() };
+    Calibration {
+        model: Box::new(|| Curve::new(&["k", "o", "x0"], |p, t| p[2] * math::exp(-p[0] * t) + p[1]).into()),
+        tuners: vec![
+            ("k", TunerBuilder::new(1.0, 0.1, 10.0)),
+            ("o", TunerBuilder::new(0.0, -5.0, 5.0)),
+            ("x0", TunerBuilder::new(1.0, 0.0, 10.0)),
+        ],
+        channels: vec![Channel { spikes: (share, upwards), ..channel }],
+        criteria: Box::new(move || vec![("y", CriterionBuilder::minimise(criterion(), 1.0))]),
+        uncertainty: None,
+    }
+}
+
+const DECAY: [(&str, f64); 3] = [("k", 0.9), ("o", 0.4), ("x0", 2.0)];
+
+#[test]
+fn intervals_of_hubers_loss_cover_the_truth_beside_outliers() {
+    for share in [0.0, 0.03, 0.1] {
+        assert_covers(&with_spikes(Loss::Huber, share, false), &DECAY);
+    }
+}
+
+#[test]
+fn intervals_of_students_loss_cover_the_truth_beside_outliers() {
+    for share in [0.03, 0.1] {
+        assert_covers(&with_spikes(Loss::Student, share, false), &DECAY);
+    }
+}
+
+/// Has no target: a robust estimate is biased by outliers on one side.
+#[test]
+fn outliers_on_one_side_are_reported_with_what_they_shift() {
+    for loss in [Loss::Huber, Loss::Student] {
+        let calibration = with_spikes(loss, 0.1, true);
+        let count = mops_tiers::cases(CALIBRATIONS);
+        for ((name, _), hits) in DECAY.iter().zip(hits(&calibration, &DECAY, count)) {
+            println!("{loss:?}, spikes upwards, {name}: {hits} of {count} intervals hold the truth");
+        }
+        let words = words(&calibration.run(0));
+        assert!(words.contains("standard deviations of the noise off the model are above it"), "{words}");
+        let (_, told) = words.split_once("to first order: ").unwrap();
+        assert!((loss == Loss::Huber) == told.contains("`o` = "), "{words}");
+    }
+}
+
+/// Sets of 200 replicates whose bootstrap intervals are counted; `MOPS_BOOTSTRAP=all` counts ten times as many.
+const SETS: u32 = 20;
+
+#[test]
+fn bootstrap_intervals_beside_outliers_cover_the_truth() {
+    let all = std::env::var("MOPS_BOOTSTRAP").is_ok_and(|which| which == "all");
+    let count = if all { 10 * SETS } else { mops_tiers::cases(SETS) };
+    for (loss, share) in [(Loss::Huber, 0.03), (Loss::Huber, 0.1), (Loss::Student, 0.1)] {
+        let task = UncertaintyTask { profile: Chosen::None, bootstrap: 200, block: None, bands: false, level: 0.95 };
+        let calibration = Calibration { uncertainty: Some(task), ..with_spikes(loss, share, false) };
+        let mut hits = [0; 3];
+        for seed in 0..count {
+            let outcome = calibration.run(u64::from(seed));
+            let found = outcome.found.uncertainty.unwrap().bootstrap.unwrap();
+            for (k, ((name, truth), hits)) in DECAY.iter().zip(&mut hits).enumerate() {
+                let one = &found.parameters[k];
+                assert_eq!(one.parameter, *name);
+                let [low, high] = one.interval;
+                assert!(low < one.value && one.value < high, "{loss:?} {name}: {low} to {high}");
+                *hits += usize::from(low <= *truth && *truth <= high);
+            }
+        }
+        for ((name, _), hits) in DECAY.iter().zip(hits) {
+            println!("bootstrap, {loss:?}, {share} spikes, {name}: {hits} of {count} intervals hold the truth");
+            let [low, high] =
+                if all { [hits as f64 / f64::from(count); 2] } else { share_interval(hits, count as usize, 0.999) };
+            assert!(high >= 0.9 && low <= 0.99, "{loss:?} {name}: {hits} of {count}");
+        }
+    }
 }

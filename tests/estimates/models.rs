@@ -142,7 +142,12 @@ pub struct Channel {
     pub correlation: f64,
     /// Only every n-th sample is present; the others are gaps.
     pub every: usize,
+    /// Share of the samples with a spike, and whether all spikes are upwards.
+    pub spikes: (f64, bool),
 }
+
+/// Sizes of spikes, in standard deviations of the noise.
+const SPIKES: [f64; 2] = [10.0, 60.0];
 
 impl Channel {
     /// Channel of a calibration experiment with undeclared white noise, sampled uniformly from 0 to `end`.
@@ -156,7 +161,8 @@ impl Channel {
     ) -> Self {
         let times = (0..count).map(|i| end * f64::from(i) / f64::from(count - 1)).collect();
         let (role, declared, gain, correlation, every) = (Role::Calibration, None, 1.0, 0.0, 1);
-        Self { experiment, role, signal, times, truth, gain, noise, declared, correlation, every }
+        let spikes = (0.0, false);
+        Self { experiment, role, signal, times, truth, gain, noise, declared, correlation, every, spikes }
     }
 
     pub fn declared(self) -> Self {
@@ -185,7 +191,17 @@ impl Channel {
         let sample = |(i, &t): (usize, &f64)| {
             if i % self.every == 0 { self.gain * (self.truth)(t) + next() } else { f64::NAN }
         };
-        self.times.iter().enumerate().map(sample).collect()
+        let mut values: Vec<f64> = self.times.iter().enumerate().map(sample).collect();
+        let (share, upwards) = self.spikes;
+        let mut random = stream(seed, &format!("{} {} spikes", self.experiment, self.signal));
+        for value in values.iter_mut().filter(|_| share > 0.0) {
+            let [drawn, size, side]: [f64; 3] = [random.random(), random.random(), random.random()];
+            if drawn < share {
+                let sign = if upwards || side < 0.5 { 1.0 } else { -1.0 };
+                *value += sign * self.noise * (SPIKES[0] + size * (SPIKES[1] - SPIKES[0]));
+            }
+        }
+        values
     }
 
     fn measured(&self, seed: u64) -> ChannelBuilder {

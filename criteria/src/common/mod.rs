@@ -3,7 +3,6 @@
 mod comparison;
 mod error_integral;
 mod linear;
-mod loss;
 mod part;
 mod step;
 #[cfg(test)]
@@ -14,7 +13,6 @@ use mops_core::{Analysis, Quantity, StudyError, Trace, Unit};
 pub use comparison::{compare, compared_slopes};
 pub use error_integral::ErrorIntegral;
 pub use linear::{Channel, LinearCriterion, Of, Values, capped, feedback, poles};
-pub use loss::Loss;
 pub use part::part;
 pub use step::{Step, StepOptions};
 

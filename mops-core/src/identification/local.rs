@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::alike::{Alike, alike};
 use super::covariance::Covariance;
 use super::noise::{Noise, Spread};
-use super::records::records;
+use super::records::{Record, records};
 use super::sensitivity::{Coordinate, DIFFERENCES, Sensitivity, TANGENTS};
 use crate::criterion::Usage;
 use crate::problem::Problem;
@@ -65,7 +65,7 @@ pub fn local(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>)
     }
     let active: Vec<&Tuner> = problem.active().iter().map(|&i| &study.tuners[i]).collect();
     let values: Vec<f64> = problem.active().iter().map(|&i| tuners[i]).collect();
-    let jacobian = DMatrix::from_fn(rows, n, |i, k| {
+    let mut jacobian = DMatrix::from_fn(rows, n, |i, k| {
         let slope = if residuals { found.residuals[k][i] } else { found.rows[counting[i]][k] };
         slope / unit_slope(active[k], values[k])
     });
@@ -76,10 +76,22 @@ pub fn local(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>)
         span: unit_slope(tuner, value).abs(),
         unit: tuner.unit.to_string(),
     });
+    let mut at = found.at.residuals.clone();
+    let mut records = records(problem, tuners).filter(|_| residuals);
+    let holds = |record: &mut Record| match point {
+        Point::Minimum => record.as_squares(&mut at, &mut jacobian),
+        Point::Elsewhere => {
+            record.without_loss(&mut jacobian, &at);
+            true
+        }
+    };
+    if !records.iter_mut().flatten().all(holds) {
+        records = None;
+    }
     let zero = zero.unwrap_or(if exact { TANGENTS } else { DIFFERENCES });
     let mut sensitivity = Sensitivity::of(&jacobian, coordinates.collect(), zero);
-    let of_residuals = records(problem, tuners).filter(|_| residuals).map(|records| match point {
-        Point::Minimum => Noise::of(records, &found.at.residuals, &jacobian, &sensitivity.basis),
+    let of_residuals = records.map(|records| match point {
+        Point::Minimum => Noise::of(records, &at, &jacobian, &sensitivity.basis),
         Point::Elsewhere => Noise::declared(records, n),
     });
     let mut covariance = of_residuals.and_then(|noise| Covariance::of(noise, &jacobian, &sensitivity));

@@ -6,6 +6,7 @@ use super::pools::{self, Fitted, Pool, SHOWN, Sharing, Weighted};
 use super::records::Record;
 use super::whiteness::whiteness;
 use super::words::{MANY, coefficient, distinct};
+use crate::loss::Loss;
 use crate::math;
 use crate::study::Study;
 
@@ -34,7 +35,26 @@ pub struct Noise {
     /// Change and standard error of the estimate of every tuner with samples weighted by their noise level only, to
     /// first order.
     weighted: Vec<(f64, f64)>,
+    /// Large deviations on one side, beside robust losses.
+    pub(super) one_sided: Vec<OneSided>,
 }
+
+/// Large deviations of a record that are on one side.
+#[derive(Debug, Clone)]
+pub(super) struct OneSided {
+    /// Index of the record's case.
+    pub case: usize,
+    /// Measured signal.
+    pub signal: String,
+    /// Number of large deviations, and of those with a measured value above the simulated one.
+    pub count: usize,
+    pub above: usize,
+    /// Change of the estimate of every tuner without these samples, in its unit, to first order.
+    pub changes: Vec<f64>,
+}
+
+/// Probability below which large deviations are on one side by more than chance.
+const BY_CHANCE: f64 = 0.01;
 
 /// Record and its noise model.
 #[derive(Debug, Clone)]
@@ -120,6 +140,7 @@ impl Noise {
         let white: Vec<bool> = found.iter().map(|found| matches!(found.shape, Shape::White(_))).collect();
         let (sharing, disputed) = pools::sharing(&fitted, &own.pools, &white);
         let weighted = sharing.variances(&fitted);
+        let one_sided = fitted.iter().filter_map(|of| OneSided::of(of, basis)).collect();
         let [step, errors] = [basis * &weighted.step, (basis * &weighted.covariance * basis.transpose()).diagonal()];
         let mut pools = weighted.pools;
         let mut sources = Vec::with_capacity(fitted.len());
@@ -149,7 +170,7 @@ impl Noise {
             });
         }
         let weighted = step.iter().zip(&errors).map(|(step, error)| (*step, error.max(0.0).sqrt())).collect();
-        Self { sources, pools, weighted }
+        Self { sources, pools, weighted, one_sided }
     }
 
     /// Returns the noise declared in a study, for records whose residuals show none; `tuners` is the number of tuners.
@@ -164,7 +185,12 @@ impl Noise {
             changing: false,
         };
         let sources = records.into_iter().map(source).collect();
-        Self { sources, pools: vec![known, unknown], weighted: vec![(f64::NAN, f64::NAN); tuners] }
+        Self {
+            sources,
+            pools: vec![known, unknown],
+            weighted: vec![(f64::NAN, f64::NAN); tuners],
+            one_sided: Vec::new(),
+        }
     }
 
     /// Returns the covariance of `columns' * residuals`, in parts of independent noise.
@@ -199,6 +225,12 @@ impl Noise {
         let is_wanted =
             |source: &&Source| (source.record.case, source.record.signal.as_deref()) == (case, Some(signal));
         self.sources.iter().find(is_wanted).map(|source| self.deviation(source))
+    }
+
+    /// Returns the loss of a channel in a case, and its unit; `None` if the channel is not fitted.
+    pub fn loss_of_channel(&self, case: usize, signal: &str) -> Option<(Loss, f64)> {
+        let is_wanted = |record: &&Record| (record.case, record.signal.as_deref()) == (case, Some(signal));
+        self.records().find(is_wanted).map(Record::loss)
     }
 
     /// Returns remarks on the noise of records, a sentence each.
@@ -260,6 +292,50 @@ impl Noise {
         };
         (self.pools[source.pool].variance * variance).sqrt()
     }
+}
+
+impl OneSided {
+    /// Returns the large deviations of a record with a robust loss, if a sign test finds them on one side; `basis` as for [`Noise::of`].
+    ///
+    /// Without these samples, the normal equations of the step `x` are `sum w (s x + d) s = 0` over the others; over all samples,
+    /// `sum w d s = 0` and `sum w s s' = 1`.
+    fn of(of: &Fitted, basis: &DMatrix<f64>) -> Option<Self> {
+        let tail = of.record.tail.as_ref()?;
+        let count = tail.samples.len();
+        let rare = tail.above.min(count - tail.above);
+        if 2.0 * half_binomial(count, rare) >= BY_CHANCE {
+            return None;
+        }
+        let n = of.slopes.ncols();
+        let (mut information, mut pull) = (DMatrix::identity(n, n), DVector::zeros(n));
+        for &sample in &tail.samples {
+            let (slopes, weight) = (of.slopes.row(sample).transpose(), of.record.weight_of(sample));
+            information -= &slopes * slopes.transpose() * weight;
+            pull += &slopes * (weight * of.deviations[sample]);
+        }
+        let step = information.cholesky()?.solve(&pull);
+        Some(Self {
+            case: of.record.case,
+            signal: of.record.signal.clone()?,
+            count,
+            above: tail.above,
+            changes: (basis * step).as_slice().to_vec(),
+        })
+    }
+}
+
+/// Returns the probability that at most `most` of `count` tosses of a coin are heads.
+#[allow(clippy::cast_precision_loss)]
+fn half_binomial(count: usize, most: usize) -> f64 {
+    // From the largest term down: the smallest ones are below the number range.
+    let [n, k] = [count, most].map(|x| x as f64);
+    let choices = math::ln_gamma(n + 1.0) - math::ln_gamma(k + 1.0) - math::ln_gamma(n - k + 1.0);
+    let (mut term, mut sum) = (math::exp(choices - n * std::f64::consts::LN_2), 0.0);
+    for k in (0..=most).rev() {
+        sum += term;
+        term *= k as f64 / (count - k + 1) as f64;
+    }
+    sum
 }
 
 /// Character of the residuals of a record.
@@ -407,6 +483,14 @@ mod tests {
         assert_eq!(known, Spread { deviation: 1.0, freedom: f64::INFINITY });
         assert!((known.half_width(0.95) - 1.959_964).abs() < 1e-6);
         assert!(Spread::of_sum([(1.0, pool(f64::NAN, 0.5))].into_iter()).half_width(0.95).is_nan());
+    }
+
+    #[test]
+    fn a_sign_test_sums_the_tail_of_the_binomial_distribution() {
+        // Of ten tosses: 1 + 10 of 1024.
+        assert!((half_binomial(10, 1) - 11.0 / 1024.0).abs() < 1e-13);
+        assert!((half_binomial(0, 0) - 1.0).abs() < 1e-13 && (half_binomial(7, 7) - 1.0).abs() < 1e-13);
+        assert!((half_binomial(4001, 2000) - 0.5).abs() < 1e-9);
     }
 
     #[test]

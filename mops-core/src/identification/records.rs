@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
+use crate::loss::Loss;
 use crate::problem::Problem;
+use crate::samples::Samples;
 
 /// Samples of one channel in one experiment, with the residuals that they enter.
 ///
@@ -21,7 +23,21 @@ pub struct Record {
     samples: Range<usize>,
     /// Blocks of consecutive residuals, one residual per sample.
     blocks: Vec<Block>,
+    /// Large deviations, if the loss is robust and the residuals were replaced.
+    pub tail: Option<Tail>,
 }
+
+/// Deviations of a record beyond [`FAR`] standard deviations of its noise.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Tail {
+    /// Samples of the record with such a deviation.
+    pub samples: Vec<usize>,
+    /// Number of them with a measured value above the simulated one.
+    pub above: usize,
+}
+
+/// Deviation beyond which a sample may be an outlier, in standard deviations: 0.3 % of normal noise is farther.
+pub const FAR: f64 = 3.0;
 
 /// Residuals of one row of the study.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,13 +48,80 @@ struct Block {
     sample: usize,
     /// Residual divided by (simulated - measured), per sample.
     weights: Vec<f64>,
+    /// Loss of the deviations, and its unit.
+    loss: Loss,
+    unit: f64,
 }
 
 impl Record {
     /// Creates a record of one block of residuals that starts at index `first`.
     pub fn new(case: usize, signal: Option<String>, noise: Option<f64>, first: usize, weights: Vec<f64>) -> Self {
         let samples = 0..weights.len();
-        Self { case, signal, noise, samples, blocks: vec![Block { first, sample: 0, weights }] }
+        let block = Block { first, sample: 0, weights, loss: Loss::Squares, unit: 1.0 };
+        Self { case, signal, noise, samples, blocks: vec![block], tail: None }
+    }
+
+    /// Creates the record of the samples of a criterion whose residuals start at index `first`; `factor` is that of its residuals.
+    fn of(case: usize, samples: Samples, first: usize, factor: f64) -> Self {
+        let Samples { signal, first: sample, weights, noise, loss } = samples;
+        let weights = weights.iter().map(|weight| factor * weight).collect();
+        let mut record = Self::new(case, Some(signal), noise, first, weights);
+        record.samples = sample..sample + record.len();
+        let block = &mut record.blocks[0];
+        (block.sample, block.loss, block.unit) = (sample, loss, noise.unwrap_or(1.0));
+        record
+    }
+
+    /// Returns the loss of the deviations, and its unit.
+    pub fn loss(&self) -> (Loss, f64) {
+        (self.blocks[0].loss, self.blocks[0].unit)
+    }
+
+    /// Replaces the residuals of a robust loss, and the rows of their Jacobian, by those of the least-squares problem with the same
+    /// normal equations: the theory of M-estimates becomes that of least squares.
+    ///
+    /// With the score `psi` and the deviation `e`, in the unit of the loss, the deviation becomes `psi(e)/mean(psi')` and the weight
+    /// of its square `mean(psi')`. White residuals then give the covariance `s^2 mean(psi^2)/mean(psi')^2 (J'J)^-1`, and the ratio of
+    /// likelihoods becomes `(S - S_min) mean(psi')/mean(psi^2)`. Their size shows the noise, so that none is declared. Returns
+    /// false if `mean(psi')` is not positive: most samples are outliers, and the theory does not hold.
+    ///
+    /// Source: P. J. Huber, E. M. Ronchetti, Robust Statistics (2nd ed., 2009), sections 6.3, 7.6; F. R. Hampel et al., Robust
+    /// Statistics (1986), section 7.2 (tests).
+    #[allow(clippy::cast_precision_loss)]
+    pub fn as_squares(&mut self, residuals: &mut [f64], jacobian: &mut DMatrix<f64>) -> bool {
+        for block in self.blocks.iter_mut().filter(|block| block.loss != Loss::Squares) {
+            let (loss, count) = (block.loss, block.weights.len());
+            let deviations = block.deviations(residuals);
+            let scores: Vec<[f64; 2]> = deviations.iter().map(|&e| loss.score(e)).collect();
+            let mean = scores.iter().map(|[_, change]| change).sum::<f64>() / count as f64;
+            if mean <= 0.0 {
+                return false;
+            }
+            let tail = self.tail.get_or_insert_default();
+            for (i, (e, [score, _])) in deviations.iter().zip(&scores).enumerate() {
+                let weight = mean.sqrt() * block.weights[i];
+                residuals[block.first + i] = weight * block.unit * score / mean;
+                jacobian.row_mut(block.first + i).apply(|x| *x *= mean.sqrt() / loss.residual(*e)[1]);
+                block.weights[i] = weight;
+                let sample = block.sample + i - self.samples.start;
+                if e.abs() > FAR && !tail.samples.contains(&sample) {
+                    tail.samples.push(sample);
+                    tail.above += usize::from(*e < 0.0);
+                }
+            }
+            self.noise = None;
+        }
+        true
+    }
+
+    /// Replaces the residuals of a robust loss, and the rows of their Jacobian, by those of squares: where they are mostly misfit,
+    /// the declared noise alone counts.
+    pub fn without_loss(&self, jacobian: &mut DMatrix<f64>, residuals: &[f64]) {
+        for block in self.blocks.iter().filter(|block| block.loss != Loss::Squares) {
+            for (i, e) in block.deviations(residuals).into_iter().enumerate() {
+                jacobian.row_mut(block.first + i).apply(|x| *x /= block.loss.residual(e)[1]);
+            }
+        }
     }
 
     /// Returns the number of samples.
@@ -88,11 +171,24 @@ impl Record {
         })
     }
 
+    /// Returns the weights of the squared deviations of a sample in the sum of squared residuals, summed.
+    pub fn weight_of(&self, sample: usize) -> f64 {
+        self.of_sample(sample).map(|(_, weight)| weight * weight).sum()
+    }
+
     /// Adds the residuals of another criterion of the channel; samples that both read are one.
     fn add(&mut self, other: Self) {
         self.noise = self.noise.or(other.noise);
         self.samples = self.samples.start.min(other.samples.start)..self.samples.end.max(other.samples.end);
         self.blocks.extend(other.blocks);
+    }
+}
+
+impl Block {
+    /// Returns the deviations in units of the loss.
+    fn deviations(&self, residuals: &[f64]) -> Vec<f64> {
+        let residuals = &residuals[self.first..self.first + self.weights.len()];
+        residuals.iter().zip(&self.weights).map(|(r, weight)| self.loss.deviation(r / (weight * self.unit))).collect()
     }
 }
 
@@ -106,13 +202,7 @@ pub fn records(problem: &Problem, tuners: &[f64]) -> Option<Vec<Record>> {
         let case = study.jobs[row.job].case;
         let factor = problem.residual_factor(index)?;
         let record = match row.criterion.samples(&study.cases[case]) {
-            Some(samples) => {
-                let weights = samples.weights.iter().map(|weight| factor * weight).collect();
-                let mut record = Record::new(case, Some(samples.signal), samples.noise, first, weights);
-                record.samples = samples.first..samples.first + record.len();
-                record.blocks[0].sample = samples.first;
-                record
-            }
+            Some(samples) => Record::of(case, samples, first, factor),
             None => {
                 let analysis = problem.analyse_all(row.job, tuners, None).ok()?;
                 let count = row
@@ -147,7 +237,8 @@ mod tests {
     #[test]
     fn two_criteria_on_one_channel_share_the_noise_of_its_samples() {
         let mut record = Record::new(0, Some("y".into()), None, 0, vec![2.0, 2.0]);
-        record.blocks.push(Block { first: 2, sample: 0, weights: vec![1.0, 3.0] });
+        let other = Record::new(0, Some("y".into()), None, 2, vec![1.0, 3.0]);
+        record.add(other);
         let residuals = [2.0, -4.0, 1.0, -6.0];
         assert_eq!(record.deviations(&residuals), [1.0, -2.0]);
         let rows = DMatrix::from_column_slice(4, 1, &[1.0, 1.0, 10.0, 10.0]);

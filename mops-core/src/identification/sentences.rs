@@ -2,6 +2,8 @@
 
 use super::blind::{BlindDirection, Limit};
 use super::local::Local;
+use super::noise::OneSided;
+use super::records::FAR;
 use super::report::{DirectionReport, TunerSensitivity};
 use super::words::{coefficient, counted, estimate, listed, percent};
 use crate::problem::Problem;
@@ -40,6 +42,7 @@ pub(super) fn sentences(
     if let Some(covariance) = &local.covariance {
         sentences.extend(covariance.noise().remarks(problem.study()));
     }
+    sentences.extend(one_sided(problem, local, tuners));
     sentences.extend(alike(local, tuners));
     sentences
 }
@@ -118,10 +121,50 @@ fn extremes(local: &Local, tuners: &[TunerSensitivity], of: &[usize]) -> Option<
     })
 }
 
+/// Relative change below which an estimate, in standard errors, and its error count as unchanged.
+const SAME: f64 = 0.2;
+
+/// Returns large deviations on one side beside a robust loss, and what the estimates would be without them.
+fn one_sided(problem: &Problem, local: &Local, tuners: &[TunerSensitivity]) -> Vec<String> {
+    let sentence = |found: &OneSided| {
+        let (most, side) =
+            if 2 * found.above >= found.count { (found.above, "above") } else { (found.count - found.above, "below") };
+        let moves = |&k: &usize| !local.starts[k] && found.changes[k].abs() > SAME * tuners[k].std_error;
+        let moved: Vec<usize> = (0..tuners.len()).filter(moves).collect();
+        let would_be = |&k: &usize| {
+            let TunerSensitivity { name, value, std_error, .. } = &tuners[k];
+            format!(
+                "`{name}` = {} instead of {}",
+                estimate(value + found.changes[k], *std_error),
+                estimate(*value, *std_error)
+            )
+        };
+        let without = match moved.as_slice() {
+            [] => "no estimate would change by more than a fifth of its standard error".to_owned(),
+            some => some_of(some, would_be),
+        };
+        format!(
+            "{most} of the {} samples of `{}` in `{}` that are more than {FAR} standard deviations of the noise off the model are {side} \
+             it. A robust loss limits the bias by outliers on one side, but does not remove it; without these samples, to first \
+             order: {without}.",
+            found.count,
+            found.signal,
+            problem.study().cases[found.case].name
+        )
+    };
+    local.covariance.iter().flat_map(|covariance| &covariance.noise().one_sided).map(sentence).collect()
+}
+
+/// Lists the first items as text, and the number of the others.
+fn some_of(items: &[usize], text: impl Fn(&usize) -> String) -> String {
+    let more = items.len().saturating_sub(MOST);
+    let mut parts: Vec<String> = items.iter().take(MOST).map(text).collect();
+    parts.extend((more > 0).then(|| format!("{more} more")));
+    listed(&parts)
+}
+
 /// Returns the changes with equal sample weights, if records differ much in length.
 fn alike(local: &Local, tuners: &[TunerSensitivity]) -> Option<String> {
-    /// Relative change below which an estimate, in standard errors, and its error count as unchanged.
-    const SAME: f64 = 0.2;
     let found = local.alike.as_ref()?;
     let [least, most] = found.samples;
     let changes = |&k: &usize| {
@@ -138,10 +181,7 @@ fn alike(local: &Local, tuners: &[TunerSensitivity]) -> Option<String> {
         let now = estimate(tuner.value, tuner.std_error);
         format!("`{}` = {} instead of {now}", tuner.name, estimate(tuner.value + step, error))
     };
-    let more = changed.len().saturating_sub(MOST);
-    let mut parts: Vec<String> = changed.iter().take(MOST).map(would_be).collect();
-    parts.extend((more > 0).then(|| format!("{more} more")));
-    Some(format!("{begin}, to first order: {}.", listed(&parts)))
+    Some(format!("{begin}, to first order: {}.", some_of(&changed, would_be)))
 }
 
 /// Returns sentences about correlated tuners, the strongest correlation first.

@@ -2,7 +2,7 @@
 
 use mops_core::math;
 use mops_core::statistics::{Summary, moving_blocks, quantile};
-use mops_core::{BootstrapParameter, BootstrapReport, Role, Stream, Study, UncertaintyTask, Watch, stream};
+use mops_core::{BootstrapParameter, BootstrapReport, Loss, Role, Stream, Study, UncertaintyTask, Watch, stream};
 
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 
@@ -15,7 +15,8 @@ struct Measured {
     channel: usize,
     /// Response of the calibrated model.
     fitted: Vec<f64>,
-    /// Centred residuals (measured minus fitted), scaled to the noise level of the standard errors.
+    /// Centred residuals (measured minus fitted), scaled to the noise level of the standard errors. The centre of a robust loss is its
+    /// location, about which the scores of the residuals cancel.
     residuals: Vec<f64>,
     /// Length of a block.
     block: usize,
@@ -104,21 +105,30 @@ fn measured(calibrated: &Calibrated<'_>, task: &UncertaintyTask) -> Result<Vec<M
             let Some(trace) = trace.filter(|_| !all.iter().any(of_channel)) else { continue };
             let fitted = trace.sample(&channel.times);
             let raw: Vec<f64> = channel.values.iter().zip(&fitted).map(|(y, f)| y - f).collect();
-            let mean = raw.iter().sum::<f64>() / raw.len() as f64;
-            let scale = scale(&raw, mean, calibrated.covariance.noise().of_channel(plan.case, &channel.signal));
+            let noise = calibrated.covariance.noise();
+            let (loss, unit) = noise.loss_of_channel(plan.case, &channel.signal).unwrap_or((Loss::Squares, 1.0));
+            let deviations: Vec<f64> = raw.iter().map(|e| e / unit).collect();
+            let centre = loss.location(&deviations);
+            let scale =
+                scale(&deviations, centre, loss, noise.of_channel(plan.case, &channel.signal).map(|s| s / unit));
             let usual = math::cbrt(raw.len() as f64).ceil() as usize;
             let block = task.block.unwrap_or(usual).clamp(1, raw.len());
-            let residuals = raw.into_iter().map(|e| scale * (e - mean)).collect();
+            let residuals = deviations.into_iter().map(|e| scale * unit * (e - centre)).collect();
             all.push(Measured { case: plan.case, channel: index, fitted, residuals, block });
         }
     }
     Ok(all)
 }
 
-/// Returns the factor that scales centred residuals to the standard deviation of the noise; 1 if the noise is unknown.
+/// Returns the factor that scales centred residuals to the standard deviation of the noise; 1 if the noise is unknown. With a robust
+/// loss it is that of `psi / mean psi'`, as in the covariance of the estimates.
 #[allow(clippy::cast_precision_loss)]
-fn scale(residuals: &[f64], mean: f64, noise: Option<f64>) -> f64 {
-    let size = (residuals.iter().map(|e| math::powi(e - mean, 2)).sum::<f64>() / residuals.len() as f64).sqrt();
+fn scale(residuals: &[f64], centre: f64, loss: Loss, noise: Option<f64>) -> f64 {
+    let (mut squares, mut change) = (0.0, 0.0);
+    for [score, slope] in residuals.iter().map(|e| loss.score(e - centre)) {
+        (squares, change) = (squares + score * score, change + slope);
+    }
+    let size = (squares * residuals.len() as f64).sqrt() / change;
     noise.filter(|noise| noise.is_finite() && size > 0.0).map_or(1.0, |noise| noise / size)
 }
 

@@ -148,7 +148,6 @@ fn build_experiment(
         same_unit(&channel.signal, &variable.unit, &known).map_err(|m| m.within("channels"))?;
         let built = build_channel(channel, &variable.unit).map_err(|m| m.within(&channel.signal).within("channels"))?;
         warnings.extend(suspicious_start(name, &built));
-        warnings.extend(outliers(name, &built));
         if channel.unwrap == Some(true) {
             warnings.extend(gap_of(&built).map(|t| {
                 format!(
@@ -277,7 +276,7 @@ fn build_channel(draft: &ChannelBuilder, to: &Unit) -> Result<Channel, StudyErro
 const OUTLYING: f64 = 12.0;
 
 /// Returns a warning about outliers: far from both neighbours, which agree with theirs.
-fn outliers(experiment: &str, channel: &Channel) -> Option<String> {
+pub(super) fn outliers(experiment: &str, channel: &Channel) -> Option<String> {
     let v = &channel.values;
     let off = |k: usize| (v[k] - 0.5 * (v[k - 1] + v[k + 1])).abs();
     let mut sorted: Vec<f64> = (1..v.len().saturating_sub(1)).map(off).collect();

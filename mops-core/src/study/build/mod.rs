@@ -12,11 +12,12 @@ use std::sync::Arc;
 use crate::case::Case;
 use crate::criterion::Usage;
 use crate::evaluation::Objective;
+use crate::loss::Loss;
 use crate::model::{AnalysisKind, Interface, Model};
 use crate::study::draft::{CaseBuilder, CriterionBuilder, StudyBuilder};
 use crate::study::{JobPlan, Study, Task, Tasks, diagnosis, tasks};
 use crate::study_error::StudyError;
-use cases::{assumed_units, build_case, with_sensors};
+use cases::{assumed_units, build_case, outliers, with_sensors};
 use criteria::add_rows;
 use jobs::{complete, job};
 use tuners::{build_tuner, check_use, free_start, tie_tuners};
@@ -130,6 +131,8 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
                 .extend((0..study.cases.len()).filter_map(|case| study.plan(model, case).ok()).collect::<Vec<_>>());
         }
     }
+    let outlying = outliers_that_count(&study);
+    study.warnings.extend(outlying);
     refuse_forgotten_inputs(&study, &drafts)?;
     let cold = temperatures_of_nothing(&study);
     study.warnings.extend(cold);
@@ -208,6 +211,25 @@ fn refuse_forgotten_inputs(study: &Study, drafts: &[CaseBuilder]) -> Result<(), 
 
 /// Largest number of columns that a message lists.
 const MOST_COLUMNS: usize = 8;
+
+/// Returns warnings about outliers in the channels of experiments, except those that robust losses alone read.
+fn outliers_that_count(study: &Study) -> Vec<String> {
+    let losses = |case: usize, signal: &str| -> Vec<Loss> {
+        let rows = study.rows.iter().filter(|row| study.jobs[row.job].case == case);
+        let samples = rows.filter_map(|row| row.criterion.samples(&study.cases[case]));
+        samples.filter(|samples| samples.signal == signal).map(|samples| samples.loss).collect()
+    };
+    let mut warnings = Vec::new();
+    for (index, case) in study.cases.iter().enumerate() {
+        for channel in case.experiment.iter().flat_map(|experiment| &experiment.channels) {
+            let found = losses(index, &channel.signal);
+            if found.is_empty() || found.contains(&Loss::Squares) {
+                warnings.extend(outliers(&case.name, channel));
+            }
+        }
+    }
+    warnings
+}
 
 /// Returns warnings for undriven inputs on a temperature scale: they stay at the zero of the scale, which is rarely
 /// intended.
