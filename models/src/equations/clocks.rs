@@ -5,7 +5,7 @@ use mops_core::{Instant, Scalar};
 use super::bank::Bank;
 use super::compiled::Clock;
 use super::running::Running;
-use crate::kernel::is_due;
+use crate::kernel::{is_due, latest};
 
 /// Progress of a clock.
 #[derive(Debug, Clone)]
@@ -55,6 +55,8 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         for (k, clock) in model.clocks.iter().enumerate().filter(|(k, _)| due[*k]) {
             let mut bank = self.bank.borrow_mut();
             self.load(&mut bank, &before);
+            // A condition on the time is met at the instant itself, however the instant is rounded.
+            bank.set(model.layout.time(), S::from(latest(at.t)));
             clock.next.run(&mut *bank);
             let values = clock.next.results.iter().map(|&register| bank.get(register));
             if clock.delay > 0.0 {

@@ -77,13 +77,14 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
             Phase::AtRest(_) => {
                 self.phases[k] = Phase::Armed(0.0);
                 self.hold_states();
-                self.arm(k, event, x);
+                self.arm(k, event, x, false);
                 &happening.leaves
             }
             Phase::Armed(_) => {
                 self.assign(&happening.resets, event, x);
                 self.settle_modes(&Instant { x, ..event.at });
-                self.arm(k, event, x);
+                let places = self.resets_guard(k, &Instant { x, ..event.at });
+                self.arm(k, event, x, places);
                 &happening.name
             }
         }
@@ -91,18 +92,35 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
 
     /// Arms an event if its guard is positive or increases. After a reset that reverses the guard, rounding may leave
     /// the guard negative; if nothing moves any more, the guard is 0. A guard that stays negative, as after a jump of an input, arms the
-    /// event when it is positive again.
-    fn arm(&mut self, k: usize, event: &EventInstant<'_, S>, x: &[S]) {
+    /// event when it is positive again. A guard that the reset itself `places` at 0 happens again if it falls: the events accumulate.
+    fn arm(&mut self, k: usize, event: &EventInstant<'_, S>, x: &[S], places: bool) {
         self.phases[k] = Phase::Armed(0.0);
         let at = Instant { x, ..event.at };
         let guard = self.happening_guard(k, &at).value();
         if guard <= 0.0 {
             let rounding = AT_ZERO * self.sizes.iter().fold(0.0, |largest: f64, &size| largest.max(size));
+            let is_zero = guard >= -rounding;
             let rises = self
                 .guard_rate(self.guard_of(k), &at, event.du)
-                .is_some_and(|rate| rate > 0.0 || (rate == 0.0 && guard >= -rounding));
-            self.phases[k] = if rises { Phase::Armed(guard) } else { Phase::Passed };
+                .is_some_and(|rate| rate > 0.0 || (rate == 0.0 && is_zero));
+            self.phases[k] = match (rises, places && is_zero) {
+                (true, _) => Phase::Armed(guard),
+                (false, true) => Phase::Armed(0.0),
+                (false, false) => Phase::Passed,
+            };
         }
+    }
+
+    /// Returns true if the guard of an event depends on a state that the event resets.
+    fn resets_guard(&self, k: usize, at: &Instant<'_, S>) -> bool {
+        let happening = &self.model.happenings[k];
+        let still = vec![0.0; at.u.len()];
+        let mut bank = self.dual_bank();
+        happening.resets.0.iter().any(|&reset| {
+            self.load_dual(&mut bank, at, |i| f64::from(u8::from(i == reset)), (0.0, &still));
+            happening.guard.run(&mut bank);
+            bank.get(happening.guard.results[0]).tangent[0] != 0.0
+        })
     }
 
     /// Moves the states to rest after the events of a guard accumulated.

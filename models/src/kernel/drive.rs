@@ -204,7 +204,7 @@ impl<'a, S: Scalar> Drive<'a, S> {
                 self.curve = Some(Curve::Sine { amplitude: *amplitude, angular, phase: *phase });
             }
             Input::Chirp(chirp) => {
-                self.curve = (chirp.start <= t && t < chirp.end()).then_some(Curve::Chirp(chirp));
+                self.curve = (chirp.start <= t && t < chirp.end).then_some(Curve::Chirp(chirp));
             }
             Input::Sum(inputs) => match &mut self.curve {
                 Some(Curve::Sum(parts)) => parts.iter_mut().for_each(|part| part.pass_break(t)),

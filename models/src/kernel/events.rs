@@ -200,7 +200,7 @@ impl<S: Scalar> Events<S> {
             };
             let bracket = if whole.value.low >= 0.0 {
                 None
-            } else if whole.value.low > f64::NEG_INFINITY || (has_bounds && is_bounded(&mut enclose)) {
+            } else if has_bounds && bounds_narrow(whole, &mut enclose) {
                 Search { value: &mut value, enclose: &mut enclose, length: step.length, left: MOST_BOUNDS }
                     .first(ends, whole, HALVINGS)
             } else if has_bounds || end < 1.0 {
@@ -237,12 +237,17 @@ impl<S: Scalar> Events<S> {
     }
 }
 
-/// Returns true if a guard without bounds over the whole step has bounds over parts of it. Only a jump or a pole then
-/// prevents bounds over the whole.
-fn is_bounded(enclose: &mut impl FnMut(f64, f64) -> Enclosure) -> bool {
+/// Returns true if the bounds of a guard over narrow parts of a step are narrower than those over the whole, so that halving the step
+/// decides where the guard is negative. A jump or a pole may prevent bounds over the whole. Bounds that stay as they are come from a
+/// quantity without bounds, such as a delayed one, in a function that has bounds everywhere.
+fn bounds_narrow(whole: Enclosure, enclose: &mut impl FnMut(f64, f64) -> Enclosure) -> bool {
     // Irregularly placed, and far narrower than the time between jumps.
     const WIDTH: f64 = 1e-6;
-    [0.137, 0.457, 0.829].into_iter().any(|place| enclose(place, place + WIDTH).value.low > f64::NEG_INFINITY)
+    let width = |of: Enclosure| of.value.high - of.value.low;
+    [0.137, 0.457, 0.829].into_iter().any(|place| {
+        let part = enclose(place, place + WIDTH);
+        part.value.low > f64::NEG_INFINITY && (part.value.low >= 0.0 || width(part) < 0.5 * width(whole))
+    })
 }
 
 /// Position in a step, as a fraction of its length, and the value of a guard there.

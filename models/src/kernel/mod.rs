@@ -230,9 +230,14 @@ pub fn seconds(key: &str, time: Option<&Quantity>) -> Result<Option<f64>, StudyE
 /// Relative difference of two times up to which they are the same instant: 3 times 0.1 s is 0.3 s.
 const SAME_INSTANT: f64 = 8.0 * f64::EPSILON;
 
+/// Returns the latest time that is the same instant as `t`.
+pub(crate) fn latest(t: f64) -> f64 {
+    t + SAME_INSTANT * t.abs()
+}
+
 /// Returns true if `t` has reached a time, within rounding.
 pub(crate) fn is_due(time: f64, t: f64) -> bool {
-    time <= t + SAME_INSTANT * t.abs()
+    time <= latest(t)
 }
 
 /// Returns the first of these times; of those at the same instant, the last, so that all are due.

@@ -4,7 +4,7 @@ use mops_core::{
     Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Past, Response, Scalar, Trace, WithTangents,
 };
 
-use super::weights::{SHARE, perturbed};
+use super::weights::{PERTURBATION, SHARE, perturbed};
 use super::{Dynamics, Sink, Step, Tolerance, integrate};
 
 /// Recorded simulation: the signals and their derivatives in every direction of the scalar.
@@ -112,7 +112,7 @@ pub(crate) fn remember<S: Scalar, D>(
     past: &impl Fn(&D, f64, &[S]) -> Vec<S>,
     store: &impl Fn(&mut D, &Past<'_, S>) -> bool,
 ) {
-    remember_part(of, step, past, store, ([0.0, 1.0], HALVINGS));
+    remember_part(of, step, past, store, ([0.0, 1.0], HALVINGS_OF_PAST));
 }
 
 fn remember_part<S: Scalar, D>(
@@ -150,8 +150,12 @@ fn remember_part<S: Scalar, D>(
     }
 }
 
-/// Limit on the number of halvings of a step.
-const HALVINGS: u32 = 12;
+/// Limit on the number of halvings of a step for a signal: parts as short as the resolution of the clock. Rounding ends them before, and
+/// so does the size of the recording.
+const HALVINGS: u32 = 40;
+
+/// Limit on the number of halvings of a step for the past of a delay, whose size has no limit of its own.
+const HALVINGS_OF_PAST: u32 = 12;
 
 /// Ratio to the longest compared step beyond which a step is compared again.
 const LONGER: f64 = 1.2;
@@ -218,7 +222,8 @@ impl<S: Scalar> Recorder<'_, S> {
             at.signal(step.start + s * step.taken, &state, signal)
         };
         let values = Trace::NODES.map(|s| at(s, At::State));
-        if halvings == 0 || self.taken > self.room || self.agrees(index, &values, &mut at) {
+        let ends = self.taken > self.room || self.cancellation.requested().is_some();
+        if halvings == 0 || ends || self.agrees(index, &values, &mut at) {
             self.push(index, step.start + to * step.taken, &values);
             return;
         }
@@ -242,7 +247,7 @@ impl At {
     fn signal<S: Scalar>(self, t: f64, x: &[S], signal: &impl Fn(f64, &[S]) -> S) -> S {
         match self {
             Self::State => signal(t, x),
-            Self::Perturbed => signal(t, &perturbed(x)),
+            Self::Perturbed => signal(t * (1.0 + PERTURBATION), &perturbed(x)),
         }
     }
 }

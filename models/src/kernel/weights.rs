@@ -47,7 +47,7 @@ const BRIEF: f64 = 1e-6;
 const OFTEN: usize = 64;
 
 /// Relative perturbation of a state: a few units in the last place, so that sums of terms round differently.
-const PERTURBATION: f64 = 16.0 * f64::EPSILON;
+pub(super) const PERTURBATION: f64 = 16.0 * f64::EPSILON;
 
 impl Weights {
     pub(super) fn new<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, x: &[S], span: f64, tolerance: &Tolerance) -> Self {

@@ -15,6 +15,9 @@ use crate::input::{Chirp, Hold, Input, PRBS_STAGES};
 use crate::study_error::StudyError;
 use crate::unit::{Quantity, Unit};
 
+/// Relative difference of times that rounding explains.
+const ROUNDING: f64 = 1e-12;
+
 /// Stages of a pseudo-random binary sequence, if none are given: a period of 127 intervals.
 const STAGES: usize = 7;
 
@@ -433,7 +436,10 @@ impl Reader<'_> {
                 let frequencies = [self.positive("from", &chirp.from, "Hz")?, self.positive("to", &chirp.to, "Hz")?];
                 let logarithmic = chirp.sweep == Some(Sweep::Logarithmic);
                 let amplitude = self.amplitude(&chirp.amplitude)?;
-                let sine = Input::Chirp(Chirp { amplitude, frequencies, start, duration, logarithmic });
+                // At its last instant, a sweep over the rest of the simulation has not fallen to the offset yet.
+                let last = self.until(start).unwrap_or(f64::INFINITY);
+                let end = if start + duration < (1.0 - ROUNDING) * last { start + duration } else { f64::INFINITY };
+                let sine = Input::Chirp(Chirp { amplitude, frequencies, start, duration, end, logarithmic });
                 let offset = self.value_or_zero("offset", &chirp.offset)?;
                 Ok(if offset == 0.0 { sine } else { Input::Sum(vec![Input::Constant(offset), sine]) })
             }

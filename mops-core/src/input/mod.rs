@@ -88,18 +88,15 @@ pub struct Chirp {
     pub frequencies: [f64; 2],
     /// Start, s.
     pub start: f64,
-    /// Duration `T`, s, positive.
+    /// Duration `T` of the sweep, s, positive.
     pub duration: f64,
+    /// Time from which the value is 0 again, s; infinite if the simulation ends with the sweep.
+    pub end: f64,
     /// True for a logarithmic sweep.
     pub logarithmic: bool,
 }
 
 impl Chirp {
-    /// Returns the end, s.
-    pub fn end(&self) -> f64 {
-        self.start + self.duration
-    }
-
     /// Returns the value of the sine at `t`, between its start and its end.
     pub fn sine(&self, t: f64) -> f64 {
         self.amplitude * math::sin(self.phase(t)[0])
@@ -159,7 +156,7 @@ impl Input {
                 offset + amplitude * math::sin(std::f64::consts::TAU * frequency * t + phase)
             }
             Self::Chirp(chirp) => {
-                if (chirp.start..chirp.end()).contains(&t) {
+                if (chirp.start..chirp.end).contains(&t) {
                     chirp.sine(t)
                 } else {
                     0.0
@@ -229,9 +226,7 @@ impl Input {
                     f64::INFINITY
                 }
             }
-            Self::Chirp(chirp) => {
-                [chirp.start, chirp.end()].into_iter().find(|time| *time > t).unwrap_or(f64::INFINITY)
-            }
+            Self::Chirp(chirp) => [chirp.start, chirp.end].into_iter().find(|time| *time > t).unwrap_or(f64::INFINITY),
             Self::Sum(parts) => parts.iter().map(|part| part.next_break(t)).fold(f64::INFINITY, f64::min),
             Self::Sampled { times, .. } => {
                 times.get(times.partition_point(|&time| time <= t)).copied().unwrap_or(f64::INFINITY)
@@ -281,7 +276,7 @@ impl Input {
                 phase: phase + std::f64::consts::TAU * frequency * from,
                 offset: *offset,
             },
-            Self::Chirp(chirp) => Self::Chirp(Chirp { start: chirp.start - from, ..*chirp }),
+            Self::Chirp(chirp) => Self::Chirp(Chirp { start: chirp.start - from, end: chirp.end - from, ..*chirp }),
             Self::Sampled { times, values, hold } => {
                 // A clock that starts at a sample has this sample at 0, whatever the rounding.
                 let later = |t: &f64| if (t - from).abs() <= 1e-12 * (1.0 + from.abs()) { 0.0 } else { t - from };
@@ -338,7 +333,8 @@ mod tests {
     #[test]
     fn a_chirp_has_its_frequencies_at_its_ends() {
         for logarithmic in [false, true] {
-            let chirp = Chirp { amplitude: 2.0, frequencies: [0.5, 8.0], start: 1.0, duration: 4.0, logarithmic };
+            let chirp =
+                Chirp { amplitude: 2.0, frequencies: [0.5, 8.0], start: 1.0, duration: 4.0, end: 5.0, logarithmic };
             let tau = std::f64::consts::TAU;
             assert_eq!(chirp.phase(1.0), [0.0, tau * 0.5]);
             assert!((chirp.phase(5.0)[1] - tau * 8.0).abs() < 1e-12);

@@ -394,3 +394,22 @@ fn a_loop_that_is_cut_between_the_instants_is_refused() {
     let between = linearised(&delayed, None, &gains()).unwrap_err();
     assert!(between.contains("acts between them"), "{between}");
 }
+
+#[test]
+fn a_condition_on_the_time_is_met_at_the_instant_itself() {
+    // Decimal times of instants that are sums of rounded numbers.
+    for (every, offset, first) in [(100, 50, 0), (10, 5, 0), (70, 0, 0), (1, 0, 0), (3, 1, 2)] {
+        for k in (first..400).step_by(7) {
+            let time = f64::from(offset + k * every) * 1e-3;
+            let text = format!(
+                "states = {{ y = '1' }}\nder = {{ y = '0' }}\n\
+                 clocks.c = {{ every = '{every} ms', offset = '{offset} ms', memory = {{ from = '1', after = '1' }}, \
+                 next = {{ from = 'if(time >= {time}, from + 1, from)', after = 'if(time < {time}, after + 1, after)' }} }}"
+            );
+            let response = respond(&read(&text).unwrap(), &[], &[], f64::from(offset + 400 * every) * 1e-3 + 1e-4);
+            let end = f64::from(offset + 400 * every) * 1e-3 + 1e-4;
+            let counts = [at(&response, "from", end), at(&response, "after", end)];
+            assert_eq!(counts, [f64::from(401 - k), f64::from(k)], "{every} ms, {offset} ms, {time} s");
+        }
+    }
+}

@@ -284,3 +284,49 @@ fn an_event_whose_guard_jumps_with_an_input_happens_at_every_jump() {
     let analysis = model.analyse(&job).unwrap();
     assert_eq!(analysis.trace("n").last(), 19.0);
 }
+
+/// Returns the model of a level that falls at rate `q`, with an event at its guard.
+fn tank(guard: &str, reset: &str, more: &str) -> String {
+    format!(
+        "states = {{ h = 'm', n = '1' }}\nparameters = {{ q = 'm/s' }}\nder = {{ h = '-q + 2*q*n', n = '0' }}\n\
+         when.empty = {{ guard = '{guard}', reset = {{ {reset} }}{more} }}"
+    )
+}
+
+#[test]
+fn an_event_that_resets_a_state_onto_its_own_guard_does_not_let_it_through() {
+    for (guard, reset, rate) in [
+        ("h", "h = 0", 1.0),
+        ("h - 0.3", "h = 0.3", 1.0),
+        ("2 - h", "h = 2", -1.0),
+        ("3*h - 0.3", "h = 0.1", 1.0),
+        ("h", "h = '0.5*h'", 1.0),
+    ] {
+        let of = |more: &str| {
+            let model = read(&tank(guard, reset, more)).unwrap();
+            attempt(&model, &[], &[("q", rate), ("h0", 1.0)], 10.0)
+        };
+        let failure = of("").unwrap_err();
+        assert!(matches!(failure, Failure::EventsAccumulate(t, _) if (0.5..1.1).contains(&t)), "{guard}: {failure:?}");
+        let rest = if reset.contains('*') { "h = 0" } else { reset };
+        let response = of(&format!(", at-rest = {{ {rest} }}")).unwrap();
+        let end: f64 = rest.trim_start_matches("h = ").parse().unwrap();
+        assert_eq!(at(&response, "h", 10.0), end, "{guard}");
+    }
+    // The reset reverses the rate: the level leaves its guard.
+    let response = respond(&read(&tank("h", "h = 0, n = 1", "")).unwrap(), &[], &[("q", 1.0), ("h0", 1.0)], 3.0);
+    assert!((at(&response, "h", 3.0) - 2.0).abs() < 1e-9);
+    // The reset leaves the level alone: it passes its guard once.
+    let response = respond(&read(&tank("h", "n = 0", "")).unwrap(), &[], &[("q", 1.0), ("h0", 1.0)], 3.0);
+    assert!((at(&response, "h", 3.0) + 2.0).abs() < 1e-9 && times(&response, "empty").len() == 1);
+}
+
+#[test]
+fn a_guard_with_a_bounded_function_of_a_delayed_quantity_is_found() {
+    // x(t) = t; sin(x(t - 0.5)) falls through 0 at pi + 0.5 and 3 pi + 0.5.
+    let text = "states = { x = '1', n = '1' }\nparameters = { T = 's' }\nder = { x = '1 [1/s]', n = '0' }\n\
+                when.pass = { guard = 'sin(delay(x, T))', reset = { n = 'n + 1' } }";
+    let response = respond(&read(text).unwrap(), &[], &[("T", 0.5)], 12.0);
+    let found = times(&response, "pass");
+    assert!(near(&found, &[PI + 0.5, 3.0 * PI + 0.5]), "{found:?}");
+}

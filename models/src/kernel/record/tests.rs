@@ -63,6 +63,13 @@ fn a_signal_that_bends_more_than_the_states_is_exact_with_its_tangents() {
 }
 
 #[test]
+fn a_signal_far_faster_than_its_state_keeps_its_size() {
+    // Ten thousand periods in a step.
+    let [off, _] = difference(0.0, 1.0, 10.0, |_, x: f64| math::sin(6500.0 * x));
+    assert!(off < 2e-6, "{off}");
+}
+
+#[test]
 fn a_signal_that_jumps_within_a_step_is_recorded_all_the_same() {
     let signals = vec![(0, "y".to_owned())].into();
     let jump = |t: f64, _: f64| if t < 7.3 { 0.0 } else { 1.0 };
