@@ -23,9 +23,9 @@ impl Known {
     /// Adds entries of `before` that this entry lacks.
     pub fn complete(&mut self, before: &Self) {
         for (job, then) in &before.jobs {
-            match (self.jobs.iter_mut().find(|(index, _)| index == job), then) {
+            match (place(&self.jobs, *job).map(|k| &mut self.jobs[k].1), then) {
                 (None, _) => self.jobs.push((*job, then.clone())),
-                (Some((_, Ok(now))), Ok(then)) => {
+                (Some(Ok(now)), Ok(then)) => {
                     let missing = then.iter().filter(|(row, _)| !now.iter().any(|(known, _)| known == row));
                     let missing: Vec<RowValue> = missing.cloned().collect();
                     now.extend(missing);
@@ -37,8 +37,18 @@ impl Known {
 
     /// Returns the cached result of a job.
     pub fn job(&self, job: usize) -> Option<&JobValues> {
-        self.jobs.iter().find(|(index, _)| *index == job).map(|(_, values)| values)
+        entry(&self.jobs, job)
     }
+}
+
+/// Returns the entry with an index. Entries are mostly complete and in order, so that the index itself is tried first.
+pub fn entry<T>(entries: &[(usize, T)], index: usize) -> Option<&T> {
+    place(entries, index).map(|k| &entries[k].1)
+}
+
+fn place<T>(entries: &[(usize, T)], index: usize) -> Option<usize> {
+    let is_here = |(found, _): &(usize, T)| *found == index;
+    if entries.get(index).is_some_and(is_here) { Some(index) } else { entries.iter().position(is_here) }
 }
 
 /// Derivatives of rows, by index, along every coordinate of the unit box, in the units of the criteria.

@@ -10,7 +10,8 @@ use crate::criterion::{Tangent, Usage, Value};
 use crate::evaluation::{Evaluation, Merit, Objective, Reading};
 use crate::experiment::Role;
 use crate::failure::Failure;
-use crate::known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes as KnownSlopes, RowValue};
+use crate::known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes as KnownSlopes, RowValue, entry};
+use crate::loss::Loss;
 use crate::math;
 use crate::model::{Analysis, Job};
 use crate::objectives::FrontObjective;
@@ -34,6 +35,8 @@ pub struct Problem {
     jobs: Vec<usize>,
     /// Jobs needed for the points of a solver: all except monitored ones.
     counting: Vec<usize>,
+    /// Rows that read each job of the study.
+    rows_of: Arc<Vec<Vec<usize>>>,
 }
 
 /// Derivatives of the rows and residuals, as in [`crate::Linearisation`].
@@ -84,11 +87,11 @@ impl Problem {
     fn with(study: Arc<Study>, active: Vec<usize>, base: Vec<f64>, usage: impl Fn(&Row, &Study) -> Usage) -> Self {
         let shape = shape(&study, &active, usage);
         let jobs: Vec<usize> = (0..study.jobs.len()).collect();
-        let counts = |job: &usize| {
-            (study.rows.iter().zip(&shape.rows)).any(|(row, (usage, _))| row.job == *job && *usage != Usage::Monitor)
-        };
+        let mut rows_of = vec![Vec::new(); jobs.len()];
+        study.rows.iter().enumerate().for_each(|(index, row)| rows_of[row.job].push(index));
+        let counts = |job: &usize| rows_of[*job].iter().any(|&row| shape.rows[row].0 != Usage::Monitor);
         let counting = jobs.iter().copied().filter(counts).collect();
-        let mut problem = Self { study, active, base, shape, jobs, counting };
+        let mut problem = Self { study, active, base, shape, jobs, counting, rows_of: Arc::new(rows_of) };
         problem.shape.residuals = problem.count_residuals();
         problem.shape.noise = problem.noise_of_residuals().unwrap_or(0.0);
         problem
@@ -117,6 +120,10 @@ impl Problem {
         let (mut mean, mut variance) = (0.0, 0.0);
         for row in (0..self.study.rows.len()).filter(|&row| self.is_minimised(row)) {
             let samples = self.study.rows[row].criterion.samples(self.study.case_of(&self.study.rows[row]))?;
+            // The mean of another loss depends on the distribution of the noise.
+            if samples.loss != Loss::Squares {
+                return None;
+            }
             let unit = self.residual_factor(row)? * samples.noise?;
             for weight in samples.weights {
                 let term = math::powi(unit * weight, 2);
@@ -263,8 +270,7 @@ impl Problem {
     /// Returns true if the cached values of a job contain everything that this problem needs.
     fn suffices(&self, job: usize, values: &JobValues) -> bool {
         let Ok(values) = values else { return true };
-        let mut rows = self.study.rows.iter().enumerate().filter(|(_, row)| row.job == job);
-        rows.all(|(index, _)| values.iter().any(|(row, _)| *row == index))
+        self.rows_of[job].iter().all(|index| values.iter().any(|(row, _)| row == index))
     }
 
     /// Rates the values of jobs by the demands of the study.
@@ -308,17 +314,16 @@ impl Problem {
         let parameters = study.parameters(plan, tuners);
         let request = Job { case, parameters: &parameters, signals: &plan.signals, horizon: plan.horizon };
         let analysis = study.analyse(plan.model, &request)?;
-        let rows = study.rows.iter().enumerate().filter(|(_, row)| row.job == job);
         let value = |row: &Row| match row.value(case, &analysis, &parameters) {
             Ok(value) if !value.number.is_finite() => Err("its value is not finite".to_owned()),
             other => other,
         };
         // A criterion of a large linear system takes as long as a simulation.
-        let unless_cancelled = |(index, row)| match case.cancellation.requested() {
+        let unless_cancelled = |&index: &usize| match case.cancellation.requested() {
             Some(_) => Err(Failure::Cancelled),
-            None => Ok((index, value(row))),
+            None => Ok((index, value(&study.rows[index]))),
         };
-        rows.map(unless_cancelled).collect()
+        self.rows_of[job].iter().map(unless_cancelled).collect()
     }
 
     /// Returns the derivatives at an evaluated point, from the tangents of the models. `None` if a model, a criterion or a
@@ -360,10 +365,10 @@ impl Problem {
     fn suffice(&self, known: &KnownSlopes) -> bool {
         let n = self.active.len();
         self.shape.rows.iter().enumerate().all(|(index, (usage, _))| {
-            match known.iter().find(|(row, _)| *row == index) {
+            match entry(known, index) {
                 _ if *usage == Usage::Monitor => true,
                 None => false,
-                Some((_, along)) => along.len() == n,
+                Some(along) => along.len() == n,
             }
         })
     }
@@ -429,9 +434,9 @@ impl Problem {
         let parameters = study.parameters(plan, tuners);
         let request = Job { case, parameters: &parameters, signals: &plan.signals, horizon: plan.horizon };
         let (analysis, tangents) = study.models[plan.model].1.tangents(&request, &wanted)?.ok()?;
-        let rows = study.rows.iter().zip(&self.shape.rows).enumerate();
-        let rows = rows.filter(|(_, (row, (usage, _)))| row.job == job && *usage != Usage::Monitor);
-        rows.map(|(index, (row, _))| {
+        let rows = self.rows_of[job].iter().filter(|index| self.shape.rows[**index].0 != Usage::Monitor);
+        rows.map(|&index| {
+            let row = &study.rows[index];
             if case.cancellation.requested().is_some() {
                 return None;
             }
