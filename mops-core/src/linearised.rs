@@ -327,7 +327,15 @@ impl Linearised {
         point.resize(point.len() + delays.len(), 0.0);
         let here = self.local(parameters, &mut point, &ties)?;
         let rough = self.rough(&point, &here, |point| self.evaluate(parameters, point).ok());
-        let Local { mut rates, slopes, frictionless, .. } = here;
+        let Local { mut rates, slopes, frictionless, limited, .. } = here;
+        // A limit of what follows the cut variable at once opens the loop there, whatever else acts beside it, such as anti-windup.
+        let follows = |slopes: &[f64]| self.cut.iter().any(|[input, _]| slopes[n + input] != 0.0);
+        if let Some((place, _)) = limited.iter().find(|(_, slopes)| follows(slopes)) {
+            return Err(Failure::Undefined(format!(
+                "a limit is active at the operating point ({place}), so that the loop is open there and has no margins; choose an \
+                 operating point within the limits"
+            )));
+        }
         let clocks = self.model.clocks(parameters)?;
         let system = self.system(&slopes, &delays, &clocks).map_err(Failure::Undefined)?;
         if !self.cut.is_empty()
@@ -494,6 +502,7 @@ mod tests {
                 slopes: DMatrix::from_fn(4, 3, |i, j| slopes[i][j]),
                 past: Vec::new(),
                 frictionless: Vec::new(),
+                limited: Vec::new(),
             }))
         }
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::eigen::balance;
+use super::eigen::{balance, is_moved_onto_axis};
 use super::eigenvalues;
 
 /// Singular value, relative to the norm of the scaled system, below which an influence counts as zero.
@@ -100,6 +100,18 @@ impl Staircase {
     pub fn indices(&self) -> Vec<usize> {
         let inputs = self.ranks.first().copied().unwrap_or(0);
         (1..=inputs).map(|i| self.ranks.iter().filter(|&&rank| rank >= i).count()).collect()
+    }
+
+    /// Returns true if the input leaves a mode in the closed right half-plane, or one that a change of `A` by this size moves there.
+    pub fn leaves_unstable(&self, size: f64) -> Result<bool, String> {
+        let unstable = eigenvalues(&self.fixed)?.iter().any(|mode| mode.re >= 0.0);
+        Ok(unstable || self.leaves_undamped(size)?)
+    }
+
+    /// Returns true if the input leaves a mode that a change of `A` by this size moves onto the imaginary axis.
+    pub fn leaves_undamped(&self, size: f64) -> Result<bool, String> {
+        let mut modes = eigenvalues(&self.fixed)?.into_iter();
+        Ok(modes.any(|mode| is_moved_onto_axis(&self.fixed, mode, size)))
     }
 
     /// Checks that the inputs control every state.
