@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Budget, Cancellation, Effect, End, Ending, Evaluation, Objective, Optimality, Oracle, Outcome, Pareto, Patience,
-    Place, Problem, Quiet, Record, Run, Shape, SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError,
-    Task, Watch, conclude,
+    Budget, Cancellation, Contradiction, DerivativesReport, Effect, End, Ending, Evaluation, Objective, Optimality,
+    Oracle, Outcome, Pareto, Patience, Place, Problem, Quiet, Record, Run, Shape, SlopesReport, Solver, SolverChoice,
+    Stop, Store, Study, StudyError, Task, Watch, conclude,
 };
 
 use crate::numbers::significant;
@@ -180,18 +180,23 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     } else {
         stop
     };
+    let derivatives = derivatives(&run, &mut probe, watch);
+    let contradiction = derivatives.as_ref().and_then(contradiction);
     // A replay ends where the run was interrupted, not at a budget.
     let cause = if options.replayed.is_some() { Stop::Interrupted } else { stop };
     let end = run.best().map(|best| {
         let is_noise = best.merit.is_feasible() && problem.shape().is_noise(best.merit.objective);
         let end = End::new(point, best.merit, solver.ends(), cause, is_noise);
         let twin = if problem.study().task() == Task::Calibration { twin(&run, best) } else { None };
-        twin.into_iter().fold(end, End::with_twin)
+        let end = twin.into_iter().fold(end, End::with_twin);
+        contradiction.clone().into_iter().fold(end, End::with_contradiction)
     });
+    let pareto = if contradiction.is_some() { Pareto::NotShown } else { pareto };
     let ending = Ending { stop, end, pareto, seconds: started.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
     outcome.methods = solver.methods().to_vec();
     outcome.found.slopes = slopes(&run, &mut probe, watch);
+    outcome.found.derivatives = derivatives;
     outcome.seconds = started.elapsed().as_secs_f64();
     outcome.reused = begin.map(|_| run.reused());
     let archive = run.archive().to_vec();
@@ -282,6 +287,31 @@ fn slopes(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> Option<Slope
         return None;
     }
     SlopesReport::at(problem, probe, &run.best()?.point, NEAR)
+}
+
+/// Compares exact derivatives at the best point with differences; `None` if there are none, or after a stop request.
+fn derivatives(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> Option<DerivativesReport> {
+    let best = run.best().filter(|best| best.scaled.is_some() && !best.point.is_empty() && !watch.wants_stop())?;
+    let before = probe.linearisations();
+    let found = probe.linearise(&best.point, NEAR).ok()??;
+    // Finite differences are no derivatives to compare.
+    (probe.linearisations() > before).then(|| DerivativesReport::of(run.problem(), probe, &found))
+}
+
+/// Returns a sentence on the first derivative that simulations contradict.
+fn contradiction(found: &DerivativesReport) -> Option<String> {
+    let Contradiction { key, tuner, derivative, differences } = found.contradictions.first()?;
+    let along =
+        tuner.as_ref().map_or_else(|| "in a direction".to_owned(), |tuner| format!("with respect to `{tuner}`"));
+    let differences: Vec<String> = differences.iter().flatten().map(|d| significant(*d, 4)).collect();
+    let others = found.contradictions.len() - 1;
+    let more = if others > 0 { format!(" ({others} more in result.json)") } else { String::new() };
+    Some(format!(
+        "Simulations contradict the derivative of `{key}` {along}: {} per range of the tuners, and differences give {}{more}. \
+         What rests on derivatives is not shown: compare with --solver pattern-search.",
+        significant(*derivative, 4),
+        differences.join(" and ")
+    ))
 }
 
 /// Returns what is shown of the best point: its classification for the objective, and its Pareto optimality.

@@ -191,3 +191,18 @@ fn ambiguous_demands_and_criteria_of_unstable_systems_are_refused() {
     let equal = run(&format!("{LOOP}c = {{ phase-margin = {{}}, demand = 1, usage = 'equality' }}"));
     assert!((number(&equal["criteria"][0]["value"]) - 1.0).abs() < 1e-3 && equal["criteria"][0]["at_least"] != true);
 }
+
+#[test]
+fn a_simulation_fails_where_a_demanded_criterion_has_no_value_but_not_where_a_monitored_one_has_none() {
+    let simulate = |criterion: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let text = format!("{}c = {{ {criterion} }}\n", GROWTH.replace("HORIZON", "2 s"));
+        let output = cargo_bin_cmd!("mops").args(["simulate", &write(folder.path(), &text)]).output().unwrap();
+        assert!(String::from_utf8_lossy(&output.stdout).contains("longer than the simulation"), "{output:?}");
+        output.status.code()
+    };
+    let without_value = "steady-state-error = { signal = 'y', target = 1, window = '50 s' }";
+    assert_eq!(simulate(&format!("{without_value}, usage = 'monitor'")), Some(0));
+    assert_eq!(simulate(&format!("{without_value}, demand = 1")), Some(3));
+    assert_eq!(simulate(&format!("{without_value}, demand = 1, usage = 'inequality'")), Some(3));
+}

@@ -132,6 +132,8 @@ fn a_criterion_reads_a_window_as_if_the_simulation_began_there() {
     for (change, fact) in [
         ("from = '21 s', until = '22 s'\u{2192}from = '21 s', until = '20 s'", "is not after `from`"),
         ("from = '21 s', until = '22 s'\u{2192}from = '-1 s'", "before the start"),
+        ("until = '22 s'\u{2192}until = '41 s'", "is after the end of the simulation at 40 s in case `both`"),
+        ("until = 20, usage\u{2192}until = 400, usage", "is after the end of the simulation"),
         ("unit = 'deg', usage\u{2192}unit = 'm', usage", "not in `m`"),
         ("first + 2*second\u{2192}sum + 1 [s]", "circular reference"),
         ("first + 2*second\u{2192}first + late", "same dimension"),

@@ -307,7 +307,7 @@ fn values_of_the_wrong_type() {
             ),
             design("a step without a value", "{ p = 0.0 }", "{ p = 0.0, inputs = { d = { step = { time = 1.0 } } } }"),
             calibration("free states that are a text", "[\"theta\"]", "\"theta\""),
-            calibration("a column that is a number", "\"torque\"", "4"),
+            calibration("a column that is neither a name nor a number", "\"torque\"", "true"),
             design("a date for a name", "name = \"loop\"", "name = 2026-01-01"),
         ],
     );

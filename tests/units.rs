@@ -322,3 +322,141 @@ fn common_notations_of_units_are_read() {
         assert!(code == 2 && output.contains(message), "{}", &output[..output.len().min(2000)]);
     }
 }
+
+const OVEN: &str = "
+[study]
+name = 'oven'
+[models.o.equations]
+states     = { T = 'SCALE', v = 'K/s' }
+inputs     = { r = 'SCALE' }
+parameters = { z = { unit = '1', default = 0.3 }, Tr = 'SCALE' }
+der        = { T = 'v', v = '(r - T)/1 [s2] - 2*z*v/1 [s]' }
+start      = { T = '20 degC' }
+horizon    = '30 s'
+[models.o.parameters]
+Tr = '30 degC'
+[tuners]
+z = { start = 0.3, min = 0.1, max = 2.0 }
+[cases]
+on = { inputs.r.step = { before = '20 degC', after = '60 degC' } }
+[criteria]
+c = { CRITERION }
+";
+
+#[test]
+fn a_demand_of_a_formula_on_a_temperature_scale_is_refused_and_one_in_kelvin_is_a_difference() {
+    let text = |scale: &str, criterion: &str| OVEN.replace("SCALE", scale).replace("CRITERION", criterion);
+    let refused = |scale: &str, value: &str, limits: &str| {
+        let folder = study(&text(scale, &format!("expression = {{ value = '{value}' }}, {limits}")), "");
+        let (code, output) = mops(folder.path(), &["check", "study.toml"]);
+        assert!(code == 2 && output.contains("has a zero of its own"), "{scale} {value} {limits}: {output}");
+    };
+    let swing = "maximum(T) - minimum(T)";
+    for value in [swing, "rms(T - r)", "maximum(T)", "mean(T - Tr)", "integral(T)/30 [s]"] {
+        refused("degC", value, "demand = '3 degC'");
+    }
+    for scale in ["degC", "degF", "K"] {
+        for limits in ["demand = '3 degF'", "good = '1 degC', bad = '3 K'", "good = 1, bad = '3 degF'"] {
+            refused(scale, swing, limits);
+        }
+        // 40 K (1 + exp(-pi 0.3/sqrt(1 - 0.3^2))).
+        let expected = 40.0 * (1.0 + math::exp(-std::f64::consts::PI * 0.3 / 0.91f64.sqrt()));
+        for (demand, factor, unit) in
+            [("demand = 3", 1.0, "K"), ("good = '1 K', bad = 3", 1.0, "K"), ("demand = '5.4 degR'", 1.8, "degR")]
+        {
+            let found = &values(&text(scale, &format!("expression = {{ value = '{swing}' }}, {demand}")), "")[0];
+            assert!((found.1 - factor * expected).abs() < 1e-4 && found.2 == unit, "{scale} {demand}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn a_difference_of_temperatures_takes_degc_as_kelvin_and_a_temperature_as_itself() {
+    let text = |criterion: &str| OVEN.replace("SCALE", "degC").replace("CRITERION", criterion);
+    for (criterion, shown) in [
+        ("overshoot = { signal = 'T', target = '60 degC', absolute = true }, demand = '3 degC'", " 3  K"),
+        ("steady-state-error = { signal = 'T', target = '60 degC' }, good = '1 degC', bad = '3 degC'", "1 .. 3  K"),
+        ("peak = { signal = 'T' }, demand = '100 degC'", "100  degC"),
+    ] {
+        let (code, output) = mops(study(&text(criterion), "").path(), &["check", "study.toml"]);
+        assert!(code == 0 && output.contains(shown), "{criterion}: {output}");
+    }
+}
+
+#[test]
+fn a_share_of_a_temperature_on_a_scale_is_refused() {
+    let text = OVEN
+        .replace("SCALE", "degC")
+        .replace("CRITERION", "peak = { signal = 'T' }, demand = '100 degC'")
+        .replace("[models.o.parameters]\nTr = '30 degC'\n", "")
+        .replace("[tuners]\n", "[tuners]\nTr = { start = '30 degC', min = '20 degC', max = '40 degC' }\n")
+        + "[uncertain]\nTr = { tolerance = 0.05 }\n[robust]\n";
+    let (code, output) = mops(study(&text, "").path(), &["check", "study.toml"]);
+    assert!(code == 2 && output.contains("depends on the zero of the scale"), "{output}");
+}
+
+#[test]
+fn setpoint_weights_on_a_temperature_scale_are_refused() {
+    let text = |scale: &str, pid: &str| {
+        format!(
+            "[study]\nname = 'p'\n[models.m.equations]\nstates = {{ T = '{scale}' }}\ninputs = {{ P = 'W', r = '{scale}' }}\n\
+             parameters = {{ kp = {{ unit = 'W/K', default = 10.0 }} }}\nconstants = {{ C = '100 J/K', G = '1 W/K', Ta = '20 degC' }}\n\
+             der = {{ T = '(P - G*(T - Ta))/C' }}\nstart = {{ T = '20 degC' }}\nhorizon = '100 s'\npid.P = {{ k = 'kp', Ti = '20 s', {pid} }}\n\
+             [tuners]\nkp = {{ start = 10, min = 1, max = 20 }}\n[cases]\na = {{ inputs.r.constant = '60 degC' }}\n\
+             [criteria]\nx = {{ peak = {{ signal = 'P' }}, demand = '1 W' }}\n"
+        )
+    };
+    let plain = "setpoint = 'r', measured = 'T'";
+    let check = |scale: &str, pid: &str| mops(study(&text(scale, pid), "").path(), &["check", "study.toml"]);
+    for (scale, signals, weights) in [
+        ("degC", plain, "wp = 0.5"),
+        ("degF", plain, "wp = 'kp/20 [W/K]'"),
+        ("degC", plain, "wd = 0, Td = '1 s'"),
+        ("degC", "setpoint = '60 degC', measured = 'T'", "wp = 0"),
+    ] {
+        let (code, output) = check(scale, &format!("{signals}, {weights}"));
+        assert!(code == 2 && output.contains("depends on the zero of the scale"), "{scale} {weights}: {output}");
+    }
+    assert_eq!(check("degC", &format!("{plain}, wp = 1, wd = 0")).0, 0);
+    // A difference has one meaning on all scales.
+    let of = |scale: &str| values(&text(scale, "setpoint = 'r - Ta', measured = 'T - Ta', wp = 0.5"), "")[0].1;
+    assert!((of("degC") - of("K")).abs() < 1e-3 && of("degC") >= 200.0, "{} {}", of("degC"), of("K"));
+}
+
+#[test]
+fn radiation_has_the_absolute_zero_of_the_scale_of_its_state() {
+    let text = |scale: &str, values: &str| {
+        format!(
+            "[study]\nname = 'r'\n[models.m.equations]\nstates = {{ T = '{scale}' }}\nparameters = {{ C = {{ unit = 'J/K', default = 100.0 }} }}\n\
+             der = {{ T = \"C*T' = 0 [W]\" }}\nstart = {{ T = '400 degC' }}\nhorizon = '1000 s'\n\
+             [models.m.effects.rad.radiation-loss]\nplace = 'process:T'\n[models.m.parameters]\n{values}\n\
+             [tuners]\nC = {{ start = 100, min = 10, max = 1000 }}\n[criteria]\nT = {{ final-value = {{ signal = 'T' }}, demand = '1 {scale}' }}\n"
+        )
+    };
+    let k = "'rad.k' = 1e-9\n'rad.around' = '20 degC'\n";
+    let known = values(&text("K", &format!("{k}'rad.zero' = 0")), "")[0].1;
+    assert!(known > 300.0 && known < 600.0, "{known}");
+    for (scale, zero, around) in [
+        ("degC", "", "20 degC"),
+        ("degC", "'rad.zero' = '273.15 K'", "293.15 K"),
+        ("degC", "'rad.zero' = 273.15", "68 degF"),
+        ("K", "'rad.zero' = 0", "293.15 K"),
+    ] {
+        let found = &values(&text(scale, &format!("{}{zero}", k.replace("20 degC", around))), "")[0];
+        let kelvin = if scale == "K" { found.1 } else { found.1 + 273.15 };
+        assert!((kelvin - known).abs() < 1e-3, "{scale} {zero}: {found:?} {known}");
+    }
+    let folder = study(&text("degC", &format!("{k}'rad.zero' = '0 degC'")), "");
+    let (code, output) = mops(folder.path(), &["check", "study.toml"]);
+    assert!(code == 2 && output.contains("has a zero of its own"), "{output}");
+}
+
+#[test]
+fn a_definition_without_a_unit_gets_one_where_it_is_defined() {
+    let text = "[study]\nname = 'm'\n[models.m.equations]\nstates = { x = 'rad' }\nparameters = { k = '1/s' }\nconstants = { th = '20 deg' }\n\
+                let = { g = '3', s = 'g + th' }\nder = { x = 'k*(s - x)' }\nhorizon = '1 s'\n\
+                [tuners]\nk = { start = 1, min = 0.1, max = 2 }\n[criteria]\ny = { final-value = { signal = 'x' }, demand = 1 }\n";
+    let (code, output) = mops(study(text, "").path(), &["check", "study.toml"]);
+    let output = output.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(code == 2 && output.contains("give `g` a unit where it is defined, as in \"3 [rad]\""), "{output}");
+}

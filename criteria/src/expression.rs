@@ -122,6 +122,7 @@ impl CriterionSpec for Expression {
             let fact = format!("`{unit}` has a zero of its own, but the formula may be a difference");
             return Err(StudyError::new("unit", fact).with_help(format!("give {found}")));
         }
+        let unit = unit.of_unknown_kind();
         Ok(Box::new(Bound { formula, sources, courses, unit, window }))
     }
 }

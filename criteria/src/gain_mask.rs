@@ -18,7 +18,7 @@ use crate::common::{Channel, LinearCriterion, Values, number};
 /// ["100 Hz", 6]]`, `decibel = true`.
 ///
 /// The ratio is located by bounds of the response over all frequencies of the mask, with or without delay, not on a grid. A sampled
-/// system is compared up to half of the sampling frequency.
+/// system is compared up to half of the sampling frequency; a bound that begins above it is refused.
 ///
 /// Less is better. Range: from 0 up. The default demand is 1. There is no value if a loop is unstable.
 ///
@@ -93,9 +93,21 @@ impl CriterionSpec for GainMask {
                 .with_help("add `upper = [[frequency, gain], ...]` or `lower = [[frequency, gain], ...]`"));
         }
         let value = move |system: StateSpace| {
+            let half = system.period.map(|period| std::f64::consts::PI / period);
+            if let Some(half) = half
+                && let Some(first) = masks.iter().map(Mask::first).find(|first| *first >= half)
+            {
+                return Err(format!(
+                    "a bound begins at {first} rad/s, above half of the sampling frequency, {half} rad/s: nothing is compared"
+                ));
+            }
             let ratios = masks.iter().map(|mask| mask.largest_ratio(&system, of).map(|(ratio, _)| ratio));
             let ratios = ratios.collect::<Result<Vec<f64>, String>>()?;
-            Ok(Value::from(ratios.into_iter().fold(0.0, f64::max)))
+            let largest = ratios.into_iter().fold(0.0, f64::max);
+            Ok(match half.is_some_and(|half| masks.iter().any(|mask| mask.last() > half)) {
+                true => Value::noted(largest, "not compared above half of the sampling frequency"),
+                false => largest.into(),
+            })
         };
         let values = Values::of(Unit::one(), Sense::Less).within(0.0, f64::INFINITY).demanding(1.0);
         Ok(LinearCriterion::boxed(channel, values, value))
@@ -105,7 +117,8 @@ impl CriterionSpec for GainMask {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::common::testing::{assert_near, bound, linear, mistake, quantity, value};
+    use crate::common::testing::{assert_near, bound, linear, mistake, quantity, undefined, value};
+    use mops_core::Analysis;
 
     fn mask(upper: &[(&str, &str)], lower: &[(&str, &str)], decibel: bool) -> GainMask {
         let points = |list: &[(&str, &str)]| list.iter().map(|(w, gain)| [quantity(w), quantity(gain)]).collect();
@@ -122,6 +135,21 @@ mod tests {
         // The lower bound is 1/w: sqrt(1 + w^2)/(2 w) is largest at 1 rad/s.
         assert_near(value(&decibel, &lag).number, 0.5f64.sqrt(), 1e-6);
         assert_eq!(bound(&plain).natural_demand(), Some(1.0));
+    }
+
+    #[test]
+    fn a_bound_above_half_of_the_sampling_frequency_has_no_value() {
+        // Half of the sampling frequency is 2 pi rad/s.
+        let sampled = |points: &[(&str, &str)]| {
+            let Analysis::Linear(lag) = linear(&[1.0], &[1.0, 1.0]) else { unreachable!("it is linear") };
+            (mask(points, &[], false), Analysis::Linear(StateSpace { period: Some(0.5), ..lag }))
+        };
+        let (above, system) = sampled(&[("10", "0.001"), ("100", "0.001")]);
+        assert!(undefined(&above, &system).contains("above half of the sampling frequency"));
+        let (across, system) = sampled(&[("1", "1"), ("100", "1")]);
+        assert_eq!(value(&across, &system).note, Some("not compared above half of the sampling frequency"));
+        let (below, system) = sampled(&[("1", "1"), ("6", "1")]);
+        assert_eq!(value(&below, &system).note, None);
     }
 
     #[test]

@@ -33,6 +33,11 @@ impl Definition for InputAsymmetry {
 
 impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
-        at.value + self.a * at.value.abs()
+        let negative = at.closed.unwrap_or(at.value.value() < 0.0);
+        if negative { at.value - self.a * at.value } else { at.value + self.a * at.value }
+    }
+
+    fn gap(&self, at: &PortState<'_, S>) -> Option<S> {
+        Some(at.value)
     }
 }

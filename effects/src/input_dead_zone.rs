@@ -3,7 +3,7 @@
 use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
-use super::terms::clamp;
+use super::terms::without_gap;
 
 /// Effect `input-dead-zone`.
 pub struct InputDeadZone;
@@ -33,6 +33,10 @@ impl Definition for InputDeadZone {
 
 impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
-        at.value - clamp(at.value, -self.width, self.width)
+        without_gap(at.value, S::from(0.0), self.width, at.closed)
+    }
+
+    fn gap(&self, at: &PortState<'_, S>) -> Option<S> {
+        Some(at.value.abs() - self.width)
     }
 }

@@ -37,7 +37,7 @@ impl Definition for InputGainStep {
 }
 
 impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
-    fn breaks(&self) -> Vec<f64> {
+    fn breaks(&self) -> Vec<S> {
         self.span.breaks()
     }
 

@@ -3,7 +3,7 @@
 use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
-use super::terms::clamp;
+use super::terms::{clamp, sign};
 
 /// Effect `input-rate-limit`.
 pub struct InputRateLimit;
@@ -24,7 +24,7 @@ impl Definition for InputRateLimit {
         &[EffectParameter::positive("rate", "maximum rate", Dimension::VALUE.over(Dimension::TIME))
             .null_at(f64::INFINITY)
             .with_grid(InitialGrid::SlewAndScaled(&[0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 0.95], &[0.3, 1.0, 3.0]))];
-    const HYSTERESIS_STATES: usize = 2;
+    const HYSTERESIS_STATES: usize = 3;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {
@@ -37,14 +37,33 @@ impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
         at.value
     }
 
+    /// The state is the output at the last update, the time of that, and the direction in which the output lags behind: 0 if it
+    /// follows the command.
     fn update_hysteresis(&self, at: &PortState<'_, S>, memory: &mut [S]) {
         let first = memory[0].value().is_nan();
-        memory[0] = if first { at.value } else { self.hysteresis_value(at, memory) };
-        memory[1] = S::from(at.t);
+        let way = self.rate * (at.t - memory[1]);
+        memory[0] =
+            if first || way.value().is_nan() { at.value } else { clamp(at.value, memory[0] - way, memory[0] + way) };
+        memory[1] = at.t;
+        let (behind, rate) = ((at.value - memory[0]).value(), at.v.value());
+        memory[2] = S::from(match sign(behind) {
+            0.0 if rate.abs() > self.rate.value() => sign(rate),
+            side => side,
+        });
+    }
+
+    fn hysteresis_guard(&self, at: &PortState<'_, S>, memory: &[S]) -> S {
+        match sign(memory[2].value()) {
+            0.0 => self.rate - at.v.abs(),
+            side => (at.value - self.hysteresis_value(at, memory)) * side,
+        }
     }
 
     fn hysteresis_value(&self, at: &PortState<'_, S>, memory: &[S]) -> S {
-        let way = self.rate * (at.t - memory[1].value());
-        if way.value().is_nan() { at.value } else { clamp(at.value, memory[0] - way, memory[0] + way) }
+        match sign(memory[2].value()) {
+            _ if self.rate.value().is_infinite() => at.value,
+            0.0 => at.value,
+            side => memory[0] + self.rate * (at.t - memory[1]) * side,
+        }
     }
 }

@@ -3,7 +3,7 @@
 use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
-use super::terms::clamp;
+use super::terms::limited;
 
 /// Effect `input-saturation`.
 pub struct InputSaturation;
@@ -32,6 +32,10 @@ impl Definition for InputSaturation {
 
 impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
-        clamp(at.value, -self.limit, self.limit)
+        limited(at.value, self.limit, at.closed)
+    }
+
+    fn gap(&self, at: &PortState<'_, S>) -> Option<S> {
+        self.limit.value().is_finite().then(|| self.limit - at.value.abs())
     }
 }

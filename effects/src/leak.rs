@@ -37,9 +37,22 @@ impl Definition for Leak {
     }
 }
 
+/// Head, relative to the levels, up to which the level is at the hole within rounding.
+const CROSSING: f64 = 1e-12;
+
 impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let head = at.q - self.hole;
-        if head.value() > 0.0 { -self.k * head.sqrt() } else { S::from(0.0) }
+        let flows = !at.closed.unwrap_or(false) && head.value() > 0.0;
+        if !flows {
+            return S::from(0.0);
+        }
+        // The derivative of the root is infinite at the hole, but its integral is not: at the crossing itself it counts as 0.
+        let crosses = head.value() <= CROSSING * (at.q.value().abs() + self.hole.value().abs());
+        -self.k * if crosses { S::from(head.value().sqrt()) } else { head.sqrt() }
+    }
+
+    fn gap(&self, at: &PortState<'_, S>) -> Option<S> {
+        (self.k.value() != 0.0).then(|| at.q - self.hole)
     }
 }

@@ -1,6 +1,8 @@
 //! Radiation to surroundings whose temperature is an input.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, RADIATION, emission, radiated};
@@ -32,6 +34,7 @@ impl Definition for RadiationExchange {
             NOT_NEGATIVE,
             InitialGrid::Plain(&[0.0, 273.15]),
         )
+        .of_kind(ParameterKind::Zero)
         .kept(),
     ];
 

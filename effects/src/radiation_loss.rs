@@ -1,6 +1,8 @@
 //! Radiation to the surroundings.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind, PortState, Scalar,
+};
 
 use super::Definition;
 use super::terms::{ANY, NOT_NEGATIVE, RADIATION, emission, radiated};
@@ -38,6 +40,7 @@ impl Definition for RadiationLoss {
             NOT_NEGATIVE,
             InitialGrid::Plain(&[0.0, 273.15, 293.15]),
         )
+        .of_kind(ParameterKind::Zero)
         .kept(),
     ];
 

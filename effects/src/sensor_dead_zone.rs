@@ -5,7 +5,7 @@ use mops_core::{
 };
 
 use super::Definition;
-use super::terms::{ANY, clamp};
+use super::terms::{ANY, without_gap};
 
 /// Effect `sensor-dead-zone`.
 pub struct SensorDeadZone;
@@ -45,6 +45,10 @@ impl Definition for SensorDeadZone {
 
 impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
-        at.value - clamp(at.value - self.centre, -self.width, self.width)
+        without_gap(at.value, self.centre, self.width, at.closed)
+    }
+
+    fn gap(&self, at: &PortState<'_, S>) -> Option<S> {
+        Some((at.value - self.centre).abs() - self.width)
     }
 }

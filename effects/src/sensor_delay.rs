@@ -15,8 +15,7 @@ struct AtParameters<S> {
 impl Definition for SensorDelay {
     const NAME: &'static str = "sensor-delay";
     const ABOUT: &'static str = "The measurement is delayed by a constant time.";
-    const FORMULA: &'static str =
-        "y(t - delay); before the start, y is extrapolated with its initial slope and curvature";
+    const FORMULA: &'static str = "y(t - delay); before the start, y has its value just before it; in an experiment, y is extrapolated with its initial slope and curvature";
     const SOURCE: &'static str =
         "L. Ljung, System Identification: Theory for the User, 2nd edition (Prentice Hall 1999), section 4.2";
     const CLASS: EffectClass = EffectClass::DelayLike;

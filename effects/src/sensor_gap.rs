@@ -44,6 +44,11 @@ impl Definition for SensorGap {
 
 impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
-        if (at.value - self.centre).value().abs() < self.width.value() { self.centre } else { at.value }
+        let within = at.closed.unwrap_or((at.value - self.centre).value().abs() < self.width.value());
+        if within { self.centre } else { at.value }
+    }
+
+    fn gap(&self, at: &PortState<'_, S>) -> Option<S> {
+        Some((at.value - self.centre).abs() - self.width)
     }
 }

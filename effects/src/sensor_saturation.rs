@@ -3,7 +3,7 @@
 use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
 
 use super::Definition;
-use super::terms::{ANY, clamp};
+use super::terms::{ANY, sign};
 
 /// Effect `sensor-saturation`.
 pub struct SensorSaturation;
@@ -44,15 +44,17 @@ impl Definition for SensorSaturation {
 
 impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
-        let (y, limit) = (at.value, self.limit);
-        if limit.value().is_infinite() {
-            return y;
+        let Some(gap) = self.gap(at) else { return at.value };
+        match at.closed.unwrap_or(gap.value() < 0.0) {
+            false => at.value,
+            true if self.side == 0.0 => self.limit.abs() * sign(at.value.value()),
+            true => self.limit,
         }
-        if self.side == 0.0 {
-            let limit = if limit.value() < 0.0 { -limit } else { limit };
-            return clamp(y, -limit, limit);
-        }
-        let beyond = (y.value() - limit.value()) * self.side > 0.0;
-        if beyond { limit } else { y }
+    }
+
+    fn gap(&self, at: &PortState<'_, S>) -> Option<S> {
+        let inside =
+            |value: S| if self.side == 0.0 { self.limit.abs() - value.abs() } else { (self.limit - value) * self.side };
+        self.limit.value().is_finite().then(|| inside(at.value))
     }
 }

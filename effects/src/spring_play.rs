@@ -5,7 +5,7 @@ use mops_core::{
 };
 
 use super::Definition;
-use super::terms::{NOT_NEGATIVE, clamp};
+use super::terms::{NOT_NEGATIVE, sign};
 
 /// Effect `spring-play`.
 pub struct SpringPlay;
@@ -51,6 +51,11 @@ impl Definition for SpringPlay {
 impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         let half = self.gap * 0.5;
-        self.k * clamp(at.q, -half, half)
+        let pressed = at.closed.unwrap_or(at.q.value().abs() > half.value());
+        self.k * if pressed { half * sign(at.q.value()) } else { at.q }
+    }
+
+    fn gap(&self, at: &PortState<'_, S>) -> Option<S> {
+        (self.k.value() != 0.0).then(|| self.gap * 0.5 - at.q.abs())
     }
 }

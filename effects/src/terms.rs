@@ -70,6 +70,18 @@ pub(super) fn clamp<S: Scalar>(x: S, low: S, high: S) -> S {
     }
 }
 
+/// Limits `x` to `limit` on both sides; `beyond` selects one law until the step ends.
+pub(super) fn limited<S: Scalar>(x: S, limit: S, beyond: Option<bool>) -> S {
+    let beyond = beyond.unwrap_or(x.value().abs() > limit.value());
+    if beyond { limit * sign(x.value()) } else { x }
+}
+
+/// Removes from `x` what is within `width` of `centre`; `within` selects one law until the step ends.
+pub(super) fn without_gap<S: Scalar>(x: S, centre: S, width: S, within: Option<bool>) -> S {
+    let from = (x - centre).value();
+    if within.unwrap_or(from.abs() < width.value()) { centre } else { x - width * sign(from) }
+}
+
 /// Damped contact.
 #[derive(Clone, Copy)]
 pub(super) struct Pressed<S> {
@@ -146,13 +158,13 @@ impl<S: Scalar> Span<S> {
     }
 
     /// Returns start and end of the time span, s.
-    pub fn breaks(&self) -> Vec<f64> {
-        vec![self.from.value(), self.from.value() + self.length.value()]
+    pub fn breaks(&self) -> Vec<S> {
+        vec![self.from, self.from + self.length]
     }
 
     /// Returns the elapsed fraction of the time span: 0 before, 1 after.
-    pub fn passed(&self, t: f64) -> S {
-        let since = -self.from + t;
+    pub fn passed(&self, t: S) -> S {
+        let since = t - self.from;
         if since.value() <= 0.0 {
             S::from(0.0)
         } else if since.value() >= self.length.value() {
@@ -163,7 +175,7 @@ impl<S: Scalar> Span<S> {
     }
 
     /// Rises from 0 to 1 along half a period of a cosine: `(1 - cos(pi (t - from)/length))/2`, 0 before, 1 after.
-    pub fn risen(&self, t: f64) -> S {
+    pub fn risen(&self, t: S) -> S {
         (-(self.passed(t) * PI).cos() + 1.0) * 0.5
     }
 }

@@ -18,11 +18,11 @@ impl Even {
 }
 
 /// Names of all quantities that an effect may use, including its states: one number each.
-const SEEN: [&str; 11] =
-    ["value", "q", "v", "a", "mobility", "other", "other speed", "z1", "z2", "memory 1", "memory 2"];
+const SEEN: [&str; 12] =
+    ["value", "q", "v", "a", "mobility", "other", "other speed", "z1", "z2", "memory 1", "memory 2", "memory 3"];
 
 /// Returns a value for every quantity.
-fn place(even: &mut Even) -> [f64; 11] {
+fn place(even: &mut Even) -> [f64; 12] {
     SEEN.map(|name| match name {
         "mobility" => even.between(0.5, 2.0),
         "z1" | "z2" => even.between(-0.9, 0.9),
@@ -32,13 +32,13 @@ fn place(even: &mut Even) -> [f64; 11] {
     })
 }
 
-fn at<S: Scalar>(seen: &[S; 11]) -> PortState<'static, S> {
+fn at<S: Scalar>(seen: &[S; 12]) -> PortState<'static, S> {
     let [value, q, v, a, mobility, other, other_speed, ..] = *seen;
-    PortState { t: 0.3, value, q, v, a, mobility, other, other_speed, u: &[], closed: None }
+    PortState { t: S::from(0.3), value, q, v, a, mobility, other, other_speed, u: &[], closed: None }
 }
 
 /// Returns the output of an effect: value, delay, the four numbers of dry friction, and the rates of its states.
-fn answer<S: Scalar>(effect: &dyn Effect, acting: &dyn BoundEffect<S>, seen: &[S; 11]) -> Vec<S> {
+fn answer<S: Scalar>(effect: &dyn Effect, acting: &dyn BoundEffect<S>, seen: &[S; 12]) -> Vec<S> {
     let at = at(seen);
     let z = &seen[7..7 + effect.states()];
     let mut all = vec![if effect.hysteresis_states() > 0 {
@@ -186,7 +186,7 @@ fn friction_with_states_dissipates_energy_over_a_cycle() {
         // q = sin t over three periods, of which the last counts.
         for step in 0..(6.0 * std::f64::consts::PI / h) as usize {
             let t = step as f64 * h;
-            let mut seen = [0.0; 11];
+            let mut seen = [0.0; 12];
             (seen[1], seen[2]) = (math::sin(t), math::cos(t));
             let at = at(&seen);
             acting.rates(&at, &z, &mut dz);
@@ -215,7 +215,7 @@ fn odd_effects_are_odd() {
 }
 
 /// Returns the output of an effect after a change of one of its parameters or of one of its input quantities.
-fn moved(effect: &dyn Effect, s: &[f64], seen: &[f64; 11], index: usize, by: f64) -> Vec<f64> {
+fn moved(effect: &dyn Effect, s: &[f64], seen: &[f64; 12], index: usize, by: f64) -> Vec<f64> {
     let (mut s, mut seen) = (s.to_vec(), *seen);
     if index < s.len() {
         s[index] += by;
@@ -234,7 +234,7 @@ fn tangents_agree_with_differences() {
             for index in 0..s.len() + seen.len() - 1 {
                 let lifted = |i: usize, x: f64| if i == index { Dual7::variable(x, 0) } else { Dual7::from(x) };
                 let with: Vec<Dual7> = s.iter().enumerate().map(|(i, &x)| lifted(i, x)).collect();
-                let sees: [Dual7; 11] = std::array::from_fn(|i| lifted(s.len() + i, seen[i]));
+                let sees: [Dual7; 12] = std::array::from_fn(|i| lifted(s.len() + i, seen[i]));
                 let exact = answer(effect.as_ref(), effect.bind_dual(&with).as_ref(), &sees);
                 let plain = answer(effect.as_ref(), effect.bind(&s).as_ref(), &seen);
                 let [up, down] = [1e-6, -1e-6].map(|by| moved(effect.as_ref(), &s, &seen, index, by));
@@ -275,9 +275,9 @@ fn the_catalogue_has_the_effects_that_engineers_name() {
 #[test]
 fn play_keeps_its_output_until_the_gap_is_crossed() {
     let play = effects().into_iter().find(|e| e.name() == "backlash").expect("it is there").bind(&[0.4]);
-    let mut memory = [f64::NAN];
-    let follow = |value: f64, memory: &mut [f64; 1]| {
-        let at = at(&[value, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let mut memory = [f64::NAN; 2];
+    let follow = |value: f64, memory: &mut [f64; 2]| {
+        let at = at(&[value, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         play.update_hysteresis(&at, memory);
         play.hysteresis_value(&at, memory)
     };
@@ -292,7 +292,7 @@ fn a_gust_has_the_impulse_of_its_integral() {
     let gust = effects().into_iter().find(|e| e.name() == "wind-gust").expect("it is there").bind(&[3.0, 0.7, 0.45]);
     let h = 1e-4;
     let push: f64 =
-        (0..20_000).map(|k| gust.value(&PortState { t: f64::from(k) * h, ..at(&[0.0; 11]) }, &[]) * h).sum();
+        (0..20_000).map(|k| gust.value(&PortState { t: f64::from(k) * h, ..at(&[0.0; 12]) }, &[]) * h).sum();
     assert!((push - 3.0 * 0.45 / 2.0).abs() < 1e-9, "{push}");
 }
 
@@ -325,7 +325,7 @@ fn what_passes_an_actuator_or_a_sensor_is_what_the_formula_says() {
     ];
     for (name, parameters, value, expected) in cases {
         let effect = effects().into_iter().find(|e| e.name() == name).expect("it is in the catalogue");
-        let mut seen = [0.0; 11];
+        let mut seen = [0.0; 12];
         seen[0] = value;
         let found = effect.bind(parameters).value(&at(&seen), &[]);
         assert!((found - expected).abs() < 1e-15, "{name} {value}: {found}");

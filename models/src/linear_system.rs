@@ -138,8 +138,8 @@ impl<S: Scalar> Plant<S> for Delayed<S> {
         self.remembers()
     }
 
-    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
-        pass_delays(self, |system| &mut system.inputs, |_, _| {}, at, x);
+    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) -> S {
+        pass_delays(self, |system| &mut system.inputs, |_, _| {}, at, x)
     }
 
     fn next_break(&self, t: f64) -> f64 {
@@ -292,6 +292,16 @@ impl Bound {
             })
         };
         Self { places: entry.0.names().iter().map(place).collect(), expression: entry.0.clone() }
+    }
+
+    /// Binds a delay, which is not negative where it depends on no parameter.
+    pub fn delay(entry: &Entry, names: &mut Vec<String>) -> Result<Self, StudyError> {
+        let bound = Self::new(entry, names);
+        let value: Option<f64> = bound.places.is_empty().then(|| bound.value(&[]));
+        match value.filter(|value| !(*value >= 0.0 && value.is_finite())) {
+            None => Ok(bound),
+            Some(value) => Err(StudyError::new("delay", format!("expected a delay of at least 0 s, found {value} s"))),
+        }
     }
 
     /// Binds all entries of a list.

@@ -82,6 +82,14 @@ impl ModelOptions for PidLoopOptions {
         let step = |key: &str, options: &Option<StepOptions>| -> Result<Option<Input>, StudyError> {
             let Some(options) = options else { return Ok(None) };
             let time = options.time.as_ref().map_or(Ok(0.0), |q| seconds("time", q)).map_err(|m| m.within(key))?;
+            if !(time >= 0.0 && time.is_finite()) {
+                let fact = format!("expected a time from 0 s on, found {time} s");
+                return Err(StudyError::new("time", fact).within(key));
+            }
+            if !options.size.is_finite() {
+                let fact = format!("expected a finite size of the step, found {}", options.size);
+                return Err(StudyError::new("size", fact).within(key));
+            }
             Ok(Some(Input::Step { time, before: 0.0, after: options.size }))
         };
         let setpoint = step("setpoint", &self.setpoint)?.unwrap_or(Input::Step { time: 0.0, before: 0.0, after: 1.0 });
@@ -503,11 +511,12 @@ impl<S: Scalar> Plant<S> for Loop<S> {
         self.sampled.is_some()
     }
 
-    fn sample(&mut self, at: &Instant<'_, S>, _: &mut [S]) {
+    fn sample(&mut self, at: &Instant<'_, S>, _: &mut [S]) -> S {
         let (r, y) = (at.u[0], self.output(at.x));
         if let Some(sampled) = &mut self.sampled {
             sampled.pass(at.t, &self.controller, self.limit, r, y);
         }
+        S::from(0.0)
     }
 
     fn settle(&mut self, at: &Instant<'_, S>) {

@@ -86,7 +86,7 @@ impl ModelOptions for StateSpaceOptions {
         let mut names = Vec::new();
         let matrices = [self.a, self.b, self.c, d]
             .map(|rows| rows.iter().map(|row| Bound::all(row, &mut names)).collect::<Rows<Bound>>());
-        let delay = self.delay.map(|delay| Bound::new(&delay, &mut names));
+        let delay = self.delay.map(|delay| Bound::delay(&delay, &mut names)).transpose()?;
         let units: Vec<(String, String)> = self.units.into_iter().collect();
         let units = Units(&units);
         let entries = matrices.iter().flatten().flatten();

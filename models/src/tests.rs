@@ -1,6 +1,7 @@
 //! Models, compared with closed forms, published values and an independent integration.
 
 mod effects_simulated;
+mod effects_together;
 mod furuta_bodies;
 mod state_feedback;
 

@@ -103,7 +103,7 @@ impl ModelOptions for TransferFunctionOptions {
                 StudyError::here(fact).with_help("the order of the denominator must be at least that of the numerator")
             );
         }
-        let delay = self.delay.as_ref().map(|delay| Bound::new(delay, &mut names));
+        let delay = self.delay.as_ref().map(|delay| Bound::delay(delay, &mut names)).transpose()?;
         let (input, output) = (self.input.unwrap_or_else(|| "u".into()), self.output.unwrap_or_else(|| "y".into()));
         let units: Vec<(String, String)> = self.units.into_iter().collect();
         let units = Units(&units);

@@ -99,7 +99,7 @@ impl<S: Scalar> BoundEffect<S> for Relative<S> {
     fn gap(&self, at: &PortState<'_, S>) -> Option<S> {
         self.0.gap(&relative(at))
     }
-    fn breaks(&self) -> Vec<f64> {
+    fn breaks(&self) -> Vec<S> {
         self.0.breaks()
     }
     fn longest_step(&self) -> f64 {

@@ -218,6 +218,8 @@ pub enum ParameterKind {
     LowerEdge,
     /// Value above which a stop or an overflow acts: below it, part of the range visited is free of it.
     UpperEdge,
+    /// Absolute temperature at the zero of the scale of the place: 273.15 for degC.
+    Zero,
     /// Damping of a contact divided by its stiffness: shorter than the time in which the place moves, else the contact is a damper.
     Damping,
     /// Angle of a periodic function.
@@ -233,6 +235,12 @@ pub enum ParameterKind {
 }
 
 impl ParameterKind {
+    /// Returns true for a value that the place itself may have, on a temperature scale its temperature.
+    #[must_use]
+    pub fn is_value(self) -> bool {
+        matches!(self, Self::Level | Self::LowerEdge | Self::UpperEdge)
+    }
+
     /// Returns true for an edge, beyond which a stop or an overflow acts.
     #[must_use]
     pub fn is_edge(self) -> bool {
@@ -391,13 +399,13 @@ impl EffectParameter {
 /// State of the port at which an effect is evaluated.
 #[derive(Debug, Clone, Copy)]
 pub struct PortState<'a, S> {
-    /// Time, s.
-    pub t: f64,
+    /// Time, s; with the derivatives of the time of a jump while a hysteresis state passes it.
+    pub t: S,
     /// Command at an actuator, signal at a sensor, both before the effect; 0 elsewhere.
     pub value: S,
     /// Position of the joint; state at a process; else `value`.
     pub q: S,
-    /// Speed of the joint; 0 elsewhere.
+    /// Speed of the joint; rate of `value` for an effect with a hysteresis state; 0 elsewhere.
     pub v: S,
     /// Acceleration of the joint without the effect, provided if [`Effect::is_inertial`]; else 0.
     pub a: S,
@@ -409,8 +417,8 @@ pub struct PortState<'a, S> {
     pub other_speed: S,
     /// The inputs as they reach the plant.
     pub u: &'a [S],
-    /// True if the contact of the effect is closed, fixed by the simulation for a whole step. `None` without a contact, or
-    /// if the sign of [`BoundEffect::gap`] decides.
+    /// True if [`BoundEffect::gap`] is negative, fixed by the simulation for a whole step. `None` for an effect without a gap, or if the
+    /// sign decides.
     pub closed: Option<bool>,
 }
 
@@ -445,9 +453,11 @@ pub trait BoundEffect<S: Scalar> {
         None
     }
 
-    /// Returns the opening of a contact at a joint, or the height of an edge above the state of a process; negative while the contact
-    /// is closed, or the edge is below the state. The gap depends on positions and speeds, or on the state alone; an effect has one throughout a simulation or never. A simulation ends a step at its zero crossing, and
-    /// tangents account for the event time. Within a step [`PortState::closed`] selects the law, also slightly beyond the crossing.
+    /// Returns the distance to the edge at which the law of the effect changes: the opening of a contact, the height of an edge above a
+    /// level, the distance to the limit of an actuator or a sensor. It is negative beyond the edge, and depends on what the effect
+    /// receives at its own place; an effect has one throughout a simulation or never. A simulation ends a step at its zero
+    /// crossing, and tangents account for the event time. Within a step [`PortState::closed`] selects the law, also slightly beyond
+    /// the crossing.
     fn gap(&self, _at: &PortState<'_, S>) -> Option<S> {
         None
     }
@@ -458,7 +468,7 @@ pub trait BoundEffect<S: Scalar> {
     }
 
     /// Returns the times at which the effect changes its form, s; steps end there.
-    fn breaks(&self) -> Vec<f64> {
+    fn breaks(&self) -> Vec<S> {
         Vec::new()
     }
 
@@ -473,9 +483,15 @@ pub trait BoundEffect<S: Scalar> {
         f64::INFINITY
     }
 
-    /// Updates the hysteresis state ([`Effect::hysteresis_states`]), which is NaN before the first update. Called at an
-    /// actuator before and after each jump of the command or of its derivative, at a sensor along the simulation.
+    /// Updates the hysteresis state ([`Effect::hysteresis_states`]), which is NaN before the first update: where the command jumps or
+    /// bends, before and after it, and where [`BoundEffect::hysteresis_guard`] becomes negative.
     fn update_hysteresis(&self, _at: &PortState<'_, S>, _memory: &mut [S]) {}
+
+    /// Returns a guard that becomes negative where the hysteresis state must be updated: the law of
+    /// [`BoundEffect::hysteresis_value`] is valid until then.
+    fn hysteresis_guard(&self, _at: &PortState<'_, S>, _memory: &[S]) -> S {
+        S::from(1.0)
+    }
 
     /// Returns the output, as [`BoundEffect::value`], for an effect with a hysteresis state.
     fn hysteresis_value(&self, at: &PortState<'_, S>, _memory: &[S]) -> S {

@@ -42,7 +42,7 @@ pub struct Basins {
     /// Number of values, a thousandth apart, at which these searches ended.
     pub optima: usize,
     /// Expected share of the starting points that lead to an optimum not yet seen, `w (w + 1)/(n (n - 1))` for `w` optima in `n`
-    /// searches; null if fewer than two searches have ended.
+    /// searches; null if `n < w + 2`, where the estimate is 1 whatever the searches found.
     ///
     /// Source: C. G. E. Boender, A. H. G. Rinnooy Kan, Mathematical Programming 37 (1987) 59-80.
     pub unseen: Option<f64>,
@@ -59,7 +59,7 @@ pub const SMALL_OBJECTIVE: f64 = 1e-3;
 /// searches, 2 in 7.
 const UNLIKELY: f64 = 0.2;
 
-/// Expected share from which another basin is likely: 1 optimum in 2 searches, 2 in 4, 3 in 6, 4 in 7.
+/// Expected share from which another basin is likely: 2 optima in 4 searches, 3 in 6, 4 in 7.
 const LIKELY: f64 = 0.4;
 
 impl Basins {
@@ -75,7 +75,7 @@ impl Basins {
         let optima = values.len() + usize::from(ends.iter().any(|end| !end.is_feasible()));
         #[allow(clippy::cast_precision_loss)]
         let [n, w] = [ends.len() as f64, optima as f64];
-        let unseen = (ends.len() > 1).then(|| (w * (w + 1.0) / (n * (n - 1.0))).min(1.0));
+        let unseen = (ends.len() >= optima + 2).then(|| w * (w + 1.0) / (n * (n - 1.0)));
         Self { searches: ends.len(), arrived, optima, unseen }
     }
 
@@ -85,10 +85,12 @@ impl Basins {
         self.arrived > 1 && self.unseen.is_some_and(|share| share < UNLIKELY)
     }
 
-    /// Returns true if a single search of several ended at the best objective, or another optimum is likely.
+    /// Returns true if a single search of several ended at the best objective, or another optimum is likely: by its expected share, or
+    /// as nearly every search ended in an optimum of its own.
     #[must_use]
     pub fn is_doubtful(&self) -> bool {
-        self.searches > 1 && (self.arrived < 2 || self.unseen.is_some_and(|share| share >= LIKELY))
+        let is_likely = self.unseen.map_or(self.optima > 1, |share| share >= LIKELY);
+        self.searches > 1 && (self.arrived < 2 || is_likely)
     }
 }
 
@@ -131,6 +133,15 @@ impl End {
         self
     }
 
+    /// Returns the end where simulations contradict the derivatives, as a sentence states: what follows from derivatives is not shown.
+    #[must_use]
+    pub fn with_contradiction(mut self, sentence: String) -> Self {
+        let of_point = self.words_of_point();
+        self.words.retain(|words| Some(words) != of_point.as_ref());
+        (self.point, self.doubt) = (Optimality::NotShown, Some(sentence));
+        self
+    }
+
     fn words_of_point(&self) -> Option<String> {
         let words = match self.point {
             Optimality::Stationary => "The point is stationary: to first order, no direction lowers the objective.",
@@ -150,15 +161,20 @@ impl End {
         match (searches, unseen) {
             (0, _) => None,
             (1, _) => Some("A single local search was completed: other basins are unexplored.".to_owned()),
-            (_, Some(unseen)) => {
-                let of_optima = if optima == 1 { "1 optimum".to_owned() } else { format!("{optima} optima") };
+            (_, unseen) => {
+                let of_optima = counted(optima, "optimum", "optima");
+                let share = unseen.map(|unseen| {
+                    format!(
+                        "; the expected share of starting points that lead to another optimum is {:.0} %",
+                        100.0 * unseen
+                    )
+                });
                 Some(format!(
-                    "Of {searches} local searches, {arrived} ended here, all in {of_optima}; the expected share of starting \
-                     points that lead to another optimum is {:.0} %.",
-                    100.0 * unseen
+                    "Of {searches} local searches, {} ended here, all in {of_optima}{}.",
+                    none_or(arrived),
+                    share.unwrap_or_default()
                 ))
             }
-            _ => None,
         }
     }
 
@@ -179,10 +195,11 @@ impl End {
                     .to_owned(),
             ),
             _ if may_be_elsewhere && self.basins.is_doubtful() => {
-                let others = if arrived == 1 { "only 1".to_owned() } else { arrived.to_string() };
+                let here = if arrived == 1 { "only 1".to_owned() } else { none_or(arrived) };
                 Some(format!(
-                    "Another basin is likely, as {others} of {searches} local searches ended here, and all of them in {optima} \
-                     optima: raise `starts` of the solver, or try another one."
+                    "Another basin is likely, as {here} of {searches} local searches ended here, and all of them in {}: raise \
+                     `starts` of the solver, or try another one.",
+                    counted(optima, "optimum", "optima")
                 ))
             }
             Optimality::Jump if !is_found_again => Some(
@@ -198,6 +215,14 @@ impl End {
             _ => None,
         }
     }
+}
+
+fn counted(count: usize, one: &str, several: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { several })
+}
+
+fn none_or(count: usize) -> String {
+    if count == 0 { "none".to_owned() } else { count.to_string() }
 }
 
 #[cfg(test)]
@@ -229,8 +254,28 @@ mod tests {
     fn as_many_optima_as_searches_are_not_all_of_them() {
         let ends = [1.0, 1.0, 1.3, 1.6, 2.0].map(merit);
         let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged, false);
-        assert_eq!((end.basins.arrived, end.basins.optima, end.basins.unseen), (2, 4, Some(1.0)));
+        assert_eq!((end.basins.arrived, end.basins.optima, end.basins.unseen), (2, 4, None));
         assert!(end.doubt.is_some());
+    }
+
+    #[test]
+    fn two_searches_that_agree_give_no_estimate_and_no_doubt() {
+        let end = End::new(Optimality::Stationary, merit(1.0), &[merit(1.0); 2], Stop::Converged, false);
+        assert_eq!((end.basins.unseen, end.doubt), (None, None));
+        assert_eq!(end.words[1], "Of 2 local searches, 2 ended here, all in 1 optimum.");
+    }
+
+    #[test]
+    fn searches_of_which_none_ended_here_are_named_so() {
+        let ends = [1.1, 1.2, 1.3, 1.4].map(merit);
+        let end = End::new(Optimality::Stationary, merit(1.0), &ends, Stop::Converged, false);
+        assert!(end.doubt.unwrap().contains("as none of 4 local searches ended here, and all of them in 4 optima"));
+        let far = End::new(Optimality::Stationary, merit(1.0), &[merit(1.1); 4], Stop::Converged, false);
+        assert!(
+            far.doubt
+                .unwrap()
+                .ends_with("and all of them in 1 optimum: raise `starts` of the solver, or try another one.")
+        );
     }
 
     #[test]

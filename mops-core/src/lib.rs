@@ -12,6 +12,7 @@ mod catalogue_study;
 mod conclude;
 mod criterion;
 pub mod data;
+mod derivatives;
 pub mod diagnosis;
 mod diagnostic;
 mod differences;
@@ -72,6 +73,7 @@ pub use criterion::{
     Criterion, CriterionSpec, Demand, Mark, Missed, Other, Scaled, Sense, Side, Tangent, Usage, Value,
 };
 
+pub use derivatives::{Contradiction, DerivativesReport};
 pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use differences::Differences;
 pub use effect::{
@@ -126,7 +128,7 @@ pub use study::{
 };
 pub use study_error::StudyError;
 pub use tolerance::{IntegrationMethod, Tolerance};
-pub use trace::{Piece, Trace};
+pub use trace::{Earlier, Piece, Trace};
 pub use trade_offs::{Certified, Exchange, FrontCriterion, FrontPoint, Pareto, TradeOffs};
 pub use tuner::{Grid, Scale, Tuner};
 pub use uncertainty::{BandReport, BootstrapParameter, BootstrapReport, ProfileReport, UncertaintyReport};

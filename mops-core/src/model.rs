@@ -338,6 +338,17 @@ impl Analysis {
             _ => unreachable!("a derivative has the form of its analysis"),
         }
     }
+
+    /// Returns the largest distance up to which [`Analysis::moved`] keeps the order of the instants at which signals jump or bend.
+    pub fn room(&self, tangent: &Self) -> f64 {
+        match (self, tangent) {
+            (Self::Time(response), Self::Time(tangent)) => {
+                let room = |((_, trace), (_, tangent)): (&(String, Trace), &(String, Trace))| trace.room(tangent);
+                response.traces.iter().zip(&tangent.traces).map(room).fold(f64::INFINITY, f64::min)
+            }
+            _ => f64::INFINITY,
+        }
+    }
 }
 
 /// A simulated response: one trace for every requested signal.

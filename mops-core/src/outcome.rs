@@ -10,6 +10,7 @@ use serde_json::{Map, Value, json};
 
 use crate::criterion::Demand;
 use crate::criterion::Usage;
+use crate::derivatives::DerivativesReport;
 use crate::diagnosis::Diagnosis;
 use crate::end::End;
 use crate::evaluation::{Evaluation, Objective};
@@ -102,6 +103,9 @@ pub struct Findings {
     /// Derivatives of a design's criteria with respect to the tuners at the reported point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slopes: Option<SlopesReport>,
+    /// Derivatives at the reported point, compared with differences; null if there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub derivatives: Option<DerivativesReport>,
     /// Objective over one or two tuners.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweep: Option<SweepReport>,

@@ -174,8 +174,11 @@ pub trait Plant<S: Scalar> {
     }
 
     /// Samples: at the start, at each break of the plant, and at jumps of inputs or forces, before [`Plant::settle`]. States that
-    /// jump get their new values in `x`; `at` has those before.
-    fn sample(&mut self, _at: &Instant<'_, S>, _x: &mut [S]) {}
+    /// jump get their new values in `x`; `at` has those before. Returns the derivatives of the time of a break of the plant along the
+    /// directions of the scalar, with value 0.
+    fn sample(&mut self, _at: &Instant<'_, S>, _x: &mut [S]) -> S {
+        S::from(0.0)
+    }
 
     /// Determines the mode: at the start, at each break of the plant, and at jumps of inputs or forces.
     fn settle(&mut self, _at: &Instant<'_, S>) {}
@@ -294,7 +297,7 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Plant<S> for Box<P> {
     fn samples(&self) -> bool {
         (**self).samples()
     }
-    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
+    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) -> S {
         (**self).sample(at, x)
     }
     fn settle(&mut self, at: &Instant<'_, S>) {

@@ -202,7 +202,8 @@ pub struct RobustReport {
     pub rounds: Vec<RoundReport>,
     /// Index of the reported round: the one with the best worst case.
     pub chosen: usize,
-    /// True if the last search found no case worse than the present ones by more than the tolerance.
+    /// True if a complete search of the box found no case in which the reported design is worse than in the cases that it was designed
+    /// for by more than the tolerance.
     pub settled: bool,
     /// Tolerance, in scaled values.
     pub tolerance: f64,

@@ -15,6 +15,19 @@ pub struct Trace {
     segments: Vec<[f64; 5]>,
     /// Value at the end, if it differs from the value of the last segment.
     jumped: Option<f64>,
+    /// Value just before the start, if it differs from the value there.
+    initial: Option<f64>,
+    /// Derivatives of the knots, if the trace is the derivative of another one whose knots vary; otherwise empty.
+    moves: Vec<f64>,
+}
+
+/// Course of a trace before its start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Earlier {
+    /// Constant, at the value just before the start.
+    Constant,
+    /// Extrapolated with the first and second derivatives at the start: that of a recording, of which it is not known.
+    Extrapolated,
 }
 
 /// Weights of the values at [`Trace::NODES`] in their quartic at the first of [`Trace::CHECKS`]: Lagrange's basis. Reversed, they
@@ -64,7 +77,7 @@ impl Trace {
     pub fn starting_at(start: f64, segments: usize) -> Self {
         let mut knots = Vec::with_capacity(segments + 1);
         knots.push(start);
-        Self { knots, segments: Vec::with_capacity(segments), jumped: None }
+        Self { knots, segments: Vec::with_capacity(segments), ..Self::default() }
     }
 
     /// Appends the segment from the last knot to `end` that interpolates `samples` at [`Trace::NODES`].
@@ -98,6 +111,29 @@ impl Trace {
         self.jumped = Some(value);
     }
 
+    /// Sets the derivatives of the knots of the trace that this one is the derivative of, for derivatives at given times of which the
+    /// times increase. They vary linearly between these times, and vanish at both ends of the trace.
+    ///
+    /// At a jump or a corner whose time varies, the derivative at a fixed time is that of one side, and a criterion needs the other
+    /// part: the derivative of the time.
+    pub fn move_knots(&mut self, of_times: &[(f64, f64)]) {
+        if of_times.iter().all(|&(_, moves)| moves == 0.0) {
+            return;
+        }
+        let (start, end) = (self.start(), self.end());
+        let mut ahead = of_times.iter().copied().filter(|&(t, _)| t > start && t < end).peekable();
+        let mut last = (start, 0.0);
+        let moves = self.knots.iter().map(|&knot| {
+            while let Some(reached) = ahead.next_if(|&(t, _)| t <= knot) {
+                last = reached;
+            }
+            let next = ahead.peek().copied().unwrap_or((end, 0.0));
+            let share = if next.0 > last.0 { (knot - last.0) / (next.0 - last.0) } else { 0.0 };
+            last.1 + share * (next.1 - last.1)
+        });
+        self.moves = moves.collect();
+    }
+
     /// Returns the start time of the trace, s.
     pub fn start(&self) -> f64 {
         self.knots.first().copied().unwrap_or(0.0)
@@ -113,13 +149,14 @@ impl Trace {
         &self.knots
     }
 
-    /// Returns the trace delayed by `time` (s, not negative), with the same end. Before its start, the trace is extrapolated
-    /// with the first and second derivatives at the start.
+    /// Returns the trace delayed by `time` (s, not negative), with the same end.
     #[must_use]
-    pub fn delayed(&self, time: f64) -> Self {
+    pub fn delayed(&self, time: f64, earlier: Earlier) -> Self {
         let (start, end) = (self.start(), self.end());
         let mut late = Self::starting_at(start, self.segments.len() + 1);
-        if let (Some(c), Some(knot)) = (self.segments.first(), self.knots.get(1)) {
+        if earlier == Earlier::Constant {
+            late.push_polynomial((start + time).min(end), [self.initial(), 0.0, 0.0, 0.0, 0.0]);
+        } else if let (Some(c), Some(knot)) = (self.segments.first(), self.knots.get(1)) {
             let (h, length) = (knot - start, (start + time).min(end) - start);
             let (slope, bend) = (c[1] / h, c[2] / (h * h));
             let before = [c[0] - slope * time + bend * time * time, length * (slope - 2.0 * bend * time)];
@@ -142,11 +179,26 @@ impl Trace {
         late
     }
 
+    /// Returns the derivative of [`Trace::delayed`], where `tangent` is the derivative of the trace and `late` that of `time`.
+    #[must_use]
+    pub fn delayed_along(&self, tangent: &Self, (time, late): (f64, f64), earlier: Earlier) -> Self {
+        let mut along = tangent.delayed(time, earlier);
+        for (d, rate) in along.segments.iter_mut().zip(self.delayed(time, earlier).derivative().segments) {
+            d.iter_mut().zip(rate).for_each(|(d, rate)| *d -= late * rate);
+        }
+        let moves = |(i, knot): (usize, &f64)| (knot + time, tangent.moves.get(i).unwrap_or(&0.0) + late);
+        along.move_knots(&tangent.knots.iter().enumerate().map(moves).collect::<Vec<_>>());
+        along
+    }
+
     /// Returns the part between two times, on a clock that starts at the first of them, or at the start of the trace if that is later.
     #[must_use]
     pub fn between(&self, from: f64, until: f64) -> Self {
         let (from, until) = (from.max(self.start()), until.min(self.end()));
         let mut part = Self::starting_at(0.0, self.segments.len());
+        if !self.moves.is_empty() {
+            part.moves.push(0.0);
+        }
         for (segment, c) in self.segments.iter().enumerate() {
             let (t0, t1) = (self.knots[segment], self.knots[segment + 1]);
             if t1 <= from || t0 >= until {
@@ -154,12 +206,16 @@ impl Trace {
             }
             if from <= t0 && t1 <= until {
                 part.push_polynomial(t1 - from, *c);
-                continue;
+            } else {
+                let [low, high] = [from.max(t0), until.min(t1)].map(|t| (t - t0) / (t1 - t0));
+                part.push(until.min(t1) - from, Self::NODES.map(|s| polynomial(c, low + s * (high - low))));
             }
-            let [low, high] = [from.max(t0), until.min(t1)].map(|t| (t - t0) / (t1 - t0));
-            part.push(until.min(t1) - from, Self::NODES.map(|s| polynomial(c, low + s * (high - low))));
+            if !self.moves.is_empty() && part.moves.len() < part.knots.len() {
+                part.moves.push(if t1 < until { self.moves[segment + 1] } else { 0.0 });
+            }
         }
         part.jumped = self.jumped.filter(|_| until >= self.end());
+        part.set_initial(if from > self.start() { self.before(from) } else { self.initial() });
         part
     }
 
@@ -174,8 +230,11 @@ impl Trace {
         self.value_on(segment, t)
     }
 
-    /// Returns the value just before `t`; at the start, the value there.
+    /// Returns the value just before `t`.
     pub fn before(&self, t: f64) -> f64 {
+        if t <= self.start() {
+            return self.initial();
+        }
         let segment = self.knots.partition_point(|&knot| knot < t).saturating_sub(1);
         let segment = segment.min(self.segments.len().saturating_sub(1));
         let Some(c) = self.segments.get(segment) else { return f64::NAN };
@@ -200,6 +259,16 @@ impl Trace {
     /// Returns the value at the start.
     pub fn first(&self) -> f64 {
         self.segments.first().map_or(f64::NAN, |c| c[0])
+    }
+
+    /// Returns the value just before the start: that of a response to inputs that jump at the start, before they do.
+    pub fn initial(&self) -> f64 {
+        self.initial.unwrap_or_else(|| self.first())
+    }
+
+    /// Sets the value just before the start.
+    pub fn set_initial(&mut self, value: f64) {
+        self.initial = Some(value).filter(|value| *value != self.first());
     }
 
     /// Returns the value at the end.
@@ -366,17 +435,41 @@ impl Trace {
                 [c[1] / h, 2.0 * c[2] / h, 3.0 * c[3] / h, 4.0 * c[4] / h, 0.0]
             })
             .collect();
-        Self { knots: self.knots.clone(), segments, jumped: None }
+        Self { knots: self.knots.clone(), segments, ..Self::default() }
     }
 
-    /// Returns `y + distance tangent`, for a tangent on the same segments.
+    /// Returns `y + distance tangent`, for a tangent on the same segments. Knots that vary are moved along their derivatives, and
+    /// with them jumps and corners: on a segment from `a` to `b`, whose derivatives are `a'` and `b'`, the value at the position `s`
+    /// changes by the tangent and by `y' (a' + s (b' - a'))`.
     #[must_use]
     pub fn moved(&self, tangent: &Self, distance: f64) -> Self {
         debug_assert_eq!(self.knots, tangent.knots, "a tangent has the segments of its trace");
-        let add = |(c, d): (&[f64; 5], &[f64; 5])| std::array::from_fn(|i| c[i] + distance * d[i]);
-        let segments = self.segments.iter().zip(&tangent.segments).map(add).collect();
+        let add = |c: &[f64; 5], d: &[f64; 5]| std::array::from_fn(|i| c[i] + distance * d[i]);
         let jumped = self.jumped.map(|value| value + distance * tangent.last());
-        Self { knots: self.knots.clone(), segments, jumped }
+        let initial = self.initial.map(|value| value + distance * tangent.initial());
+        if tangent.moves.is_empty() {
+            let segments = self.segments.iter().zip(&tangent.segments).map(|(c, d)| add(c, d)).collect();
+            return Self { knots: self.knots.clone(), segments, jumped, initial, moves: Vec::new() };
+        }
+        let (start, end) = (self.start(), self.end());
+        let mut moved = Self { jumped, initial, ..Self::starting_at(start, self.segments.len()) };
+        for (segment, (c, d)) in self.segments.iter().zip(&tangent.segments).enumerate() {
+            let (length, [from, to]) =
+                (self.knots[segment + 1] - self.knots[segment], [tangent.moves[segment], tangent.moves[segment + 1]]);
+            let rate = [0.0, c[1], 2.0 * c[2], 3.0 * c[3], 4.0 * c[4], 0.0];
+            let carried: [f64; 5] = std::array::from_fn(|i| (rate[i + 1] * from + rate[i] * (to - from)) / length);
+            let knot = if segment + 1 == self.segments.len() { end } else { self.knots[segment + 1] + distance * to };
+            moved.push_polynomial(knot.min(end), add(c, &std::array::from_fn(|i| d[i] + carried[i])));
+        }
+        moved
+    }
+
+    /// Returns the largest distance in either direction by which [`Trace::moved`] at most halves the length of each segment;
+    /// infinity if no segment becomes shorter.
+    pub fn room(&self, tangent: &Self) -> f64 {
+        let lengths = self.knots.windows(2).map(|knots| knots[1] - knots[0]);
+        let changes = tangent.moves.windows(2).map(|moves| (moves[1] - moves[0]).abs());
+        lengths.zip(changes).map(|(length, change)| 0.5 * length / change).fold(f64::INFINITY, f64::min)
     }
 
     /// Returns the largest jump between consecutive segments, in absolute value.
@@ -511,7 +604,7 @@ mod tests {
         trace.push_polynomial(0.4, [1.0, -0.8, 3.0 * 0.16, 0.0, 0.0]);
         trace.push_polynomial(1.0, [parabola(0.4), 0.4 * 0.6, 3.0 * 0.36, 0.0, 0.0]);
         for delay in [0.0, 0.3, 0.7, 5.0] {
-            let late = trace.delayed(delay);
+            let late = trace.delayed(delay, Earlier::Extrapolated);
             assert_eq!((late.start(), late.end()), (0.0, 1.0));
             for t in [0.0, 0.1, 0.35, 0.72, 1.0] {
                 assert!((late.at(t) - parabola(t - delay)).abs() < 1e-12 * (1.0 + delay * delay), "{delay} {t}");
@@ -549,6 +642,67 @@ mod tests {
         step.push(1.0, [0.0; 5]);
         step.push(2.0, [3.0; 5]);
         assert_eq!((step.largest_jump(), step.at(0.999), step.at(1.0), step.at(9.0)), (3.0, 0.0, 3.0, 3.0));
+    }
+
+    #[test]
+    fn before_its_start_a_delayed_trace_is_constant_if_that_is_known() {
+        let mut trace = sine();
+        trace.set_initial(-2.0);
+        let late = trace.delayed(1.5, Earlier::Constant);
+        assert_eq!((late.at(0.0), late.at(1.4), late.initial()), (-2.0, -2.0, -2.0));
+        assert!((late.at(2.5) - math::sin(1.0)).abs() < 1e-9);
+    }
+
+    /// Trace that rises with slope `a` until it reaches `b`, and is 0 from then on, until 5 s.
+    fn sawtooth(a: f64, b: f64) -> Trace {
+        let mut trace = Trace::starting_at(0.0, 3);
+        trace.push_polynomial(b / a, [0.0, b, 0.0, 0.0, 0.0]);
+        trace.push_polynomial(0.5 * (5.0 + b / a), [0.0; 5]);
+        trace.push_polynomial(5.0, [0.0; 5]);
+        trace
+    }
+
+    #[test]
+    fn a_jump_moves_along_the_derivative_of_its_time() {
+        let (a, b) = (0.7, 0.9);
+        let trace = sawtooth(a, b);
+        // Derivatives with respect to a: t before the jump, whose time is b/a; with respect to b: 0.
+        let mut along_a = Trace::starting_at(0.0, 3);
+        along_a.push_polynomial(trace.knots()[1], [0.0, b / a, 0.0, 0.0, 0.0]);
+        along_a.push_polynomial(trace.knots()[2], [0.0; 5]);
+        along_a.push_polynomial(5.0, [0.0; 5]);
+        let mut along_b = trace.clone();
+        along_b.segments.iter_mut().for_each(|c| *c = [0.0; 5]);
+        along_a.move_knots(&[(b / a, -b / (a * a))]);
+        along_b.move_knots(&[(b / a, 1.0 / a)]);
+        let h = 1e-5;
+        let slope = |along: &Trace, of: &dyn Fn(&Trace) -> f64| {
+            (of(&trace.moved(along, h)) - of(&trace.moved(along, -h))) / (2.0 * h)
+        };
+        let (peak, area) = (|y: &Trace| y.maximum().0, |y: &Trace| y.integral(|_, y| y));
+        let near = |found: f64, exact: f64| assert!((found - exact).abs() < 1e-8, "{found} {exact}");
+        near(slope(&along_a, &peak), 0.0);
+        near(slope(&along_b, &peak), 1.0);
+        // The area is b^2/(2 a).
+        near(slope(&along_a, &area), -b * b / (2.0 * a * a));
+        near(slope(&along_b, &area), b / a);
+        let window = |along: &Trace| slope(along, &|y| y.between(1.0, 4.0).integral(|_, y| y));
+        assert_eq!(along_b.between(1.0, 4.0).knots().len(), trace.between(1.0, 4.0).knots().len());
+        near(window(&along_b), b / a);
+    }
+
+    #[test]
+    fn an_initial_value_differs_from_the_first_one() {
+        let mut trace = sine();
+        assert_eq!((trace.initial(), trace.before(0.0)), (0.0, 0.0));
+        trace.set_initial(-2.0);
+        assert_eq!((trace.initial(), trace.before(0.0), trace.first()), (-2.0, -2.0, 0.0));
+        // Of a part, it is the value just before it.
+        assert_eq!(trace.between(0.0, 1.0).initial(), -2.0);
+        let mut step = Trace::starting_at(0.0, 2);
+        step.push(1.0, [0.0; 5]);
+        step.push(2.0, [3.0; 5]);
+        assert_eq!((step.between(1.0, 2.0).first(), step.between(1.0, 2.0).initial()), (3.0, 0.0));
     }
 
     #[test]

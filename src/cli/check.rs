@@ -91,7 +91,9 @@ fn channels(study: &Study, case: &Case) -> Vec<Vec<String>> {
                 channel.values.len().to_string(),
                 until,
                 channel.noise.map_or_else(|| "not given".to_owned(), number),
-                signals().find(|s| s.name == channel.signal).map_or_else(String::new, |s| s.unit.to_string()),
+                signals()
+                    .find(|s| s.name == channel.signal)
+                    .map_or_else(String::new, |s| s.unit.difference().to_string()),
             ]
         };
         experiment.channels.iter().enumerate().map(one).collect()

@@ -20,6 +20,9 @@ use crate::terminal::{CommandError, number, print, table};
 pub(super) struct Arguments {
     /// CSV file, or MATLAB file of level 4 or 5.
     file: PathBuf,
+    /// Time column [default: `t`, `time`, `Zeit` and the like, or the first column of time stamps].
+    #[arg(long, value_name = "COLUMN")]
+    time: Option<String>,
     /// Print the order of persistent excitation of this column as an input.
     #[arg(long, value_name = "COLUMN")]
     excitation: Option<String>,
@@ -35,21 +38,27 @@ pub(super) struct Arguments {
 pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let file = DataFile::read(&arguments.file)?;
     let names = file.column_names();
+    let time = match &arguments.time {
+        Some(time) => {
+            file.column(time)?;
+            names.iter().find(|name| file.is_same(name, time)).cloned()
+        }
+        None => file.time_column(),
+    };
     if let Some(column) = &arguments.excitation {
-        print(&excitation(&file, column, &arguments.file.display().to_string())?)?;
+        print(&excitation(&file, time.as_deref(), column, &arguments.file.display().to_string())?)?;
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(rest) = &arguments.rest {
-        print(&at_rest(&file, [rest[0], rest[1]])?)?;
+        print(&at_rest(&file, time, [rest[0], rest[1]])?)?;
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(path) = &arguments.plot {
-        for written in plot(&file, path)? {
+        for written in plot(&file, time, path)? {
             print(&format!("wrote {}\n", written.display()))?;
         }
         return Ok(ExitCode::SUCCESS);
     }
-    let time = file.time_column();
     let times = time.as_ref().map(|name| file.column(name)).transpose()?.map(|column| column.values);
     let mut rows = Vec::new();
     let (mut sampling, mut unknown, mut advice) = (String::new(), Vec::new(), Vec::new());
@@ -103,6 +112,9 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
     for line in advice {
         text += &line;
     }
+    for remark in file.remarks() {
+        text += &format!("note: {remark}\n");
+    }
     for skipped in &file.skipped {
         text += &format!("skipped: {skipped}\n");
     }
@@ -111,15 +123,14 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
 }
 
 /// Formats the order of persistent excitation of a column.
-fn excitation(file: &DataFile, name: &str, shown: &str) -> Result<String, Diagnostic> {
+fn excitation(file: &DataFile, time: Option<&str>, name: &str, shown: &str) -> Result<String, Diagnostic> {
     let column = file.column(name)?;
     if let Some(gap) = column.values.iter().position(|v| !v.is_finite()) {
         return Err(Diagnostic::new(format!("`{name}` has a gap at row {}", gap + 1))
             .with_help("fill the gap or cut the file: an input needs a value at every sample"));
     }
-    let time = file.time_column();
     let step = match time {
-        Some(time) => spacing(file.column(&time)?.values).ok_or_else(|| {
+        Some(time) => spacing(file.column(time)?.values).ok_or_else(|| {
             Diagnostic::new(format!("the samples are not equally spaced in `{time}`"))
                 .with_help("resample them in a study: task = \"excitation\" with `sample-time` in [excitation]")
         })?,
@@ -159,10 +170,8 @@ fn suspicious_start(name: &str, (times, unit): (&[f64], &str), values: &[f64], n
 
 /// Formats mean and standard deviation of every column between two times.
 #[allow(clippy::cast_precision_loss)]
-fn at_rest(file: &DataFile, [from, to]: [f64; 2]) -> Result<String, Diagnostic> {
-    let time = file.time_column().ok_or_else(|| {
-        Diagnostic::new("no column of the file is the time").with_help("call it `t` or `time` in the header")
-    })?;
+fn at_rest(file: &DataFile, time: Option<String>, [from, to]: [f64; 2]) -> Result<String, Diagnostic> {
+    let time = time.ok_or_else(|| file.without_time("name it with `--time`"))?;
     let times = file.column(&time)?.values;
     let mut rows = Vec::new();
     for name in file.column_names().iter().filter(|name| **name != time) {
@@ -189,14 +198,13 @@ fn at_rest(file: &DataFile, [from, to]: [f64; 2]) -> Result<String, Diagnostic> 
 }
 
 /// Plots every column over time, each in a file of its own if there are several, and returns the files.
-fn plot(file: &DataFile, path: &Path) -> Result<Vec<PathBuf>, CommandError> {
+fn plot(file: &DataFile, time: Option<String>, path: &Path) -> Result<Vec<PathBuf>, CommandError> {
     let end = path.extension().and_then(|end| end.to_str()).unwrap_or_default();
     if !["svg", "png"].contains(&end) {
         return Err(Diagnostic::new(format!("`{}` is neither .svg nor .png", path.display()))
             .with_help("name a file such as columns.svg")
             .into());
     }
-    let time = file.time_column();
     let mut plots = Vec::new();
     for name in file.column_names().iter().filter(|name| time.as_ref() != Some(name)) {
         let column = file.column(name)?;

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use mops_core::{Analysis, Catalogue, Diagnostic, Failure, Problem, Quantity, Response, Study, suggestion};
+use mops_core::{Analysis, Catalogue, Diagnostic, Failure, Problem, Quantity, Response, Study, Usage, suggestion};
 
 use super::families::{folded, runs, spelled};
 use super::study::{StudyArguments, open};
@@ -61,7 +61,11 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     print(&criteria(&pick(&start), &pick(&here), "here"))?;
     let failures = || here.failures.iter().filter(|(job, _)| wanted(&study.cases()[study.jobs()[*job].case].name));
     let criteria = failures().filter(|(_, why)| matches!(why, Failure::Criterion(_)));
-    let mut failed = failures().next().is_some();
+    // A monitored criterion demands nothing.
+    let lacks = |row: usize| study.rows()[row].usage != Usage::Monitor && here.readings[row].is_none();
+    let of_wanted = |row: usize| wanted(&study.cases()[study.jobs()[study.rows()[row].job].case].name);
+    let mut failed = failures().any(|(_, why)| !matches!(why, Failure::Criterion(_)))
+        || (0..study.rows().len()).any(|row| of_wanted(row) && lacks(row));
     let mut names = FileNames::default();
     for (job, why) in criteria {
         print(&format!("no value in case {}: {why}\n", study.cases()[study.jobs()[*job].case].name))?;

@@ -11,7 +11,7 @@ use mops_core::{
 use super::batches::Stage;
 use super::copies::Copies;
 use super::worst_case::{Effort, NO_GUARANTEE, Region, Worst, sentence};
-use crate::numbers::significant;
+use crate::numbers::{counted, significant};
 use crate::search::{EvaluationStore, Options, SolveError, Solved, search};
 
 /// Outer approximation: solves for the present cases, searches the box for worse cases, adds them, and repeats.
@@ -282,7 +282,9 @@ impl Rounds {
             }
             return Solved { outcome, archive: Vec::new(), ..last };
         };
-        let settled = self.done.last().is_some_and(|round| round.added.is_empty());
+        // A search that did not take place, or was cut off, shows nothing.
+        let settled = self.done[chosen].added.is_empty();
+        let cut_off = self.worst.last().is_some_and(Vec::is_empty);
         let design = &self.done[chosen].tuners;
         let problem = Problem::new(Arc::new(self.study.with_scenarios(&self.scenarios))).concluding();
         let mut run = Run::new(&problem, Budget { evaluations: 1 }, &());
@@ -309,7 +311,7 @@ impl Rounds {
             tolerance: self.task.tolerance,
             guaranteed: false,
         };
-        report.words = words(&report, stop);
+        report.words = words(&report, outcome.worst_scaled, if cut_off { End::CutOff } else { End::of(stop) });
         outcome.found.robust = Some(report);
         Solved { outcome, problem, best, archive: Vec::new(), front: Vec::new() }
     }
@@ -320,20 +322,45 @@ fn violation(worst: &Worst) -> f64 {
     if worst.subject.usage == Usage::Equality { worst.severity() } else { worst.scaled - 1.0 }
 }
 
-fn words(report: &RobustReport, stop: Stop) -> Vec<String> {
+/// Reason why no further round followed.
+enum End {
+    /// The search for worst cases of the last round did not take place, or was cut off.
+    CutOff,
+    Interrupted,
+    Budget,
+    Rounds,
+}
+
+impl End {
+    fn of(stop: Stop) -> Self {
+        match stop {
+            Stop::Interrupted => Self::Interrupted,
+            Stop::Budget => Self::Budget,
+            Stop::Converged | Stop::Stalled => Self::Rounds,
+        }
+    }
+}
+
+/// Returns the findings as sentences. `over_all` is the worst scaled value of the reported design over the cases of all rounds.
+fn words(report: &RobustReport, over_all: f64, end: End) -> Vec<String> {
     let round = &report.rounds[report.chosen];
     let added: usize = report.rounds.iter().map(|round| round.added.len()).sum();
     let number = |value: f64| significant(value, 4);
     let rounds = report.rounds.len();
-    let end = match (report.settled, stop) {
+    let after = counted(rounds, "round");
+    let found = round.found.max(over_all);
+    let still = format!("worse cases were still found (scaled value {})", number(found));
+    let end = match (report.settled, end) {
         (true, _) => {
-            format!("after {rounds} rounds no case was found that is worse by more than {}", number(report.tolerance))
+            format!("after {after} no case was found that is worse by more than {}", number(report.tolerance))
         }
-        (false, Stop::Interrupted) => "interrupted while worse cases were still found".to_owned(),
-        (false, Stop::Budget) => "the budget was spent while worse cases were still found".to_owned(),
-        (false, _) => format!("worse cases were still found after {rounds} rounds"),
+        (false, End::CutOff) => format!("{still}, and the search for worst cases of the last round was cut off"),
+        (false, End::Interrupted) => format!("interrupted while {still}"),
+        (false, End::Budget) => format!("the budget was spent while {still}"),
+        (false, End::Rounds) => format!("{still} after {after}"),
     };
-    let mut words = vec![format!("{added} worst cases were added; {end}.")];
+    let were = if added == 1 { "was" } else { "were" };
+    let mut words = vec![format!("{} {were} added; {end}.", counted(added, "worst case"))];
     let violated = match number(round.violation_found) {
         _ if round.violation_found <= FEASIBLE => String::new(),
         by if round.violation_found <= report.tolerance => {
@@ -349,7 +376,7 @@ fn words(report: &RobustReport, stop: Stop) -> Vec<String> {
             "Design of round {}: worst scaled value {} over the cases of the design, {} found in the box{violated}.",
             report.chosen + 1,
             number(round.for_cases),
-            number(round.found)
+            number(found)
         ));
     }
     let best = report.rounds.iter().map(|round| round.for_cases).filter(|v| v.is_finite()).fold(f64::NAN, f64::max);
@@ -357,7 +384,7 @@ fn words(report: &RobustReport, stop: Stop) -> Vec<String> {
         words.push(format!(
             "Lower bound {} (if the solver found the optimum for the added cases); gap {}.",
             number(best),
-            number((round.found - best).max(0.0))
+            number((found - best).max(0.0))
         ));
     }
     words.extend(report.criteria.iter().map(sentence));

@@ -82,7 +82,7 @@ impl Step {
             } else {
                 Cow::Owned(part(whole, &[time, end], |_, y| y))
             },
-            from: self.from.unwrap_or_else(|| whole.first()),
+            from: self.from.unwrap_or_else(|| whole.initial()),
             target: self.target.unwrap_or_else(|| whole.last()),
             time,
             is_assumed: self.target.is_none(),

@@ -71,9 +71,11 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
             ParameterKind::Level | ParameterKind::LowerEdge | ParameterKind::UpperEdge | ParameterKind::Strength => {
                 at_centre(added.sizes.range[1] - added.sizes.range[0], UNIFORM)
             }
-            ParameterKind::Shape | ParameterKind::BuildUp | ParameterKind::WaveNumber | ParameterKind::Duration => {
-                at_centre(typical(), settings().shape_prior)
-            }
+            ParameterKind::Shape
+            | ParameterKind::Zero
+            | ParameterKind::BuildUp
+            | ParameterKind::WaveNumber
+            | ParameterKind::Duration => at_centre(typical(), settings().shape_prior),
         }
     };
     let shared = fit.globals.iter().zip(&point.globals).map(|(global, &value)| match global.sets {

@@ -4,7 +4,7 @@ use mops_core::file::{Entries, Short};
 use mops_core::{Quantity, StudyError, Unit};
 
 use super::definition::{path, under};
-use super::filters::in_brackets;
+use super::filters::{in_brackets, number_before_formulas};
 use super::options::{Clock, Described, EquationsOptions, Formula, Output, Pid};
 
 /// Returns the options with each controller replaced by what it computes.
@@ -32,8 +32,13 @@ pub(super) fn at_its_key(mistake: StudyError, options: &EquationsOptions) -> Stu
         });
         let filters = clock.into_iter().filter(|_| !is_own).flat_map(|clock| &clock.filter.0);
         let part_of = |of: &str| memory.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('_'));
-        if let Some(name) = filters.map(|(name, _)| name).find(|name| part_of(name)) {
-            return StudyError { path: path(&["clocks", key, "filter", name]), span: None, ..mistake.clone() };
+        if let Some((name, filter)) = filters.into_iter().find(|(name, _)| part_of(name)) {
+            let place = ["clocks", key, "filter", name];
+            if let Some((list, help)) = number_before_formulas(filter) {
+                let place = path(&[&place[..], &["continuous", list]].concat());
+                return StudyError { path: place, span: None, help: Some(help), ..mistake.clone() };
+            }
+            return StudyError { path: path(&place), span: None, ..mistake.clone() };
         }
     }
     let is_own = options.definitions.0.iter().any(|(name, _)| *section == "let" && name == key)
@@ -111,10 +116,57 @@ fn add(options: &mut EquationsOptions, u: &str, pid: &Pid) -> Result<(), StudyEr
     }
 }
 
+/// Refuses a setpoint weight for a temperature: `w r - y` depends on the zero of its scale, unless the weight is 1.
+fn refuse_weighted_temperature(options: &EquationsOptions, pid: &Pid) -> Result<(), StudyError> {
+    let is_one = |weight: &&Formula| weight.0.trim().parse::<f64>() == Ok(1.0);
+    let of_part = |given: Option<&Formula>, acts: bool| given.filter(|weight| acts && !is_one(weight)).is_some();
+    let Some(key) = [("wp", of_part(pid.wp.as_ref(), true)), ("wd", of_part(pid.wd.as_ref(), pid.td.is_some()))]
+        .into_iter()
+        .find_map(|(key, weights)| weights.then_some(key))
+    else {
+        return Ok(());
+    };
+    let unit = |formula: &Formula| match Quantity::parse(&formula.0) {
+        Ok(quantity) => quantity.unit,
+        Err(_) => declared_unit(options, &formula.0).and_then(|unit| Unit::parse(unit).ok()),
+    };
+    let Some(scale) =
+        [&pid.setpoint, &pid.measured].into_iter().find_map(|of| unit(of).filter(|unit| unit.zero() != 0.0))
+    else {
+        return Ok(());
+    };
+    let [setpoint, measured] = [&pid.setpoint.0, &pid.measured.0];
+    let setpoint = if Quantity::parse(setpoint).is_ok() { "r" } else { setpoint };
+    let fact = format!(
+        "`{key}` weights the setpoint, which is a temperature in {scale}: the result depends on the zero of the scale"
+    );
+    let help = format!(
+        "control a difference: setpoint = \"{setpoint} - 20 [{scale}]\", measured = \"{measured} - 20 [{scale}]\", with the \
+         temperature at rest for 20"
+    );
+    Err(StudyError::new(key, fact).with_help(help))
+}
+
+/// Returns the unit of a state, an input, an output or a memory.
+fn declared_unit<'o>(options: &'o EquationsOptions, name: &str) -> Option<&'o str> {
+    let states = options.states.0.iter().map(|(state, of)| (state, Some(&of.0.unit)));
+    let inputs = options.inputs.0.iter().map(|(input, of)| (input, Some(&of.0.unit)));
+    let outputs = options.outputs.0.iter().map(|(output, of)| (output, of.0.unit.as_ref()));
+    let memory = options.clocks.0.iter().flat_map(|(_, clock)| &clock.memory.0);
+    let mut known = states.chain(inputs).chain(outputs).chain(memory.map(|(memory, of)| (memory, Some(&of.0.unit))));
+    known.find(|(known, _)| *known == name.trim()).and_then(|(_, unit)| unit).map(String::as_str)
+}
+
 /// Checks the values that are quantities, and that the controller acts.
 fn check(options: &EquationsOptions, u: &str, pid: &Pid, unit: &str) -> Result<(), StudyError> {
+    refuse_weighted_temperature(options, pid)?;
     for (key, formula) in pid.given() {
         let Ok(Quantity { number, unit: given }) = Quantity::parse(&formula.0) else { continue };
+        let is_limit = key.starts_with("limit_");
+        if number.is_nan() || number.is_infinite() && !is_limit {
+            let key = if is_limit { "limit" } else { key };
+            return Err(StudyError::new(key, format!("expected a finite value for `{key}`, found {number}")));
+        }
         let (key, expected) = match key {
             "Ti" | "Td" | "Tt" => (key, "s"),
             "Nd" | "wp" | "wd" => (key, "1"),
@@ -131,6 +183,15 @@ fn check(options: &EquationsOptions, u: &str, pid: &Pid, unit: &str) -> Result<(
             return Err(StudyError::new(key, format!("expected a value above 0 for `{key}`, found {number}"))
                 .with_help("omit `Ti` or `Td` for a controller without this part"));
         }
+    }
+    if let Some([Ok(low), Ok(high)]) =
+        pid.limit.as_ref().map(|limit| limit.each_ref().map(|end| Quantity::parse(&end.0)))
+        && let Ok(unit) = Unit::parse(unit)
+        && let (Ok(low), Ok(high)) = (low.to(&unit), high.to(&unit))
+        && low >= high
+    {
+        let fact = format!("expected a lower limit below the upper limit, found {low} and {high}");
+        return Err(StudyError::new("limit", fact));
     }
     if pid.tt.is_some() && (pid.ti.is_none() || pid.limit.is_none()) {
         let fact = "a tracking time has an effect only with an integral part and a limit";
@@ -183,17 +244,11 @@ fn unit_of_number(
     unit: &str,
     number: f64,
 ) -> Result<Option<Unit>, StudyError> {
-    let name = &pid.measured.0;
-    let states = options.states.0.iter().map(|(state, of)| (state, Some(&of.0.unit)));
-    let inputs = options.inputs.0.iter().map(|(input, of)| (input, Some(&of.0.unit)));
-    let outputs = options.outputs.0.iter().map(|(output, of)| (output, of.0.unit.as_ref()));
-    let memory = options.clocks.0.iter().flat_map(|(_, clock)| &clock.memory.0);
-    let mut known = states.chain(inputs).chain(outputs).chain(memory.map(|(memory, of)| (memory, Some(&of.0.unit))));
-    let measured = known.find(|(known, _)| *known == name).and_then(|(_, unit)| unit);
+    let measured = declared_unit(options, &pid.measured.0);
     let unit = match key {
         "limit_low" | "limit_high" | "feedforward" => Some(unit),
         "setpoint" => match measured {
-            Some(unit) => Some(unit.as_str()),
+            Some(unit) => Some(unit),
             None if number == 0.0 => None,
             None => {
                 let fact = format!("the setpoint {number} has no unit");

@@ -246,6 +246,17 @@ impl Definition {
                 let default = value("default", &parameter.default)?;
                 let min = value("min", &parameter.min)?.unwrap_or(f64::NEG_INFINITY);
                 let max = value("max", &parameter.max)?.unwrap_or(f64::INFINITY);
+                let place = |name: &str| path(&["parameters", key, name]);
+                if min.is_nan() || max.is_nan() || min >= max {
+                    let fact = format!("expected a smallest value below the largest, found {min} and {max}");
+                    return Err(under(&place("max"), StudyError::here(fact)).with_help("correct `min` and `max`"));
+                }
+                if let Some(value) = default.filter(|value| !value.is_finite() || !(min..=max).contains(value)) {
+                    let fact = format!("expected a finite default from {min} to {max}, found {value}");
+                    return Err(
+                        under(&place("default"), StudyError::here(fact)).with_help("correct it, or `min` and `max`")
+                    );
+                }
                 d.parameters.push(Settable { quantity, default, range: [min, max] });
             }
         }

@@ -180,7 +180,7 @@ fn bilinear(
     let factor = match &filter.prewarp {
         None => format!("(2/{period})"),
         Some(frequency) => {
-            let angular = angular(frequency)?;
+            let angular = angular(frequency, clock)?;
             format!("({angular}/tan({angular}*{period}/2))")
         }
     };
@@ -232,14 +232,28 @@ pub(super) fn in_brackets(time: &Formula) -> String {
 }
 
 /// Returns a frequency as an angular frequency in an expression.
-fn angular(frequency: &Quantity) -> Result<String, StudyError> {
+///
+/// The factor of the transform is positive below half of the sampling frequency only. If the period depends on parameters, a
+/// frequency above makes the filter undefined.
+fn angular(frequency: &Quantity, clock: &Clock) -> Result<String, StudyError> {
     let value = frequency.to(&Unit::known("rad/s")).map_err(|why| StudyError::new("prewarp", why))?;
     let value = if frequency.unit.is_none() { std::f64::consts::TAU * frequency.number } else { value };
-    if value.is_finite() && value > 0.0 {
-        Ok(format!("({value:?} [rad/s])"))
-    } else {
-        Err(StudyError::new("prewarp", format!("`prewarp` must be above 0 Hz, and is {} Hz", frequency.number)))
+    let period = Quantity::parse(&clock.every.0).ok().and_then(|period| period.to(&Unit::known("s")).ok());
+    let half = period.map_or(f64::INFINITY, |period| 0.5 / period);
+    let hertz = value / std::f64::consts::TAU;
+    if value.is_nan() || value <= 0.0 || hertz >= half {
+        let range = if half.is_finite() {
+            format!("above 0 Hz and below half of the sampling frequency, {half} Hz")
+        } else {
+            "above 0 Hz".to_owned()
+        };
+        return Err(StudyError::new("prewarp", format!("`prewarp` must be {range}, and is {hertz} Hz"))
+            .with_help("a number without a unit is in Hz"));
     }
+    if value.is_infinite() {
+        return Err(StudyError::new("prewarp", "`prewarp` must be finite"));
+    }
+    Ok(format!("({value:?} [rad/s])"))
 }
 
 /// Returns a coefficient of `s^power`; a number has the unit `s^power`.
@@ -248,6 +262,27 @@ fn in_seconds(coefficient: &Formula, power: usize) -> String {
         Ok(number) => format!("{number:?} [s{power}]"),
         Err(_) => coefficient.0.clone(),
     }
+}
+
+/// Returns the list with a number as coefficient of `s^n`, n above 0, beside formulas, which may have the unit of another convention,
+/// and how to write the number then.
+pub(super) fn number_before_formulas(filter: &Filter) -> Option<(&'static str, String)> {
+    let of = filter.continuous.as_ref()?;
+    let is_number = |coefficient: &Formula| coefficient.0.trim().parse::<f64>().is_ok();
+    let lists = [("denominator", &of.denominator), ("numerator", &of.numerator)];
+    if lists.iter().all(|(_, list)| list.iter().all(is_number)) {
+        return None;
+    }
+    lists.into_iter().find_map(|(key, list)| {
+        let numbers = list.iter().enumerate().filter(|(_, c)| is_number(c) && !is_zero(c));
+        let (index, number) = numbers.map(|(index, c)| (index, c.0.trim())).next()?;
+        let power = list.len() - 1 - index;
+        let help = format!(
+            "the number {number} before s^{power} counts in s^{power}, as each number before s^n in s^n; write \"{number} [1]\" for a \
+             number without a unit, as in s^2 + 2 z w s + w^2"
+        );
+        (power > 0).then_some((key, help))
+    })
 }
 
 /// Returns the filter whose output at the instants is that of the continuous one for an input that is constant in between.

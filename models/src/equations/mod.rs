@@ -82,6 +82,10 @@ impl Equations {
         options.tolerance.check()?;
         let horizon = options.horizon.as_ref().map(|q| q.to(&Unit::known("s"))).transpose();
         let horizon = horizon.map_err(|why| StudyError::new("horizon", why))?;
+        if let Some((key, constant)) = options.constants.0.iter().find(|(_, constant)| !constant.number.is_finite()) {
+            let fact = format!("a constant must be finite, not {}", constant.number);
+            return Err(definition::under(&definition::path(&["constants", key]), StudyError::here(fact)));
+        }
         let expanded = filters::expanded(controllers::expanded(options.clone())?)?;
         let model = Definition::read(&expanded).and_then(|mut definition| {
             tables::replace(&mut definition, options, files)?;

@@ -510,9 +510,10 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         !self.ticking.is_empty() || self.remembers()
     }
 
-    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
-        pass_delays(self, |running| &mut running.delays, Self::settle_modes, at, x);
+    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) -> S {
+        let moves = pass_delays(self, |running| &mut running.delays, Self::settle_modes, at, x);
         self.tick(at, x);
+        moves
     }
 
     fn settle(&mut self, at: &Instant<'_, S>) {

@@ -112,6 +112,11 @@ impl<'a, S: Scalar> Drive<'a, S> {
         }
     }
 
+    /// Returns true if the value jumps at time 0.
+    pub fn jumps_at_start(&self) -> bool {
+        self.input.is_some_and(|input| input.at(-f64::MIN_POSITIVE) != input.at(0.0))
+    }
+
     /// Returns the value just before time 0.
     pub fn before(&self) -> S {
         self.input.map_or(self.value, |input| S::from(input.at(-f64::MIN_POSITIVE)))

@@ -76,6 +76,24 @@ impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
         self.look(0.0, x, |plant, at| plant.can_start(at))
     }
 
+    /// Returns true if an input jumps at time 0.
+    pub fn jumps_at_start(&self) -> bool {
+        self.drives.iter().any(Drive::jumps_at_start)
+    }
+
+    /// Returns signals just before time 0, given a plant that has not been simulated.
+    pub fn initial(&self, mut plant: P, start: &[S], signals: &[usize]) -> Vec<S> {
+        let u: Vec<S> = self.drives.iter().map(Drive::before).collect();
+        let at = Instant { t: 0.0, x: start, u: &u, w: &self.forces };
+        if plant.remembers() {
+            plant.begin(&at);
+        }
+        plant.settle(&at);
+        let signal =
+            |&signal: &usize| self.shows[signal].map_or_else(|| plant.signal(signal, &at), |state| start[state]);
+        signals.iter().map(signal).collect()
+    }
+
     fn rates_of_inputs(&self, t: f64) -> Vec<f64> {
         self.drives.iter().map(|drive| drive.slope(t)).collect()
     }
@@ -189,7 +207,7 @@ impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
         remember(self, step, &past, &|of, over| of.plant.remember(over));
     }
 
-    fn pass_break(&mut self, t: f64, x: &mut [S]) {
+    fn pass_break(&mut self, t: f64, x: &mut [S]) -> S {
         if !std::mem::replace(&mut self.has_started, true) && self.plant.remembers() {
             let u: Vec<S> = self.drives.iter().map(Drive::before).collect();
             self.plant.begin(&Instant { t, x, u: &u, w: &self.forces });
@@ -198,10 +216,12 @@ impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
         let mut inputs = self.inputs.borrow_mut();
         self.take_inputs(t, &mut inputs);
         self.constant = self.drives.iter().all(Drive::is_constant).then(|| inputs.clone());
+        let mut moves = S::from(0.0);
         if self.plant.samples() {
             let before = x.to_vec();
-            self.plant.sample(&Instant { t, x: &before, u: &inputs, w: &self.forces }, x);
+            moves = self.plant.sample(&Instant { t, x: &before, u: &inputs, w: &self.forces }, x);
         }
         self.plant.settle(&Instant { t, x, u: &inputs, w: &self.forces });
+        moves
     }
 }

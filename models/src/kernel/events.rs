@@ -434,7 +434,7 @@ pub(super) fn delay<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, index: usize, ste
 }
 
 /// Moves the state by `delay` along its derivative, to first order; the value of the state does not change.
-pub(super) fn shift<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, t: f64, x: &mut [S], dx: &mut [S], delay: S) {
+pub(crate) fn shift<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, t: f64, x: &mut [S], dx: &mut [S], delay: S) {
     if S::DIRECTIONS > 0 {
         f.derivative(t, x, dx);
         for (x, dx) in x.iter_mut().zip(dx.iter()) {

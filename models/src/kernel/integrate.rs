@@ -158,7 +158,8 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
                 method.advance();
                 continue;
             }
-            pass_break(dynamics, (t, end), &mut x, sink);
+            let moves = pass_break(dynamics, (t, end), &mut x, sink);
+            sink.restart(t, moves);
             events.settle(dynamics, t, &mut x, sink)?;
             if t < end {
                 stop = dynamics.next_break(t).min(end);
@@ -177,6 +178,7 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
             t = here;
             step.at(step.share, &mut x);
         }
+        sink.restart(t, delay);
         shift(dynamics, t, &mut x, &mut spare, delay);
         if at_stop {
             pass_break(dynamics, (t, end), &mut x, sink);
@@ -192,17 +194,19 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
     if all_finite(&x) { Ok((x, work)) } else { Err(Failure::Diverged(t)) }
 }
 
-/// Sets the inputs to their values at the break. At the end of the simulation, reports them to the sink.
+/// Sets the inputs to their values at the break. At the end of the simulation, reports them to the sink. Returns the derivatives of
+/// the time of the break.
 fn pass_break<S: Scalar, D: Dynamics<S> + ?Sized>(
     dynamics: &mut D,
     (t, end): (f64, f64),
     x: &mut [S],
     sink: &mut impl Sink<S, D>,
-) {
-    dynamics.pass_break(t, x);
+) -> S {
+    let moves = dynamics.pass_break(t, x);
     if t >= end {
         sink.end(t, x, dynamics);
     }
+    moves
 }
 
 fn all_finite<S: Scalar>(x: &[S]) -> bool {

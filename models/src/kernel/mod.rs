@@ -63,6 +63,7 @@ pub use mops_core::{IntegrationMethod, Tolerance};
 use dormand_prince::DormandPrince;
 pub use driven::Driven;
 pub(crate) use esdirk::groups;
+pub(crate) use events::shift;
 use integrate::Attempt;
 pub use integrate::integrate;
 pub(crate) use local::rests;
@@ -203,8 +204,11 @@ pub trait Dynamics<S: Scalar> {
         false
     }
 
-    /// Handles a break, and is called once at the start: inputs take their new values.
-    fn pass_break(&mut self, _t: f64, _x: &mut [S]) {}
+    /// Handles a break, and is called once at the start: inputs take their new values. Returns the derivatives of the time of
+    /// the break along the directions of the scalar, with value 0.
+    fn pass_break(&mut self, _t: f64, _x: &mut [S]) -> S {
+        S::from(0.0)
+    }
 
     /// Returns true if [`Dynamics::accepted`] is to be called for accepted steps.
     fn remembers(&self) -> bool {
@@ -253,6 +257,9 @@ pub trait Sink<S: Scalar, D: Dynamics<S> + ?Sized> {
     fn end(&mut self, _t: f64, _x: &[S], _dynamics: &D) {}
     /// Handles a change of the mode.
     fn event(&mut self, _t: f64, _what: &str) {}
+    /// Handles the end of a step by an event or a break. `moves` are the derivatives of its time along the directions of the
+    /// scalar, with value 0.
+    fn restart(&mut self, _t: f64, _moves: S) {}
 }
 
 /// Sink that ignores steps and events.

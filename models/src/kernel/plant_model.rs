@@ -177,7 +177,11 @@ impl<M: PlantModel> Simulated<M> {
         let wanted = wanted(job, &interface.signals);
         let tolerance = self.of.tolerance();
         let recording = record(&mut driven as &mut dyn Dynamics<S>, &start, job.horizon, &tolerance, &wanted);
-        recording.map_err(|failure| driven.plant.explain(failure))
+        let mut recording = recording.map_err(|failure| driven.plant.explain(failure))?;
+        if driven.jumps_at_start() {
+            recording.set_initial(&driven.initial(self.of.plant(parameters)?, &start, job.signals));
+        }
+        Ok(recording)
     }
 }
 

@@ -61,8 +61,8 @@ const ROOM: usize = 512 << 20;
 /// Limit on the initial capacity of all traces in bytes; most simulations take few steps.
 const FIRST_ROOM: usize = 16 << 20;
 
-/// Size of a segment of a trace in bytes: its end and five coefficients.
-const SEGMENT: usize = 6 * size_of::<f64>();
+/// Size of a segment of a trace in bytes: its end, five coefficients, and the derivative of its end.
+const SEGMENT: usize = 7 * size_of::<f64>();
 
 /// Sink that records signals along the steps.
 struct Recorder<'a, S> {
@@ -76,6 +76,8 @@ struct Recorder<'a, S> {
     /// Traces of the signals, then of their tangents in each direction.
     traces: Vec<Vec<Trace>>,
     events: Vec<Event>,
+    /// Instants of breaks and events, and their derivatives.
+    restarts: Vec<(f64, S)>,
     /// States at [`Trace::NODES`].
     states: [Vec<S>; 5],
     resolved: Vec<Resolved>,
@@ -311,6 +313,12 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
             self.events.push(Event { time: t, what: what.to_owned() });
         }
     }
+
+    fn restart(&mut self, t: f64, moves: S) {
+        if S::DIRECTIONS > 0 {
+            self.restarts.push((t, moves));
+        }
+    }
 }
 
 /// Simulates from 0 to `end` and records signals.
@@ -325,6 +333,18 @@ pub fn record<S: Scalar, D: Dynamics<S> + ?Sized>(
     wanted: &Wanted,
 ) -> Result<Recording, Failure> {
     record_within(ROOM, dynamics, (start, end), tolerance, wanted)
+}
+
+impl Recording {
+    /// Sets the values of all signals just before the start.
+    pub fn set_initial<S: Scalar>(&mut self, values: &[S]) {
+        for (i, value) in values.iter().enumerate() {
+            self.response.traces[i].1.set_initial(value.value());
+            for (tangents, &tangent) in self.tangents.iter_mut().zip(value.tangents()) {
+                tangents.traces[i].1.set_initial(tangent);
+            }
+        }
+    }
 }
 
 /// Implements [`record`] with a limit on the recorded bytes.
@@ -346,11 +366,17 @@ fn record_within<S: Scalar, D: Dynamics<S> + ?Sized>(
         room,
         traces: vec![vec![Trace::starting_at(0.0, segments); signals.len()]; 1 + S::DIRECTIONS],
         events: Vec::new(),
+        restarts: Vec::new(),
         states: std::array::from_fn(|_| start.to_vec()),
         resolved: vec![Resolved { size: 0.0, slope: f64::NAN, longest: 0.0 }; signals.len()],
         tolerance,
     };
     let (_, work) = integrate(dynamics, 0.0, end, start, tolerance, &mut recorder)?;
+    for direction in 0..S::DIRECTIONS {
+        let moves = |&(t, moves): &(f64, S)| (t, moves.tangents()[direction]);
+        let moves: Vec<(f64, f64)> = recorder.restarts.iter().map(moves).collect();
+        recorder.traces[1 + direction].iter_mut().for_each(|trace| trace.move_knots(&moves));
+    }
     let name = |traces: Vec<Trace>| signals.iter().map(|(_, name)| name.clone()).zip(traces).collect();
     let mut traces = recorder.traces.into_iter();
     let response =

@@ -3,7 +3,7 @@
 //! The rates of a plant are affine in its forces, `v' = a + B f`. The friction forces of stuck joints make their
 //! accelerations vanish, so no mass matrix is needed.
 
-use mops_core::{Opening, Scalar};
+use mops_core::{DryFriction, Opening, Scalar};
 use nalgebra::{DMatrix, DVector};
 
 use super::dynamics::Driven;
@@ -16,10 +16,10 @@ pub(super) struct Contacts {
 }
 
 /// Joint with dry friction.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Joint {
-    /// Effect that gives the friction.
-    actor: usize,
+    /// Effects that give the friction: the joint sticks or slides as a whole, and their friction adds up.
+    actors: Vec<usize>,
     /// Force in the equation of the joint.
     w: usize,
     /// Speed of the joint, as a state.
@@ -29,7 +29,10 @@ struct Joint {
 
 impl Contacts {
     pub(super) fn add(&mut self, actor: usize, w: usize, velocity: usize) {
-        self.joints.push(Joint { actor, w, velocity, contact: Contact::Stuck });
+        match self.joints.iter_mut().find(|joint| joint.w == w) {
+            Some(joint) => joint.actors.push(actor),
+            None => self.joints.push(Joint { actors: vec![actor], w, velocity, contact: Contact::Stuck }),
+        }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -49,8 +52,8 @@ impl Contacts {
     /// Returns the contacts with every stuck joint sliding forward.
     pub(super) fn sliding(&self) -> Self {
         let slide = |joint: &Joint| match joint.contact {
-            Contact::Stuck => Joint { contact: Contact::Forward, ..*joint },
-            _ => *joint,
+            Contact::Stuck => Joint { contact: Contact::Forward, ..joint.clone() },
+            _ => joint.clone(),
         };
         Self { joints: self.joints.iter().map(slide).collect() }
     }
@@ -58,7 +61,7 @@ impl Contacts {
     /// Returns 1 if the joint of this effect slides forward, -1 if backward; `None` if it is stuck or has no dry
     /// friction.
     pub(super) fn direction(&self, actor: usize) -> Option<f64> {
-        let joint = self.joints.iter().find(|joint| joint.actor == actor)?;
+        let joint = self.joints.iter().find(|joint| joint.actors.contains(&actor))?;
         (joint.contact != Contact::Stuck).then(|| joint.contact.sign())
     }
 }
@@ -96,15 +99,30 @@ impl<S: Opening> Driven<'_, S> {
         forces
     }
 
+    /// Returns the friction at a joint with a contact: sliding forces and limits against forward and backward motion.
+    fn friction(&self, joint: &Joint, t: f64, x: &[S], u: &[S]) -> DryFriction<S> {
+        let mut sum = DryFriction { sliding: [S::from(0.0); 2], limit: [S::from(0.0); 2] };
+        for &index in &joint.actors {
+            let actor = &self.actors[index];
+            let at = self.at(actor, t, x, u, S::from(0.0));
+            let one = actor.acting.friction(&at, self.states(actor, x)).expect("it has friction from the start");
+            for side in 0..2 {
+                sum.sliding[side] += one.sliding[side];
+                sum.limit[side] += one.limit[side];
+            }
+        }
+        sum
+    }
+
     pub(super) fn contact_guard(&self, index: usize, t: f64, x: &[S], u: &mut Vec<S>, w: &mut Vec<S>) -> S {
-        let joint = self.contacts.joints[index];
+        let joint = &self.contacts.joints[index];
         if joint.contact != Contact::Stuck {
             return x[joint.velocity] * joint.contact.sign();
         }
         let mut dx = vec![S::from(0.0); self.own];
         let held = self.balance(t, x, u, w, &mut dx)[index] * self.forward(joint.w);
         // A backward friction force is limited by the friction against forward motion.
-        let friction = self.friction(joint.actor, t, x, u);
+        let friction = self.friction(joint, t, x, u);
         friction.limit[usize::from(held.value() > 0.0)] - held.abs()
     }
 
@@ -112,7 +130,7 @@ impl<S: Opening> Driven<'_, S> {
     pub(super) fn holding(&self, t: f64, x: &[S], u: &[S]) -> Vec<(usize, usize, f64)> {
         let stuck = self.contacts.joints.iter().filter(|joint| joint.contact == Contact::Stuck);
         let most = |joint: &Joint| {
-            let limit = self.friction(joint.actor, t, x, u).limit;
+            let limit = self.friction(joint, t, x, u).limit;
             limit[0].value().max(limit[1].value())
         };
         stuck.map(|joint| (joint.w, joint.velocity, most(joint))).collect()
@@ -120,14 +138,14 @@ impl<S: Opening> Driven<'_, S> {
 
     /// Switches a contact after its guard became negative. Returns true if the joint is now stuck.
     pub(super) fn contact_switch(&mut self, index: usize, t: f64, x: &mut [S]) -> bool {
-        let joint = self.contacts.joints[index];
-        if joint.contact == Contact::Stuck {
+        let Joint { w: force, velocity, contact, .. } = self.contacts.joints[index];
+        if contact == Contact::Stuck {
             let (mut u, mut w, mut dx) = (Vec::new(), Vec::new(), vec![S::from(0.0); self.own]);
-            let held = self.balance(t, x, &mut u, &mut w, &mut dx)[index].value() * self.forward(joint.w);
+            let held = self.balance(t, x, &mut u, &mut w, &mut dx)[index].value() * self.forward(force);
             self.contacts.joints[index].contact = if held < 0.0 { Contact::Forward } else { Contact::Backward };
             self.settle_contacts(t, x, Some(index));
         } else {
-            x[joint.velocity] = S::from(0.0);
+            x[velocity] = S::from(0.0);
             self.contacts.joints[index].contact = Contact::Stuck;
             self.settle_contacts(t, x, None);
         }
@@ -165,10 +183,10 @@ impl<S: Opening> Driven<'_, S> {
             let mut excess: f64 = 0.0;
             let mut departures = 0.0;
             for &i in &resting {
-                let joint = self.contacts.joints[i];
+                let joint = &self.contacts.joints[i];
                 departures += f64::from(u8::from(joint.contact != before[i]));
                 if joint.contact == Contact::Stuck {
-                    let friction = self.friction(joint.actor, t, x, &u);
+                    let friction = self.friction(joint, t, x, &u);
                     let held = held[i].value() * self.forward(joint.w);
                     let limit = friction.limit[usize::from(held > 0.0)].value();
                     let never = limit == 0.0 || released == Some(i);

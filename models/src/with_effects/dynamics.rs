@@ -8,17 +8,19 @@ use mops_core::{
     Span,
 };
 
+use super::command::Command;
 use super::contacts::Contacts;
+use super::edges::BLINK;
 use super::{Place, Site, WithEffects};
 use crate::kernel::drive::Drive;
-use crate::kernel::{Dynamics, shown};
+use crate::kernel::{Dynamics, shift, shown};
 
 /// Effect in a simulation.
 pub(super) struct Actor<S> {
     pub(super) acting: Box<dyn BoundEffect<S>>,
     pub(super) place: Place,
     /// Index of the first state of the effect, and number of its states.
-    z: (usize, usize),
+    pub(super) z: (usize, usize),
     /// Hysteresis state.
     pub(super) memory: Vec<S>,
     /// Initial offset between output and input.
@@ -29,14 +31,14 @@ pub(super) struct Actor<S> {
 }
 
 impl<S: Scalar> Actor<S> {
-    /// Updates the hysteresis state to an instant, and returns the output.
-    pub(super) fn follow(&mut self, at: &PortState<'_, S>) -> S {
+    /// Updates the hysteresis state to an instant.
+    pub(super) fn follow(&mut self, at: &PortState<'_, S>) {
         let first = self.memory[0].value().is_nan();
         self.acting.update_hysteresis(at, &mut self.memory);
         if first {
             self.memory[0] += self.ahead;
+            self.acting.update_hysteresis(at, &mut self.memory);
         }
-        self.acting.hysteresis_value(at, &self.memory)
     }
 }
 
@@ -71,68 +73,35 @@ impl WithEffects {
     }
 }
 
-/// Input, possibly delayed by an effect.
-struct Command<'a, S> {
-    drive: Drive<'a, S>,
-    delay: Option<S>,
-    /// Start of the command, s: below 0 in a window of a record.
-    begun: f64,
-}
-
-impl<S: Scalar> Command<'_, S> {
-    /// Returns the time up to which a delayed input has reached the output.
-    fn out(&self, t: f64) -> f64 {
-        self.delay.map_or(t, |delay| (t - delay.value() + 1e-12 * (1.0 + t.abs())).max(self.begun))
-    }
-
-    fn at(&self, t: f64) -> S {
-        match self.delay {
-            None => self.drive.at(t),
-            Some(delay) => {
-                let then = t - delay.value();
-                if then < self.begun {
-                    return self.drive.at(self.begun);
-                }
-                let late = delay - delay.value();
-                self.drive.at(then) - late * self.drive.slope(then)
-            }
-        }
-    }
-
-    fn next_break(&self, t: f64, smooth: bool) -> f64 {
-        let delay = self.delay.map_or(0.0, Scalar::value);
-        let out = if delay > 0.0 { self.out(t) } else { t };
-        if t < self.begun + delay - 1e-12 * (1.0 + t.abs()) {
-            return self.begun + delay;
-        }
-        delay + if smooth { self.drive.next_break(out) } else { self.drive.next_sample(out) }
-    }
-}
-
 /// Plant with effects; the state consists of the states of the plant, then those of the effects.
 pub(super) struct Driven<'a, S> {
     pub(super) plant: Box<dyn Plant<S> + 'a>,
     pub(super) actors: Vec<Actor<S>>,
     pub(super) contacts: Contacts,
-    commands: Vec<Command<'a, S>>,
+    pub(super) commands: Vec<Command<'a, S>>,
     /// Number of states of the plant.
     pub(super) own: usize,
     forces: usize,
-    breaks: Vec<f64>,
+    /// Times at which effects change their form, s.
+    breaks: Vec<S>,
     longest_step: f64,
     damped_step: f64,
     /// Index of the state that each signal equals, if any.
     shows: Vec<Option<usize>>,
-    /// True if no effect acts at a sensor.
-    smooth: bool,
     /// Index of the state that each signal equals, if any, for signals that no effect changes.
     untouched: Vec<Option<usize>>,
     /// Clock time at the start of the simulation, s.
     begins: f64,
-    started: bool,
+    pub(super) started: bool,
     /// Text of the last event of the plant.
     happened: String,
     scratch: RefCell<Scratch<S>>,
+    /// Values that reach the effects of actuators, by the index of the effect.
+    pub(super) incoming: RefCell<Vec<S>>,
+    /// Derivatives of the time of an event or a break while the system passes it, with value 0.
+    late: S,
+    /// Half the time over which the rate of a value is a difference, s.
+    pub(super) blink: f64,
     /// Sign of each force for which it acts in the forward direction.
     forward: Vec<f64>,
     /// State whose equation contains each force of the plant.
@@ -167,28 +136,25 @@ impl<'a, S: Opening> Driven<'a, S> {
             let late = actors.iter().filter(|a| matches!(a.place.site, Site::Actuator { input: i } if i == input));
             late.filter_map(|actor| actor.acting.delay()).reduce(|a, b| a + b)
         };
-        let commands = of.inputs.iter().enumerate();
-        let begun = 0.0 - job.case.begins;
+        // The output of a sensor effect may be rough, so steps end at all samples.
+        let every_sample = actors.iter().any(|a| matches!(a.place.site, Site::Sensor { .. }));
         let command = |(i, v): (usize, &mops_core::Variable)| {
-            let mut command = Command { drive: Drive::new(job.case.input(&v.name)), delay: delay(i), begun };
-            command.drive.pass_break(command.out(0.0));
-            command
+            Command::new(job.case.input(&v.name), delay(i), job.case.begins, every_sample)
         };
-        let commands: Vec<_> = commands.map(command).collect();
+        let commands: Vec<_> = of.inputs.iter().enumerate().map(command).collect();
         let forces = of.forces();
         let disturbances = disturbances(of, job.case);
         let states = model.equation_states();
         let shows = shown(of, &states);
         let touched = |k: usize| actors.iter().any(|a| matches!(a.place.site, Site::Sensor { signal } if signal == k));
         let untouched = (0..shows.len()).map(|k| shows[k].filter(|_| !touched(k))).collect();
-        let smooth = !actors.iter().any(|a| matches!(a.place.site, Site::Sensor { .. }));
         let begins = job.case.begins;
-        let breaks = actors.iter().flat_map(|a| a.acting.breaks()).filter(|t| t.is_finite());
-        let mut breaks: Vec<f64> = breaks.map(|t| t - begins).collect();
-        breaks.sort_by(f64::total_cmp);
+        let breaks = actors.iter().flat_map(|a| a.acting.breaks()).filter(|t| t.value().is_finite());
+        let mut breaks: Vec<S> = breaks.map(|t| t - begins).collect();
+        breaks.sort_by(|a, b| a.value().total_cmp(&b.value()));
         let longest = actors.iter().map(|a| a.acting.longest_step()).fold(f64::INFINITY, f64::min);
         let damped = actors.iter().map(|a| a.acting.damped_step()).fold(f64::INFINITY, f64::min);
-        let longest = commands.iter().map(|c| c.drive.longest_step()).fold(longest, f64::min);
+        let longest = commands.iter().map(Command::longest_step).fold(longest, f64::min);
         let longest = disturbances.iter().map(Drive::longest_step).fold(longest, f64::min);
         let longest = longest.min(plant.longest_step());
         Self {
@@ -202,12 +168,14 @@ impl<'a, S: Opening> Driven<'a, S> {
             longest_step: longest,
             damped_step: damped,
             shows,
-            smooth,
             untouched,
             begins,
             started: false,
             happened: String::new(),
             scratch: RefCell::new(Scratch { u: Vec::new(), w: Vec::new(), dx: Vec::new() }),
+            incoming: RefCell::default(),
+            late: S::from(0.0),
+            blink: BLINK * job.horizon,
             forward: vec![1.0; forces],
             balances: balances(of).filter_map(|state| states.iter().position(|s| s.name == *state)).collect(),
             disturbances,
@@ -222,7 +190,9 @@ impl<'a, S: Opening> Driven<'a, S> {
         let mut x = self.plant.start();
         let total = self.actors.last().map_or(self.own, |a| a.z.0 + a.z.1);
         x.resize(total, S::from(0.0));
-        let u: Vec<S> = self.commands.iter().map(|c| c.at(0.0)).collect();
+        self.start_actuators(&mut x, parameters);
+        let mut u = Vec::new();
+        self.inputs(0.0, &x, &mut u);
         let w = vec![S::from(0.0); self.forces];
         self.plant.settle(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w });
         let sites = self.actors.iter().flat_map(|actor| [Some(actor.place.site), actor.place.companion]);
@@ -236,6 +206,9 @@ impl<'a, S: Opening> Driven<'a, S> {
         self.force_per_rate = (0..self.disturbances.len()).map(force_per_rate).collect();
         for index in 0..self.actors.len() {
             let actor = &self.actors[index];
+            if matches!(actor.place.site, Site::Actuator { .. }) {
+                continue;
+            }
             let (first, count) = actor.z;
             let value = self.passing(index, 0.0, &x, &u, &w);
             let at = self.at(actor, 0.0, &x, &u, value);
@@ -253,7 +226,12 @@ impl<'a, S: Opening> Driven<'a, S> {
             }
             x[first..first + count].copy_from_slice(&z);
         }
-        self.settle_gaps(0.0, &x);
+        self.update_hysteresis(0.0, &x);
+        self.settle_gaps(0.0, &x, false);
+        let before = self.commands.clone();
+        self.commands.iter_mut().for_each(|command| command.pass_break(0.0));
+        self.inputs(0.0, &x, &mut u);
+        self.commands = before;
         self.plant.can_start(&Instant { t: 0.0, x: &x[..self.own], u: &u, w: &w })?;
         Ok(x)
     }
@@ -268,7 +246,7 @@ impl<'a, S: Opening> Driven<'a, S> {
     }
 
     /// Returns the port state that an effect receives.
-    fn at<'b>(&self, actor: &Actor<S>, t: f64, x: &[S], u: &'b [S], value: S) -> PortState<'b, S> {
+    pub(super) fn at<'b>(&self, actor: &Actor<S>, t: f64, x: &[S], u: &'b [S], value: S) -> PortState<'b, S> {
         let zero = S::from(0.0);
         let (q, v) = match actor.place.site {
             Site::Joint { position, velocity, .. } => (x[position], x[velocity]),
@@ -285,25 +263,45 @@ impl<'a, S: Opening> Driven<'a, S> {
             None => (zero, zero),
         };
         let closed = actor.closed;
-        PortState { t: t + self.begins, value, q, v, a: zero, mobility: zero, other, other_speed, u, closed }
+        let t = self.late + (t + self.begins);
+        PortState { t, value, q, v, a: zero, mobility: zero, other, other_speed, u, closed }
     }
 
-    fn states<'b>(&self, actor: &Actor<S>, x: &'b [S]) -> &'b [S] {
+    pub(super) fn states<'b>(&self, actor: &Actor<S>, x: &'b [S]) -> &'b [S] {
         &x[actor.z.0..actor.z.0 + actor.z.1]
     }
 
-    /// Computes the inputs that reach the plant.
-    fn inputs(&self, t: f64, x: &[S], u: &mut Vec<S>) {
-        u.clear();
-        u.extend(self.commands.iter().map(|command| command.at(t)));
-        for actor in &self.actors {
-            let Site::Actuator { input } = actor.place.site else { continue };
-            let at = self.at(actor, t, x, u, u[input]);
-            let passed = if actor.memory.is_empty() {
-                actor.acting.value(&at, self.states(actor, x))
-            } else {
-                actor.acting.hysteresis_value(&at, &actor.memory)
+    /// Computes the rates of all states.
+    pub(super) fn rates(&self, t: f64, x: &[S], dx: &mut [S]) {
+        let mut scratch = self.scratch.borrow_mut();
+        let Scratch { u, w, .. } = &mut *scratch;
+        let (own, further) = dx.split_at_mut(self.own);
+        self.balance(t, x, u, w, own);
+        for (index, actor) in self.actors.iter().enumerate().filter(|(_, actor)| actor.z.1 > 0) {
+            // The state of an actuator effect follows its input, not its output.
+            let value = match actor.place.site {
+                Site::Actuator { .. } => self.incoming.borrow()[index],
+                _ => self.passing(index, t, x, u, w),
             };
+            let at = self.at(actor, t, x, u, value);
+            let (first, count) = (actor.z.0 - self.own, actor.z.1);
+            actor.acting.rates(&at, self.states(actor, x), &mut further[first..first + count]);
+        }
+    }
+
+    /// Computes the inputs that reach the plant: the effects of an actuator act in their order, after its delays.
+    pub(super) fn inputs(&self, t: f64, x: &[S], u: &mut Vec<S>) {
+        u.clear();
+        match S::DIRECTIONS {
+            0 => u.extend(self.commands.iter().map(|command| command.at(t))),
+            _ => u.extend(self.commands.iter().map(|command| command.at(t) + self.late * command.slope(t))),
+        }
+        let mut incoming = self.incoming.borrow_mut();
+        incoming.resize(self.actors.len(), S::from(0.0));
+        for (index, actor) in self.actors.iter().enumerate() {
+            let Site::Actuator { input } = actor.place.site else { continue };
+            incoming[index] = u[input];
+            let passed = actor.passed(&self.at(actor, t, x, u, u[input]), self.states(actor, x));
             u[input] = passed;
         }
     }
@@ -380,8 +378,7 @@ impl<'a, S: Opening> Driven<'a, S> {
 
     /// Replaces commands and disturbances by constant ones.
     pub(super) fn command(&mut self, commands: impl Iterator<Item = S>, disturbances: impl Iterator<Item = S>) {
-        let command = |value| Command { drive: Drive::held(value), delay: None, begun: 0.0 };
-        self.commands = commands.map(command).collect();
+        self.commands = commands.map(Command::held).collect();
         self.disturbances = disturbances.map(Drive::held).collect();
     }
 
@@ -435,26 +432,22 @@ impl<'a, S: Opening> Driven<'a, S> {
         Vec::new()
     }
 
-    /// Returns the friction at a joint with a contact: sliding forces and limits against forward and backward motion.
-    pub(super) fn friction(&self, actor: usize, t: f64, x: &[S], u: &[S]) -> mops_core::DryFriction<S> {
-        let actor = &self.actors[actor];
-        let at = self.at(actor, t, x, u, S::from(0.0));
-        actor.acting.friction(&at, self.states(actor, x)).expect("it has friction from the start")
+    /// Returns the measured value of a signal; effects with a delay act after the simulation.
+    pub(super) fn measured(&self, signal: usize, t: f64, x: &[S]) -> S {
+        self.seen(signal, self.actors.len(), t, x)
     }
 
-    /// Returns the measured value of a signal; effects with a hysteresis state are applied after the simulation.
-    pub(super) fn measured(&self, signal: usize, t: f64, x: &[S]) -> S {
-        let here = |actor: &&Actor<S>| {
-            matches!(actor.place.site, Site::Sensor { signal: s } if s == signal) && actor.memory.is_empty()
-        };
+    /// Returns the value of a signal after the effects at its sensor whose index is below `end`.
+    pub(super) fn seen(&self, signal: usize, end: usize, t: f64, x: &[S]) -> S {
+        let here = |actor: &&Actor<S>| matches!(actor.place.site, Site::Sensor { signal: s } if s == signal);
+        let actors = &self.actors[..end];
         let simple = |actor: &Actor<S>| actor.place.companion.is_none();
         if let Some(state) = self.shows[signal]
-            && self.actors.iter().filter(here).all(simple)
+            && actors.iter().filter(here).all(simple)
         {
-            let see = |value: S, actor: &Actor<S>| {
-                actor.acting.value(&self.at(actor, t, x, &[], value), self.states(actor, x))
-            };
-            return self.actors.iter().filter(here).fold(x[state], see);
+            let see =
+                |value: S, actor: &Actor<S>| actor.passed(&self.at(actor, t, x, &[], value), self.states(actor, x));
+            return actors.iter().filter(here).fold(x[state], see);
         }
         let mut scratch = self.scratch.borrow_mut();
         let Scratch { u, w, dx, .. } = &mut *scratch;
@@ -462,113 +455,27 @@ impl<'a, S: Opening> Driven<'a, S> {
         // Outputs may contain rates, which depend on the forces.
         self.balance(t, x, u, w, dx);
         let value = self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w });
-        self.actors
-            .iter()
-            .filter(here)
-            .fold(value, |value, actor| actor.acting.value(&self.at(actor, t, x, u, value), self.states(actor, x)))
+        let see = |value: S, actor: &Actor<S>| actor.passed(&self.at(actor, t, x, u, value), self.states(actor, x));
+        actors.iter().filter(here).fold(value, see)
     }
 
-    /// Updates the hysteresis states of actuators to the current command.
-    fn update_hysteresis(&mut self, t: f64, x: &[S]) {
-        let mut u: Vec<S> = self.commands.iter().map(|command| command.at(t)).collect();
-        for index in 0..self.actors.len() {
-            let Site::Actuator { input } = self.actors[index].place.site else { continue };
-            let at = self.at(&self.actors[index], t, x, &u, u[input]);
-            let actor = &mut self.actors[index];
-            let passed = if actor.memory.is_empty() {
-                actor.acting.value(&at, &x[actor.z.0..actor.z.0 + actor.z.1])
-            } else {
-                actor.follow(&at)
-            };
-            u[input] = passed;
+    /// Passes a break at which `due` changes what is valid from `t` on. The time of the break has the derivatives `late`: the state
+    /// moves along the rates before the break, and back along those after it.
+    fn pass(&mut self, t: f64, x: &mut [S], late: S, due: impl FnOnce(&mut Self)) {
+        let moves = late.tangents().iter().any(|&tangent| tangent != 0.0);
+        let mut rates = x.to_vec();
+        if moves {
+            shift(self, t, x, &mut rates, late);
+            self.late = late;
         }
-    }
-
-    /// Moves the commands to their course from `t` on.
-    fn follow_commands(&mut self, t: f64) {
-        for command in &mut self.commands {
-            let out = command.out(t);
-            command.drive.pass_break(out);
+        self.update_hysteresis(t, x);
+        due(self);
+        self.update_hysteresis(t, x);
+        self.settle_gaps(t, x, true);
+        if moves {
+            self.late = S::from(0.0);
+            shift(self, t, x, &mut rates, -late);
         }
-        self.disturbances.iter_mut().for_each(|drive| drive.pass_break(t));
-    }
-
-    /// Initialises the hysteresis states of actuators from the commands before time 0, in a window of a record.
-    ///
-    /// N.B.: effects before them on the same actuator that depend on the state of the plant, or have states, are
-    /// evaluated as at time 0.
-    fn run_up(&mut self, x: &[S]) {
-        let none = S::from(0.0);
-        let ahead: Vec<S> = self.actors.iter_mut().map(|a| std::mem::replace(&mut a.ahead, none)).collect();
-        let mut t = 0.0 - self.begins;
-        while t < 0.0 {
-            self.follow_commands(t);
-            self.update_hysteresis(t, x);
-            t = self.next_break(t).min(0.0);
-            self.update_hysteresis(t, x);
-        }
-        for (actor, ahead) in self.actors.iter_mut().zip(ahead) {
-            actor.ahead = ahead;
-            if matches!(actor.place.site, Site::Actuator { .. }) && !actor.memory.is_empty() {
-                actor.memory[0] += ahead;
-            }
-        }
-    }
-
-    /// Returns the guard of a gap, by its number: not negative while the gap stays open, or closed.
-    fn gap_guard(&self, number: usize, t: f64, x: &[S]) -> S {
-        let mut gaps = self.actors.iter().filter(|actor| actor.closed.is_some());
-        let actor = gaps.nth(number).expect("the number is valid");
-        let gap =
-            actor.acting.gap(&self.at(actor, t, x, &[], S::from(0.0))).expect("the effect had a gap at the start");
-        if actor.closed == Some(true) { -gap } else { gap }
-    }
-
-    /// Finds the closed contacts, at the start and after a jump of the plant state.
-    fn settle_gaps(&mut self, t: f64, x: &[S]) {
-        for index in 0..self.actors.len() {
-            let actor = &self.actors[index];
-            if !matches!(actor.place.site, Site::Joint { .. } | Site::Process { .. }) {
-                continue;
-            }
-            let gap = actor.acting.gap(&self.at(actor, t, x, &[], S::from(0.0)));
-            self.actors[index].closed = gap.map(|gap| gap.value() < 0.0);
-        }
-    }
-
-    /// Switches a gap after its guard became negative. Returns what happened.
-    fn gap_switch(&mut self, number: usize) -> &'static str {
-        let mut gaps = self.actors.iter_mut().filter(|actor| actor.closed.is_some());
-        let actor = gaps.nth(number).expect("the number is valid");
-        let closed = actor.closed.as_mut().expect("the actor has a gap");
-        *closed = !*closed;
-        match (actor.place.site, *closed) {
-            (Site::Process { .. }, true) => "a level rises above an edge",
-            (Site::Process { .. }, false) => "a level falls below an edge",
-            (_, true) => "a contact closes",
-            (_, false) => "a contact opens",
-        }
-    }
-
-    /// Handles a break of inputs. The time of a jump of a delayed input varies with the delay, and so does the state.
-    fn pass(&mut self, t: f64, x: &mut [S]) {
-        let delayed = self.commands.iter().any(|c| c.delay.is_some());
-        if delayed && S::DIRECTIONS > 0 && self.started {
-            for k in 0..self.commands.len() {
-                let Some(delay) = self.commands[k].delay else { continue };
-                let mut rates = [vec![S::from(0.0); self.own], vec![S::from(0.0); self.own]];
-                let (mut u, mut w) = (Vec::new(), Vec::new());
-                self.balance(t, x, &mut u, &mut w, &mut rates[0]);
-                let out = self.commands[k].out(t);
-                self.commands[k].drive.pass_break(out);
-                self.balance(t, x, &mut u, &mut w, &mut rates[1]);
-                let late = delay - delay.value();
-                for i in 0..self.own {
-                    x[i] += (rates[0][i] - rates[1][i]) * late;
-                }
-            }
-        }
-        self.follow_commands(t);
     }
 }
 
@@ -589,47 +496,32 @@ fn disturbances<'a, S: Scalar>(of: &Interface, case: &'a Case) -> Vec<Drive<'a, 
     balances(of).map(|state| Drive::new(of_state(state))).collect()
 }
 
-/// Creates the instant of a plant event. The outputs of effects at actuators are taken at that instant; their
-/// dependence on the parameters is neglected.
-fn event<'a, S: Scalar>(at: Instant<'a, S>, still: &'a [f64]) -> EventInstant<'a, S> {
-    EventInstant { at, du: still, delay: S::from(0.0) }
-}
-
 impl<S: Opening> Dynamics<S> for Driven<'_, S> {
     fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
         self.measured(signal, t, x)
     }
 
     fn derivative(&self, t: f64, x: &[S], dx: &mut [S]) {
-        let mut scratch = self.scratch.borrow_mut();
-        let Scratch { u, w, .. } = &mut *scratch;
-        let (own, further) = dx.split_at_mut(self.own);
-        self.balance(t, x, u, w, own);
-        for (index, actor) in self.actors.iter().enumerate().filter(|(_, actor)| actor.z.1 > 0) {
-            // The state of an actuator effect follows its input, not its output.
-            let value = match actor.place.site {
-                Site::Actuator { input } => self.commands[input].at(t),
-                _ => self.passing(index, t, x, u, w),
-            };
-            let at = self.at(actor, t, x, u, value);
-            let (first, count) = (actor.z.0 - self.own, actor.z.1);
-            actor.acting.rates(&at, self.states(actor, x), &mut further[first..first + count]);
-        }
+        self.rates(t, x, dx);
+    }
+
+    fn delay_events(&mut self, delay: S) {
+        self.late = delay;
     }
 
     fn guards(&self) -> usize {
-        let gaps = self.actors.iter().filter(|actor| actor.closed.is_some()).count();
-        self.plant.guards() + self.contacts.len() + gaps
+        let [gaps, turns] = self.edges();
+        self.plant.guards() + self.contacts.len() + gaps + turns
     }
 
     fn guard(&self, index: usize, t: f64, x: &[S]) -> S {
+        let own = self.plant.guards();
+        let edges = own + self.contacts.len();
+        if index >= edges {
+            return self.edge_guard(index - edges, t, x);
+        }
         let mut scratch = self.scratch.borrow_mut();
         let Scratch { u, w, dx } = &mut *scratch;
-        let own = self.plant.guards();
-        let gaps = own + self.contacts.len();
-        if index >= gaps {
-            return self.gap_guard(index - gaps, t, x);
-        }
         if index >= own {
             return self.contact_guard(index - own, t, x, u, w);
         }
@@ -640,12 +532,12 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
 
     fn switch(&mut self, index: usize, t: f64, x: &mut [S]) -> &str {
         let own = self.plant.guards();
-        let gaps = own + self.contacts.len();
+        let edges = own + self.contacts.len();
         let (mut u, mut w) = (Vec::new(), Vec::new());
         let mut dx = vec![S::from(0.0); self.own];
         if index >= own {
-            let what = if index >= gaps {
-                let happened = self.gap_switch(index - gaps);
+            let what = if index >= edges {
+                let happened = self.edge_switch(index - edges, t, x);
                 self.settle_contacts(t, x, None);
                 happened
             } else if self.contact_switch(index - own, t, x) {
@@ -659,9 +551,9 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         }
         self.balance(t, x, &mut u, &mut w, &mut dx);
         let before = x[..self.own].to_vec();
-        let event = event(Instant { t, x: &before, u: &u, w: &w }, &self.still);
+        let event = EventInstant { at: Instant { t, x: &before, u: &u, w: &w }, du: &self.still, delay: self.late };
         self.plant.switch(index, &event, &mut x[..self.own]).clone_into(&mut self.happened);
-        self.settle_gaps(t, x);
+        self.settle_gaps(t, x, false);
         &self.happened
     }
 
@@ -677,9 +569,9 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         let acts_on = |i: usize| {
             self.actors.iter().any(|actor| matches!(actor.place.site, Site::Actuator { input } if input == i))
         };
-        let input = |(i, command): (usize, &Command<'_, S>)| match acts_on(i) {
-            true => Enclosure::UNKNOWN,
-            false => command.drive.enclose(time),
+        let input = |(i, command): (usize, &Command<'_, S>)| match command.undelayed().filter(|_| !acts_on(i)) {
+            Some(drive) => drive.enclose(time),
+            None => Enclosure::UNKNOWN,
         };
         let u: Vec<Enclosure> = self.commands.iter().enumerate().map(input).collect();
         let w = vec![Enclosure::UNKNOWN; self.forces];
@@ -700,9 +592,9 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         let mut dx = vec![S::from(0.0); self.own];
         self.balance(t, x, &mut u, &mut w, &mut dx);
         let before = x[..self.own].to_vec();
-        let event = event(Instant { t, x: &before, u: &u, w: &w }, &self.still);
+        let event = EventInstant { at: Instant { t, x: &before, u: &u, w: &w }, du: &self.still, delay: self.late };
         self.plant.rest(index, &event, close, &mut x[..self.own])?.clone_into(&mut self.happened);
-        self.settle_gaps(t, x);
+        self.settle_gaps(t, x, false);
         Ok(&self.happened)
     }
 
@@ -715,12 +607,10 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
     }
 
     fn next_break(&self, t: f64) -> f64 {
-        // The output of a sensor effect may be rough, so steps end at all samples.
-        let smooth = self.smooth;
-        let inputs = self.commands.iter().map(|command| command.next_break(t, smooth)).fold(f64::INFINITY, f64::min);
+        let inputs = self.commands.iter().map(Command::next_break).fold(f64::INFINITY, f64::min);
         let forces = self.disturbances.iter().map(|drive| drive.next_break(t)).fold(inputs, f64::min);
         let next = self.plant.next_break(t).min(forces);
-        self.breaks.iter().copied().find(|&at| at > t).map_or(next, |at| at.min(next))
+        self.breaks.iter().map(|at| at.value()).find(|&at| at > t).map_or(next, |at| at.min(next))
     }
 
     fn longest_step(&self) -> f64 {
@@ -731,27 +621,27 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         self.damped_step
     }
 
-    fn pass_break(&mut self, t: f64, x: &mut [S]) {
-        let at_actuator = |actor: &Actor<S>| matches!(actor.place.site, Site::Actuator { .. });
-        let remembers = self.actors.iter().any(|actor| at_actuator(actor) && !actor.memory.is_empty());
-        // Hysteresis states are updated just before the break, and across it.
-        if remembers && self.started {
-            self.update_hysteresis(t, x);
-        } else if remembers && self.begins > 0.0 {
-            self.run_up(x);
+    fn pass_break(&mut self, t: f64, x: &mut [S]) -> S {
+        let moving = self.breaks.iter().find(|at| at.value() == t).copied();
+        let mut moves = moving.map_or(S::from(0.0), |at| at - at.value());
+        for k in 0..self.commands.len() {
+            if self.commands[k].is_due(t) {
+                let late = self.commands[k].late();
+                self.pass(t, x, late, |of| of.commands[k].pass_break(t));
+                if self.commands[k].is_delayed() {
+                    moves = late;
+                }
+            }
         }
-        self.pass(t, x);
-        if remembers {
-            self.update_hysteresis(t, x);
-        }
+        self.disturbances.iter_mut().for_each(|drive| drive.pass_break(t));
         let first = !std::mem::replace(&mut self.started, true);
-        if !first && self.guards() == 0 {
-            return;
+        if first || self.guards() > 0 {
+            self.settle_contacts(t, x, None);
+            let (mut u, mut w) = (Vec::new(), Vec::new());
+            let mut dx = vec![S::from(0.0); self.own];
+            self.balance(t, x, &mut u, &mut w, &mut dx);
+            self.plant.settle(&Instant { t, x: &x[..self.own], u: &u, w: &w });
         }
-        self.settle_contacts(t, x, None);
-        let (mut u, mut w) = (Vec::new(), Vec::new());
-        let mut dx = vec![S::from(0.0); self.own];
-        self.balance(t, x, &mut u, &mut w, &mut dx);
-        self.plant.settle(&Instant { t, x: &x[..self.own], u: &u, w: &w });
+        moves
     }
 }

@@ -2,15 +2,17 @@
 //! effects.
 
 mod along;
+mod command;
 mod contacts;
 mod dynamics;
+mod edges;
 mod sensors;
 
 use std::sync::Arc;
 
 use mops_core::{
-    Analysis, Case, Dimension, Failure, InitialGrid, Interface, Job, Model, Opening, Parameter, Placement, Port,
-    Scalar, State, StudyError, Unit, Variable, WithTangents,
+    Analysis, Case, Dimension, Earlier, Failure, InitialGrid, Interface, Job, Model, Opening, Parameter, ParameterKind,
+    Placement, Port, Scalar, State, StudyError, Unit, Variable, WithTangents,
 };
 
 use crate::kernel::{Recording, Tolerance, record, tangents_of, wanted};
@@ -78,6 +80,12 @@ impl WithEffects {
                     unit: match parameter.grid {
                         // With the unit 1/s, 5 Hz would be read as 5 rad/s.
                         InitialGrid::Frequencies(_) => Unit::known("rad/s"),
+                        _ if parameter.kind.is_value() && parameter.dimension == Dimension::POSITION => {
+                            unit_of_place(&placement.port, placement.companion.as_ref(), of)
+                        }
+                        _ if parameter.kind == ParameterKind::Zero => {
+                            unit_of_place(&placement.port, None, of).difference().of_unknown_kind()
+                        }
                         _ => unit(parameter.dimension, &placement.port, placement.companion.as_ref(), of),
                     },
                     about: parameter.about.to_owned(),
@@ -86,7 +94,10 @@ impl WithEffects {
                     let fact = format!("the model already has a parameter `{}`", variable.name);
                     return Err(StudyError::new(name, fact).with_help("give the effect another name"));
                 }
-                let default = parameter.null_value;
+                let default = match parameter.kind {
+                    ParameterKind::Zero => zero_of_scale(&placement.port, of),
+                    _ => parameter.null_value,
+                };
                 interface.parameters.push(Parameter {
                     variable,
                     default,
@@ -177,8 +188,12 @@ impl WithEffects {
         let mut dynamics = self.driven(plant, &acting, job, parameters);
         let start = dynamics.start(parameters)?;
         let signals = wanted(job, &self.interface.signals);
-        let recording = record(&mut dynamics, &start, job.horizon, &self.tolerance(open), &signals)?;
-        Ok(dynamics.remembered(recording, &signals.signals))
+        let initial: Vec<S> = job.signals.iter().map(|&signal| dynamics.measured(signal, 0.0, &start)).collect();
+        let mut recording = record(&mut dynamics, &start, job.horizon, &self.tolerance(open), &signals)?;
+        recording.set_initial(&initial);
+        // What a recorded signal was before the record is not known.
+        let earlier = if job.case.experiment.is_some() { Earlier::Extrapolated } else { Earlier::Constant };
+        Ok(dynamics.delayed_sensors(recording, &signals.signals, earlier))
     }
 }
 
@@ -247,6 +262,27 @@ impl Site {
             }
         })
     }
+}
+
+/// Returns the unit of the position or the state at which an effect acts, on its temperature scale.
+fn unit_of_place(port: &Port, companion: Option<&Port>, interface: &Interface) -> Unit {
+    let place = match port {
+        Port::Joint { .. } | Port::Process { .. } => port,
+        Port::Actuator { .. } | Port::Sensor { .. } => companion.unwrap_or(port),
+    };
+    let (Port::Joint { position: name, .. }
+    | Port::Process { state: name, .. }
+    | Port::Actuator { input: name }
+    | Port::Sensor { output: name }) = place;
+    let mut all = interface.signals.iter().chain(&interface.inputs);
+    all.find(|v| v.name == *name).map_or_else(Unit::one, |v| v.unit.clone())
+}
+
+/// Returns the absolute temperature at the zero of the scale of a place, in the unit of its differences; `None` if the place is on
+/// no scale.
+fn zero_of_scale(port: &Port, interface: &Interface) -> Option<f64> {
+    let unit = unit_of_place(port, None, interface);
+    (unit.zero() != 0.0).then(|| unit.zero() / unit.factor())
 }
 
 /// Returns the unit of an effect parameter at a port, as far as the units of the model determine it.

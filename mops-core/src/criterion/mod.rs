@@ -128,12 +128,14 @@ pub trait Criterion: Send + Sync {
     }
 
     /// Computes the directional derivative of the value and of its residuals along a tangent of the analysis. The default is
-    /// a central difference of two analyses moved by `± tangent.reach`, without simulation.
+    /// a central difference of two analyses moved by `± tangent.reach`, without simulation; by less where the order of jumps and
+    /// corners would change.
     ///
     /// # Errors
     /// Returns one sentence if the criterion has no derivative for the response.
     fn slope(&self, case: &Case, tangent: &Tangent<'_>) -> Result<Value, String> {
         let Tangent { analysis, along, parameters, seed, reach, .. } = *tangent;
+        let reach = analysis.room(along).max(LEAST_REACH).min(reach);
         let [high, low] = [reach, -reach].map(|distance| {
             let there: Vec<f64> = parameters.iter().zip(seed).map(|(value, slope)| value + distance * slope).collect();
             self.value_with(case, &analysis.moved(along, distance), &there)
@@ -163,6 +165,10 @@ pub trait Criterion: Send + Sync {
         Vec::new()
     }
 }
+
+/// Smallest distance that [`Criterion::slope`] moves an analysis by, as jumps and corners come to one instant, in the unit box:
+/// rounding of the values then changes a difference by some 1e-9 of the value.
+const LEAST_REACH: f64 = 1e-7;
 
 /// Which values of a criterion are better.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -1,16 +1,15 @@
 //! CSV reader: a header with names and units, and rows of numbers.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
 use csv::{ByteRecord, ReaderBuilder};
 
 use super::Variable;
-use super::stamps::nanoseconds;
+use super::header::{Header, later_headers};
+use super::stamps::{self, Origin, Reference, is_stamp};
 use crate::diagnostic::{Diagnostic, Source};
-use crate::unit::Unit;
 
 /// Positions of the cells in the text.
 #[derive(Debug, Clone, Default)]
@@ -33,14 +32,37 @@ impl Layout {
     }
 }
 
-/// Reads every column that contains numbers or only gaps. Returns the variables, the skipped columns and the cell
-/// positions.
+/// Content of a CSV file.
+pub(super) struct Content {
+    pub variables: Vec<Variable>,
+    /// Skipped columns, as `name: reason`.
+    pub skipped: Vec<String>,
+    pub layout: Layout,
+    /// Lines before the header, which are not read.
+    pub before: Range<usize>,
+}
+
+/// Reads every column that contains numbers or only gaps. If the first line is no header of a table, a later one may be.
 ///
 /// # Errors
 /// If there is no header, no row or no column of numbers, or if a name is repeated. If a row has a different number of
 /// cells than the header. If a column mixes numbers and text, or contains an infinite number.
-pub(super) fn read(source: &Arc<Source>) -> Result<(Vec<Variable>, Vec<String>, Layout), Diagnostic> {
-    let header = Header::read(source)?;
+pub(super) fn read(source: &Arc<Source>) -> Result<Content, Diagnostic> {
+    let first = first_line(&source.text).ok_or_else(|| {
+        Diagnostic::new("the data file is empty")
+            .with_help("write a header such as `t[s],u[N*m]` and rows of numbers below it")
+            .at(source, 0..0)
+    })?;
+    read_from(source, first).or_else(|mistake| {
+        let mut later = later_headers(&source.text, first).into_iter();
+        let found = later.find_map(|start| Some(Content { before: first..start, ..read_from(source, start).ok()? }));
+        found.ok_or(mistake)
+    })
+}
+
+/// Reads the table whose header starts at a byte.
+fn read_from(source: &Arc<Source>, start: usize) -> Result<Content, Diagnostic> {
+    let header = Header::read(source, start)?;
     let mut layout = Layout { separator: header.separator, ..Layout::default() };
     let columns = read_rows(source, &header, &mut layout)?;
     let mistakes = columns.iter().enumerate().filter_map(|(cell, column)| Some((column.mistake()?, cell)));
@@ -56,84 +78,86 @@ pub(super) fn read(source: &Arc<Source>) -> Result<(Vec<Variable>, Vec<String>, 
             .with_help("write thousands without a mark, or decimal numbers with a fixed number of digits")
             .at(source, span));
     }
-    let (mut variables, mut skipped) = (Vec::new(), Vec::new());
+    let texts: Vec<usize> = (0..columns.len()).filter(|&k| columns[k].bad.is_some()).collect();
+    let mut stamps: Vec<(usize, stamps::Column)> = Vec::new();
+    let mut skipped = Vec::new();
+    for &cell in &texts {
+        let name = &header.names[cell].0;
+        match columns[cell].stamps(|row| layout.cell(&source.text, cell, row), &source.text) {
+            Some(Ok(column)) => stamps.push((cell, column)),
+            Some(Err(reason)) => skipped.push((cell, format!("{name}: {reason}"))),
+            None => {
+                let row = columns[cell].bad.expect("it is a text");
+                let span = layout.cell(&source.text, cell, row).expect("the row is in the layout");
+                skipped.push((cell, format!("{name}: text (`{}`)", shortened(&source.text[span]))));
+            }
+        }
+    }
+    if let Some((date, time)) = joined(&mut stamps) {
+        skipped.push((date, format!("{}: joined with `{}`", header.names[date].0, header.names[time].0)));
+    }
+    skipped.sort();
+    let mut variables = Vec::new();
     for (cell, (column, (name, unit))) in columns.into_iter().zip(&header.names).enumerate() {
-        if let Some((values, origin)) = column.stamps(|row| layout.cell(&source.text, cell, row), &source.text) {
+        let (name, rows) = (name.clone(), column.values.len());
+        if let Some((_, column)) = stamps.iter().find(|(known, _)| *known == cell) {
+            let (values, origin) = since_first(column);
+            let unit = Some("s".to_owned());
             layout.cells.push(cell);
-            let (name, rows) = (name.clone(), values.len());
-            variables.push(Variable {
-                name,
-                unit: Some("s".to_owned()),
-                rows,
-                columns: 1,
-                values,
-                origin: Some(origin),
-            });
-        } else if let Some(row) = column.bad {
-            let span = layout.cell(&source.text, cell, row).expect("the row is in the layout");
-            skipped.push(format!("{name}: text (`{}`)", shortened(&source.text[span])));
-        } else if cell + 1 == header.names.len() && is_unnamed(&header, source) && !column.has_numbers {
+            variables.push(Variable { name, unit, rows, columns: 1, values, origin: Some(origin) });
+        } else if skipped.iter().any(|(known, _)| *known == cell) {
+        } else if cell + 1 == header.names.len() && header.ends_unnamed(source) && !column.has_numbers {
             // A separator at the end of the header starts no column.
         } else {
             layout.cells.push(cell);
-            let (name, unit, rows) = (name.clone(), unit.clone(), column.values.len());
-            variables.push(Variable { name, unit, rows, columns: 1, values: column.values, origin: None });
+            variables.push(Variable {
+                name,
+                unit: unit.clone(),
+                rows,
+                columns: 1,
+                values: column.values,
+                origin: None,
+            });
         }
     }
+    let skipped = skipped.into_iter().map(|(_, reason)| reason).collect();
     if variables.is_empty() {
         return Err(Diagnostic::new("no column of the file contains numbers")
             .with_help("separate the cells by commas, semicolons, tabs or blanks")
             .at(source, header.span));
     }
-    Ok((variables, skipped, layout))
+    Ok(Content { variables, skipped, layout, before: start..start })
 }
 
-/// Returns true if the last cell of the header is empty.
-fn is_unnamed(header: &Header, source: &Arc<Source>) -> bool {
-    header.names.len() > 1 && source.text[header.span.clone()].ends_with(char::from(header.separator))
-}
-
-struct Header {
-    separator: u8,
-    /// Name and unit of each column.
-    names: Vec<(String, Option<String>)>,
-    span: Range<usize>,
-    /// First byte of the rows.
-    body: usize,
-}
-
-impl Header {
-    fn read(source: &Arc<Source>) -> Result<Self, Diagnostic> {
-        let text = &source.text;
-        let start = first_line(text).ok_or_else(|| {
-            Diagnostic::new("the data file is empty")
-                .with_help("write a header such as `t[s],u[N*m]` and rows of numbers below it")
-                .at(source, 0..0)
-        })?;
-        let separator = separator(text, start);
-        let spans: Vec<_> = cells(text, start, separator).collect();
-        let span = start..spans.last().expect("every line has a cell").end;
-        // A line of numbers and time stamps is a row; the file has no header then.
-        let number = |cell: &Range<usize>| {
-            let cell = &text[cell.clone()];
-            number(cell.as_bytes(), separator).or_else(|| nanoseconds(cell).map(|ns| ns as f64))
-        };
-        let numbers: Option<Vec<f64>> = spans.iter().map(number).collect();
-        if numbers.is_some_and(|numbers| numbers.iter().any(|number| !number.is_nan())) {
-            let names = (1..=spans.len()).map(|k| (k.to_string(), None)).collect();
-            return Ok(Self { separator, names, span, body: start });
-        }
-        refuse_long_quotes(source, start, separator)?;
-        let name = |(cell, k): (&Range<usize>, usize)| name_and_unit(&text[cell.clone()], k);
-        let mut names: Vec<_> = spans.iter().zip(1..).map(name).collect();
-        keep_labels_that_differ(&mut names);
-        refuse_duplicates(source, &names, &spans)?;
-        Ok(Self { separator, names, body: span.end, span })
+/// Adds the dates of one column to the times of day of another, if there is exactly one of each and no other column of time stamps.
+/// Returns both columns.
+fn joined(stamps: &mut Vec<(usize, stamps::Column)>) -> Option<(usize, usize)> {
+    let [(_, a), (_, b)] = &stamps[..] else { return None };
+    let date = match (a.is_dates, a.reference, b.is_dates, b.reference) {
+        (true, Reference::Local, _, Reference::Midnight) => 0,
+        (_, Reference::Midnight, true, Reference::Local) => 1,
+        _ => return None,
+    };
+    let (date, dates) = stamps.remove(date);
+    let (time, times) = &mut stamps[0];
+    for (time, date) in times.nanoseconds.iter_mut().zip(dates.nanoseconds) {
+        *time = time.zip(date).and_then(|(time, date)| time.checked_add(date));
     }
+    times.reference = Reference::Local;
+    Some((date, *time))
+}
+
+/// Returns the times of a column since its first one, s, and the first one.
+fn since_first(column: &stamps::Column) -> (Vec<f64>, Origin) {
+    let first = column.nanoseconds.iter().flatten().next().copied().unwrap_or(0);
+    #[allow(clippy::cast_precision_loss)]
+    let value = |ns: &Option<i64>| ns.map_or(f64::NAN, |ns| (ns - first) as f64 * 1e-9);
+    let origin = Origin { nanoseconds: first, reference: column.reference };
+    (column.nanoseconds.iter().map(value).collect(), origin)
 }
 
 /// Returns the start of the first line that is neither blank nor a `#` comment.
-fn first_line(text: &str) -> Option<usize> {
+pub(super) fn first_line(text: &str) -> Option<usize> {
     let mut start = 0;
     for line in text.split_inclusive(['\n', '\r']) {
         if !line.trim().is_empty() && !line.starts_with('#') {
@@ -146,7 +170,7 @@ fn first_line(text: &str) -> Option<usize> {
 
 /// Returns the separator: a semicolon if the line contains one, else a tab, else a comma, else a blank if the next line has as many
 /// cells between blanks.
-fn separator(text: &str, start: usize) -> u8 {
+pub(super) fn separator(text: &str, start: usize) -> u8 {
     let count = |start: usize, separator: u8| cells(text, start, separator).count();
     if let Some(separator) = [b';', b'\t', b','].into_iter().find(|&separator| count(start, separator) > 1) {
         return separator;
@@ -158,8 +182,7 @@ fn separator(text: &str, start: usize) -> u8 {
     let by_blanks = count(start, BLANK);
     let is_table = next.is_some_and(|next| {
         let mut row = cells(text, next, BLANK);
-        let is_value = |cell: &str| number(cell.as_bytes(), BLANK).is_some() || nanoseconds(cell).is_some();
-        count(next, BLANK) == by_blanks && row.all(|cell| is_value(&text[cell]))
+        count(next, BLANK) == by_blanks && row.all(|cell| is_value(&text[cell], BLANK))
     });
     if by_blanks > 1 && is_table { BLANK } else { b',' }
 }
@@ -177,68 +200,6 @@ fn with_semicolons(text: &str) -> Vec<u8> {
         start += line.len();
     }
     bytes
-}
-
-/// Splits a label into name and unit: `u [N*m]`, or `u (N*m)` if the parentheses contain a unit.
-pub(super) fn label(text: &str) -> Option<(&str, &str)> {
-    let text = text.trim();
-    let within = |open: char, close: char| {
-        let (name, unit) = text.strip_suffix(close)?.rsplit_once(open)?;
-        Some((name.trim(), unit.trim()))
-    };
-    // `trial (2)` and `motor (left)` have no unit.
-    let is_unit = |text: &str| text.contains(|c: char| c.is_alphabetic() || c == '%') && Unit::parse(text).is_ok();
-    within('[', ']').or_else(|| within('(', ')').filter(|(name, unit)| !name.is_empty() && is_unit(unit)))
-}
-
-/// Formats a label that [`label`] can read.
-pub(super) fn labelled(name: &str, unit: &str) -> String {
-    format!("{name} ({unit})")
-}
-
-/// Splits a cell of the header into name and unit; an unnamed column gets its number as name.
-fn name_and_unit(cell: &str, k: usize) -> (String, Option<String>) {
-    let cell = cell.trim();
-    let unquoted = cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"'));
-    let cell = unquoted.map_or(cell.to_owned(), |cell| cell.replace("\"\"", "\""));
-    let (name, unit) = label(&cell).unwrap_or((&cell, ""));
-    let (name, unit) = (name.trim(), unit.trim());
-    let name = if name.is_empty() { k.to_string() } else { name.to_owned() };
-    (name, (!unit.is_empty()).then(|| unit.to_owned()))
-}
-
-/// Uses the whole label as name for columns that differ only in their units, such as `motor (V)` and `motor (A)`.
-fn keep_labels_that_differ(names: &mut [(String, Option<String>)]) {
-    let differs = |(name, unit): &(String, Option<String>)| {
-        let count = |unit: Option<&String>| {
-            names
-                .iter()
-                .filter(|other| other.0 == *name && unit.is_none_or(|unit| other.1.as_ref() == Some(unit)))
-                .count()
-        };
-        unit.is_some() && count(unit.as_ref()) < count(None)
-    };
-    let differs: Vec<bool> = names.iter().map(differs).collect();
-    for ((name, unit), _) in names.iter_mut().zip(differs).filter(|(_, differs)| *differs) {
-        *name = labelled(name, unit.as_deref().unwrap_or_default());
-    }
-}
-
-fn refuse_duplicates(
-    source: &Arc<Source>,
-    names: &[(String, Option<String>)],
-    spans: &[Range<usize>],
-) -> Result<(), Diagnostic> {
-    let mut seen = HashMap::new();
-    for (k, (name, _)) in names.iter().enumerate() {
-        if let Some(first) = seen.insert(name, k) {
-            return Err(Diagnostic::new(format!("columns {} and {} have the same name `{name}`", first + 1, k + 1))
-                .with_label("second column")
-                .with_help("rename one of them in the header")
-                .at(source, spans[k].clone()));
-        }
-    }
-    Ok(())
 }
 
 /// Column during reading.
@@ -261,20 +222,19 @@ impl Reading {
         }
     }
 
-    /// Returns the times of a column of time stamps, s from the first one on, and the first one, ns since 1970; `None` if a cell is
-    /// no time stamp.
-    fn stamps(&self, cell: impl Fn(usize) -> Option<Range<usize>>, text: &str) -> Option<(Vec<f64>, i64)> {
+    /// Returns the time stamps of a column that has only these and gaps, as [`stamps::column`].
+    fn stamps(
+        &self,
+        cell: impl Fn(usize) -> Option<Range<usize>>,
+        text: &str,
+    ) -> Option<Result<stamps::Column, String>> {
         let first = self.bad.filter(|_| !self.has_numbers)?;
-        let stamp = |row: usize| nanoseconds(&text[cell(row)?]);
-        let origin = stamp(first)?;
-        let is_gap = |row: usize| cell(row).is_some_and(|span| number(text[span].as_bytes(), b';').is_some());
-        #[allow(clippy::cast_precision_loss)]
-        let value = |row: usize| match stamp(row) {
-            Some(ns) => Some((ns - origin) as f64 * 1e-9),
-            None => is_gap(row).then_some(f64::NAN),
-        };
-        let values: Option<Vec<f64>> = (0..self.values.len()).map(value).collect();
-        values.map(|values| (values, origin))
+        let shown = |row: usize| cell(row).map_or("", |span| &text[span]);
+        if !is_stamp(shown(first)) {
+            return None;
+        }
+        let given = |row: usize| Some(shown(row)).filter(|cell| number(cell.as_bytes(), b';').is_none());
+        stamps::column((0..self.values.len()).map(given))
     }
 
     /// Returns the first bad row of a column that contains numbers; a column of text only has none.
@@ -339,7 +299,7 @@ fn blank_lines(text: &str, between: Range<usize>) -> impl Iterator<Item = usize>
 
 /// Refuses a cell whose quotation mark is unclosed, or closed after further rows, because the enclosed rows would be
 /// lost silently. Multi-line text is accepted.
-fn refuse_long_quotes(source: &Arc<Source>, start: usize, separator: u8) -> Result<(), Diagnostic> {
+pub(super) fn refuse_long_quotes(source: &Arc<Source>, start: usize, separator: u8) -> Result<(), Diagnostic> {
     let text = &source.text;
     let row: Vec<Range<usize>> = cells(text, start, separator).collect();
     let Some(cell) = row.iter().find(|cell| text[(*cell).clone()].contains(['\n', '\r'])) else { return Ok(()) };
@@ -440,7 +400,7 @@ impl DecimalMarks {
 }
 
 /// Returns the number in a cell, NaN for a gap, or `None` for text.
-fn number(cell: &[u8], separator: u8) -> Option<f64> {
+pub(super) fn number(cell: &[u8], separator: u8) -> Option<f64> {
     let cell = str::from_utf8(cell.trim_ascii()).ok()?;
     match cell {
         "" | "NA" => Some(f64::NAN),
@@ -449,8 +409,13 @@ fn number(cell: &[u8], separator: u8) -> Option<f64> {
     }
 }
 
+/// Returns true for a number, a time stamp or a gap.
+pub(super) fn is_value(cell: &str, separator: u8) -> bool {
+    number(cell.as_bytes(), separator).is_some() || is_stamp(cell)
+}
+
 /// Returns the cells of the row that starts at `start`, with their quotes.
-fn cells(text: &str, start: usize, separator: u8) -> impl Iterator<Item = Range<usize>> {
+pub(super) fn cells(text: &str, start: usize, separator: u8) -> impl Iterator<Item = Range<usize>> {
     let bytes = text.as_bytes();
     let mut next = Some(start);
     std::iter::from_fn(move || {
@@ -550,7 +515,7 @@ fn plural(count: usize) -> String {
     if count == 1 { "1 cell".to_owned() } else { format!("{count} cells") }
 }
 
-fn shortened(cell: &str) -> String {
+pub(super) fn shortened(cell: &str) -> String {
     let cell = cell.trim();
     match cell.char_indices().nth(30) {
         Some((end, _)) => format!("{}...", &cell[..end]),

@@ -1,7 +1,9 @@
 //! Measured data: readers that convert a file to named columns of numbers.
 
 mod csv;
+mod encoding;
 mod files;
+mod header;
 mod mat4;
 mod mat5;
 mod matlab;
@@ -21,8 +23,10 @@ use std::sync::Arc;
 use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::unit::Unit;
 
+pub use encoding::Encoding;
 pub use files::{Files, Folder};
 pub(crate) use sources::{FILE as SOURCES, source_of};
+pub use stamps::{Origin, Reference};
 
 /// File format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,8 +65,8 @@ pub struct Variable {
     pub columns: usize,
     /// Values column by column, `rows * columns` of them; NaN is a gap.
     pub values: Vec<f64>,
-    /// Origin of a column of time stamps, whose values are in s from its first stamp on: ns since 1970.
-    pub origin: Option<i64>,
+    /// First stamp of a column of time stamps, whose values are in s from there on.
+    pub origin: Option<Origin>,
 }
 
 /// Data file in memory.
@@ -72,6 +76,10 @@ pub struct DataFile {
     pub source: Arc<Source>,
     /// Format, detected from the content.
     pub format: Format,
+    /// Encoding of a CSV file.
+    pub encoding: Encoding,
+    /// Lines before the header of a CSV file, which are not read, as a range of bytes.
+    pub before: Range<usize>,
     /// Numeric variables, in the order of the file.
     pub variables: Vec<Variable>,
     /// Other variables, as `name: reason`.
@@ -90,8 +98,8 @@ pub struct Column<'a> {
     pub unit: Option<&'a str>,
     /// One value per sample, finite or NaN; NaN is a gap.
     pub values: &'a [f64],
-    /// Origin of a column of time stamps, ns since 1970; see [`Variable::origin`].
-    pub origin: Option<i64>,
+    /// First stamp of a column of time stamps; see [`Variable::origin`].
+    pub origin: Option<Origin>,
 }
 
 impl DataFile {
@@ -149,34 +157,105 @@ impl DataFile {
                 .at(&source, 0..0));
         }
         let index = index_of(&variables);
-        Ok(Self { source, format, variables, skipped, layout: csv::Layout::default(), index })
+        let (encoding, before, layout) = (Encoding::Utf8, 0..0, csv::Layout::default());
+        Ok(Self { source, format, encoding, before, variables, skipped, layout, index })
     }
 
     fn parse_text(name: &str, bytes: Vec<u8>) -> Result<Self, Diagnostic> {
-        let source = text_source(name, bytes)?;
+        let (source, encoding) = text_source(name, bytes)?;
         let read = csv::read(&source);
         if read.is_err() && name.to_lowercase().ends_with(".mat") {
             return Err(Diagnostic::new("the file is not in MATLAB format, despite its extension")
                 .with_help("copy it again, or save it again with `save -v7`")
                 .at(&source, 0..0));
         }
-        let (variables, skipped, layout) = read?;
+        let csv::Content { variables, skipped, layout, before } = read?;
         let index = index_of(&variables);
-        Ok(Self { source, format: Format::Csv, variables, skipped, layout, index })
+        Ok(Self { source, format: Format::Csv, encoding, before, variables, skipped, layout, index })
     }
 
     /// Returns the default time column: `t`, or `time` in any case, or `T` with a time unit (without one, `T` may be a
-    /// temperature), or the first column of time stamps.
+    /// temperature), or the first column of time stamps, or a name such as `time_s` or `Zeit`.
     pub fn time_column(&self) -> Option<String> {
         let names = self.column_names();
         let is_time = |name: &&String| name.as_str() == "t" || name.eq_ignore_ascii_case("time");
-        let in_seconds = |name: &&String| {
+        let has_time_unit = |name: &&String| {
             let unit = self.column(name).ok().and_then(|column| column.unit).map(Unit::parse);
-            name.as_str() == "T" && unit.is_some_and(|unit| unit.is_ok_and(|u| u.is_compatible(&Unit::known("s"))))
+            unit.is_some_and(|unit| unit.is_ok_and(|u| u.is_compatible(&Unit::known("s"))))
         };
+        let in_seconds = |name: &&String| name.as_str() == "T" && has_time_unit(name);
         let has_stamps = |name: &&String| self.column(name).is_ok_and(|column| column.origin.is_some());
         let find = |is_one: &dyn Fn(&&String) -> bool| names.iter().find(is_one).cloned();
-        find(&is_time).or_else(|| find(&in_seconds)).or_else(|| find(&has_stamps))
+        find(&is_time)
+            .or_else(|| find(&in_seconds))
+            .or_else(|| find(&has_stamps))
+            .or_else(|| find(&|name| header::is_time(name)))
+    }
+
+    /// Returns the error for a file without a time column; the caller adds a location, and what else to do.
+    pub fn without_time(&self, otherwise: &str) -> Diagnostic {
+        let reason =
+            self.skipped.iter().find(|entry| entry.split_once(": ").is_some_and(|(name, _)| header::is_time(name)));
+        match reason.and_then(|entry| entry.split_once(": ")) {
+            Some((column, reason)) => Diagnostic::new(format!(
+                "`{column}` of the file is neither a column of numbers nor one of time stamps: {reason}"
+            ))
+            .with_help(format!("correct the column `{column}`, or {otherwise}")),
+            None => Diagnostic::new("no column of the file is called `t` or `time`").with_help(otherwise),
+        }
+    }
+
+    /// Returns what a reader of the file should know: another encoding, and lines that are not read.
+    pub fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if self.encoding != Encoding::Utf8 {
+            remarks.push(format!("read as {}", self.encoding));
+        }
+        let before = &self.source.text[self.before.clone()];
+        let mut lines = before.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#')).peekable();
+        if let Some(first) = lines.peek().map(|line| csv::shortened(line)) {
+            remarks.push(match lines.count() {
+                1 => format!("1 line before the header skipped (`{first}`)"),
+                count => format!("{count} lines before the header skipped (from `{first}` on)"),
+            });
+        }
+        remarks
+    }
+
+    /// Checks that the times of a time column, in any unit, exist and increase from row `skip` on.
+    ///
+    /// # Errors
+    /// With the place in the file.
+    pub fn increases(&self, column: &str, times: &[f64], skip: usize) -> Result<(), Diagnostic> {
+        let wrong = |row: usize, message: String, way_out: &str| {
+            Err(Diagnostic::new(message).with_help(way_out).at(&self.source, self.span_of(column, row)))
+        };
+        let used = &times[skip..];
+        if let Some(row) = used.iter().position(|t| !t.is_finite()) {
+            let fact = format!("sample {} has no value in the time column `{column}`", skip + row + 1);
+            return wrong(skip + row, fact, "delete the row; `skip` drops wrong rows at the start");
+        }
+        let Some(row) = used.windows(2).position(|pair| pair[1] <= pair[0]) else { return Ok(()) };
+        let back = used[row] - used[row + 1];
+        let fact = format!(
+            "the time `{column}` does not increase: sample {} at {} s follows one at {} s",
+            skip + row + 2,
+            used[row + 1],
+            used[row]
+        );
+        let origin = self.column(column).ok().and_then(|column| column.origin);
+        let way_out = match origin.map(|origin| origin.reference) {
+            Some(Reference::Midnight) if back > 0.5 * DAY => {
+                "times of day start again at midnight: write the date too, such as 2024-05-17T00:00:05, in the same or in another \
+                 column"
+            }
+            Some(Reference::Local) if back > 0.0 && back <= HOUR => {
+                "if the clock was set back at the end of daylight saving time, write the zone too, such as \
+                 2024-10-27T02:00:00+01:00, or UTC; sort the rows only if they are out of order"
+            }
+            _ => "sort the rows and delete duplicates; `skip` drops wrong rows at the start",
+        };
+        wrong(skip + row + 1, fact, way_out)
     }
 
     /// Returns the column called `name`.
@@ -213,6 +292,11 @@ impl DataFile {
         self.find(column).and_then(|(variable, _)| self.layout.span(&self.source.text, variable, row)).unwrap_or(0..0)
     }
 
+    /// Returns true if two names are those of one column.
+    pub fn is_same(&self, name: &str, other: &str) -> bool {
+        self.find(name).is_some_and(|found| self.find(other) == Some(found))
+    }
+
     /// Returns the indices of the variable and of its column.
     fn find(&self, name: &str) -> Option<(usize, usize)> {
         let index_of = |name: &str| self.index.get(name).copied();
@@ -220,10 +304,10 @@ impl DataFile {
             return Some((variable, 0));
         }
         // Label of a column as in the header: `t [ms]`.
-        let labelled = csv::label(name).and_then(|(name, unit)| {
+        let labelled = header::label(name).and_then(|(name, unit)| {
             let has_unit =
                 |&i: &usize| self.variables[i].columns == 1 && self.variables[i].unit.as_deref() == Some(unit);
-            index_of(name).or_else(|| index_of(&csv::labelled(name, unit))).filter(has_unit)
+            index_of(name).or_else(|| index_of(&header::labelled(name, unit))).filter(has_unit)
         });
         if let Some(variable) = labelled {
             return Some((variable, 0));
@@ -289,8 +373,12 @@ fn keep_last_of_each_name(variables: &mut Vec<Variable>) {
     variables.reverse();
 }
 
-/// Returns the file as text, or an error if it is not text.
-fn text_source(name: &str, bytes: Vec<u8>) -> Result<Arc<Source>, Diagnostic> {
+/// Day and hour, s.
+const DAY: f64 = 86_400.0;
+const HOUR: f64 = 3600.0;
+
+/// Returns the file as text and its encoding, or an error if it is not text.
+fn text_source(name: &str, bytes: Vec<u8>) -> Result<(Arc<Source>, Encoding), Diagnostic> {
     let whole = Arc::new(Source { name: name.to_owned(), text: String::new() });
     if matlab::is_level_7_3(&bytes) {
         return Err(Diagnostic::new("MATLAB level 7.3 (HDF5) is not supported")
@@ -302,15 +390,18 @@ fn text_source(name: &str, bytes: Vec<u8>) -> Result<Arc<Source>, Diagnostic> {
             .with_help("save it as CSV, or in MATLAB with `save -v7`")
             .at(&whole, 0..0)
     };
-    let utf16 = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
-    if !utf16 && bytes.contains(&0) {
+    let is_utf8 = !bytes.contains(&0) && std::str::from_utf8(&bytes).is_ok();
+    if !is_utf8 && let Some((text, encoding)) = encoding::decode(&bytes) {
+        return Ok((Arc::new(Source { name: name.to_owned(), text }), encoding));
+    }
+    if bytes.contains(&0) {
         return Err(binary());
     }
     // Text in another encoding has letters that are not UTF-8, but no control characters.
     let controls = bytes.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace());
     match Source::from_bytes(name, bytes) {
-        Ok(source) => Ok(Arc::new(source)),
-        Err(_) if !utf16 && controls => Err(binary()),
+        Ok(source) => Ok((Arc::new(source), Encoding::Utf8)),
+        Err(_) if controls => Err(binary()),
         Err(mistake) => Err(mistake),
     }
 }

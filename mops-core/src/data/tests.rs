@@ -72,7 +72,8 @@ mod csv {
     fn time_stamps_count_from_the_first_one() {
         let file = read("when,y\n2024-02-29T23:59:59.5Z,1\n,2\n2024-03-01T00:00:01Z,3\n");
         let column = file.column("when").unwrap();
-        assert_eq!((column.unit, column.origin), (Some("s"), Some(1_709_251_199_500_000_000)));
+        let origin = Origin { nanoseconds: 1_709_251_199_500_000_000, reference: Reference::Universal };
+        assert_eq!((column.unit, column.origin), (Some("s"), Some(origin)));
         assert_same(column.values, &[0.0, f64::NAN, 1.5]);
         assert_eq!(file.time_column().as_deref(), Some("when"));
         // One cell that is no time stamp makes the column a text.
@@ -258,14 +259,146 @@ mod csv {
     }
 
     #[test]
-    fn other_encodings_are_reported_with_their_place() {
+    fn headers_as_people_write_them_have_their_time_and_their_units() {
+        for (header, time, units) in [
+            ("time_s,P_heater_W,T_oven_degC", "time_s", [Some("s"), Some("W"), Some("degC")]),
+            ("Zeit / s;Heizleistung / W;Ofentemperatur / \u{b0}C", "Zeit", [Some("s"), Some("W"), Some("\u{b0}C")]),
+            ("Time (s),speed (rpm),u_V", "Time", [Some("s"), Some("rpm"), Some("V")]),
+            ("Timestamp;Druck in bar;Kommentar", "Timestamp", [None, Some("bar"), None]),
+            ("x_m;elapsed [min];i_d", "elapsed", [None, Some("min"), None]),
+            ("t_s,x_m,x_ref", "t_s", [Some("s"), None, None]),
+            ("t\tQ / (l/min)\tp / (kg/(m s^2))", "t", [None, Some("l/min"), Some("kg/(m s^2)")]),
+        ] {
+            let separator = if header.contains(';') {
+                ";"
+            } else if header.contains('\t') {
+                "\t"
+            } else {
+                ","
+            };
+            let rows = ["0", "1"].map(|t| [t, t, t].join(separator)).join("\n");
+            let file = read(format!("{header}\n{rows}\n").as_str());
+            let names = file.column_names();
+            assert_eq!(file.time_column().as_deref(), Some(time), "{header}");
+            let found: Vec<_> = names.iter().map(|name| file.column(name).unwrap().unit).collect();
+            assert_eq!(found, units, "{header}");
+            // Every column answers to its whole label, too.
+            for label in header.split(separator) {
+                assert!(file.column(label).is_ok(), "{label}");
+            }
+        }
+    }
+
+    #[test]
+    fn units_in_a_line_below_the_names_are_read() {
+        for text in ["t;u;y\ns;V;-\n0;1;2\n1;2;3\n", "t,u,y\n[s],(V),\n0,1,2\n1,2,3\n"] {
+            let file = read(text);
+            assert_eq!((file.column("t").unwrap().unit, file.column("u").unwrap().unit), (Some("s"), Some("V")));
+            assert_same(values(&file, "y"), &[2.0, 3.0]);
+        }
+        assert!(error("t,u\ns,Volt\n0,1\n").0.contains("is not a number"));
+    }
+
+    #[test]
+    fn lines_of_an_instrument_before_the_header_are_skipped_and_counted() {
+        for text in [
+            "Logger 7;;\nStart;2024-05-01;\nInterval;0.5;\n\nt [s];u [V];y\n0;1;2\n1;2;3\n",
+            "Logger 7;;\nStart;2024-05-01;\n;;\nt [s];u [V];y\n0;1;2\n1;2;3\n",
+            "Measurement of the rig\nby hand, twice\nat night\nt [s],u [V],y\n0,1,2\n1,2,3\n",
+            "sep=;\nmade by a spreadsheet\n2024\nt;u;y\ns;V;-\n0,5;1;2\n1,5;2;3\n",
+        ] {
+            let file = read(text);
+            assert_eq!(file.column_names(), ["t", "u", "y"], "{text}");
+            assert_eq!(file.column("u").unwrap().unit, Some("V"));
+            assert_same(values(&file, "y"), &[2.0, 3.0]);
+            assert!(file.remarks()[0].starts_with("3 lines before the header skipped"), "{:?}", file.remarks());
+            let cell = file.span_of("y", 1);
+            assert_eq!(&file.source.text[cell], "3");
+        }
+        assert!(read("t,y\n0,1\n").remarks().is_empty());
+    }
+
+    #[test]
+    fn rows_of_numbers_are_never_taken_for_lines_before_the_header() {
+        for text in ["t,y\n0,1\n1,2\n\nt2,y2\n0,1\n1,2\n", "1,2,3\n\nt,y\n0,1\n", "t,y\nERROR,none\n0,1\n1,2\n"] {
+            assert!(DataFile::parse("data", text.into()).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_date_and_a_time_of_day_in_two_columns_are_one_clock() {
+        let file = read("Datum;Uhrzeit;T\n31.12.2023;23:59:59;1\n01.01.2024;00:00:01;2\n");
+        assert_eq!(file.time_column().as_deref(), Some("Uhrzeit"));
+        assert_same(values(&file, "Uhrzeit"), &[0.0, 2.0]);
+        assert_eq!(file.skipped, ["Datum: joined with `Uhrzeit`"]);
+        assert_eq!(file.column("Uhrzeit").unwrap().origin.unwrap().reference, Reference::Local);
+    }
+
+    #[test]
+    fn time_stamps_that_have_no_common_clock_are_no_column() {
+        let file = read("time,y\n05/01/2024 11:50:00 AM,1\n05/01/2024 11:55:00 AM,2\n");
+        assert_eq!((file.column_names(), file.time_column()), (vec!["y".to_owned()], None));
+        let why = file.without_time("").message;
+        assert!(why.starts_with("`time` of the file") && why.contains("day/month or month/day"), "{why}");
+        let file = read("time,y\n2024-06-01T00:00:00Z,1\n2024-06-01T00:00:01,2\n");
+        assert!(file.without_time("").message.contains("with and without a zone"));
+        assert_same(
+            values(&read("time,y\n05/31/2024 11:59:59 AM,1\n06/01/2024 12:00:01 PM,2\n"), "time"),
+            &[0.0, 86_402.0],
+        );
+    }
+
+    #[test]
+    fn a_clock_that_is_set_back_is_not_called_disorder() {
+        let way_out = |text: &str, unit: f64| {
+            let file = read(text);
+            let time = file.time_column().unwrap();
+            let times: Vec<f64> = values(&file, &time).iter().map(|t| t * unit).collect();
+            file.increases(&time, &times, 0).unwrap_err().to_string()
+        };
+        let midnight = way_out("time,y\n23:59:50,1\n23:59:55,2\n00:00:00,3\n", 1.0);
+        assert!(midnight.contains("midnight") && !midnight.contains("delete"), "{midnight}");
+        let autumn = way_out("time,T\n2024-10-27 02:30:00,25\n2024-10-27 02:00:00,26\n", 1.0);
+        assert!(autumn.contains("daylight saving time") && !autumn.contains("delete"), "{autumn}");
+        for disorder in ["t,y\n0,1\n2,2\n1,3\n", "time,y\n2024-10-27T02:30:00Z,1\n2024-10-27T02:00:00Z,2\n"] {
+            assert!(way_out(disorder, 1.0).contains("sort the rows"), "{disorder}");
+        }
+    }
+
+    #[test]
+    fn latin_1_and_utf_16_are_read_and_reported() {
+        let text = "Zeit / s;T / \u{b0}C;Preis / \u{20ac}\n0,0;20,5;1\n1,0;21,5;2\n";
+        let letter = |c: char| if c == '\u{20ac}' { 0x80 } else { u8::try_from(u32::from(c)).unwrap() };
+        let latin: Vec<u8> = text.chars().map(letter).collect();
+        let units = || text.encode_utf16();
+        let little: Vec<u8> = units().flat_map(u16::to_le_bytes).collect();
+        let big: Vec<u8> = units().flat_map(u16::to_be_bytes).collect();
+        let marked = [b"\xff\xfe", &little[..]].concat();
+        for (bytes, encoding) in [
+            (latin, Encoding::Windows1252),
+            (little, Encoding::Utf16),
+            (big, Encoding::Utf16),
+            (marked, Encoding::Utf16),
+        ] {
+            let file = read(bytes);
+            assert_eq!(file.encoding, encoding);
+            assert_eq!(file.column_names(), ["Zeit", "T", "Preis / \u{20ac}"]);
+            assert_eq!(file.column("T").unwrap().unit, Some("\u{b0}C"));
+            assert_same(values(&file, "T"), &[20.5, 21.5]);
+            assert_eq!(file.remarks(), [format!("read as {encoding}")]);
+        }
+    }
+
+    #[test]
+    fn text_that_promises_utf_8_is_not_read_as_another_encoding() {
         let (message, marked) = error(b"\xef\xbb\xbft,\xef\xbf\xbd,w[\xb0]\n0,1,2\n");
         assert_eq!(
             (message.as_str(), marked.as_str()),
             ("data:1:7: the file is not UTF-8; save it as UTF-8", "\u{fffd}")
         );
-        let (message, _) = error(b"\xff\xfet\0,\0y\0\n\0");
-        assert_eq!(message, "data: the file is UTF-16, not UTF-8; save it as UTF-8");
+        // Half a character at the end.
+        let (message, _) = error(b"\xff\xfet\0,\0y\0\n\0\x30");
+        assert!(message.contains("neither CSV nor MATLAB") || message.contains("UTF-16"), "{message}");
     }
 }
 

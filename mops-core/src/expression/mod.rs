@@ -309,4 +309,21 @@ mod tests {
         assert_eq!(equation("T[i-1] - 2*T[i]").unwrap().left, None);
         assert_eq!(equation("a = b = c").unwrap_err().span, 6..7);
     }
+
+    #[test]
+    fn operators_of_other_languages_are_named_with_what_is_written_instead() {
+        for (text, operator, way_out) in [
+            ("JL/N**2", "**", "`^`"),
+            ("2 ** x", "**", "`^`"),
+            ("if(a > 0 && b > 0, 1, 2)", "&&", "`and`"),
+            ("if(a > 0 || b > 0, 1, 2)", "||", "`or`"),
+            ("if(a == 0, 1, 2)", "==", "`<=`"),
+            ("if(a != 0, 1, 2)", "!=", "`<=`"),
+            ("a .* b", ".*", "`*`"),
+        ] {
+            let mistake = Expression::parse(text).unwrap_err();
+            assert!(mistake.message.contains(way_out), "{text}: {}", mistake.message);
+            assert_eq!(&text[mistake.span], operator, "{text}");
+        }
+    }
 }

@@ -156,6 +156,9 @@ fn run<'t, T>(text: &'t str, mut parser: impl Parser<Input<'t>, T, ErrMode<Conte
         if error.inner().context().any(|context| *context == TOO_DEEP) {
             return SyntaxError { span: from..to, message: format!("nested more than {DEEPEST} deep") };
         }
+        if let Some((span, message)) = foreign(text, from) {
+            return SyntaxError { span, message };
+        }
         let rest: String = text[from..].chars().take(12).collect();
         let wanted: Vec<String> = error
             .inner()
@@ -176,6 +179,26 @@ fn run<'t, T>(text: &'t str, mut parser: impl Parser<Input<'t>, T, ErrMode<Conte
         }
         let wanted = if wanted.is_empty() { "an operator or the end".to_owned() } else { wanted.join(", ") };
         SyntaxError { span: from..to, message: format!("expected {wanted}, found {found}") }
+    })
+}
+
+/// Operators of other languages, and what is written here instead.
+const FOREIGN: [(&str, &str); 6] = [
+    ("**", "a power is written with `^`, as in x^2"),
+    ("&&", "conditions are joined by `and`"),
+    ("||", "conditions are joined by `or`"),
+    ("==", "numbers are compared by `<`, `<=`, `>` or `>=`"),
+    ("!=", "numbers are compared by `<`, `<=`, `>` or `>=`"),
+    (".*", "a product is written with `*`"),
+];
+
+/// Returns the place and the message if the text at a mistake is an operator of another language.
+fn foreign(text: &str, from: usize) -> Option<(Range<usize>, String)> {
+    // The mistake may be at the second character.
+    let starts = [from, from.saturating_sub(1)].into_iter().filter(|start| text.is_char_boundary(*start));
+    starts.into_iter().find_map(|start| {
+        let (operator, way_out) = FOREIGN.iter().find(|(operator, _)| text[start..].starts_with(operator))?;
+        Some((start..start + operator.len(), format!("`{operator}` is no operator here: {way_out}")))
     })
 }
 

@@ -447,7 +447,10 @@ impl Dimensions {
         let place = literals(node).into_iter().next();
         let (number, span) = place.unwrap_or_else(|| ("0".to_owned(), node.span.clone()));
         let dimension = self.of(joined);
-        let help = if joined.is_temperature() {
+        let help = if number.starts_with('`') {
+            let unit = if joined.is_temperature() { unit.to_string() } else { dimension.coherent() };
+            format!("give {number} a unit where it is defined, as in \"3 [{unit}]\"")
+        } else if joined.is_temperature() {
             let difference = unit.difference();
             format!("write {number} [{unit}] for a temperature, {number} [{difference}] for a temperature difference")
         } else if dimension.is_none() && unit.dimension().is_none() {

@@ -7,11 +7,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::entries::Short;
-use super::sections::{ChannelTable, ExperimentSection, InputTable};
+use super::sections::{ChannelTable, ExperimentSection, InputTable, RecordedInput};
 use super::tree::Node;
 use super::{Files, UNIT_HELP, at_key, frequency, read_seconds, read_unit};
-use crate::data::{Column, DataFile, SOURCES, is_since_1970, source_of};
-use crate::diagnostic::{Diagnostic, Source};
+use crate::data::{Column, DataFile, Origin, Reference, SOURCES, is_since_1970, source_of};
+use crate::diagnostic::Diagnostic;
 use crate::input::{Hold, Input};
 use crate::study::{CaseBuilder, ChannelBuilder, Free, Measured};
 use crate::unit::{Quantity, Unit};
@@ -123,14 +123,18 @@ fn experiment(
     for (signal, Short(channel)) in &section.channels.0 {
         let place = entry(node, "channels", signal);
         let keys = Elsewhere::of(&channel.file, &channel.time, &channel.time_unit, &channel.sample_time);
-        let other = keys.table(&place, &channel.column, table, opened)?;
+        let other = keys.table(&place, &channel.column, table, opened, true)?;
         channels.push(other.as_ref().unwrap_or(table).channel(&place, signal, channel)?);
     }
-    let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
-    for (input, Short(column)) in &section.inputs.0 {
+    let (mut inputs, mut warnings) = (Vec::new(), opened.remarks(section, table));
+    for (input, RecordedInput(column)) in &section.inputs.0 {
         let place = entry(node, "inputs", input);
+        if let Some(value) = constant(&place, column)? {
+            inputs.push((input.clone(), Input::Constant(value.number), value.unit));
+            continue;
+        }
         let keys = Elsewhere::of(&column.file, &column.time, &column.time_unit, &column.sample_time);
-        let other = keys.table(&place, &column.column, table, opened)?;
+        let other = keys.table(&place, &column.column, table, opened, false)?;
         let source = other.as_ref().unwrap_or(table);
         let (values, unit, missing) = source.input(&place, column)?;
         warnings.extend(source.ends_early(&values).map(|(last, end)| {
@@ -163,9 +167,36 @@ fn experiment(
         parameters: section.parameters.0.clone(),
         inputs,
         horizon: None,
-        measured: Some(Measured { channels, responses: Vec::new(), role: section.role, free: free.collect() }),
+        measured: Some(Measured {
+            channels,
+            responses: Vec::new(),
+            role: section.role,
+            free: free.collect(),
+            unused: opened.unused(section, table),
+        }),
         warnings,
     })
+}
+
+/// Returns the value of a constant input, or `None` for a recorded one.
+fn constant(place: &Node<'_>, table: &InputTable) -> Result<Option<Quantity>, Diagnostic> {
+    let Some(value) = &table.constant else {
+        if table.column.is_empty() {
+            let fact = "the input has neither a column nor a constant value".to_owned();
+            return Err(place.diagnostic(fact).with_help("write column = \"...\", or constant = 0"));
+        }
+        return Ok(None);
+    };
+    if let Ok(entries) = place.entries()
+        && let Some((key, other)) = entries.iter().find(|(key, _)| key != "constant")
+    {
+        let fact = format!("`{key}` is for a recorded input, and this one is constant");
+        return Err(other.key_diagnostic(fact).with_help("remove one of them"));
+    }
+    if !value.number.is_finite() {
+        return Err(place.diagnostic(format!("expected a finite value, found {}", value.number)));
+    }
+    Ok(Some(value.clone()))
 }
 
 /// Reads an input of a case from a data file, in `unit`.
@@ -179,10 +210,10 @@ pub(super) fn recorded(
     let file = Opened { files, known: RefCell::default() }.open(place, "path", path)?;
     let keys = Elsewhere::of(&None, &column.time, &column.time_unit, &column.sample_time);
     let clock = Clock::new(place, &file, keys.time, keys.unit, keys.sample_time, &column.column)?;
-    check_times(&file, &clock.column, &clock.times, 0)?;
+    file.increases(&clock.column, &clock.times, 0)?;
     let rows = 0..clock.times.len();
     let table = Table { file, driving: rows.clone(), rows, clock, end: f64::INFINITY, is_other: true };
-    let shift = read_seconds(place, "shift", column.shift.as_ref())?.unwrap_or(0.0);
+    let shift = read_shift(place, column.shift.as_ref())?;
     let last = table.clock.at(table.rows.end - 1) + shift;
     if last < 0.0 {
         let fact = format!("`{}` ends {} s before the simulation starts at 0 s", column.column, -last);
@@ -208,6 +239,48 @@ struct Opened<'a> {
 }
 
 impl Opened<'_> {
+    /// Returns what a reader of the files of an experiment should know.
+    fn remarks(&self, section: &ExperimentSection, main: &Table) -> Vec<String> {
+        let of = |file: &DataFile| {
+            let name = format!("`{}`", file.source.name);
+            file.remarks().into_iter().map(move |remark| format!("{name}: {remark}")).collect::<Vec<_>>()
+        };
+        self.of(section, main).iter().flat_map(|(file, _)| of(file)).collect()
+    }
+
+    /// Returns the columns of the files of an experiment that it does not use, with their units.
+    fn unused(&self, section: &ExperimentSection, main: &Table) -> Vec<String> {
+        let mut unused = Vec::new();
+        for (file, used) in self.of(section, main) {
+            for name in file.column_names() {
+                let unit = file.column(&name).ok().and_then(|column| column.unit.map(|unit| format!(" [{unit}]")));
+                if !used.iter().any(|used| file.is_same(used, &name)) {
+                    unused.push(format!("{name}{}", unit.unwrap_or_default()));
+                }
+            }
+        }
+        unused
+    }
+
+    /// Returns the files of an experiment, with the columns that it uses.
+    fn of(&self, section: &ExperimentSection, main: &Table) -> Vec<(Arc<DataFile>, Vec<String>)> {
+        let mut files = vec![(Arc::clone(&main.file), vec![main.clock.column.clone()])];
+        let channels = section.channels.0.iter().map(|(_, Short(c))| (&c.file, &c.column, &c.time));
+        let inputs = section.inputs.0.iter().map(|(_, RecordedInput(u))| (&u.file, &u.column, &u.time));
+        for (path, column, time) in channels.chain(inputs) {
+            let known = self.known.borrow();
+            let other = path.as_ref().and_then(|path| known.iter().find(|(own, _)| own == path));
+            let file = other.map_or(&main.file, |(_, file)| file);
+            let at = files.iter().position(|(own, _)| Arc::ptr_eq(own, file)).unwrap_or_else(|| {
+                files.push((Arc::clone(file), file.time_column().into_iter().collect()));
+                files.len() - 1
+            });
+            files[at].1.push(column.clone());
+            files[at].1.extend(time.clone());
+        }
+        files
+    }
+
     /// Opens the file that a key of a table names.
     fn open(&self, node: &Node<'_>, key: &str, path: &str) -> Result<Arc<DataFile>, Diagnostic> {
         if let Some((_, file)) = self.known.borrow().iter().find(|(known, _)| known == path) {
@@ -252,12 +325,9 @@ struct Clock {
     times: Arc<Vec<f64>>,
     /// Time in the file that is time 0 of the study, s.
     zero: f64,
-    /// Time stamp of time 0 in the file, ns since 1970, if the file has time stamps.
-    origin: Option<i64>,
+    /// Time stamp of time 0 in the file, if the file has time stamps.
+    origin: Option<Origin>,
 }
-
-/// Time stamps below one day have no date.
-const DAY: i64 = 86_400_000_000_000;
 
 impl Clock {
     /// Reads the time column, or counts samples. `column` is one of the columns that were sampled then.
@@ -290,9 +360,10 @@ impl Clock {
             Some(time) => time.to_owned(),
             None => file.time_column().ok_or_else(|| {
                 let names = file.column_names().join(", ");
-                place.diagnostic("no column of the file is called `t` or `time`".to_owned()).with_help(format!(
-                    "set time = \"...\" to one of {names}, or sample-time = \"...\" if none is the time"
-                ))
+                let otherwise =
+                    format!("set time = \"...\" to one of {names}, or sample-time = \"...\" if none is the time");
+                let Diagnostic { message, help, .. } = file.without_time(&otherwise);
+                Diagnostic { help, ..place.diagnostic(message) }
             })?,
         };
         let column = column_at(&place, file, &time)?;
@@ -379,6 +450,7 @@ impl<'a> Elsewhere<'a> {
         column: &str,
         main: &Table,
         opened: &Opened<'_>,
+        is_measured: bool,
     ) -> Result<Option<Table>, Diagnostic> {
         if self.file.is_none() && self.time.is_none() && self.sample_time.is_none() {
             return Ok(None);
@@ -388,24 +460,10 @@ impl<'a> Elsewhere<'a> {
             None => Arc::clone(&main.file),
         };
         let mut clock = Clock::new(place, &file, self.time, self.unit, self.sample_time, column)?;
-        check_times(&file, &clock.column, &clock.times, 0)?;
-        let apart = |fact: String| place.diagnostic(fact).with_help("give both the same kind of time");
-        let between = match (clock.origin, main.clock.origin) {
-            (Some(own), Some(of_main)) if (own.abs() < DAY) != (of_main.abs() < DAY) => {
-                let fact =
-                    "only one of this file and the file of the experiment has dates, so that they have no common clock";
-                return Err(apart(fact.to_owned()));
-            }
-            #[allow(clippy::cast_precision_loss)]
-            (Some(own), Some(of_main)) => (own - of_main) as f64 * 1e-9,
-            (None, None) => 0.0,
-            (own, _) => {
-                let files = ["this file", "the file of the experiment"];
-                let [with, without] = if own.is_some() { files } else { [files[1], files[0]] };
-                let fact = format!("{with} has time stamps, but {without} has not, so that they have no common clock");
-                return Err(apart(fact));
-            }
-        };
+        file.increases(&clock.column, &clock.times, 0)?;
+        let between = between(clock.origin, main.clock.origin).map_err(|(fact, way_out)| {
+            place.diagnostic(format!("{fact}, so that they have no common clock")).with_help(way_out)
+        })?;
         // Rounding must not part samples of both files that belong to one instant.
         let count = main.rows.len().max(2) - 1;
         #[allow(clippy::cast_precision_loss)]
@@ -421,19 +479,77 @@ impl<'a> Elsewhere<'a> {
         let all = 0..clock.times.len();
         let first = clock.first_from(all.clone(), main.clock.at(main.rows.start));
         let last = clock.times.partition_point(|&t| t <= main.clock.at(main.rows.end - 1)).max(first);
+        if is_measured && first == last {
+            let [from, to] = [main.clock.at(main.rows.start), main.clock.at(main.rows.end - 1)];
+            let [begins, ends] = [clock.at(0), clock.at(clock.times.len() - 1)];
+            let fact = match (begins > to, ends < from) {
+                (true, _) => format!("this file begins {} s after the experiment ends", begins - to),
+                (_, true) => format!("this file ends {} s before the experiment begins", from - ends),
+                _ => "this file has no sample during the experiment".to_owned(),
+            };
+            return Err(place
+                .diagnostic(fact)
+                .with_help("the times of all files are on one clock: correct the time column, or `from` and `to`"));
+        }
         Ok(Some(Table { file, rows: first..last, driving: all, clock, end: main.end, is_other: true }))
     }
 }
 
+/// Returns the time from the first stamp of the file of the experiment to that of another file, s.
+///
+/// # Errors
+/// If their times count from different instants: the fact and the way out.
+fn between(own: Option<Origin>, of_main: Option<Origin>) -> Result<f64, (String, &'static str)> {
+    let (own, of_main) = match (own, of_main) {
+        (Some(own), Some(of_main)) => (own, of_main),
+        (None, None) => return Ok(0.0),
+        (own, _) => {
+            let [with, without] = if own.is_some() { OF_BOTH } else { [OF_BOTH[1], OF_BOTH[0]] };
+            let fact = format!("{with} has time stamps, but {without} has not");
+            return Err((fact, "give both the same kind of time"));
+        }
+    };
+    let only = |wanted: Reference| {
+        let [this, main] = OF_BOTH;
+        format!("only the time stamps of {} have", if own.reference == wanted { this } else { main })
+    };
+    match (own.reference, of_main.reference) {
+        (a, b) if a == b =>
+        {
+            #[allow(clippy::cast_precision_loss)]
+            Ok((own.nanoseconds - of_main.nanoseconds) as f64 * 1e-9)
+        }
+        (Reference::Midnight, of_other) | (of_other, Reference::Midnight) => {
+            Err((format!("{} dates", only(of_other)), "give both the same kind of time"))
+        }
+        _ => Err((
+            format!("{} a zone", only(Reference::Universal)),
+            "write the zone of the other stamps too, such as 2024-06-01T02:00:00+02:00, or Z for universal time",
+        )),
+    }
+}
+
+/// Names of the two files of a comparison.
+const OF_BOTH: [&str; 2] = ["this file", "the file of the experiment"];
+
 /// Distance of two samples of different files, relative to the mean time between samples, up to which they belong to one instant.
 const SAME: f64 = 1e-6;
+
+/// Returns the time by which a column is moved, s.
+fn read_shift(place: &Node<'_>, shift: Option<&Quantity>) -> Result<f64, Diagnostic> {
+    let shift = read_seconds(place, "shift", shift)?.unwrap_or(0.0);
+    match shift.is_finite() {
+        true => Ok(shift),
+        false => Err(at_key(place, "shift", format!("`shift` must be finite, not {shift} s")).with_help("give a time")),
+    }
+}
 
 /// Returns the largest time by which channels are moved to later times, s.
 fn ahead(node: &Node<'_>, section: &ExperimentSection) -> Result<f64, Diagnostic> {
     let mut most = 0.0f64;
     for (signal, Short(channel)) in &section.channels.0 {
         let place = entry(node, "channels", signal);
-        most = most.max(read_seconds(&place, "shift", channel.shift.as_ref())?.unwrap_or(0.0));
+        most = most.max(read_shift(&place, channel.shift.as_ref())?);
     }
     Ok(most)
 }
@@ -456,13 +572,15 @@ struct Table {
 impl Table {
     fn new(node: &Node<'_>, section: &ExperimentSection, file: Arc<DataFile>) -> Result<Self, Diagnostic> {
         let columns = section.channels.0.iter().map(|(_, Short(channel))| &channel.column);
-        let column = columns.chain(section.inputs.0.iter().map(|(_, Short(input))| &input.column)).next();
+        let inputs = section.inputs.0.iter().map(|(_, RecordedInput(input))| &input.column);
+        let inputs = inputs.filter(|column| !column.is_empty());
+        let column = columns.chain(inputs).next();
         let (time, unit) = (section.time.as_deref(), section.time_unit.as_deref());
         let column = column.map_or("", String::as_str);
         let mut clock = Clock::new(node, &file, time, unit, section.sample_time.as_ref(), column)?;
         let times = Arc::clone(&clock.times);
         let skip = section.skip.min(times.len());
-        check_times(&file, &clock.column, &times, skip)?;
+        file.increases(&clock.column, &times, skip)?;
 
         let from = read_seconds(node, "from", section.from.as_ref())?;
         let to = read_seconds(node, "to", section.to.as_ref())?;
@@ -556,7 +674,7 @@ impl Table {
     fn channel(&self, place: &Node<'_>, signal: &str, table: &ChannelTable) -> Result<ChannelBuilder, Diagnostic> {
         let (values, unit) =
             self.values(place, &table.column, table.unit.as_deref(), table.scale, table.offset.as_ref())?;
-        let shift = read_seconds(place, "shift", table.shift.as_ref())?.unwrap_or(0.0);
+        let shift = read_shift(place, table.shift.as_ref())?;
         // A shifted sample before the start of the simulation has no counterpart in it.
         let rows = self.rows.clone().filter(|&row| shift == 0.0 || self.clock.at(row) + shift >= 0.0);
         let (times, values) = rows.map(|row| (self.clock.at(row) + shift, values[row])).unzip();
@@ -572,7 +690,7 @@ impl Table {
 
     /// Returns an input, its unit, and the number of missing samples.
     fn input(&self, place: &Node<'_>, table: &InputTable) -> Result<(Input, Option<Unit>, usize), Diagnostic> {
-        let shift = read_seconds(place, "shift", table.shift.as_ref())?.unwrap_or(0.0);
+        let shift = read_shift(place, table.shift.as_ref())?;
         let Some(rows) = self.driven(shift) else {
             let first = self.clock.at(self.driving.start) + shift;
             let fact = format!("the simulation starts at 0 s, but `{}` is unknown before {first} s", table.column);
@@ -670,7 +788,11 @@ impl Table {
             (Some(q), Some(unit)) => q.to(&unit.difference()).map_err(|why| {
                 at_key(place, "offset", why).with_help(format!("a number without a unit is in `{unit}`"))
             })?,
-            (Some(q), None) => q.number,
+            (Some(Quantity { number, unit: None }), None) => *number,
+            (Some(Quantity { unit: Some(given), .. }), None) => {
+                let fact = format!("the offset is in `{given}`, but the column `{name}` has no unit");
+                return Err(at_key(place, "offset", fact).with_help("set `unit` to that of the column"));
+            }
         };
         Ok((column.values.iter().map(|v| scale * v + offset).collect(), unit))
     }
@@ -709,30 +831,4 @@ pub(super) fn unit_of_header(
             .diagnostic(format!("unknown unit `{unit}` of `{column}` in the header of {name}"))
             .with_help(format!("set {key} = \"...\" here; {UNIT_HELP}"))
     })
-}
-
-/// Checks that the times from row `skip` on exist and increase.
-fn check_times(file: &DataFile, column: &str, times: &[f64], skip: usize) -> Result<(), Diagnostic> {
-    let wrong = |row: usize, message: String, way_out: &str| {
-        let source: &Arc<Source> = &file.source;
-        Err(Diagnostic::new(message).with_help(way_out).at(source, file.span_of(column, row)))
-    };
-    let used = &times[skip..];
-    if let Some(row) = used.iter().position(|t| !t.is_finite()) {
-        let fact = format!("sample {} has no value in the time column `{column}`", skip + row + 1);
-        return wrong(skip + row, fact, "delete the row; `skip` drops wrong rows at the start");
-    }
-    match used.windows(2).position(|pair| pair[1] <= pair[0]) {
-        Some(row) => wrong(
-            skip + row + 1,
-            format!(
-                "the time `{column}` does not increase: sample {} at {} s follows one at {} s",
-                skip + row + 2,
-                used[row + 1],
-                used[row]
-            ),
-            "sort the rows and delete duplicates; `skip` drops wrong rows at the start",
-        ),
-        None => Ok(()),
-    }
 }

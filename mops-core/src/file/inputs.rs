@@ -278,6 +278,7 @@ impl FileSection {
     fn column(&self) -> InputTable {
         InputTable {
             column: self.column.clone(),
+            constant: None,
             unit: self.unit.clone(),
             scale: self.scale,
             offset: self.offset.clone(),
@@ -363,6 +364,13 @@ impl Reader<'_> {
         (value > 0.0).then_some(value).ok_or_else(wrong)
     }
 
+    /// Returns a quantity that is not negative.
+    fn not_negative(&self, key: &str, quantity: &Quantity, unit: &str) -> Result<f64, StudyError> {
+        let value = self.number(key, quantity, &Unit::known(unit))?;
+        let wrong = || StudyError::new(key, format!("`{key}` must not be negative, and is {value} {unit}"));
+        (value >= 0.0).then_some(value).ok_or_else(|| wrong().with_help("reverse a sine by its amplitude or phase"))
+    }
+
     /// Returns the end of the simulation, up to which a periodic input is computed.
     fn until(&self, start: f64) -> Result<f64, StudyError> {
         let missing =
@@ -404,7 +412,7 @@ impl Reader<'_> {
             }
             InputSection::Sine(sine) => Ok(Input::Sine {
                 amplitude: self.amplitude(&sine.amplitude)?,
-                frequency: self.number("frequency", &sine.frequency, &Unit::known("Hz"))?,
+                frequency: self.not_negative("frequency", &sine.frequency, "Hz")?,
                 phase: self.or_zero("phase", &sine.phase, &Unit::known("rad"))?,
                 offset: self.value_or_zero("offset", &sine.offset)?,
             }),

@@ -337,9 +337,13 @@ fn read_cases(
 
 fn read_seconds(node: &Node<'_>, key: &str, quantity: Option<&Quantity>) -> Result<Option<f64>, Diagnostic> {
     let second = Unit::known("s");
-    quantity
-        .map(|q| q.to(&second).map_err(|why| at_key(node, key, why).with_help("a number without a unit is in s")))
-        .transpose()
+    let Some(quantity) = quantity else { return Ok(None) };
+    let seconds =
+        quantity.to(&second).map_err(|why| at_key(node, key, why).with_help("a number without a unit is in s"))?;
+    if seconds.is_nan() {
+        return Err(at_key(node, key, format!("`{key}` is not a number")).with_help("give a time"));
+    }
+    Ok(Some(seconds))
 }
 
 fn read_criterion(catalogue: &Catalogue, node: &Node<'_>) -> Result<CriterionBuilder, Diagnostic> {

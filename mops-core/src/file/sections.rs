@@ -3,7 +3,8 @@
 use std::fmt;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Deserialize, Deserializer, IntoDeserializer, MapAccess, Visitor};
 
 use super::entries::{Entries, Short};
 use super::inputs::InputEntry;
@@ -219,11 +220,12 @@ pub(super) struct ExperimentSection {
     /// from another file, also with another rate, has the keys `file` and `time` or `sample-time`.
     #[serde(default)]
     pub channels: Entries<Short<ChannelTable>>,
-    /// Recorded inputs: `u = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `hold`, `shift`. An input from another file
-    /// has the keys `file` and `time` or `sample-time`. Between samples an
-    /// input is constant (`hold = "zero"`, default) or interpolated linearly (`hold = "first"`).
+    /// Inputs: recorded, `u = "column"`, or a table with `column`, `unit`, `scale`, `offset`, `hold`, `shift`; or constant, `u = 0` or
+    /// `u = { constant = "20 degC" }`. An input from another file has the keys `file` and `time` or `sample-time`. Between samples an
+    /// input is constant (`hold = "zero"`, default) or interpolated linearly (`hold = "first"`). If the file has columns that nothing
+    /// uses, every input of the model must be given.
     #[serde(default)]
-    pub inputs: Entries<Short<InputTable>>,
+    pub inputs: Entries<RecordedInput>,
     /// Role: `calibration` (default), `selection` or `validation`.
     #[serde(default)]
     pub role: Role,
@@ -305,7 +307,10 @@ pub(super) struct ChannelTable {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct InputTable {
     /// Column of the file.
+    #[serde(default)]
     pub column: String,
+    /// Value of an input that is not recorded and does not change: the only key then. A number is in the unit of the input.
+    pub constant: Option<Quantity>,
     /// Unit of the column; default is the unit in the header, else that of the input.
     pub unit: Option<String>,
     /// Factor applied to the column.
@@ -327,6 +332,45 @@ pub(super) struct InputTable {
     pub time_unit: Option<String>,
     /// Time between two samples of that file, if it has no time column; the first is at 0.
     pub sample_time: Option<Quantity>,
+}
+
+/// Input of an experiment: the name of a column, a number for a constant, or a table.
+#[derive(Debug)]
+pub(super) struct RecordedInput(pub InputTable);
+
+impl<'de> Deserialize<'de> for RecordedInput {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct AnyForm;
+        impl<'de> Visitor<'de> for AnyForm {
+            type Value = InputTable;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a column, a number or a table")
+            }
+            fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<InputTable, E> {
+                Ok(InputTable { constant: Some(number.into()), ..InputTable::default() })
+            }
+            fn visit_i64<E: serde::de::Error>(self, number: i64) -> Result<InputTable, E> {
+                let constant = Quantity::deserialize(number.into_deserializer())?;
+                Ok(InputTable { constant: Some(constant), ..InputTable::default() })
+            }
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<InputTable, E> {
+                Ok(text.to_owned().into())
+            }
+            fn visit_map<M: MapAccess<'de>>(self, map: M) -> Result<InputTable, M::Error> {
+                InputTable::deserialize(MapAccessDeserializer::new(map))
+            }
+        }
+        deserializer.deserialize_any(AnyForm).map(RecordedInput)
+    }
+}
+
+impl JsonSchema for RecordedInput {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "RecordedInput".into()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "anyOf": [{ "type": ["string", "number"] }, generator.subschema_for::<InputTable>()] })
+    }
 }
 
 impl From<String> for ChannelTable {
@@ -418,7 +462,7 @@ impl<'de> Deserialize<'de> for FreeSection {
                 Ok(FreeSection(states))
             }
             fn visit_map<M: MapAccess<'de>>(self, map: M) -> Result<FreeSection, M::Error> {
-                Entries::deserialize(serde::de::value::MapAccessDeserializer::new(map)).map(|e| FreeSection(e.0))
+                Entries::deserialize(MapAccessDeserializer::new(map)).map(|e| FreeSection(e.0))
             }
         }
         deserializer.deserialize_any(Either)

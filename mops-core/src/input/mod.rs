@@ -183,6 +183,16 @@ impl Input {
         }
     }
 
+    /// Returns the time from which values are known, s, at most 0: the first sample, or 0 for inputs that are not sampled. What was
+    /// before it is constant.
+    pub fn first_known(&self) -> f64 {
+        match self {
+            Self::Sampled { times, .. } => times[0].min(0.0),
+            Self::Sum(parts) => parts.iter().map(Self::first_known).fold(0.0, f64::min),
+            _ => 0.0,
+        }
+    }
+
     /// Returns the first time (s) at which the step between samples differs from the mean step by more than 1 %. `None` for
     /// even sampling, and for inputs that need not be evenly sampled.
     pub fn uneven(&self) -> Option<f64> {

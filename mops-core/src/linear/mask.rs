@@ -43,6 +43,16 @@ impl Mask {
         Ok(Self { points: points.iter().map(|[w, gain]| [*w, math::ln(*gain)]).collect(), is_upper })
     }
 
+    /// Returns the lowest angular frequency of the mask, rad/s.
+    pub fn first(&self) -> f64 {
+        self.ends()[0]
+    }
+
+    /// Returns the highest angular frequency of the mask, rad/s.
+    pub fn last(&self) -> f64 {
+        self.ends()[1]
+    }
+
     fn ends(&self) -> [f64; 2] {
         [self.points[0][0], self.points[self.points.len() - 1][0]]
     }

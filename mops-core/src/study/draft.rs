@@ -130,6 +130,8 @@ pub struct Measured {
     pub role: Role,
     /// States whose initial values are estimated.
     pub free: Vec<Free>,
+    /// Columns of the data files that the experiment does not use: one of them may be an input that is not given.
+    pub unused: Vec<String>,
 }
 
 /// A state whose initial value is estimated; absent values are derived from the data.

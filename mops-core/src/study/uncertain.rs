@@ -81,6 +81,11 @@ fn build(name: &str, draft: UncertainBuilder, study: &Study) -> Result<Uncertain
     let bound = |key: &str, quantity: &Option<Quantity>| quantity.as_ref().map(|q| number(key, q)).transpose();
     let (min, max) = (bound("min", &draft.min)?, bound("max", &draft.max)?);
     let tolerance = tolerance(&draft, tuner.is_some(), name)?;
+    if tolerance.is_some() && unit.zero() != 0.0 {
+        let fact = format!("`{name}` is a temperature in {unit}, of which a share depends on the zero of the scale");
+        return Err(StudyError::new("tolerance", fact)
+            .with_help("declare it in K, or as a difference from a fixed temperature"));
+    }
     let mut bounds = [min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)];
     if bounds[1] <= bounds[0] {
         let [min, max] = bounds;

@@ -32,12 +32,23 @@ pub struct Unit {
     factor: f64,
     /// Zero of a temperature scale, in K.
     zero: f64,
-    /// True for a unit of differences, which ignores the zeros of scales.
-    is_difference: bool,
+    /// Whether quantities in the unit are differences.
+    kind: Kind,
     /// Exponents of units that count angles, and of those that count cycles.
     turning: [f64; 2],
     /// Value of the angle units in the coherent unit: 180/pi for V/deg, 1 for rad.
     angles: f64,
+}
+
+/// Meaning of quantities in a unit, which matters for temperatures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// Values of a quantity: 20 degC are 293.15 K.
+    Value,
+    /// Differences, which ignore the zeros of scales: 20 degC are 20 K.
+    Difference,
+    /// Either, which cannot be known: degC is refused.
+    Unknown,
 }
 
 impl Unit {
@@ -48,7 +59,7 @@ impl Unit {
             dimension: Dimension::NONE,
             factor: 1.0,
             zero: 0.0,
-            is_difference: false,
+            kind: Kind::Value,
             turning: [0.0; 2],
             angles: 1.0,
         }
@@ -163,7 +174,19 @@ impl Unit {
             (_, true) => Self::known("K"),
             _ => Self::known("degR"),
         };
-        Self { is_difference: true, ..unit }
+        Self { kind: Kind::Difference, ..unit }
+    }
+
+    /// Returns the unit for values of which it is unknown whether they are differences, such as those of a formula: quantities on a
+    /// temperature scale are refused.
+    #[must_use]
+    pub fn of_unknown_kind(self) -> Self {
+        Self { kind: Kind::Unknown, ..self }
+    }
+
+    /// Returns true if a quantity in this unit can have two meanings in `other`: a temperature or a difference.
+    pub fn is_ambiguous_in(&self, other: &Self) -> bool {
+        other.kind == Kind::Unknown && self.zero != other.zero && self.is_compatible(other)
     }
 
     /// Formats a number with this unit for a sentence: `3 rad`; a pure number without unit.
@@ -195,7 +218,7 @@ impl Unit {
     /// Returns `None` for different dimensions.
     pub fn convert(&self, number: f64, other: &Self) -> Option<f64> {
         let factor = self.factor_to(other)?;
-        if self.zero == other.zero || self.is_difference || other.is_difference {
+        if self.zero == other.zero || self.kind == Kind::Difference || other.kind == Kind::Difference {
             return Some(number * factor);
         }
         Some((number * self.factor + self.zero - other.zero) / other.factor)
@@ -344,7 +367,7 @@ fn symbol(text: &str) -> Option<Unit> {
         dimension: found.dimension,
         factor,
         zero: found.zero,
-        is_difference: false,
+        kind: Kind::Value,
         turning,
         angles: if turning[0] == 0.0 { 1.0 } else { factor },
     })

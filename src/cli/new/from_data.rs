@@ -13,6 +13,7 @@ use crate::toml_text::{key, number, quoted};
 
 /// Columns that the user has chosen.
 pub(super) struct Chosen<'a> {
+    pub time: Option<&'a str>,
     pub inputs: Option<&'a [String]>,
     pub outputs: Option<&'a [String]>,
 }
@@ -64,23 +65,9 @@ pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, CommandError> {
 /// Returns the text of the study; `copy` is the name of the data file in its folder.
 pub(super) fn study(name: &str, path: &Path, copy: &str, chosen: &Chosen<'_>) -> Result<String, Diagnostic> {
     let file = DataFile::read(path)?;
-    let shown = path.display();
-    let time = file.time_column().ok_or_else(|| {
-        Diagnostic::new(format!("no column of `{shown}` is called `t` or `time`, and none has time stamps"))
-            .with_help("name the time column so, or write a study with `sample-time`: `mops new NAME`")
-    })?;
-    let column = file.column(&time)?;
-    let to_seconds = column.unit.map_or(Some(1.0), |unit| Unit::parse(unit).ok()?.factor_to(&Unit::known("s")));
-    let to_seconds = to_seconds.ok_or_else(|| {
-        let unit = column.unit.unwrap_or_default();
-        Diagnostic::new(format!("the time column `{time}` is in `{unit}`, which is not a unit of time"))
-            .with_help("correct the header of the file")
-    })?;
-    let times: Vec<f64> = column.values.iter().map(|t| t * to_seconds).collect();
-    if let Some(pair) = times.windows(2).find(|pair| pair[1] <= pair[0]) {
-        let fact = format!("the time `{time}` does not increase: {} s follows {} s", pair[1], pair[0]);
-        return Err(Diagnostic::new(fact).with_help("sort the rows and delete duplicates"));
-    }
+    let (time, times) = times(&file, chosen.time)?;
+    let names = file.column_names();
+    let time = names.into_iter().find(|name| file.is_same(name, &time)).unwrap_or(time);
     let (inputs, outputs) = signals(&file, &time, &times, chosen)?;
     // An input is needed from the first sample on.
     let skip = inputs.iter().filter_map(|u| u.values.iter().position(|v| v.is_finite())).max().unwrap_or(0);
@@ -96,6 +83,29 @@ pub(super) fn study(name: &str, path: &Path, copy: &str, chosen: &Chosen<'_>) ->
             writeln!(text, "{fit} = {{ fit-percent = {{ signal = {} }}, usage = \"monitor\" }}", quoted(&output.name));
     }
     Ok(text)
+}
+
+/// Returns the name of the time column, chosen or recognised, and its times in s.
+fn times(file: &DataFile, chosen: Option<&str>) -> Result<(String, Vec<f64>), Diagnostic> {
+    let time = match chosen {
+        Some(name) => name.to_owned(),
+        None => file.time_column().ok_or_else(|| {
+            let names = file.column_names().join(", ");
+            file.without_time(&format!(
+                "name it with `--time`, one of {names}; without any, write a study with `sample-time`: `mops new NAME`"
+            ))
+        })?,
+    };
+    let column = file.column(&time)?;
+    let to_seconds = column.unit.map_or(Some(1.0), |unit| Unit::parse(unit).ok()?.factor_to(&Unit::known("s")));
+    let to_seconds = to_seconds.ok_or_else(|| {
+        let unit = column.unit.unwrap_or_default();
+        Diagnostic::new(format!("the time column `{time}` is in `{unit}`, which is not a unit of time"))
+            .with_help("correct the header of the file, or choose another column with `--time`")
+    })?;
+    let times: Vec<f64> = column.values.iter().map(|t| t * to_seconds).collect();
+    file.increases(&time, &times, 0)?;
+    Ok((time, times))
 }
 
 /// Returns the inputs and the outputs among the columns that change.

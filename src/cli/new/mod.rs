@@ -26,6 +26,9 @@ pub(super) struct Arguments {
     /// Write a calibration of a linear model of order 2 for every output in this data file, with a copy of the data.
     #[arg(long, value_name = "FILE")]
     from_data: Option<PathBuf>,
+    /// Time column [default: `t`, `time`, `Zeit` and the like, or the first column of time stamps].
+    #[arg(long, value_name = "COLUMN", requires = "from_data")]
+    time: Option<String>,
     /// Columns that are inputs [default: by their names and units].
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',', requires = "from_data")]
     inputs: Option<Vec<String>>,
@@ -57,7 +60,7 @@ impl Template {
 }
 
 pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    let Arguments { folder, template, from, from_data, inputs, outputs } = arguments;
+    let Arguments { folder, template, from, from_data, time, inputs, outputs } = arguments;
     if folder.exists() {
         return Err(Diagnostic::new(format!("`{}` already exists", folder.display()))
             .with_help("name a new folder; nothing was written")
@@ -70,7 +73,8 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
             let copy = data.file_name().map_or(data.as_path(), Path::new);
             let copy = if copy == Path::new("study.toml") { Path::new("data.csv") } else { copy };
             let bytes = from_data::bytes(data)?;
-            let chosen = from_data::Chosen { inputs: inputs.as_deref(), outputs: outputs.as_deref() };
+            let chosen =
+                from_data::Chosen { time: time.as_deref(), inputs: inputs.as_deref(), outputs: outputs.as_deref() };
             let text = from_data::study(&called, data, &copy.to_string_lossy(), &chosen)?;
             vec![(Path::new("study.toml"), text.into_bytes()), (copy, bytes)]
         }

@@ -109,11 +109,25 @@ fn a_filter_that_does_not_exist_is_refused() {
         ("method = 'tustin'", "given in `z` or as `continuous`"),
         ("continuous = { numerator = ['k'], denominator = [1, 1] }, method = 'zero-order-hold'", "needs numbers"),
         ("continuous = { numerator = [1], denominator = [1, 1] }, prewarp = '-1 Hz'", "above 0 Hz"),
+        ("continuous = { numerator = [1], denominator = [1, 1] }, prewarp = '1 MHz'", "half of the sampling frequency"),
         ("continuous = { numerator = [1], denominator = [1, 1] }, prewarp = '1 s'", "expected a quantity in"),
     ] {
         let mistake = read(&sampled(filter, "k = '1'")).err().unwrap().to_string();
         assert!(mistake.contains(fact) && mistake.starts_with("clocks.c.filter.u"), "{filter}: {mistake}");
     }
+}
+
+#[test]
+fn a_number_beside_coefficients_of_another_convention_is_named() {
+    let parameters = "w = { unit = 'rad/s', default = 5 }, z = { unit = '1', default = 0.7 }";
+    let low_pass = |one: &str| format!("continuous = {{ numerator = ['w^2'], denominator = [{one}, '2*z*w', 'w^2'] }}");
+    let mistake = read(&sampled(&low_pass("1"), parameters)).err().unwrap().to_string();
+    assert!(
+        mistake.starts_with("clocks.c.filter.u.continuous.denominator: ") && mistake.contains("write \"1 [1]\""),
+        "{mistake}"
+    );
+    assert!(read(&sampled(&low_pass("'1 [1]'"), parameters)).is_ok());
+    assert!(read(&sampled("continuous = { numerator = [1], denominator = ['1/w', 1] }", parameters)).is_ok());
 }
 
 /// Coefficients, in descending powers, of the denominator of a Butterworth low pass with gain 1.

@@ -213,43 +213,39 @@ impl<S: Scalar> Delay<S> {
 }
 
 /// Lets the jumps of delayed quantities that are due take effect; `settle` determines the mode of the plant. A jump that moves with
-/// the parameters moves the state by the jump of its rates.
+/// the parameters moves the state by the jump of its rates. Returns the derivatives of the time of the jump of lowest derivative.
 pub(crate) fn pass_delays<S: Scalar, P: Plant<S>>(
     plant: &mut P,
     delays: impl Fn(&mut P) -> &mut [Delay<S>],
     settle: impl Fn(&mut P, &Instant<'_, S>),
     at: &Instant<'_, S>,
     x: &mut [S],
-) {
-    let count = delays(plant).len();
-    let mut restarts = vec![Restart::fixed(); count];
-    for k in 0..count {
+) -> S {
+    let mut first: Option<Arrival<S>> = None;
+    for k in 0..delays(plant).len() {
         let moves = S::DIRECTIONS > 0 && delays(plant)[k].jumps_at(at.t);
-        let look = |plant: &P, x: &[S]| {
-            let (at, mut rates) = (Instant { x, ..*at }, x.to_vec());
-            plant.rates(&at, &mut rates);
-            (rates, plant.past(&at))
+        let rates = |plant: &P, x: &[S]| {
+            let mut rates = x.to_vec();
+            plant.rates(&Instant { x, ..*at }, &mut rates);
+            rates
         };
-        let before = moves.then(|| look(plant, x));
+        let before = moves.then(|| rates(plant, x));
         let Some(arrival) = delays(plant)[k].pass_break(at.t) else { continue };
-        for restart in &mut restarts {
-            // A jump that arrives in the rates is one derivative higher in the states.
-            let derivative = arrival.derivative + 1;
-            restart.derivative = Some(restart.derivative.map_or(derivative, |known| known.min(derivative)));
+        if first.is_none_or(|first| arrival.derivative < first.derivative) {
+            first = Some(arrival);
         }
-        let Some((rates_before, past_before)) = before else { continue };
+        let Some(before) = before else { continue };
         settle(plant, &Instant { x, ..*at });
-        let (rates, past) = look(plant, x);
-        for ((x, before), after) in x.iter_mut().zip(rates_before).zip(rates) {
+        let after = rates(plant, x);
+        for ((x, before), after) in x.iter_mut().zip(before).zip(after) {
             *x += arrival.moves * (before.value() - after.value());
         }
-        for ((restart, before), after) in restarts.iter_mut().zip(past_before).zip(past) {
-            if before.value() != after.value() {
-                restart.moves = arrival.moves;
-            }
-        }
     }
-    delays(plant).iter_mut().zip(restarts).for_each(|(delay, restart)| delay.restart(restart));
+    let moves = first.map_or(S::from(0.0), |arrival| arrival.moves);
+    // A jump that arrives in the rates is one derivative higher in the states.
+    let restart = Restart { derivative: first.map(|arrival| arrival.derivative + 1), moves };
+    delays(plant).iter_mut().for_each(|delay| delay.restart(restart));
+    moves
 }
 
 /// Stores delayed quantities over a part of a step, or returns false if a quartic through the values is not accurate enough.

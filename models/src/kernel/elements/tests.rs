@@ -250,9 +250,10 @@ impl<S: Scalar> Dynamics<S> for Delayed<S> {
     fn next_break(&self, t: f64) -> f64 {
         self.0.next_break(t)
     }
-    fn pass_break(&mut self, t: f64, _: &mut [S]) {
+    fn pass_break(&mut self, t: f64, _: &mut [S]) -> S {
         let derivative = self.0.pass_break(t).map(|arrival| arrival.derivative + 1);
         self.0.restart(Restart { derivative, moves: S::from(0.0) });
+        S::from(0.0)
     }
     fn remembers(&self) -> bool {
         true
@@ -296,10 +297,11 @@ impl Dynamics<f64> for DelayedStep {
     fn next_break(&self, t: f64) -> f64 {
         self.0.next_break(t).min(if t < 0.3 { 0.3 } else { f64::INFINITY })
     }
-    fn pass_break(&mut self, t: f64, _: &mut [f64]) {
+    fn pass_break(&mut self, t: f64, _: &mut [f64]) -> f64 {
         self.0.pass_break(t);
         self.0.restart(Restart::fixed());
         self.1 = f64::from(u8::from(t >= 0.3));
+        0.0
     }
     fn remembers(&self) -> bool {
         true

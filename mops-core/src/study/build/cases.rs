@@ -161,6 +161,7 @@ fn build_experiment(
         warnings.extend(channel.unwrap.is_none().then(|| wrapped(name, &built, &variable.unit)).flatten());
         channels.push(built);
     }
+    warnings.extend(gaps(name, &channels));
     for response in &draft.responses {
         let known: Vec<&str> = models
             .iter()
@@ -330,6 +331,53 @@ fn gap_of(channel: &Channel) -> Option<f64> {
     steps.sort_by(f64::total_cmp);
     let longest = 3.0 * steps.get(steps.len() / 2)?;
     channel.times.windows(2).find(|pair| pair[1] - pair[0] > longest).map(|pair| pair[0])
+}
+
+/// Smallest distance of two samples that is a gap, in typical distances.
+const GAP: f64 = 3.0;
+
+/// Share of the distances between samples that are at most the typical one: loggers are seldom exactly periodic.
+const TYPICAL: f64 = 0.95;
+
+/// Smallest number of samples of a record with a typical distance.
+const FEW: usize = 10;
+
+/// Returns warnings on gaps in the records of an experiment: each with the signals that have it.
+fn gaps(experiment: &str, channels: &[Channel]) -> Vec<String> {
+    let mut found: Vec<(String, Vec<String>)> = Vec::new();
+    for channel in channels.iter().filter(|channel| channel.times.len() >= FEW) {
+        let steps: Vec<f64> = channel.times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let mut sorted = steps.clone();
+        sorted.sort_by(f64::total_cmp);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, clippy::cast_sign_loss)]
+        let typical = sorted[(TYPICAL * (sorted.len() - 1) as f64) as usize];
+        let is_gap = |step: &f64| *step > GAP * typical;
+        let count = steps.iter().filter(|step| is_gap(step)).count();
+        let Some(longest) =
+            (0..steps.len()).filter(|&k| is_gap(&steps[k])).max_by(|&a, &b| steps[a].total_cmp(&steps[b]))
+        else {
+            continue;
+        };
+        let rounded = |time: f64| (time * 1e6).round() / 1e6;
+        let others = match count - 1 {
+            0 => String::new(),
+            1 => ", the longer of 2".to_owned(),
+            _ => format!(", the longest of {count}"),
+        };
+        let fact = format!("a gap of {} s at {} s{others}", rounded(steps[longest]), rounded(channel.times[longest]));
+        match found.iter_mut().find(|(known, _)| *known == fact) {
+            Some((_, signals)) => signals.push(format!("`{}`", channel.signal)),
+            None => found.push((fact, vec![format!("`{}`", channel.signal)])),
+        }
+    }
+    let warning = |(fact, signals): (String, Vec<String>)| {
+        let (signals, have) = (signals.join(", "), if signals.len() == 1 { "has" } else { "have" });
+        format!(
+            "{signals} in `{experiment}` {have} {fact}: inputs are continued across it; give each part an experiment with `from` and \
+             `to` if they changed meanwhile"
+        )
+    };
+    found.into_iter().map(warning).collect()
 }
 
 /// Steps that look like a sensor that starts a new turn, in turns, if the median step is at most [`SLOW`].

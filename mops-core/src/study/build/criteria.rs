@@ -75,6 +75,12 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -
             let help = "give an earlier time, a longer `horizon`, or the cases for which it applies in `cases`";
             return Err(StudyError::new("from", fact).with_help(help));
         }
+        if let Some([_, until]) = window.filter(|[_, until]| until.is_finite() && *until > end * (1.0 + SAME)) {
+            let case = &study.cases[case].name;
+            let fact = format!("`until` at {until} s is after the end of the simulation at {end} s in case `{case}`");
+            let help = "omit it to read up to the end, or give a longer `horizon`, or the cases for which it applies in `cases`";
+            return Err(StudyError::new("until", fact).with_help(help));
+        }
         study.rows.push(Row {
             name: name.to_owned(),
             job,
@@ -88,6 +94,9 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -
     }
     Ok(())
 }
+
+/// Relative difference of two times that rounding explains.
+const SAME: f64 = 1e-9;
 
 /// Returns the criteria of the model that a criterion refers to.
 fn others(study: &Study, model: usize, of: &dyn CriterionSpec) -> Vec<Other> {

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use crate::case::Case;
 use crate::criterion::Usage;
 use crate::evaluation::Objective;
-use crate::model::{Interface, Model};
+use crate::model::{AnalysisKind, Interface, Model};
 use crate::study::draft::{CaseBuilder, CriterionBuilder, StudyBuilder};
 use crate::study::{JobPlan, Study, Task, Tasks, diagnosis, tasks};
 use crate::study_error::StudyError;
@@ -130,6 +130,7 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
                 .extend((0..study.cases.len()).filter_map(|case| study.plan(model, case).ok()).collect::<Vec<_>>());
         }
     }
+    refuse_forgotten_inputs(&study, &drafts)?;
     let cold = temperatures_of_nothing(&study);
     study.warnings.extend(cold);
     let solved = matches!(study.task, Task::Design | Task::Calibration);
@@ -171,6 +172,42 @@ fn in_order(mut left: Vec<(String, CriterionBuilder)>) -> Result<Vec<(String, Cr
     }
     Ok(ordered)
 }
+
+/// Refuses an experiment that does not give an input of a model, although its data files have columns that it does not use.
+fn refuse_forgotten_inputs(study: &Study, drafts: &[CaseBuilder]) -> Result<(), StudyError> {
+    for job in &study.jobs {
+        let (case, draft) = (&study.cases[job.case], &drafts[job.case]);
+        let Some(measured) = draft.measured.as_ref().filter(|measured| !measured.unused.is_empty()) else { continue };
+        let interface = study.models[job.model].1.interface();
+        if interface.analysis == AnalysisKind::Linear {
+            continue;
+        }
+        let is_given = |name: &str| case.input(name).is_some();
+        if let Some(input) = interface.inputs.iter().find(|input| !is_given(&input.name)) {
+            let columns: Vec<String> = measured.unused.iter().map(|column| format!("`{column}`")).collect();
+            let [shown, more] = match columns.split_at_checked(MOST_COLUMNS) {
+                Some((shown, rest)) if !rest.is_empty() => [shown.join(", "), format!(" and {} others", rest.len())],
+                _ => [columns.join(", "), String::new()],
+            };
+            let files = if columns.len() == 1 { "column" } else { "columns" };
+            let fact = format!(
+                "the input `{}` is not given, but the data file has the {files} {shown}{more}, which nothing uses",
+                input.name
+            );
+            let column = measured.unused[0].split(" [").next().unwrap_or_default();
+            let column = if columns.len() == 1 { column } else { "..." };
+            let help = format!(
+                "add `{0} = \"{column}\"` to `inputs` of the experiment, or `{0} = 0` if it is 0 throughout",
+                input.name
+            );
+            return Err(StudyError::new("inputs", fact).within(&case.name).within(section(draft)).with_help(help));
+        }
+    }
+    Ok(())
+}
+
+/// Largest number of columns that a message lists.
+const MOST_COLUMNS: usize = 8;
 
 /// Returns warnings for undriven inputs on a temperature scale: they stay at the zero of the scale, which is rarely
 /// intended.

@@ -294,8 +294,13 @@ pub(super) fn free_start(free: &Free, index: usize, case: &Case, models: &Models
     let parameter =
         parameter(&model.interface().parameters, &state.start).expect("a state's initial value is a parameter");
     let unit = parameter.variable.unit.clone();
-    let given = |key: &str, q: &Option<Quantity>| {
-        q.as_ref().map(|q| converted(q, &unit).map_err(|m| m.within(key).within(&free.state))).transpose()
+    let given = |key: &str, q: &Option<Quantity>| -> Result<Option<f64>, StudyError> {
+        let Some(q) = q else { return Ok(None) };
+        let value = converted(q, &unit).map_err(|m| m.within(key).within(&free.state))?;
+        if value.is_finite() {
+            return Ok(Some(value));
+        }
+        Err(StudyError::new(key, format!("`{key}` must be a finite number, not {value}")).within(&free.state))
     };
     let (start, min, max) = (given("start", &free.start)?, given("min", &free.min)?, given("max", &free.max)?);
     let in_case = case.parameters.iter().find(|(name, _)| *name == state.start).map(|(_, value)| *value);

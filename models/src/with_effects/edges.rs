@@ -1,0 +1,169 @@
+//! Edges of effects, at which their laws change, and hysteresis states: their guards, and what happens there.
+
+use mops_core::{Opening, PortState};
+
+use super::Site;
+use super::command::Command;
+use super::dynamics::{Actor, Driven};
+
+/// Half the time over which the rate of a value at an actuator or a sensor is a difference, as a fraction of the horizon: it resolves
+/// 10,000 oscillations, and rounding of the value changes the rate by 1e-9 of the value per horizon.
+pub(super) const BLINK: f64 = 1e-7;
+
+impl<S: Opening> Actor<S> {
+    /// Returns the output of the effect at an actuator or a sensor.
+    pub(super) fn passed(&self, at: &PortState<'_, S>, z: &[S]) -> S {
+        match &self.memory[..] {
+            [] => self.acting.value(at, z),
+            memory => self.acting.hysteresis_value(at, memory),
+        }
+    }
+
+    fn is_at_actuator(&self) -> bool {
+        matches!(self.place.site, Site::Actuator { .. })
+    }
+}
+
+impl<S: Opening> Driven<'_, S> {
+    /// Returns the number of gaps, and of effects with a hysteresis state.
+    pub(super) fn edges(&self) -> [usize; 2] {
+        let count = |has: fn(&&Actor<S>) -> bool| self.actors.iter().filter(has).count();
+        [count(|actor| actor.closed.is_some()), count(|actor| !actor.memory.is_empty())]
+    }
+
+    /// Returns the index of an effect with a gap, or of one with a hysteresis state, by the number of the edge: first the gaps.
+    fn of_edge(&self, number: usize) -> (usize, bool) {
+        let all = || self.actors.iter().enumerate();
+        let gaps = all().filter(|(_, actor)| actor.closed.is_some()).map(|(index, _)| (index, true));
+        let turns = all().filter(|(_, actor)| !actor.memory.is_empty()).map(|(index, _)| (index, false));
+        gaps.chain(turns).nth(number).expect("the number is valid")
+    }
+
+    /// Returns the value that reaches an effect at an actuator or a sensor; 0 for other effects.
+    fn arriving(&self, index: usize, t: f64, x: &[S]) -> S {
+        match self.actors[index].place.site {
+            Site::Actuator { .. } => {
+                self.inputs(t, x, &mut Vec::new());
+                self.incoming.borrow()[index]
+            }
+            Site::Sensor { signal } => self.seen(signal, index, t, x),
+            Site::Joint { .. } | Site::Process { .. } => S::from(0.0),
+        }
+    }
+
+    /// Returns what an effect with an edge receives; for an effect with a hysteresis state with the rate of its value, per s.
+    fn at_edge(&self, index: usize, t: f64, x: &[S]) -> PortState<'static, S> {
+        let actor = &self.actors[index];
+        let at = self.at(actor, t, x, &[], self.arriving(index, t, x));
+        let v = if actor.memory.is_empty() { at.v } else { self.arriving_rate(index, t, x) };
+        PortState { v, u: &[], ..at }
+    }
+
+    fn arriving_rate(&self, index: usize, t: f64, x: &[S]) -> S {
+        let mut rates = vec![S::from(0.0); x.len()];
+        if self.started {
+            self.rates(t, x, &mut rates);
+        }
+        let there = |by: f64| {
+            let x: Vec<S> = x.iter().zip(&rates).map(|(&x, &rate)| x + rate * by).collect();
+            self.arriving(index, t + by, &x)
+        };
+        (there(self.blink) - there(-self.blink)) / (2.0 * self.blink)
+    }
+
+    /// Returns the guard of an edge, by its number.
+    pub(super) fn edge_guard(&self, number: usize, t: f64, x: &[S]) -> S {
+        let (index, is_gap) = self.of_edge(number);
+        let (actor, at) = (&self.actors[index], self.at_edge(index, t, x));
+        if !is_gap {
+            return actor.acting.hysteresis_guard(&at, &actor.memory);
+        }
+        let gap = actor.acting.gap(&at).expect("the effect had a gap at the start");
+        if actor.closed == Some(true) { -gap } else { gap }
+    }
+
+    /// Finds the side of the edges on which effects are: of all at the start and after a jump of the plant state; of those at
+    /// actuators after a jump of the command.
+    pub(super) fn settle_gaps(&mut self, t: f64, x: &[S], only_actuators: bool) {
+        for index in 0..self.actors.len() {
+            if only_actuators && !self.actors[index].is_at_actuator() {
+                continue;
+            }
+            // The sign decides where the side is unknown.
+            self.actors[index].closed = None;
+            let gap = self.actors[index].acting.gap(&self.at_edge(index, t, x));
+            self.actors[index].closed = gap.map(|gap| gap.value() < 0.0);
+        }
+    }
+
+    /// Passes an edge after its guard became negative. Returns what happened; empty at actuators and sensors.
+    pub(super) fn edge_switch(&mut self, number: usize, t: f64, x: &[S]) -> &'static str {
+        let (index, is_gap) = self.of_edge(number);
+        if !is_gap {
+            self.update_hysteresis_of(index, t, x);
+            return "";
+        }
+        let actor = &mut self.actors[index];
+        let closed = actor.closed.as_mut().expect("the effect has a gap");
+        *closed = !*closed;
+        match (actor.place.site, *closed) {
+            (Site::Process { .. }, true) => "a level rises above an edge",
+            (Site::Process { .. }, false) => "a level falls below an edge",
+            (Site::Joint { .. }, true) => "a contact closes",
+            (Site::Joint { .. }, false) => "a contact opens",
+            (Site::Actuator { .. } | Site::Sensor { .. }, _) => "",
+        }
+    }
+
+    fn update_hysteresis_of(&mut self, index: usize, t: f64, x: &[S]) {
+        let at = self.at_edge(index, t, x);
+        self.actors[index].follow(&at);
+    }
+
+    /// Updates all hysteresis states, in the order of the effects.
+    pub(super) fn update_hysteresis(&mut self, t: f64, x: &[S]) {
+        for index in 0..self.actors.len() {
+            if !self.actors[index].memory.is_empty() {
+                self.update_hysteresis_of(index, t, x);
+            }
+        }
+    }
+
+    /// Moves the commands to time 0 from the left, and initialises the states and the hysteresis states of the effects at actuators, as
+    /// if the command just before time 0 had been constant for long. Hysteresis states follow the earlier samples of a record.
+    ///
+    /// N.B.: effects before them on the same actuator that depend on the state of the plant, or have states, are
+    /// evaluated as at time 0.
+    pub(super) fn start_actuators(&mut self, x: &mut [S], parameters: &[S]) {
+        let next = |of: &Self| of.commands.iter().map(Command::next_break).fold(f64::INFINITY, f64::min);
+        let first = next(self).min(0.0);
+        self.update_at_actuators(first, x);
+        while next(self) < 0.0 {
+            let t = next(self);
+            self.update_at_actuators(t, x);
+            self.commands.iter_mut().for_each(|command| command.pass_break(t));
+            self.update_at_actuators(t, x);
+        }
+        self.update_at_actuators(0.0, x);
+        for index in (0..self.actors.len()).filter(|&index| self.actors[index].is_at_actuator()).collect::<Vec<_>>() {
+            let at = self.at_edge(index, 0.0, x);
+            let actor = &mut self.actors[index];
+            let ahead = actor.place.starts.map_or(&[][..], |starts| &parameters[starts..]);
+            let z = &mut x[actor.z.0..actor.z.0 + actor.z.1];
+            actor.acting.start(&at, z);
+            z.iter_mut().zip(ahead).for_each(|(z, &ahead)| *z += ahead);
+            if let (Some(output), Some(&ahead)) = (actor.memory.first_mut(), ahead.first()) {
+                *output += ahead;
+                actor.follow(&at);
+            }
+        }
+    }
+
+    fn update_at_actuators(&mut self, t: f64, x: &[S]) {
+        for index in 0..self.actors.len() {
+            if self.actors[index].is_at_actuator() && !self.actors[index].memory.is_empty() {
+                self.update_hysteresis_of(index, t, x);
+            }
+        }
+    }
+}
