@@ -282,6 +282,7 @@ pub(super) fn norm<T: Real>(m: &DMatrix<T>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math;
 
     #[test]
     fn sums_products_quotients_and_roots_keep_thirty_digits() {
@@ -290,10 +291,10 @@ mod tests {
         let root = Extended::from(2.0).sqrt();
         assert!((root * root - Extended::from(2.0)).size() < 1e-31);
         // 1 + 2^-80 - 1, and the square of 1 + 2^-60.
-        let tiny = 2f64.powi(-80);
+        let tiny = math::powi(2.0, -80);
         assert_eq!((one + Extended::from(tiny) - one).value(), tiny);
-        let near = one + Extended::from(2f64.powi(-60));
-        assert!((near * near - one - Extended::from(2f64.powi(-59))).size() <= 2f64.powi(-104));
+        let near = one + Extended::from(math::powi(2.0, -60));
+        assert!((near * near - one - Extended::from(math::powi(2.0, -59))).size() <= math::powi(2.0, -104));
     }
 
     #[test]
