@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Budget, Cancellation, Contradiction, DerivativesReport, Effect, End, Ending, Evaluation, Objective, Optimality,
-    Oracle, Outcome, Pareto, Patience, Place, Problem, Quiet, Record, Run, Shape, SlopesReport, Solver, SolverChoice,
-    Stop, Store, Study, StudyError, Task, Watch, conclude,
+    Budget, Cancellation, Contradiction, DerivativesReport, Effect, End, Ending, Evaluation, Linearisation, Objective,
+    Optimality, Oracle, Outcome, Pareto, Patience, Place, Problem, Quiet, Record, Run, Shape, SlopesReport, Solver,
+    SolverChoice, Stop, Store, Study, StudyError, Task, Watch, conclude,
 };
 
 use crate::numbers::significant;
@@ -180,7 +180,9 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     } else {
         stop
     };
-    let derivatives = derivatives(&run, &mut probe, watch);
+    let near = linearised(&run, &mut probe, watch);
+    let derivatives = near.as_ref().filter(|(_, is_exact)| *is_exact);
+    let derivatives = derivatives.map(|(found, _)| DerivativesReport::of(&problem, &mut probe, found));
     let contradiction = derivatives.as_ref().and_then(contradiction);
     // A replay ends where the run was interrupted, not at a budget.
     let cause = if options.replayed.is_some() { Stop::Interrupted } else { stop };
@@ -195,7 +197,8 @@ pub(crate) fn search(study: Study, options: &Options, watch: &dyn Watch) -> Resu
     let ending = Ending { stop, end, pareto, seconds: started.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
     outcome.methods = solver.methods().to_vec();
-    outcome.found.slopes = slopes(&run, &mut probe, watch);
+    let is_design = problem.study().task() == Task::Design;
+    outcome.found.slopes = near.filter(|_| is_design).map(|(found, _)| SlopesReport::of(&problem, &found));
     outcome.found.derivatives = derivatives;
     outcome.seconds = started.elapsed().as_secs_f64();
     outcome.reused = begin.map(|_| run.reused());
@@ -279,23 +282,13 @@ pub(crate) fn evaluate_start(study: Study, options: &Options, watch: &dyn Watch)
 /// derivatives are then reused.
 const NEAR: f64 = 1e-4;
 
-/// Returns the derivatives of the criteria of a design with respect to its tuners at the best point; `None` after a stop
-/// request.
-fn slopes(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> Option<SlopesReport> {
-    let problem = run.problem();
-    if problem.study().task() != Task::Design || watch.wants_stop() {
-        return None;
-    }
-    SlopesReport::at(problem, probe, &run.best()?.point, NEAR)
-}
-
-/// Compares exact derivatives at the best point with differences; `None` if there are none, or after a stop request.
-fn derivatives(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> Option<DerivativesReport> {
+/// Returns values and derivatives at the best point, and whether these are exact; `None` if a simulation near it fails, if no tuner can
+/// be changed, or after a stop request.
+fn linearised(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> Option<(Linearisation, bool)> {
     let best = run.best().filter(|best| best.scaled.is_some() && !best.point.is_empty() && !watch.wants_stop())?;
     let before = probe.linearisations();
     let found = probe.linearise(&best.point, NEAR).ok()??;
-    // Finite differences are no derivatives to compare.
-    (probe.linearisations() > before).then(|| DerivativesReport::of(run.problem(), probe, &found))
+    Some((found, probe.linearisations() > before))
 }
 
 /// Returns a sentence on the first derivative that simulations contradict.

@@ -59,7 +59,7 @@ pub struct Contradiction {
 enum Comparison {
     /// The derivative lies between the differences, or these show nothing.
     Consistent,
-    /// It lies outside of differences that agree with each other.
+    /// The derivative lies outside of differences that agree with each other.
     Contradiction([Option<f64>; 2]),
     /// The value jumps.
     Jump,

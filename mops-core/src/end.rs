@@ -162,7 +162,7 @@ impl End {
             (0, _) => None,
             (1, _) => Some("A single local search was completed: other basins are unexplored.".to_owned()),
             (_, unseen) => {
-                let of_optima = counted(optima, "optimum", "optima");
+                let of_optima = of_optima(optima);
                 let share = unseen.map(|unseen| {
                     format!(
                         "; the expected share of starting points that lead to another optimum is {:.0} %",
@@ -199,7 +199,7 @@ impl End {
                 Some(format!(
                     "Another basin is likely, as {here} of {searches} local searches ended here, and all of them in {}: raise \
                      `starts` of the solver, or try another one.",
-                    counted(optima, "optimum", "optima")
+                    of_optima(optima)
                 ))
             }
             Optimality::Jump if !is_found_again => Some(
@@ -217,8 +217,8 @@ impl End {
     }
 }
 
-fn counted(count: usize, one: &str, several: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { several })
+fn of_optima(count: usize) -> String {
+    if count == 1 { "1 optimum".to_owned() } else { format!("{count} optima") }
 }
 
 fn none_or(count: usize) -> String {

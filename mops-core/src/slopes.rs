@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::criterion::Usage;
 use crate::problem::Problem;
-use crate::solver::Oracle;
+use crate::solver::Linearisation;
 
 /// The block `slopes` of a result.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -28,21 +28,16 @@ pub struct CriterionSlopes {
 }
 
 impl SlopesReport {
-    /// Returns the derivatives at a point of the unit box, as `oracle` provides them within `reach`. `None` if a simulation
-    /// near the point fails, or if no tuner can be changed.
-    pub fn at(problem: &Problem, oracle: &mut dyn Oracle, point: &[f64], reach: f64) -> Option<Self> {
-        if point.is_empty() {
-            return None;
-        }
-        let found = oracle.linearise(point, reach).ok().flatten()?;
+    /// Returns the derivatives of a linearisation.
+    pub fn of(problem: &Problem, found: &Linearisation) -> Self {
         let study = problem.study();
         let counts = |(i, _): &(usize, _)| problem.shape().rows[*i].0 != Usage::Monitor;
         let rows = study.rows.iter().enumerate().filter(counts);
-        Some(Self {
+        Self {
             tuners: problem.active().iter().map(|&i| study.tuners[i].name.clone()).collect(),
             criteria: rows
                 .map(|(i, row)| CriterionSlopes { key: study.key(row), slopes: found.rows[i].clone() })
                 .collect(),
-        })
+        }
     }
 }

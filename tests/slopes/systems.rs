@@ -83,7 +83,7 @@ const SYSTEMS: [System; 12] = [
          parameters = { T = 's', a = '1' }
          der        = { x = \"1 [s]*x' = u - a*delay(x, T)\" }
          outputs    = { y = 'u - delay(x, T)' }",
-        &[0.413, 0.8],
+        &[0.371, 0.8],
     ),
     (
         "corner of two ramps",

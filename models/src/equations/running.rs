@@ -346,7 +346,9 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
 
     fn switch(&mut self, index: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
         self.note_sizes(x);
-        self.delays.iter_mut().for_each(|delay| delay.restart(Restart { derivative: None, moves: event.delay }));
+        self.delays
+            .iter_mut()
+            .for_each(|delay| delay.restart(Restart { derivative: None, moves: event.delay, jumps: true }));
         let at = event.at;
         match self.kind(index) {
             Guard::Joint(j) => {

@@ -139,8 +139,20 @@ fn the_samples_before_time_0_are_what_a_delay_passes_on() {
     // The input is 4 + t, so that the delayed one is 2.5 + t.
     let at = [0.5, 1.0, 3.0];
     close(&values(&model, &[0.0, 1.5], recorded(Hold::First), &at), &at.map(|t| 2.5 * t + 0.5 * t * t), 1e-9);
-    // Held between samples: 2 until 0.5 s, then 3.
+    // Constant between samples: 2 until 0.5 s, then 3.
     close(&values(&model, &[0.0, 1.5], recorded(Hold::Zero), &[0.5, 1.0]), &[1.0, 2.5], 1e-9);
+}
+
+#[test]
+fn a_lag_of_a_sensor_follows_the_output_of_the_effect_before_it() {
+    let model = with(TANK, &[("sensor-saturation", "sensor:h"), ("sensor-lag", "sensor:h")]);
+    // The level rises by 1 per second, and the sensor saturates at 1.
+    let tau = 0.5;
+    let exact = TIMES.map(|t| {
+        let ramp = |t: f64| t - tau * (1.0 - math::exp(-t / tau));
+        if t < 1.0 { ramp(t) } else { 1.0 + (ramp(1.0) - 1.0) * math::exp(-(t - 1.0) / tau) }
+    });
+    close(&values(&model, &[0.0, 1.0, 1.0, tau, 0.0], Input::Constant(1.0), &TIMES), &exact, 1e-7);
 }
 
 /// Integral of a course given by its values at equal steps.

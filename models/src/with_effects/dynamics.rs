@@ -206,7 +206,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         self.force_per_rate = (0..self.disturbances.len()).map(force_per_rate).collect();
         for index in 0..self.actors.len() {
             let actor = &self.actors[index];
-            if matches!(actor.place.site, Site::Actuator { .. }) {
+            if actor.is_at_actuator() {
                 continue;
             }
             let (first, count) = actor.z;
@@ -226,8 +226,8 @@ impl<'a, S: Opening> Driven<'a, S> {
             }
             x[first..first + count].copy_from_slice(&z);
         }
-        self.update_hysteresis(0.0, &x);
-        self.settle_gaps(0.0, &x, false);
+        self.update_hysteresis(0.0, &x, |_| true);
+        self.settle_gaps(0.0, &x, |_| true);
         let before = self.commands.clone();
         self.commands.iter_mut().for_each(|command| command.pass_break(0.0));
         self.inputs(0.0, &x, &mut u);
@@ -236,13 +236,18 @@ impl<'a, S: Opening> Driven<'a, S> {
         Ok(x)
     }
 
-    /// Returns the value at an actuator or a sensor before this effect.
+    /// Returns the value at a sensor before this effect; 0 for effects elsewhere.
     fn passing(&self, index: usize, t: f64, x: &[S], u: &[S], w: &[S]) -> S {
-        match self.actors[index].place.site {
-            Site::Actuator { input } => u[input],
-            Site::Sensor { signal } => self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w }),
-            _ => S::from(0.0),
-        }
+        let Site::Sensor { signal } = self.actors[index].place.site else { return S::from(0.0) };
+        let value = self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w });
+        self.through(signal, index, value, t, x, u)
+    }
+
+    /// Returns a value of a signal after the effects at its sensor whose index is below `end`, in their order.
+    fn through(&self, signal: usize, end: usize, value: S, t: f64, x: &[S], u: &[S]) -> S {
+        let here = |actor: &&Actor<S>| matches!(actor.place.site, Site::Sensor { signal: s } if s == signal);
+        let see = |value: S, actor: &Actor<S>| actor.passed(&self.at(actor, t, x, u, value), self.states(actor, x));
+        self.actors[..end].iter().filter(here).fold(value, see)
     }
 
     /// Returns the port state that an effect receives.
@@ -278,7 +283,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         let (own, further) = dx.split_at_mut(self.own);
         self.balance(t, x, u, w, own);
         for (index, actor) in self.actors.iter().enumerate().filter(|(_, actor)| actor.z.1 > 0) {
-            // The state of an actuator effect follows its input, not its output.
+            // The states of an effect follow what reaches it.
             let value = match actor.place.site {
                 Site::Actuator { .. } => self.incoming.borrow()[index],
                 _ => self.passing(index, t, x, u, w),
@@ -440,14 +445,11 @@ impl<'a, S: Opening> Driven<'a, S> {
     /// Returns the value of a signal after the effects at its sensor whose index is below `end`.
     pub(super) fn seen(&self, signal: usize, end: usize, t: f64, x: &[S]) -> S {
         let here = |actor: &&Actor<S>| matches!(actor.place.site, Site::Sensor { signal: s } if s == signal);
-        let actors = &self.actors[..end];
         let simple = |actor: &Actor<S>| actor.place.companion.is_none();
         if let Some(state) = self.shows[signal]
-            && actors.iter().filter(here).all(simple)
+            && self.actors[..end].iter().filter(here).all(simple)
         {
-            let see =
-                |value: S, actor: &Actor<S>| actor.passed(&self.at(actor, t, x, &[], value), self.states(actor, x));
-            return actors.iter().filter(here).fold(x[state], see);
+            return self.through(signal, end, x[state], t, x, &[]);
         }
         let mut scratch = self.scratch.borrow_mut();
         let Scratch { u, w, dx, .. } = &mut *scratch;
@@ -455,8 +457,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         // Outputs may contain rates, which depend on the forces.
         self.balance(t, x, u, w, dx);
         let value = self.plant.signal(signal, &Instant { t, x: &x[..self.own], u, w });
-        let see = |value: S, actor: &Actor<S>| actor.passed(&self.at(actor, t, x, u, value), self.states(actor, x));
-        actors.iter().filter(here).fold(value, see)
+        self.through(signal, end, value, t, x, u)
     }
 
     /// Passes a break at which `due` changes what is valid from `t` on. The time of the break has the derivatives `late`: the state
@@ -468,10 +469,10 @@ impl<'a, S: Opening> Driven<'a, S> {
             shift(self, t, x, &mut rates, late);
             self.late = late;
         }
-        self.update_hysteresis(t, x);
+        self.update_hysteresis(t, x, |_| true);
         due(self);
-        self.update_hysteresis(t, x);
-        self.settle_gaps(t, x, true);
+        self.update_hysteresis(t, x, |_| true);
+        self.settle_gaps(t, x, Actor::is_at_actuator);
         if moves {
             self.late = S::from(0.0);
             shift(self, t, x, &mut rates, -late);
@@ -553,7 +554,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         let before = x[..self.own].to_vec();
         let event = EventInstant { at: Instant { t, x: &before, u: &u, w: &w }, du: &self.still, delay: self.late };
         self.plant.switch(index, &event, &mut x[..self.own]).clone_into(&mut self.happened);
-        self.settle_gaps(t, x, false);
+        self.settle_gaps(t, x, |_| true);
         &self.happened
     }
 
@@ -594,7 +595,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         let before = x[..self.own].to_vec();
         let event = EventInstant { at: Instant { t, x: &before, u: &u, w: &w }, du: &self.still, delay: self.late };
         self.plant.rest(index, &event, close, &mut x[..self.own])?.clone_into(&mut self.happened);
-        self.settle_gaps(t, x, false);
+        self.settle_gaps(t, x, |_| true);
         Ok(&self.happened)
     }
 

@@ -10,6 +10,12 @@ use super::dynamics::{Actor, Driven};
 /// 10,000 oscillations, and rounding of the value changes the rate by 1e-9 of the value per horizon.
 pub(super) const BLINK: f64 = 1e-7;
 
+/// Number of parts of a time span before time 0, at whose ends hysteresis guards are read: commands are polynomials within it.
+const RUN_UP_PARTS: f64 = 16.0;
+
+/// Width of the bracket in which a hysteresis guard crosses zero before time 0, relative to a part.
+const RUN_UP_RESOLUTION: f64 = 1e-10;
+
 impl<S: Opening> Actor<S> {
     /// Returns the output of the effect at an actuator or a sensor.
     pub(super) fn passed(&self, at: &PortState<'_, S>, z: &[S]) -> S {
@@ -19,7 +25,8 @@ impl<S: Opening> Actor<S> {
         }
     }
 
-    fn is_at_actuator(&self) -> bool {
+    /// Returns true if the effect acts at an actuator.
+    pub(super) fn is_at_actuator(&self) -> bool {
         matches!(self.place.site, Site::Actuator { .. })
     }
 }
@@ -82,11 +89,11 @@ impl<S: Opening> Driven<'_, S> {
         if actor.closed == Some(true) { -gap } else { gap }
     }
 
-    /// Finds the side of the edges on which effects are: of all at the start and after a jump of the plant state; of those at
+    /// Finds the side of their edges on which some effects are: all at the start and after a jump of the plant state; those at
     /// actuators after a jump of the command.
-    pub(super) fn settle_gaps(&mut self, t: f64, x: &[S], only_actuators: bool) {
+    pub(super) fn settle_gaps(&mut self, t: f64, x: &[S], which: impl Fn(&Actor<S>) -> bool) {
         for index in 0..self.actors.len() {
-            if only_actuators && !self.actors[index].is_at_actuator() {
+            if !which(&self.actors[index]) {
                 continue;
             }
             // The sign decides where the side is unknown.
@@ -120,13 +127,47 @@ impl<S: Opening> Driven<'_, S> {
         self.actors[index].follow(&at);
     }
 
-    /// Updates all hysteresis states, in the order of the effects.
-    pub(super) fn update_hysteresis(&mut self, t: f64, x: &[S]) {
+    /// Updates the hysteresis states of some effects, in their order.
+    pub(super) fn update_hysteresis(&mut self, t: f64, x: &[S], which: impl Fn(&Actor<S>) -> bool) {
         for index in 0..self.actors.len() {
-            if !self.actors[index].memory.is_empty() {
+            if which(&self.actors[index]) && !self.actors[index].memory.is_empty() {
                 self.update_hysteresis_of(index, t, x);
             }
         }
+    }
+
+    /// Updates the hysteresis states of the effects at actuators up to the end of a time span in which no command jumps or bends, also
+    /// where their laws change within it.
+    fn run_up(&mut self, [start, end]: [f64; 2], x: &[S]) {
+        let lowest = |of: &Self, t: f64| {
+            let acts = |(_, actor): &(usize, &Actor<S>)| actor.is_at_actuator() && !actor.memory.is_empty();
+            let guard = |(index, actor): (usize, &Actor<S>)| {
+                actor.acting.hysteresis_guard(&of.at_edge(index, t, x), &actor.memory)
+            };
+            of.actors.iter().enumerate().filter(acts).map(|e| guard(e).value()).fold(f64::INFINITY, f64::min)
+        };
+        let part = (end - start) / RUN_UP_PARTS;
+        let mut t = start;
+        while t < end {
+            // The last part ends at the end, whatever the rounding.
+            let to = if t + 1.5 * part >= end { end } else { t + part };
+            let [mut low, mut high] = [t, to];
+            if lowest(self, to) < 0.0 {
+                let near = RUN_UP_RESOLUTION * part;
+                while high - low > near {
+                    let middle = 0.5 * (low + high);
+                    if middle <= low || middle >= high {
+                        break;
+                    }
+                    *(if lowest(self, middle) < 0.0 { &mut high } else { &mut low }) = middle;
+                }
+                self.update_hysteresis(high, x, Actor::is_at_actuator);
+                // A guard that is negative again at once, by rounding, is read at the end of the part.
+                high = if high - t > 2.0 * near { high } else { to };
+            }
+            t = high;
+        }
+        self.update_hysteresis(end, x, Actor::is_at_actuator);
     }
 
     /// Moves the commands to time 0 from the left, and initialises the states and the hysteresis states of the effects at actuators, as
@@ -135,16 +176,16 @@ impl<S: Opening> Driven<'_, S> {
     /// N.B.: effects before them on the same actuator that depend on the state of the plant, or have states, are
     /// evaluated as at time 0.
     pub(super) fn start_actuators(&mut self, x: &mut [S], parameters: &[S]) {
-        let next = |of: &Self| of.commands.iter().map(Command::next_break).fold(f64::INFINITY, f64::min);
-        let first = next(self).min(0.0);
-        self.update_at_actuators(first, x);
-        while next(self) < 0.0 {
-            let t = next(self);
-            self.update_at_actuators(t, x);
+        let next = |of: &Self| of.commands.iter().map(Command::next_break).fold(0.0, f64::min);
+        let mut t = next(self);
+        self.update_hysteresis(t, x, Actor::is_at_actuator);
+        while t < 0.0 {
             self.commands.iter_mut().for_each(|command| command.pass_break(t));
-            self.update_at_actuators(t, x);
+            self.update_hysteresis(t, x, Actor::is_at_actuator);
+            let end = next(self);
+            self.run_up([t, end], x);
+            t = end;
         }
-        self.update_at_actuators(0.0, x);
         for index in (0..self.actors.len()).filter(|&index| self.actors[index].is_at_actuator()).collect::<Vec<_>>() {
             let at = self.at_edge(index, 0.0, x);
             let actor = &mut self.actors[index];
@@ -155,14 +196,6 @@ impl<S: Opening> Driven<'_, S> {
             if let (Some(output), Some(&ahead)) = (actor.memory.first_mut(), ahead.first()) {
                 *output += ahead;
                 actor.follow(&at);
-            }
-        }
-    }
-
-    fn update_at_actuators(&mut self, t: f64, x: &[S]) {
-        for index in 0..self.actors.len() {
-            if self.actors[index].is_at_actuator() && !self.actors[index].memory.is_empty() {
-                self.update_hysteresis_of(index, t, x);
             }
         }
     }

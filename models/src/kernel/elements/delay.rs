@@ -60,12 +60,14 @@ pub struct Restart<S> {
     pub derivative: Option<u8>,
     /// Derivatives of its time along the directions of the scalar, with value 0.
     pub moves: S,
+    /// True if a jump of `u` itself moves with it; otherwise such a jump has another cause, at a fixed time.
+    pub jumps: bool,
 }
 
 impl<S: Scalar> Restart<S> {
     /// Restart at a fixed time.
     pub fn fixed() -> Self {
-        Self { derivative: None, moves: S::from(0.0) }
+        Self { derivative: None, moves: S::from(0.0), jumps: false }
     }
 }
 
@@ -162,7 +164,7 @@ impl<S: Scalar> Delay<S> {
         let length = length.min(end - start);
         let off = |k: usize| (now[k] - last[k]).abs();
         let is_of_value = off(0) > JUMP * last[0].abs().max(now[0].abs());
-        if let Some(Restart { derivative, moves }) = self.restart.take() {
+        if let Some(Restart { derivative, moves, jumps }) = self.restart.take() {
             let found =
                 match [is_of_value, off(1) * length > BENDS[0] * error, off(2) * length * length > BENDS[1] * error] {
                     [true, ..] => Some(0),
@@ -172,6 +174,7 @@ impl<S: Scalar> Delay<S> {
                 };
             let known = derivative.filter(|&derivative| derivative <= HIGHEST);
             if let Some(derivative) = found.into_iter().chain(known).min() {
+                let moves = if derivative == 0 && !jumps { S::from(0.0) } else { moves };
                 let moves = moves + (self.time - self.time.value());
                 self.ahead.push_back(Arrival { time: start + self.time.value(), moves, derivative });
                 piece.jumps = true;
@@ -222,29 +225,34 @@ pub(crate) fn pass_delays<S: Scalar, P: Plant<S>>(
     x: &mut [S],
 ) -> S {
     let mut first: Option<Arrival<S>> = None;
+    let mut jumps = vec![false; delays(plant).len()];
     for k in 0..delays(plant).len() {
         let moves = S::DIRECTIONS > 0 && delays(plant)[k].jumps_at(at.t);
-        let rates = |plant: &P, x: &[S]| {
-            let mut rates = x.to_vec();
-            plant.rates(&Instant { x, ..*at }, &mut rates);
-            rates
+        let look = |plant: &P, x: &[S]| {
+            let (at, mut rates) = (Instant { x, ..*at }, x.to_vec());
+            plant.rates(&at, &mut rates);
+            (rates, plant.past(&at))
         };
-        let before = moves.then(|| rates(plant, x));
+        let before = moves.then(|| look(plant, x));
         let Some(arrival) = delays(plant)[k].pass_break(at.t) else { continue };
         if first.is_none_or(|first| arrival.derivative < first.derivative) {
             first = Some(arrival);
         }
-        let Some(before) = before else { continue };
+        let Some((before, past_before)) = before else { continue };
         settle(plant, &Instant { x, ..*at });
-        let after = rates(plant, x);
+        let (after, past) = look(plant, x);
         for ((x, before), after) in x.iter_mut().zip(before).zip(after) {
             *x += arrival.moves * (before.value() - after.value());
+        }
+        for ((jumps, before), after) in jumps.iter_mut().zip(past_before).zip(past) {
+            *jumps |= before.value() != after.value();
         }
     }
     let moves = first.map_or(S::from(0.0), |arrival| arrival.moves);
     // A jump that arrives in the rates is one derivative higher in the states.
-    let restart = Restart { derivative: first.map(|arrival| arrival.derivative + 1), moves };
-    delays(plant).iter_mut().for_each(|delay| delay.restart(restart));
+    let derivative = first.map(|arrival| arrival.derivative + 1);
+    let restart = |jumps: bool| Restart { derivative, moves, jumps };
+    delays(plant).iter_mut().zip(jumps).for_each(|(delay, jumps)| delay.restart(restart(jumps)));
     moves
 }
 

@@ -252,7 +252,7 @@ impl<S: Scalar> Dynamics<S> for Delayed<S> {
     }
     fn pass_break(&mut self, t: f64, _: &mut [S]) -> S {
         let derivative = self.0.pass_break(t).map(|arrival| arrival.derivative + 1);
-        self.0.restart(Restart { derivative, moves: S::from(0.0) });
+        self.0.restart(Restart { derivative, moves: S::from(0.0), jumps: true });
         S::from(0.0)
     }
     fn remembers(&self) -> bool {
