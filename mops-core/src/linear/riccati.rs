@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::controllability::{Scaled, Staircase};
+use super::controllability::Scaled;
 use super::{Complex, Schur, eigenvalues, lyapunov, undecided};
 
 /// Relative residual up to which a Riccati equation counts as solved.
@@ -44,9 +44,7 @@ pub fn riccati(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix
     let scaled = Scaled::of(a, b);
     let weighted = Scaled::of(&a.transpose(), q);
     let size = |scaled: &Scaled| UNDECIDED * scaled.a.norm();
-    if Staircase::of(&scaled).leaves_unstable(size(&scaled))?
-        || Staircase::of(&weighted).leaves_undamped(size(&weighted))?
-    {
+    if scaled.leaves_unstable(size(&scaled))? || weighted.leaves_undamped(size(&weighted))? {
         return Err(no_solution());
     }
     // In the scaled system B R^-1 B^T is D^-1 (B R^-1 B^T) D^-1, and Q is D Q D.
