@@ -13,7 +13,7 @@ use crate::common::{Channel, LinearCriterion, Values};
 /// Equals the square root of the integrated square of the impulse response. The unit is that of the output divided
 /// by that of the input, times s^(-1/2), which is omitted.
 ///
-/// Of a sampled system it is `sqrt(T/(2 pi) integral |G(e^(j w T))|^2 dw)` up to half of the sampling frequency, with the period T: the
+/// Of a sampled system it is `sqrt(T/(2 pi) integral |G(e^(j w T))|^2 dw)` over w from -pi/T to pi/T, with the period T: the
 /// root mean square of the output for independent samples of unit variance at the input, such as measurement noise.
 ///
 /// The norm is computed from both Gramians, which must agree. Less is better. Range: from 0 up. There is no value if

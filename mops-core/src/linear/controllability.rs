@@ -8,8 +8,12 @@ use super::{Complex, eigenvalues};
 /// Singular value, relative to the norm of the scaled system, below which an influence counts as zero.
 const SMALL: f64 = 1e-12;
 
-/// Largest number of turns to the nearest mode that the inputs do not reach; each halves the distance at a double one.
+/// Largest number of turns to the nearest mode that the inputs do not reach. Towards a mode of multiplicity k, the singular value falls by
+/// `(1 - 1/k)^k`, which is at most 1/e, so that these reach the rounding error.
 const TURNS: usize = 40;
+
+/// Ratio of the singular values of successive turns above which they do not tend to zero: above 1/e.
+const FALLING: f64 = 0.7;
 
 /// System `x' = A x + B u` with states and inputs scaled to similar magnitude, so that entries are comparable.
 #[derive(Debug, Clone)]
@@ -70,8 +74,8 @@ impl Scaled {
 
     /// Returns the norm of the smallest change of `A` and `B` after which the inputs leave a mode near this one, and that mode.
     ///
-    /// It is the smallest singular value of `[A - s, B]`, at a local minimum over s, or over s on the imaginary axis: with its left
-    /// vector y, `y^H A y` is the best s, and so on in turns.
+    /// It is the smallest singular value of `[A - s, B]`, over s near the mode, or over s on the imaginary axis (Eising). In turns, a
+    /// unit vector y with the least `|y^H [A - s, B]|` is sought for s, and the best s for y, which is `y^H A y`.
     ///
     /// Source: R. Eising, Between controllable and uncontrollable, Systems & Control Letters 4 (1984) 263-264.
     fn left(&self, mode: Complex, on_axis: bool) -> (f64, Complex) {
@@ -87,10 +91,13 @@ impl Scaled {
             let svd = both.svd(true, false);
             let (least, &value) =
                 svd.singular_values.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1)).expect("a state");
-            if value.is_nan() || value >= best.0 {
+            let falls = value < FALLING * best.0;
+            if value < best.0 {
+                best = (value, next);
+            }
+            if !falls {
                 break;
             }
-            best = (value, next);
             let y = svd.u.expect("the SVD computes U").column(least).into_owned();
             next = allowed(y.dotc(&(&a * &y)));
         }

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use super::Complex;
 use super::components::strong_components;
-use super::extended::{Real, extended, rounded};
+use super::extended::{Entry, Extended, Real, extended, rounded};
 use super::qr_steps::{hessenberg, hessenberg_eigenvalues};
 use crate::math;
 
@@ -21,6 +21,15 @@ use crate::math;
 /// If an entry is not finite or, very rarely, the QR steps do not converge.
 pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex>, String> {
     eigenvalues_of(&extended(a), f64::EPSILON)
+}
+
+/// Returns the eigenvalues of the given numbers as they stand: none is zero because the rounding of the entries explains it, see
+/// [`eigenvalues`].
+///
+/// # Errors
+/// See [`eigenvalues`].
+pub(super) fn eigenvalues_as_given(a: &DMatrix<f64>) -> Result<Vec<Complex>, String> {
+    eigenvalues_of(&extended(a), Extended::EPSILON)
 }
 
 /// Returns the eigenvalues of a square matrix with the digits of its entries, whose relative rounding error is given, see

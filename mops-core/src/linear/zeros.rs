@@ -13,6 +13,9 @@ use crate::math;
 /// rounding, which is `2^-53/sqrt(3)`.
 const GIVEN: f64 = 1e-14;
 
+/// Relative error of the computation itself, up to which sums of numbers that count as exact are zero: some hundred roundings.
+const COMPUTED: f64 = 100.0 * <Extended as Entry>::EPSILON;
+
 /// Matrix with twice the digits.
 type Matrix = DMatrix<Extended>;
 
@@ -25,8 +28,9 @@ struct Known {
 }
 
 impl Known {
-    fn given(m: &DMatrix<f64>) -> Self {
-        Self { entries: extended(m), squares: m.map(|x| GIVEN * x * GIVEN * x) }
+    /// Wraps a given matrix, with this relative error of its entries.
+    fn given(m: &DMatrix<f64>, rounding: f64) -> Self {
+        Self { entries: extended(m), squares: m.map(|x| rounding * x * rounding * x) }
     }
 
     fn map(&self, entries: impl Fn(&Matrix) -> Matrix, squares: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
@@ -101,11 +105,23 @@ struct Quadruple {
 /// # Errors
 /// If an entry is not finite.
 pub fn zeros(system: &StateSpace) -> Result<Vec<Complex>, String> {
+    zeros_up_to(system, GIVEN)
+}
+
+/// Returns the zeros of the given numbers as they stand, also those that only their rounding causes, far above all poles. See [`zeros`].
+///
+/// # Errors
+/// See [`zeros`].
+pub(super) fn zeros_as_given(system: &StateSpace) -> Result<Vec<Complex>, String> {
+    zeros_up_to(system, COMPUTED)
+}
+
+fn zeros_up_to(system: &StateSpace, rounding: f64) -> Result<Vec<Complex>, String> {
     let StateSpace { a, b, c, d, .. } = system;
     if [a, b, c, d].iter().any(|m| m.iter().any(|x| !x.is_finite())) {
         return Err("a system with an entry that is not finite has no zeros".to_owned());
     }
-    let [a, b, c, d] = balanced([a, b, c, d].map(DMatrix::clone)).map(|m| Known::given(&m));
+    let [a, b, c, d] = balanced([a, b, c, d].map(DMatrix::clone)).map(|m| Known::given(&m, rounding));
     let Quadruple { a, b, c, d } = Quadruple { a, b, c, d }.reduced().transposed().reduced().transposed();
     let [a, b, c, d] = [a, b, c, d].map(|known| known.entries);
     if a.nrows() == 0 || d.is_empty() {
