@@ -450,7 +450,8 @@ fn low_passes_given_in_s_have_gain_one_and_their_bandwidth_at_fast_sampling() {
         })
     };
     let folder = tempfile::tempdir().unwrap();
-    for (denominator, hertz, rate) in [(third as fn(f64) -> Vec<f64>, 0.05, 5e3), (sixth, 1.0, 1e3), (sixth, 1.0, 1e4)] {
+    for (denominator, hertz, rate) in [(third as fn(f64) -> Vec<f64>, 0.05, 5e3), (sixth, 1.0, 1e3), (sixth, 1.0, 1e4)]
+    {
         let below = denominator(std::f64::consts::TAU * hertz);
         let text = format!(
             "[study]\nname = 'filter'\n\
