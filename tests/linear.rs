@@ -432,3 +432,45 @@ fn a_parameter_without_a_value_may_be_set_by_the_command() {
     assert!(set.lines().any(|line| line.split_whitespace().collect::<Vec<_>>() == ["-2", "1", "2", "0.5"]), "{set}");
     assert!(linearise(&[]).contains("the parameter `T` has no value"));
 }
+
+#[test]
+fn low_passes_given_in_s_have_gain_one_and_their_bandwidth_at_fast_sampling() {
+    // Butterworth filters of order 3 and 6 with cut-off w: products of s^2/w^2 + 2 d s/w + 1, and s/w + 1.
+    let third = |w: f64| vec![1.0 / (w * w * w), 2.0 / (w * w), 2.0 / w, 1.0];
+    let sixth = |w: f64| {
+        let dampings = [1.0, 3.0, 5.0].map(|k| math::sin(std::f64::consts::PI * k / 12.0));
+        dampings.iter().fold(vec![1.0], |all, damping| {
+            let mut product = vec![0.0; all.len() + 2];
+            for (i, x) in all.iter().enumerate() {
+                for (j, y) in [1.0 / (w * w), 2.0 * damping / w, 1.0].iter().enumerate() {
+                    product[i + j] += x * y;
+                }
+            }
+            product
+        })
+    };
+    let folder = tempfile::tempdir().unwrap();
+    for (denominator, hertz, rate) in [(third as fn(f64) -> Vec<f64>, 0.05, 5e3), (sixth, 1.0, 1e3), (sixth, 1.0, 1e4)]
+    {
+        let below = denominator(std::f64::consts::TAU * hertz);
+        let text = format!(
+            "[study]\nname = 'filter'\n\
+             [models.f.equations]\nstates = {{ x = '1' }}\ninputs = {{ r = '1' }}\nder = {{ x = '(u - x)/1 [s]' }}\nhorizon = 1.0\n\
+             clocks.c.every = {:?}\nclocks.c.memory = {{ u = '1' }}\n\
+             clocks.c.filter.u = {{ of = 'r', continuous = {{ numerator = [1], denominator = {below:?} }} }}\n\
+             [models.lin]\nlike = 'f'\nlinearise = {{ outputs = ['u'] }}\n\
+             [criteria]\nhinf = {{ model = 'lin', hinf-norm = {{}}, usage = 'monitor' }}\n\
+             bw = {{ model = 'lin', bandwidth = {{}}, unit = 'Hz', usage = 'monitor' }}\n",
+            1.0 / rate
+        );
+        let printed = mops(&["simulate", &study(folder.path(), &text)]).output().unwrap();
+        let printed = String::from_utf8(printed.stdout).unwrap();
+        let image = rate / std::f64::consts::PI * math::atan(std::f64::consts::PI * hertz / rate);
+        for (name, expected) in [("hinf", 1.0), ("bw", image)] {
+            let row = printed.lines().find(|line| line.split_whitespace().nth(1) == Some(name)).expect("a row");
+            let value = row.split_whitespace().nth(3).and_then(|x| x.parse::<f64>().ok());
+            // Six digits are printed.
+            assert!(value.is_some_and(|value| (value - expected).abs() < 1e-5 * expected), "at {rate} Hz: {printed}");
+        }
+    }
+}

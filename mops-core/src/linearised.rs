@@ -327,9 +327,17 @@ impl Linearised {
         }
         point.resize(point.len() + delays.len(), 0.0);
         let here = self.local(parameters, &mut point, &ties)?;
-        let rough = self.rough(&point, &here, |point| self.evaluate(parameters, point).ok());
-        let Local { mut rates, slopes, frictionless, .. } = here;
         let clocks = self.model.clocks(parameters)?;
+        let rough = self.rough(&point, &here, &clocks, |point| self.evaluate(parameters, point).ok());
+        let Local { mut rates, slopes, frictionless, limited, .. } = here;
+        // A limit of what follows the cut variable at once opens the loop there, whatever else acts beside it, such as anti-windup.
+        let follows = |slopes: &[f64]| self.cut.iter().any(|[input, _]| slopes[n + input] != 0.0);
+        if let Some((place, _)) = limited.iter().find(|(_, slopes)| follows(slopes)) {
+            return Err(Failure::Undefined(format!(
+                "a limit is active at the operating point ({place}), so that the loop is open there and has no margins; choose an \
+                 operating point within the limits"
+            )));
+        }
         let system = self.system(&slopes, &delays, &clocks).map_err(Failure::Undefined)?;
         if !self.cut.is_empty()
             && let Some(open) = system.without_path().map_err(Failure::Undefined)?
@@ -349,14 +357,21 @@ impl Linearised {
     }
 
     /// Returns the rates and outputs of the system that are not differentiable at a point.
-    fn rough(&self, point: &[f64], here: &Local, local: impl Fn(&[f64]) -> Option<Local>) -> Vec<Rough> {
+    fn rough(
+        &self,
+        point: &[f64],
+        here: &Local,
+        clocks: &[Clock],
+        local: impl Fn(&[f64]) -> Option<Local>,
+    ) -> Vec<Rough> {
         let n = self.states.len();
         let values = |at: &Local| [&at.rates[..], &at.signals, &at.past].concat();
         let of = self.model.interface();
         let delayed = |first: usize| first..first + here.past.len();
         let rows = (0..n).chain(self.outputs.iter().map(|i| n + i)).chain(delayed(n + of.signals.len()));
         let columns = (0..n).chain(self.inputs.iter().map(|j| n + j)).chain(delayed(n + of.inputs.len()));
-        let at = Point { x: point, values: &values(here), slopes: &here.slopes };
+        let changes: Vec<_> = clocks.iter().map(|clock| clock.memory.clone()).collect();
+        let at = Point { x: point, values: &values(here), slopes: &here.slopes, changes: &changes };
         let find = |point: &[f64]| local(point).map(|local| values(&local));
         let found = at.rough(find, &rows.collect::<Vec<_>>(), &columns.collect::<Vec<_>>());
         let name = |index: usize, others: &[Variable]| {
@@ -503,6 +518,7 @@ mod tests {
                 slopes: DMatrix::from_fn(4, 3, |i, j| slopes[i][j]),
                 past: Vec::new(),
                 frictionless: Vec::new(),
+                limited: Vec::new(),
             }))
         }
     }

@@ -299,6 +299,8 @@ pub struct Local {
     pub slopes: DMatrix<f64>,
     /// Joints whose dry friction is omitted, as names of their positions: dry friction at rest has no derivative.
     pub frictionless: Vec<String>,
+    /// Quantities beyond an active limit, by the place of the limit, with their derivatives with respect to the columns of `slopes`.
+    pub limited: Vec<(String, Vec<f64>)>,
 }
 
 /// An analysis and its directional derivatives: one analysis of the same form per direction.

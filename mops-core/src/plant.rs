@@ -197,6 +197,11 @@ pub trait Plant<S: Scalar> {
         Ok(Vec::new())
     }
 
+    /// Returns the quantities that are limited at a point, by the places of their limits. The mode for linearisation was entered.
+    fn limited(&self, _at: &Instant<'_, S>) -> Vec<(String, S)> {
+        Vec::new()
+    }
+
     /// Returns the typical magnitude of a state, in its unit; `None` if only the simulation can determine it.
     fn scale(&self, _state: usize) -> Option<f64> {
         None
@@ -303,6 +308,9 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Plant<S> for Box<P> {
     }
     fn linearised_at(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<Vec<usize>, Failure> {
         (**self).linearised_at(at, at_rest)
+    }
+    fn limited(&self, at: &Instant<'_, S>) -> Vec<(String, S)> {
+        (**self).limited(at)
     }
     fn scale(&self, state: usize) -> Option<f64> {
         (**self).scale(state)

@@ -199,7 +199,7 @@ pub fn capped(margin: f64, most: f64) -> Value {
 pub fn poles(system: &StateSpace, of: Of) -> Result<Vec<mops_core::linear::Complex>, String> {
     let poles = match of {
         Of::System => system.poles()?,
-        Of::ClosedLoop => system.complementary_sensitivity()?.poles()?,
+        Of::ClosedLoop => system.closed_loop_poles(1.0)?,
     };
     if poles.is_empty() { Err("the system has no poles".to_owned()) } else { Ok(poles) }
 }

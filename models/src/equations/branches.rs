@@ -5,7 +5,7 @@ use mops_core::expression::{Comparison, Form, Function, Node};
 
 use super::definition::{Text, under};
 use super::graph::{Id, Level, Op};
-use super::lower::{Kinks, Lowering, Order, Switch};
+use super::lower::{Kinks, Limit, Lowering, Order, Switch};
 
 impl Lowering<'_> {
     pub(super) fn call(
@@ -65,6 +65,10 @@ impl Lowering<'_> {
             }
             Function::Clip | Function::Deadzone => {
                 let (low, high) = (values[1], values[2]);
+                if function == Function::Clip {
+                    let what = format!("`clip` in {}", text.path.join("."));
+                    self.limits.push(Limit { of: x, low, high, what });
+                }
                 let (above, below) = (self.at_least(x, low, kinks), self.at_least(high, x, kinks));
                 let (inside, over, under) = if function == Function::Clip {
                     (x, high, low)

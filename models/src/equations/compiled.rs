@@ -104,6 +104,8 @@ pub struct Compiled {
     pub switches: Vec<Switch>,
     /// Arguments that must increase: description and whether strictly; computes pairs of low and high.
     pub orders: (Vec<(String, bool)>, Program),
+    /// Places of limits; computes what is limited with its lower and upper limit.
+    pub limits: (Vec<String>, Program),
     /// Joints with dry friction.
     pub joints: Vec<Joint>,
     /// Events.
@@ -155,6 +157,7 @@ impl Compiled {
             wanted.push(vec![graph.sub(switch.left, switch.right), switch.right]);
         }
         wanted.push(system.orders.iter().flat_map(|order| [order.low, order.high]).collect());
+        wanted.push(system.limits.iter().flat_map(|limit| [limit.of, limit.low, limit.high]).collect());
         for c in &system.contacts {
             wanted.push(vec![c.torque, c.limit, c.coulomb, system.derivatives[c.velocity]]);
         }
@@ -186,6 +189,7 @@ impl Compiled {
             system.switches.iter().map(|s| Switch { mode: s.mode, strict: s.strict, jumps: s.jumps, sides: next() });
         let switches = switches.collect();
         let orders = (system.orders.iter().map(|order| (order.what.clone(), order.strict)).collect(), next());
+        let limits = (system.limits.iter().map(|limit| limit.what.clone()).collect(), next());
         let joint = |contact: &Contact, balance| Joint {
             contact: *contact,
             balance,
@@ -240,6 +244,7 @@ impl Compiled {
             signals,
             switches,
             orders,
+            limits,
             joints,
             happenings,
             clocks,

@@ -435,12 +435,41 @@ impl Definition {
             let names = self.lets.iter().map(|(name, _)| name.as_str()).chain(memory);
             return Err(StudyError::here(fact).with_help(suggestion(variable, names)));
         };
+        if let Some(state) = self.continuous_state_within(index).filter(|_| !self.clocks.is_empty()) {
+            let fact = format!(
+                "`{variable}` follows the state `{state}` between the instants of the clocks, so that the loop cut there is not \
+                 time-invariant"
+            );
+            let memory: Vec<String> =
+                self.states[self.continuous..].iter().map(|state| format!("`{}`", state.name)).collect();
+            return Err(
+                StudyError::here(fact).with_help(format!("cut it at the memory of a clock: {}", memory.join(", ")))
+            );
+        }
         let (name, text) = self.lets.remove(index);
         let shown = self.outputs.iter().position(|(output, _)| output.name == name);
         let shown = shown.map(|k| self.outputs.remove(k).0.unit);
         let unit = shown.or(unit).map_or_else(Unit::one, |unit| unit.difference());
         self.add_cut(&name, &unit, text);
         Ok(())
+    }
+
+    /// Returns the name of a continuous state on which a named expression depends, by others if need be.
+    fn continuous_state_within(&self, index: usize) -> Option<&str> {
+        let mut seen = vec![false; self.lets.len()];
+        let mut open = vec![index];
+        let mut found = None;
+        while let Some(index) = open.pop() {
+            if std::mem::replace(&mut seen[index], true) {
+                continue;
+            }
+            self.lets[index].1.equation.right.walk(&mut |node| {
+                let Form::Name(name) = &node.form else { return };
+                found = found.or_else(|| self.states[..self.continuous].iter().find(|state| state.name == *name));
+                open.extend(self.lets.iter().position(|(other, _)| other == name));
+            });
+        }
+        found.map(|state| state.name.as_str())
     }
 
     /// Cuts the loop at the memory of a clock, which keeps its value under another name. Its own next value is computed from it, for

@@ -1,7 +1,7 @@
 //! Filters of clocks: transfer functions as difference equations of their memory.
 
-use mops_core::linear::{StateSpace, TransferFunction, exponential};
-use mops_core::{Quantity, StudyError, Unit};
+use mops_core::linear::{TransferFunction, exponential_m1};
+use mops_core::{Quantity, StudyError, Unit, math};
 use nalgebra::DMatrix;
 
 use super::definition::{path, under};
@@ -9,11 +9,6 @@ use super::options::{Clock, Described, EquationsOptions, Filter, Formula, Method
 use mops_core::file::Short;
 
 /// Returns the options with each filter replaced by memory and its next values.
-///
-/// The filter `y(z) = (b0 + b1/z + ..)/(1 + a1/z + ..) e(z)` is in the transposed direct form II: `y = b0 e + m1`, then
-/// `m1 = b1 e - a1 y + m2` and so on.
-///
-/// Source: A. V. Oppenheim, R. W. Schafer, Discrete-Time Signal Processing, 3rd edition (2010), section 6.3.4.
 pub(super) fn expanded(mut options: EquationsOptions) -> Result<EquationsOptions, StudyError> {
     for (name, clock) in &mut options.clocks.0 {
         for (output, filter) in std::mem::take(&mut clock.filter.0) {
@@ -22,6 +17,36 @@ pub(super) fn expanded(mut options: EquationsOptions) -> Result<EquationsOptions
         }
     }
     Ok(options)
+}
+
+/// Loss of digits from the coefficients of a filter in z to its gain at frequency 0 from which on the model has a note.
+const LOSS: f64 = 1e6;
+
+/// Returns what the digits of the filters are worth that are given in z with numbers, where they lose many.
+pub(super) fn notes(options: &EquationsOptions) -> Vec<String> {
+    let filters = options.clocks.0.iter().flat_map(|(_, clock)| &clock.filter.0);
+    let lost = filters.filter_map(|(name, filter)| {
+        let below = filter.z.as_ref()?.denominator.iter().map(|c| c.0.trim().parse::<f64>());
+        let below = below.collect::<Result<Vec<f64>, _>>().ok()?;
+        let (sum, terms) = below.iter().fold((0.0f64, 0.0), |(sum, terms), c| (sum + c, terms + c.abs()));
+        // Poles at z = 1 are integrators.
+        (sum != 0.0 && terms > LOSS * sum.abs()).then(|| {
+            let digits = (-math::log10(f64::EPSILON * terms / sum.abs())).floor().max(0.0);
+            format!(
+                "filter `{name}`: its coefficients in z, with 16 digits, determine its gain at low frequencies to {digits:.0} digits; \
+                 `continuous` keeps them all"
+            )
+        })
+    });
+    lost.collect()
+}
+
+/// Difference equations of a filter, as expressions of its memory.
+struct Difference {
+    /// Next values of the memory.
+    next: Vec<String>,
+    /// Output.
+    value: String,
 }
 
 fn add(clock: &mut Clock, output: &str, filter: &Filter) -> Result<(), StudyError> {
@@ -35,45 +60,55 @@ fn add(clock: &mut Clock, output: &str, filter: &Filter) -> Result<(), StudyErro
         let fact = format!("`{output}` has a new value in `next` as well as by its filter");
         return Err(StudyError::here(fact).with_help("remove one of them"));
     }
-    let [above, below] = coefficients(clock, filter)?;
-    let order = below.len() - 1;
-    let e = format!("({})", filter.of.0);
-    let scaled =
-        |coefficient: &Option<String>| coefficient.as_ref().map(|c| format!("({c})*{e}/({})", leading(&below)));
     let memory = |k: usize| format!("{output}_{k}");
-    let direct = scaled(&above[0]);
-    let value = match (direct, order) {
-        (Some(direct), 0) => direct,
-        (Some(direct), _) => format!("{direct} + {}", memory(1)),
-        (None, 0) => format!("0*{e}"),
-        (None, _) => memory(1),
-    };
-    for k in 1..=order {
-        let mut next: Vec<String> = scaled(&above[k]).into_iter().collect();
-        if k < order {
-            next.push(memory(k + 1));
-        }
-        let back = below[k].as_ref().map(|a| format!("({a})/({})*({value})", leading(&below)));
-        let next = match (next.join(" + "), back) {
-            (next, Some(back)) if next.is_empty() => format!("-{back}"),
-            (next, Some(back)) => format!("{next} - {back}"),
-            (next, None) if next.is_empty() => format!("0*({value})"),
-            (next, None) => next,
-        };
-        let about = Some(format!("memory {k} of the filter {output}"));
-        clock.memory.0.push((memory(k), Short(Described { unit: unit.clone(), about })));
-        clock.next.0.push((memory(k), Formula(next)));
+    let Difference { next, value } = difference(clock, filter, &memory)?;
+    for (k, next) in next.into_iter().enumerate() {
+        let about = Some(format!("memory {} of the filter {output}", k + 1));
+        clock.memory.0.push((memory(k + 1), Short(Described { unit: unit.clone(), about })));
+        clock.next.0.push((memory(k + 1), Formula(next)));
     }
     clock.next.0.push((output.to_owned(), Formula(value)));
     Ok(())
 }
 
+/// Returns the difference equations of `y(z) = (b0 + b1/z + ..)/(1 + a1/z + ..) e(z)` in the transposed direct form II: `y = b0 e + m1`,
+/// then `m1 = b1 e - a1 y + m2` and so on. The coefficients are in descending powers of z, of equal number; `None` for zero.
+///
+/// Source: A. V. Oppenheim, R. W. Schafer, Discrete-Time Signal Processing, 3rd edition (2010), section 6.3.4.
+fn direct_form(above: &[Option<String>], below: &[Option<String>], e: &str, memory: Memory<'_>) -> Difference {
+    let order = below.len() - 1;
+    let scaled = |coefficient: &Option<String>| coefficient.as_ref().map(|c| format!("({c})*{e}/({})", leading(below)));
+    let value = match (scaled(&above[0]), order) {
+        (Some(direct), 0) => direct,
+        (Some(direct), _) => format!("{direct} + {}", memory(1)),
+        (None, 0) => format!("0*{e}"),
+        (None, _) => memory(1),
+    };
+    let next = |k: usize| {
+        let mut next: Vec<String> = scaled(&above[k]).into_iter().collect();
+        if k < order {
+            next.push(memory(k + 1));
+        }
+        let back = below[k].as_ref().map(|a| format!("({a})/({})*({value})", leading(below)));
+        match (next.join(" + "), back) {
+            (next, Some(back)) if next.is_empty() => format!("-{back}"),
+            (next, Some(back)) => format!("{next} - {back}"),
+            (next, None) if next.is_empty() => format!("0*({value})"),
+            (next, None) => next,
+        }
+    };
+    Difference { next: (1..=order).map(next).collect(), value }
+}
+
+/// Returns the name of a memory of a filter, by its number from 1 on.
+type Memory<'a> = &'a dyn Fn(usize) -> String;
+
 fn leading(below: &[Option<String>]) -> &str {
     below[0].as_deref().expect("the leading coefficient is not zero")
 }
 
-/// Returns the coefficients of numerator and denominator in descending powers of z, of equal number; `None` for zero.
-fn coefficients(clock: &Clock, filter: &Filter) -> Result<[Vec<Option<String>>; 2], StudyError> {
+fn difference(clock: &Clock, filter: &Filter, memory: Memory<'_>) -> Result<Difference, StudyError> {
+    let e = format!("({})", filter.of.0);
     match (&filter.z, &filter.continuous) {
         (Some(z), None) => {
             if let Some(key) =
@@ -86,14 +121,15 @@ fn coefficients(clock: &Clock, filter: &Filter) -> Result<[Vec<Option<String>>; 
             checked(z, "z")?;
             let below: Vec<Option<String>> = z.denominator.iter().map(text).collect();
             let padding = below.len() - z.numerator.len();
-            let above = std::iter::repeat_n(None, padding).chain(z.numerator.iter().map(text)).collect();
-            Ok([above, below])
+            let above: Vec<Option<String>> =
+                std::iter::repeat_n(None, padding).chain(z.numerator.iter().map(text)).collect();
+            Ok(direct_form(&above, &below, &e, memory))
         }
         (None, Some(continuous)) => {
             checked(continuous, "continuous")?;
             match filter.method.unwrap_or(Method::Tustin) {
-                Method::Tustin => bilinear(clock, filter, continuous),
-                Method::ZeroOrderHold => step_invariant(clock, filter, continuous),
+                Method::Tustin => bilinear(clock, filter, continuous, &e, memory),
+                Method::ZeroOrderHold => step_invariant(clock, filter, continuous, &e, memory),
             }
         }
         _ => Err(StudyError::here("a filter is given in `z` or as `continuous`")
@@ -118,22 +154,28 @@ fn checked(of: &Polynomials, key: &str) -> Result<(), StudyError> {
     Ok(())
 }
 
-/// Returns the coefficients of `(z - 1)^power (z + 1)^(order - power)` in descending powers of z.
-fn binomials(power: usize, order: usize) -> Vec<i64> {
-    (0..order).fold(vec![1], |polynomial, k| {
-        let root = if k < power { -1 } else { 1 };
-        let shifted = polynomial.iter().map(|c| c * root);
-        let mut product = [&polynomial[..], &[0]].concat();
-        product[1..].iter_mut().zip(shifted).for_each(|(c, shifted)| *c += shifted);
-        product
-    })
-}
-
 /// Returns the bilinear (Tustin) transform: `s = K (z - 1)/(z + 1)` with `K = 2/T`, or `K = w/tan(w T/2)`, so that the gain at the
 /// angular frequency `w` is that of the continuous filter.
 ///
-/// Source: K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd edition (1997), section 8.3.
-fn bilinear(clock: &Clock, filter: &Filter, of: &Polynomials) -> Result<[Vec<Option<String>>; 2], StudyError> {
+/// The filter `(b0 s^n + b1 s^(n-1) + ..)/(a0 s^n + ..)` is a chain of integrators in observer form, integrated by the trapezoidal rule.
+/// With `B_k = (b_k K^(n-k) + .. + b_n)/S`, `A_k` alike of the denominator and `S` so that `A_0 = 1`, it is
+///
+/// ```text
+/// y = B_0 e + m1 + .. + mn,   mk[next] = mk + 2 (B_k e - A_k y + m(k+1) + .. + mn)
+/// ```
+///
+/// The memory changes by small amounts where the sampling is fast. The coefficients of the polynomials in z would lose digits there, all
+/// beyond `1e-16/(w T)^n`.
+///
+/// Sources: K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd edition (1997), section 8.3; G. C. Goodwin, R. H. Middleton,
+/// H. V. Poor, High-speed digital signal processing and control, Proceedings of the IEEE 80 (1992) 240-259 (changes, not shifts).
+fn bilinear(
+    clock: &Clock,
+    filter: &Filter,
+    of: &Polynomials,
+    e: &str,
+    memory: Memory<'_>,
+) -> Result<Difference, StudyError> {
     let period = in_brackets(&clock.every);
     let factor = match &filter.prewarp {
         None => format!("(2/{period})"),
@@ -143,22 +185,42 @@ fn bilinear(clock: &Clock, filter: &Filter, of: &Polynomials) -> Result<[Vec<Opt
         }
     };
     let order = of.denominator.len() - 1;
-    let transformed = |coefficients: &[Formula]| -> Vec<Option<String>> {
+    // Sums of the last terms, from each power on; `None` for zero.
+    let sums = |coefficients: &[Formula]| -> Vec<Option<String>> {
         let highest = coefficients.len() - 1;
-        let mut sums = vec![Vec::new(); order + 1];
-        for (index, coefficient) in coefficients.iter().enumerate().filter(|(_, c)| !is_zero(c)) {
+        let terms = coefficients.iter().enumerate().map(|(index, coefficient)| {
             let power = highest - index;
             let term = match power {
                 0 => format!("({})", coefficient.0),
                 _ => format!("({})*{factor}^{power}", in_seconds(coefficient, power)),
             };
-            for (sum, count) in sums.iter_mut().zip(binomials(power, order)).filter(|(_, count)| *count != 0) {
-                sum.push(format!("({count})*{term}"));
-            }
-        }
-        sums.into_iter().map(|terms| (!terms.is_empty()).then(|| terms.join(" + "))).collect()
+            (!is_zero(coefficient)).then_some(term)
+        });
+        let terms: Vec<Option<String>> = std::iter::repeat_n(None, order - highest).chain(terms).collect();
+        let sum = |from: usize| {
+            let terms: Vec<&str> = terms[from..].iter().flatten().map(String::as_str).collect();
+            (!terms.is_empty()).then(|| terms.join(" + "))
+        };
+        (0..=order).map(sum).collect()
     };
-    Ok([transformed(&of.numerator), transformed(&of.denominator)])
+    let (above, below) = (sums(&of.numerator), sums(&of.denominator));
+    let all = leading(&below);
+    let memories = |from: usize| (from..=order).map(memory).collect::<Vec<_>>().join(" + ");
+    let driven = |k: usize| above[k].as_ref().map(|sum| format!("({sum})/({all})*{e}"));
+    let value = match (driven(0), order) {
+        (Some(direct), 0) => direct,
+        (Some(direct), _) => format!("{direct} + {}", memories(1)),
+        (None, 0) => format!("0*{e}"),
+        (None, _) => memories(1),
+    };
+    let next = |k: usize| {
+        let back = below[k].as_ref().map(|sum| format!(" - ({sum})/({all})*({value})")).unwrap_or_default();
+        let rest = (k < order).then(|| memories(k + 1));
+        let parts: Vec<String> = [driven(k), rest].into_iter().flatten().collect();
+        let change = parts.join(" + ") + &back;
+        if change.is_empty() { memory(k) } else { format!("{} + 2*({change})", memory(k)) }
+    };
+    Ok(Difference { next: (1..=order).map(next).collect(), value })
 }
 
 /// Returns a time as part of an expression.
@@ -226,7 +288,13 @@ pub(super) fn number_before_formulas(filter: &Filter) -> Option<(&'static str, S
 /// Returns the filter whose output at the instants is that of the continuous one for an input that is constant in between.
 ///
 /// Source: K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd edition (1997), section 2.3.
-fn step_invariant(clock: &Clock, filter: &Filter, of: &Polynomials) -> Result<[Vec<Option<String>>; 2], StudyError> {
+fn step_invariant(
+    clock: &Clock,
+    filter: &Filter,
+    of: &Polynomials,
+    e: &str,
+    memory: Memory<'_>,
+) -> Result<Difference, StudyError> {
     if filter.prewarp.is_some() {
         return Err(StudyError::new("prewarp", "a zero-order hold has no prewarping").with_help("remove it"));
     }
@@ -240,33 +308,32 @@ fn step_invariant(clock: &Clock, filter: &Filter, of: &Polynomials) -> Result<[V
         let fact = format!("a zero-order hold needs a period that is a time, and `{}` is an expression", clock.every.0);
         StudyError::new("method", fact).with_help("write every = \"10 ms\", or use method = \"tustin\"")
     })?;
-    let numbers = |list: &[Formula]| list.iter().map(number).collect::<Result<Vec<f64>, _>>();
+    // Coefficients in the time unit of a period.
+    let numbers = |list: &[Formula]| {
+        let power = |index: usize| i32::try_from(list.len() - 1 - index).expect("a short list");
+        let scaled = |(index, formula)| number(formula).map(|c| c / math::powi(period, power(index)));
+        list.iter().enumerate().map(scaled).collect::<Result<Vec<f64>, _>>()
+    };
     let continuous = TransferFunction::new(numbers(&of.numerator)?, numbers(&of.denominator)?);
     let system = continuous.state_space().map_err(|why| StudyError::new("continuous", why))?;
     let n = system.order();
-    // The exponential of [A B; 0 0] T has the matrices of the sampled system in its upper rows.
+    // The exponential of [A B; 0 0] has the matrices of the sampled system in its upper rows.
     let mut both = DMatrix::zeros(n + 1, n + 1);
-    both.view_mut((0, 0), (n, n)).copy_from(&(&system.a * period));
-    both.view_mut((0, n), (n, 1)).copy_from(&(&system.b * period));
-    let sampled = exponential(&both);
-    let (a, b) = (sampled.view((0, 0), (n, n)).into_owned(), sampled.view((0, n), (n, 1)).into_owned());
-    let sampled = TransferFunction::of(&StateSpace::new(a, b, system.c, system.d));
-    let TransferFunction { numerator, denominator, .. } = sampled.map_err(|why| StudyError::new("continuous", why))?;
-    let text = |c: &f64| (*c != 0.0).then(|| format!("{c:?}"));
-    let below: Vec<Option<String>> = denominator.iter().map(text).collect();
-    let padding = below.len() - numerator.len();
-    Ok([std::iter::repeat_n(None, padding).chain(numerator.iter().map(text)).collect(), below])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::binomials;
-
-    #[test]
-    fn the_bilinear_transform_has_binomial_coefficients() {
-        assert_eq!(binomials(0, 0), [1]);
-        assert_eq!(binomials(1, 1), [1, -1]);
-        assert_eq!(binomials(0, 3), [1, 3, 3, 1]);
-        assert_eq!(binomials(2, 3), [1, -1, -1, 1]);
-    }
+    both.view_mut((0, 0), (n, n)).copy_from(&system.a);
+    both.view_mut((0, n), (n, 1)).copy_from(&system.b);
+    let change = exponential_m1(&both);
+    let sum = |row: &dyn Fn(usize) -> f64| {
+        let name = |j: usize| if j < n { memory(j + 1) } else { e.to_owned() };
+        let terms = (0..=n).filter(|&j| row(j) != 0.0).map(|j| format!("({:?})*{}", row(j), name(j)));
+        terms.collect::<Vec<_>>().join(" + ")
+    };
+    let next = |i: usize| match sum(&|j| change[(i, j)]) {
+        sum if sum.is_empty() => memory(i + 1),
+        sum => format!("{} + ({sum})", memory(i + 1)),
+    };
+    let value = match sum(&|j| if j < n { system.c[(0, j)] } else { system.d[(0, 0)] }) {
+        sum if sum.is_empty() => format!("0*{e}"),
+        sum => sum,
+    };
+    Ok(Difference { next: (0..n).map(next).collect(), value })
 }

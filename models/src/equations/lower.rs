@@ -53,6 +53,17 @@ pub struct Order {
     pub what: String,
 }
 
+/// Limits of a `clip`.
+#[derive(Debug, Clone)]
+pub struct Limit {
+    /// Quantity that is limited.
+    pub of: Id,
+    pub low: Id,
+    pub high: Id,
+    /// Place, for a message.
+    pub what: String,
+}
+
 /// Delayed quantity.
 #[derive(Debug, Clone)]
 pub struct Delayed {
@@ -120,6 +131,8 @@ pub struct Lowering<'d> {
     pub switches: Vec<Switch>,
     /// Arguments that must increase, so far.
     pub orders: Vec<Order>,
+    /// Limits of every `clip`.
+    pub limits: Vec<Limit>,
     /// Delayed quantities so far.
     pub delays: Vec<Delayed>,
     /// Number of external forces, which are inputs after the declared ones.
@@ -175,6 +188,7 @@ impl<'d> Lowering<'d> {
             graph: Graph::default(),
             switches: Vec::new(),
             orders: Vec::new(),
+            limits: Vec::new(),
             delays: Vec::new(),
             forces,
             modes: 0,

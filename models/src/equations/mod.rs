@@ -91,7 +91,9 @@ impl Equations {
             tables::replace(&mut definition, options, files)?;
             Self::compile(definition, horizon, options.tolerance)
         });
-        model.map_err(|mistake| controllers::at_its_key(mistake, options))
+        let mut model = model.map_err(|mistake| controllers::at_its_key(mistake, options))?;
+        model.notes.extend(filters::notes(options));
+        Ok(model)
     }
 
     fn compile(mut definition: Definition, horizon: Option<f64>, tolerance: Tolerance) -> Result<Self, StudyError> {

@@ -462,6 +462,19 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         self.model.delayed.results.iter().map(|&register| bank.get(register)).collect()
     }
 
+    fn limited(&self, at: &Instant<'_, S>) -> Vec<(String, S)> {
+        let (places, program) = &self.model.limits;
+        let mut bank = self.bank.borrow_mut();
+        self.load(&mut bank, at);
+        program.run(&mut *bank);
+        let values: Vec<S> = program.results.iter().map(|&register| bank.get(register)).collect();
+        let limited = places.iter().zip(values.chunks(3)).filter(|(_, value)| {
+            let [of, low, high] = [0, 1, 2].map(|k| value[k].value());
+            of < low || of > high
+        });
+        limited.map(|(what, value)| (what.clone(), value[0])).collect()
+    }
+
     fn delays(&self) -> Vec<f64> {
         self.delays.iter().map(|delay| delay.time().value()).collect()
     }

@@ -8,7 +8,7 @@ use mops_core::{StudyError, suggestion};
 
 use super::definition::{self, Definition, Text, under};
 use super::graph::{Block, Graph, Id, Op};
-use super::lower::{Affine, Lowering, Order, Switch};
+use super::lower::{Affine, Limit, Lowering, Order, Switch};
 
 /// Equation `sum of coefficients * derivatives = force`.
 #[derive(Debug, Clone)]
@@ -73,6 +73,8 @@ pub struct System {
     pub switches: Vec<Switch>,
     /// Arguments that must increase.
     pub orders: Vec<Order>,
+    /// Limits of every `clip`.
+    pub limits: Vec<Limit>,
     /// Number of modes.
     pub modes: usize,
     /// Typical sizes of the states, if declared.
@@ -191,19 +193,21 @@ impl System {
         let mut delays = Vec::new();
         lower_delays(&mut l, &derivatives, &mut delays)?;
         // Unused definitions are checked too, but their switches and delays are discarded.
-        let (switches, orders, modes) = (l.switches.len(), l.orders.len(), l.modes);
+        let (switches, orders, limits, modes) = (l.switches.len(), l.orders.len(), l.limits.len(), l.modes);
         for (_, text) in &d.lets {
             l.text(text)?;
         }
         lower_delays(&mut l, &derivatives, &mut delays.clone())?;
         l.switches.truncate(switches);
         l.orders.truncate(orders);
+        l.limits.truncate(limits);
         l.modes = modes;
-        let Lowering { graph, switches, orders, modes, .. } = l;
+        let Lowering { graph, switches, orders, limits, modes, .. } = l;
         Ok(Self {
             graph,
             switches,
             orders,
+            limits,
             modes,
             scales: d.scales.clone(),
             derivatives,

@@ -20,6 +20,8 @@ struct Here<S> {
     values: Vec<S>,
     /// Positions, as states, of the joints whose dry friction is left out.
     left_out: Vec<usize>,
+    /// Quantities beyond an active limit.
+    limited: Vec<(String, S)>,
 }
 
 fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Result<Here<S>, Failure> {
@@ -33,7 +35,8 @@ fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Resul
     plant.changes(&here, &mut values);
     values.extend((0..model.interface().signals.len()).map(|signal| plant.signal(signal, &here)));
     values.extend(plant.past(&here));
-    Ok(Here { values, left_out })
+    let limited = plant.limited(&here);
+    Ok(Here { values, left_out, limited })
 }
 
 /// Linearises a model given by its plant; implements [`mops_core::Model::local`].
@@ -42,10 +45,12 @@ fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Resul
 /// The parameters are outside the domain of the model, or derivatives at the operating point are not finite.
 pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, Failure> {
     let OperatingPoint { parameters, states, inputs, past, at_rest } = *at;
-    let Here { values, left_out } = look(model, at)?;
+    let Here { values, left_out, limited } = look(model, at)?;
     let constants: Vec<Dual7> = parameters.iter().map(|&p| p.into()).collect();
     let columns = states.len() + inputs.len() + past.len();
     let mut slopes = DMatrix::zeros(values.len(), columns);
+    let mut limited: Vec<(String, Vec<f64>)> =
+        limited.into_iter().map(|(place, _)| (place, vec![0.0; columns])).collect();
     for first in (0..columns).step_by(DIRECTIONS) {
         let variable = |(j, &value): (usize, &f64)| {
             let direction = j.wrapping_sub(first);
@@ -55,6 +60,10 @@ pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, 
         let (states, others) = all.split_at(states.len());
         let (inputs, past) = others.split_at(inputs.len());
         let along = look(model, &OperatingPoint { parameters: &constants, states, inputs, past, at_rest })?;
+        for ((_, slopes), (_, value)) in limited.iter_mut().zip(&along.limited) {
+            let last = columns.min(first + DIRECTIONS);
+            slopes[first..last].copy_from_slice(&value.tangent[..last - first]);
+        }
         for (i, row) in along.values.iter().enumerate() {
             for j in first..columns.min(first + DIRECTIONS) {
                 slopes[(i, j)] = row.tangent[j - first];
@@ -70,5 +79,5 @@ pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, 
     }
     let names = model.states();
     let frictionless = left_out.into_iter().map(|position| names[position].name.clone()).collect();
-    Ok(Local { rates: rates.to_vec(), signals: signals.to_vec(), past: past.to_vec(), slopes, frictionless })
+    Ok(Local { rates: rates.to_vec(), signals: signals.to_vec(), past: past.to_vec(), slopes, frictionless, limited })
 }

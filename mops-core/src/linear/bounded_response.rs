@@ -1,6 +1,11 @@
 //! Bounds of a frequency response over ranges of frequencies; unlike a grid, they miss no peak or crossing.
 
-use super::{Complex, FrequencyResponse, StateSpace, eigenvalues, zeros};
+use nalgebra::DMatrix;
+
+use super::eigen::eigenvalues_as_given;
+use super::extended::{Entry, Extended, Real, extended, solved};
+use super::zeros::zeros_as_given;
+use super::{Complex, StateSpace, eigenvalues, zeros};
 use crate::math::{self, complex};
 
 /// Gain below which a response counts as zero: -200 dB.
@@ -9,52 +14,88 @@ const FAINT: f64 = 1e-10;
 /// Number of decades above the highest and below the lowest corner frequency that are always searched.
 const BEYOND: i32 = 4;
 
-/// Largest relative gain error of the pole-zero form with which poles and zeros are used as bounds.
-///
-/// Rounding causes far smaller errors; wrong zeros cause errors of the magnitude of the gain.
-const INACCURATE: f64 = 1e-3;
+/// Largest relative error of the pole-zero form, beside the response that the matrices give: above the error of a pole that is 0 up
+/// to the rounding of the matrices. Wrong poles or zeros cause errors of the magnitude of the response.
+const INACCURATE: f64 = 1e-6;
 
-/// Ratio of a response to the sum of its terms' magnitudes below which the response is inaccurate (cancellation).
-const LOST: f64 = 1e-10;
+/// Part of the sum of the magnitudes of the terms of a response that the rounding of the given matrices may cause.
+const NOISE: f64 = 1e-11;
+
+/// Number of points at which the pole-zero form is compared with the matrices.
+const POINTS: u32 = 5;
 
 /// Rounding error of bounds, rad or relative gain: far above that of a sum over some hundred poles and zeros.
 const ROUNDING: f64 = 1e-12;
 
-/// Single-input, single-output response `L(j w)` with its poles and zeros, which bound its change between frequencies.
+/// Single-input, single-output response `L(j w)` by its poles and zeros, which also bound its change between frequencies.
 #[derive(Debug, Clone)]
 pub(super) struct BoundedResponse {
-    response: FrequencyResponse,
     /// Zeros with weight 1, poles with weight -1.
     roots: Vec<(Complex, f64)>,
+    /// Numerators and poles of the factors.
+    factors: Vec<(Numerator, Complex)>,
+    gain: f64,
     delay: f64,
     /// Lowest and highest corner frequency, rad/s.
     corners: [f64; 2],
-    /// Value of [`BoundedResponse::inaccuracy`].
-    inaccuracy: f64,
+}
+
+/// Numerator of a factor of the response: `s - zero`, or a constant frequency.
+#[derive(Debug, Clone, Copy)]
+enum Numerator {
+    Zero(Complex),
+    Constant(f64),
 }
 
 impl BoundedResponse {
     /// Computes the bounded response of a system with one input and one output.
     ///
+    /// Poles and zeros are those of the given matrices to all digits, so that their products are accurate where the sums in
+    /// `C (s - A)^-1 B` cancel.
+    ///
     /// # Errors
-    /// If an entry is not finite, or if poles and zeros do not reproduce the response, so that they give no bounds.
+    /// If an entry is not finite, or if poles and zeros do not reproduce the response.
     pub fn new(system: &StateSpace) -> Result<Self, String> {
-        let zeros = zeros(system)?.into_iter().map(|z| (z, 1.0));
-        let roots: Vec<(Complex, f64)> = zeros.chain(eigenvalues(&system.a)?.into_iter().map(|p| (p, -1.0))).collect();
+        // Sums that the rounding of the matrices explains count as zero, and so do poles. In coordinates of a large condition this may
+        // be found of one of two poles at 0 only, which the response shows: then the numbers count as they stand.
+        Self::by_roots(system, zeros(system)?, eigenvalues(&system.a)?)
+            .or_else(|_| Self::by_roots(system, zeros_as_given(system)?, eigenvalues_as_given(&system.a)?))
+    }
+
+    /// Computes the bounded response from zeros and poles.
+    fn by_roots(system: &StateSpace, zeros: Vec<Complex>, poles: Vec<Complex>) -> Result<Self, String> {
         let delay = system.delay;
-        let sizes = roots.iter().map(|(root, _)| complex::norm(*root)).chain((delay > 0.0).then(|| 1.0 / delay));
+        let sizes =
+            zeros.iter().chain(&poles).map(|root| complex::norm(*root)).chain((delay > 0.0).then(|| 1.0 / delay));
         let sizes: Vec<f64> = sizes.filter(|size| *size > 0.0 && size.is_finite()).collect();
         let (low, high) =
             (sizes.iter().copied().fold(f64::INFINITY, f64::min), sizes.iter().copied().fold(0.0, f64::max));
         let corners = if sizes.is_empty() { [1.0, 1.0] } else { [low, high] };
-        let mut found = Self { response: system.response()?, roots, delay, corners, inaccuracy: ROUNDING };
-        found.inaccuracy += found.check()?;
+        let middle = corners[0].sqrt() * corners[1].sqrt();
+        let numerators =
+            zeros.iter().map(|zero| Numerator::Zero(*zero)).chain(std::iter::repeat(Numerator::Constant(middle)));
+        let factors = numerators.zip(poles.iter().copied()).collect();
+        let roots =
+            zeros.into_iter().map(|zero| (zero, 1.0)).chain(poles.into_iter().map(|pole| (pole, -1.0))).collect();
+        let mut found = Self { roots, factors, gain: 1.0, delay, corners };
+        found.gain = found.gain_of(system)?;
         Ok(found)
     }
 
     /// Returns the response at an angular frequency, rad/s.
     pub fn at(&self, omega: f64) -> Complex {
-        self.response.on_axis(omega)[(0, 0)]
+        let s = Complex::new(0.0, omega);
+        let rational = self.factored(s) * self.gain;
+        if self.delay == 0.0 { rational } else { rational * complex::exp(-s * self.delay) }
+    }
+
+    /// Returns the product of the factors.
+    fn factored(&self, s: Complex) -> Complex {
+        let factor = |(numerator, pole): &(Numerator, Complex)| match numerator {
+            Numerator::Zero(zero) => (s - zero) / (s - pole),
+            Numerator::Constant(omega) => Complex::new(*omega, 0.0) / (s - pole),
+        };
+        self.factors.iter().map(factor).product()
     }
 
     /// Returns the number of poles and zeros.
@@ -67,10 +108,9 @@ impl BoundedResponse {
         self.corners
     }
 
-    /// Returns the largest distance of a response from its bounds, rad or relative gain, due to rounding and to errors
-    /// of poles and zeros.
+    /// Returns the largest distance of a response from its bounds, rad or relative gain, due to rounding.
     pub fn inaccuracy(&self) -> f64 {
-        self.inaccuracy
+        ROUNDING
     }
 
     /// Returns ranges that cover all relevant frequencies, from 0 upwards.
@@ -131,34 +171,70 @@ impl BoundedResponse {
         }
     }
 
-    /// Compares the change of the gain between frequencies with that of the pole-zero form.
+    /// Returns the factor between the response that the matrices of the system give and the product of the factors.
     ///
-    /// Returns the largest difference, relative to the gain.
-    fn check(&self) -> Result<f64, String> {
+    /// # Errors
+    /// If it is not the same at all points.
+    fn gain_of(&self, system: &StateSpace) -> Result<f64, String> {
         let [low, high] = self.corners;
-        let mut largest = 0.0f64;
-        let mut before: Option<f64> = None;
-        let steps = math::log10(high / low).ceil().max(1.0);
-        for i in 0..=(2.0 * steps) as i32 {
-            // Frequencies between the corners, offset to avoid round numbers.
-            let omega = 1.07 * low * math::powf(10.0, 0.5 * f64::from(i));
-            let s = Complex::new(0.0, omega);
-            let rational: f64 = self.roots.iter().map(|(root, sign)| sign * math::ln(complex::norm(s - root))).sum();
-            let gain = complex::norm(self.at(omega));
-            // A response that is the rounding error of a sum carries no information.
-            let lost = gain <= LOST * self.response.terms(s);
-            if lost || !(gain > FAINT && gain.is_finite() && rational.is_finite()) {
-                continue;
-            }
-            let expected = rational - math::ln(gain);
-            largest = largest.max(before.map_or(0.0, |last| (expected - last).abs()));
-            if largest > INACCURATE {
-                return Err("the poles and zeros of the system are too inaccurate to bound its response".to_owned());
-            }
-            before = Some(expected);
+        // Points of the positive real axis: on the imaginary axis a pole and its mirror image have the same distance.
+        // They begin below the lowest corner and end above the highest, off both: a sampled loop may have its only zero there.
+        let [first, last] = [0.37 * low, 2.9 * high];
+        let point = |i: u32| first * math::powf(last / first, f64::from(i) / f64::from(POINTS - 1));
+        let values: Vec<(Extended, Extended, f64)> = (0..POINTS)
+            .filter_map(|i| {
+                by_matrices(system, point(i)).map(|(value, terms)| (value, self.factored_at(point(i)), terms))
+            })
+            .collect();
+        // Where the fewest terms cancel.
+        let clear = |(value, _, terms): &&(Extended, Extended, f64)| value.size() / terms;
+        let Some((value, factored, _)) = values.iter().max_by(|a, b| clear(a).total_cmp(&clear(b))) else {
+            return Ok(0.0);
+        };
+        if *value == Extended::ZERO {
+            return Ok(0.0);
         }
-        Ok(largest)
+        let gain = *value / *factored;
+        let agrees = |(value, factored, terms): &(Extended, Extended, f64)| {
+            (*value - *factored * gain).size() <= INACCURATE * value.size() + NOISE * terms
+        };
+        if values.iter().all(agrees) {
+            Ok(gain.value())
+        } else {
+            Err("the poles and zeros of the system are too inaccurate to bound its response".to_owned())
+        }
     }
+
+    /// Returns the product of the factors at a real point.
+    fn factored_at(&self, s: f64) -> Extended {
+        // Complex roots come in conjugate pairs, of which the upper one stands for both.
+        let distance = |root: Complex| {
+            let along = Extended::from(s) - Extended::from(root.re);
+            match root.im {
+                im if im < 0.0 => Extended::from(1.0),
+                0.0 => along,
+                im => along * along + Extended::from(im) * Extended::from(im),
+            }
+        };
+        self.factors.iter().fold(Extended::from(1.0), |value, (numerator, pole)| {
+            let above = match numerator {
+                Numerator::Zero(zero) => distance(*zero),
+                Numerator::Constant(omega) => Extended::from(*omega),
+            };
+            value * above / distance(*pole)
+        })
+    }
+}
+
+/// Returns `C (s - A)^-1 B + D` of a system with one input and one output at a real point, with twice the digits, and the sum of the
+/// magnitudes of its terms; `None` at a pole.
+fn by_matrices(system: &StateSpace, s: f64) -> Option<(Extended, f64)> {
+    let n = system.order();
+    let entry = |i: usize, j: usize| Extended::from(if i == j { s } else { 0.0 }) - Extended::from(system.a[(i, j)]);
+    let states = solved(DMatrix::from_fn(n, n, entry), extended(&system.b))?;
+    let direct = Extended::from(system.d[(0, 0)]);
+    let each = (0..n).map(|i| Extended::from(system.c[(0, i)]) * states[(i, 0)]);
+    Some(each.fold((direct, direct.size()), |(value, terms), term| (value + term, terms + term.size())))
 }
 
 /// Returns bounds of the change of `ln |j w - root|` from the centre frequency to any other, and of the change of its

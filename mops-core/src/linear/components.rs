@@ -2,6 +2,8 @@
 
 use nalgebra::DMatrix;
 
+use super::extended::Entry;
+
 /// Returns the groups of indices that reach each other through nonzero entries, ordered by smallest index.
 ///
 /// With the indices in a suitable order the matrix is block triangular, one block per group. Its eigenvalues are then
@@ -11,16 +13,9 @@ use nalgebra::DMatrix;
 /// Source: I. S. Duff, J. K. Reid, An implementation of Tarjan's algorithm for the block triangularization of a matrix,
 /// ACM Transactions on Mathematical Software 4 (1978) 137-147. The matrices are small, so Warshall's transitive closure
 /// is used here.
-pub(super) fn strong_components(a: &DMatrix<f64>) -> Vec<Vec<usize>> {
+pub(super) fn strong_components<T: Entry>(a: &DMatrix<T>) -> Vec<Vec<usize>> {
     let n = a.nrows();
-    let mut reaches = a.map(|x| x != 0.0);
-    for k in 0..n {
-        for i in 0..n {
-            if reaches[(i, k)] {
-                (0..n).for_each(|j| reaches[(i, j)] |= reaches[(k, j)]);
-            }
-        }
-    }
+    let reaches = paths(a);
     let mut placed = vec![false; n];
     let mut components = Vec::new();
     for i in 0..n {
@@ -33,8 +28,22 @@ pub(super) fn strong_components(a: &DMatrix<f64>) -> Vec<Vec<usize>> {
     components
 }
 
+/// Returns for each entry whether nonzero entries lead from its column to its row, over any number of other indices.
+pub(super) fn paths<T: Entry>(a: &DMatrix<T>) -> DMatrix<bool> {
+    let n = a.nrows();
+    let mut reaches = a.map(|x| x != T::ZERO);
+    for k in 0..n {
+        for i in 0..n {
+            if reaches[(i, k)] {
+                (0..n).for_each(|j| reaches[(i, j)] |= reaches[(k, j)]);
+            }
+        }
+    }
+    reaches
+}
+
 /// Returns the block of a matrix with these rows and columns.
-pub(super) fn block(a: &DMatrix<f64>, indices: &[usize]) -> DMatrix<f64> {
+pub(super) fn block<T: Entry>(a: &DMatrix<T>, indices: &[usize]) -> DMatrix<T> {
     DMatrix::from_fn(indices.len(), indices.len(), |i, j| a[(indices[i], indices[j])])
 }
 
@@ -49,6 +58,6 @@ mod tests {
         [(0, 2), (2, 0), (2, 1), (1, 3)].iter().for_each(|&(i, j)| a[(i, j)] = 1.0);
         assert_eq!(strong_components(&a), [vec![0, 2], vec![1], vec![3], vec![4]]);
         assert_eq!(block(&a, &[0, 2]), DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 1.0, 0.0]));
-        assert!(strong_components(&DMatrix::zeros(0, 0)).is_empty());
+        assert!(strong_components::<f64>(&DMatrix::zeros(0, 0)).is_empty());
     }
 }

@@ -2,11 +2,18 @@
 
 use nalgebra::DMatrix;
 
-use super::eigen::balance;
-use super::eigenvalues;
+use super::eigen::{balance, is_moved_onto_axis};
+use super::{Complex, eigenvalues};
 
 /// Singular value, relative to the norm of the scaled system, below which an influence counts as zero.
 const SMALL: f64 = 1e-12;
+
+/// Largest number of turns to the nearest mode that the inputs do not reach. Towards a mode of multiplicity k, the singular value falls by
+/// `(1 - 1/k)^k`, which is at most 1/e, so that these reach the rounding error.
+const TURNS: usize = 40;
+
+/// Ratio of the singular values of successive turns above which they do not tend to zero: above 1/e.
+const FALLING: f64 = 0.7;
 
 /// System `x' = A x + B u` with states and inputs scaled to similar magnitude, so that entries are comparable.
 #[derive(Debug, Clone)]
@@ -46,6 +53,55 @@ impl Scaled {
     /// Returns `D^-1 m D^-1` for a states x states matrix `m`.
     pub fn per_states(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / self.states[i] / self.states[j])
+    }
+
+    /// Returns true if the inputs leave a mode in the closed right half-plane, or after a change of `A` and `B` by this size.
+    ///
+    /// The staircase loses modes that are much faster than those reached before; single modes have no such limit.
+    pub fn leaves_unstable(&self, size: f64) -> Result<bool, String> {
+        let modes = eigenvalues(&self.a)?;
+        let unstable = modes.iter().filter(|mode| mode.re >= 0.0);
+        Ok(Staircase::of(self).leaves_unstable()?
+            || unstable.map(|&mode| self.left(mode, false)).any(|(left, mode)| left <= size && mode.re >= 0.0)
+            || self.leaves_undamped(size)?)
+    }
+
+    /// Returns true if the inputs leave a mode on the imaginary axis after a change of `A` and `B` by this size.
+    pub fn leaves_undamped(&self, size: f64) -> Result<bool, String> {
+        let mut modes = eigenvalues(&self.a)?.into_iter().filter(|mode| mode.im >= 0.0);
+        Ok(Staircase::of(self).leaves_undamped(size)? || modes.any(|mode| self.left(mode, true).0 <= size))
+    }
+
+    /// Returns the norm of the smallest change of `A` and `B` after which the inputs leave a mode near this one, and that mode.
+    ///
+    /// It is the smallest singular value of `[A - s, B]`, over s near the mode, or over s on the imaginary axis (Eising). In turns, a
+    /// unit vector y with the least `|y^H [A - s, B]|` is sought for s, and the best s for y, which is `y^H A y`.
+    ///
+    /// Source: R. Eising, Between controllable and uncontrollable, Systems & Control Letters 4 (1984) 263-264.
+    fn left(&self, mode: Complex, on_axis: bool) -> (f64, Complex) {
+        let n = self.a.nrows();
+        let a = self.a.map(|x| Complex::new(x, 0.0));
+        let allowed = |s: Complex| if on_axis { Complex::new(0.0, s.im) } else { s };
+        let (mut best, mut next) = ((f64::INFINITY, mode), allowed(mode));
+        for _ in 0..TURNS {
+            let mut both = DMatrix::zeros(n, n + self.b.ncols());
+            both.view_mut((0, 0), (n, n)).copy_from(&a);
+            both.view_mut((0, n), (n, self.b.ncols())).copy_from(&self.b.map(|x| Complex::new(x, 0.0)));
+            (0..n).for_each(|i| both[(i, i)] -= next);
+            let svd = both.svd(true, false);
+            let (least, &value) =
+                svd.singular_values.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1)).expect("a state");
+            let falls = value < FALLING * best.0;
+            if value < best.0 {
+                best = (value, next);
+            }
+            if !falls {
+                break;
+            }
+            let y = svd.u.expect("the SVD computes U").column(least).into_owned();
+            next = allowed(y.dotc(&(&a * &y)));
+        }
+        best
     }
 
     /// Returns the gain `K` of `u = -K x` that is equivalent to `v = -k z`.
@@ -100,6 +156,17 @@ impl Staircase {
     pub fn indices(&self) -> Vec<usize> {
         let inputs = self.ranks.first().copied().unwrap_or(0);
         (1..=inputs).map(|i| self.ranks.iter().filter(|&&rank| rank >= i).count()).collect()
+    }
+
+    /// Returns true if the input leaves a mode in the closed right half-plane.
+    fn leaves_unstable(&self) -> Result<bool, String> {
+        Ok(eigenvalues(&self.fixed)?.iter().any(|mode| mode.re >= 0.0))
+    }
+
+    /// Returns true if the input leaves a mode that a change of `A` by this size moves onto the imaginary axis.
+    fn leaves_undamped(&self, size: f64) -> Result<bool, String> {
+        let mut modes = eigenvalues(&self.fixed)?.into_iter();
+        Ok(modes.any(|mode| is_moved_onto_axis(&self.fixed, mode, size)))
     }
 
     /// Checks that the inputs control every state.

@@ -6,21 +6,40 @@ use deflation::Rounded;
 use nalgebra::DMatrix;
 
 use super::Complex;
-use super::components::{block, strong_components};
-use super::qr_steps::hessenberg_eigenvalues;
+use super::components::strong_components;
+use super::extended::{Entry, Extended, Real, extended, rounded};
+use super::qr_steps::{hessenberg, hessenberg_eigenvalues};
 use crate::math;
 
 /// Returns the eigenvalues of a square matrix, complex ones as exact conjugate pairs, upper one first.
 ///
 /// The matrix is split into its strongly connected components. Each is balanced, deflated of zero eigenvalues, reduced
-/// to Hessenberg form and treated by QR steps. The eigenvalue of a component of one state is its diagonal entry,
-/// exactly.
+/// to Hessenberg form and treated by QR steps, with twice the digits of `f64`. The eigenvalue of a component of one state is
+/// its diagonal entry, exactly.
 ///
 /// # Errors
 /// If an entry is not finite or, very rarely, the QR steps do not converge.
 pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex>, String> {
+    eigenvalues_of(&extended(a), f64::EPSILON)
+}
+
+/// Returns the eigenvalues of the given numbers as they stand: none is zero because the rounding of the entries explains it, see
+/// [`eigenvalues`].
+///
+/// # Errors
+/// See [`eigenvalues`].
+pub(super) fn eigenvalues_as_given(a: &DMatrix<f64>) -> Result<Vec<Complex>, String> {
+    eigenvalues_of(&extended(a), Extended::EPSILON)
+}
+
+/// Returns the eigenvalues of a square matrix with the digits of its entries, whose relative rounding error is given, see
+/// [`eigenvalues`].
+///
+/// # Errors
+/// See [`eigenvalues`].
+pub(super) fn eigenvalues_of<T: Real>(a: &DMatrix<T>, rounding: f64) -> Result<Vec<Complex>, String> {
     let mut roots = Vec::with_capacity(a.nrows());
-    for part in balanced_blocks(a)? {
+    for part in balanced_blocks(a, rounding)? {
         roots.extend(part.eigenvalues()?);
     }
     roots.resize(a.nrows(), Complex::new(0.0, 0.0));
@@ -39,61 +58,62 @@ pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex>, String> {
 /// See [`eigenvalues`].
 pub fn undecided(a: &DMatrix<f64>) -> Result<Vec<Complex>, String> {
     let mut found = Vec::new();
-    for part in balanced_blocks(a)?.into_iter().filter(|part| part.matrix.nrows() > 1) {
-        for root in part.eigenvalues()? {
-            let on_the_way = |share: f64| Complex::new(share * root.re, root.im) / part.scale;
-            if [0.5, 0.0, 0.25, 0.75].iter().all(|&share| part.is_nearly_eigenvalue(on_the_way(share))) {
-                found.push(root);
-            }
-        }
+    for part in balanced_blocks(&extended(a), f64::EPSILON)?.into_iter().filter(|part| part.matrix.nrows() > 1) {
+        let (matrix, n) = (rounded(&part.matrix), part.matrix.nrows() as f64);
+        let size = n * f64::EPSILON * matrix.norm();
+        found.extend(
+            part.eigenvalues()?.into_iter().filter(|root| is_moved_onto_axis(&matrix, root / part.scale, size)),
+        );
     }
     Ok(found)
 }
 
 /// Strongly connected component of a matrix, balanced and divided by `scale`.
-struct Block {
-    matrix: DMatrix<f64>,
+struct Block<T: Real> {
+    matrix: DMatrix<T>,
     scale: f64,
 }
 
-impl Block {
+impl<T: Real> Block<T> {
     fn eigenvalues(&self) -> Result<Vec<Complex>, String> {
-        let h = if self.matrix.nrows() > 2 { self.matrix.clone().hessenberg().unpack_h() } else { self.matrix.clone() };
-        let roots = hessenberg_eigenvalues(h);
+        let roots = hessenberg_eigenvalues(hessenberg(self.matrix.clone()));
         let roots = roots.ok_or("the eigenvalues were not found: the QR steps do not converge")?;
         Ok(roots.into_iter().map(|root| root * self.scale).collect())
     }
+}
 
-    /// Returns true if a perturbation of rounding size makes `z` an eigenvalue of the matrix.
-    fn is_nearly_eigenvalue(&self, z: Complex) -> bool {
-        let n = self.matrix.nrows();
-        let mut shifted = self.matrix.map(|x| Complex::new(x, 0.0));
-        (0..n).for_each(|i| shifted[(i, i)] -= z);
-        shifted.singular_values().min() <= n as f64 * f64::EPSILON * self.matrix.norm()
-    }
+/// Returns true if a perturbation of this size moves an eigenvalue onto the imaginary axis: if the smallest singular value of `A - s` is
+/// at most that all the way. Multiple eigenvalues, which rounding moves far, count as one.
+pub(super) fn is_moved_onto_axis(a: &DMatrix<f64>, root: Complex, size: f64) -> bool {
+    let least = |s: Complex| {
+        let mut shifted = a.map(|x| Complex::new(x, 0.0));
+        (0..a.nrows()).for_each(|i| shifted[(i, i)] -= s);
+        shifted.singular_values().min()
+    };
+    [0.5, 0.0, 0.25, 0.75].iter().all(|&share| least(Complex::new(share * root.re, root.im)) <= size)
 }
 
 /// Returns the strongly connected components, deflated of zero eigenvalues.
-fn balanced_blocks(a: &DMatrix<f64>) -> Result<Vec<Block>, String> {
-    if a.iter().any(|x| !x.is_finite()) {
+fn balanced_blocks<T: Real>(a: &DMatrix<T>, rounding: f64) -> Result<Vec<Block<T>>, String> {
+    if a.iter().any(|x| !x.size().is_finite()) {
         return Err("a matrix with an entry that is not finite has no eigenvalues".to_owned());
     }
     let mut blocks = Vec::new();
-    let mut open = vec![Rounded::given(a.clone())];
+    let mut open = vec![Rounded::given(a.clone(), rounding)];
     while let Some(a) = open.pop() {
         for indices in strong_components(&a.entries) {
-            let mut part = a.map(|m| block(m, &indices));
+            let mut part = a.block(&indices);
             // A power of two avoids rounding; squares of the scaled entries stay within the number range.
-            let scale = math::exp2(math::log2(part.entries.amax()).floor());
+            let scale = math::exp2(math::log2(part.entries.iter().map(|x| x.size()).fold(0.0, f64::max)).floor());
             let scale = if scale > 0.0 && scale.is_finite() { scale } else { 1.0 };
-            part = part.map(|m| m / scale);
+            part = part.scaled(1.0 / scale);
             let scales = balance(&mut part.entries);
             for (i, scale) in scales.into_iter().enumerate() {
                 part.errors.row_mut(i).unscale_mut(scale);
                 part.errors.column_mut(i).scale_mut(scale);
             }
             match part.without_zero() {
-                Some(rest) => open.push(rest.map(|m| m * scale)),
+                Some(rest) => open.push(rest.scaled(scale)),
                 None => blocks.push(Block { matrix: part.entries, scale }),
             }
         }
@@ -106,18 +126,22 @@ fn balanced_blocks(a: &DMatrix<f64>) -> Result<Vec<Block>, String> {
 ///
 /// Norms include the diagonal, so that entries at rounding level are not amplified. Source: R. James, J. Langou, B. R.
 /// Lowery, On matrix balancing and eigenvector computation, arXiv:1401.5766 (2014).
-pub(super) fn balance(a: &mut DMatrix<f64>) -> Vec<f64> {
+pub(super) fn balance<T: Real>(a: &mut DMatrix<T>) -> Vec<f64> {
     let n = a.nrows();
     let mut scales = vec![1.0; n];
     for _ in 0..100 {
         let mut changed = false;
         for i in 0..n {
-            let factor = balancing_factor(a.row(i).norm(), a.column(i).norm());
+            let norm = |at: &dyn Fn(usize) -> (usize, usize)| {
+                let sizes = (0..n).map(|j| a[at(j)].size());
+                sizes.map(|x| x * x).sum::<f64>().sqrt()
+            };
+            let factor = balancing_factor(norm(&|j| (i, j)), norm(&|j| (j, i)));
             if factor != 1.0 {
                 changed = true;
                 scales[i] *= factor;
-                a.row_mut(i).unscale_mut(factor);
-                a.column_mut(i).scale_mut(factor);
+                (0..n).for_each(|j| a[(i, j)] = a[(i, j)].scaled(1.0 / factor));
+                (0..n).for_each(|j| a[(j, i)] = a[(j, i)].scaled(factor));
             }
         }
         if !changed {

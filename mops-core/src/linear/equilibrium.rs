@@ -54,6 +54,9 @@ const ROUNDING: f64 = 1e-9;
 /// Distances of further initial guesses from the first, relative to a coordinate, or absolute if it is 0.
 const AROUND: [f64; 8] = [1e-6, 1e-4, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e4];
 
+/// Smallest step of a continuation, as part of the way: with smaller ones it would cost more points than the search may evaluate.
+const SHORTEST: f64 = 1e-3;
+
 /// Maximum number of points evaluated before the search fails.
 const MOST: usize = 4_000;
 
@@ -61,7 +64,7 @@ const MOST: usize = 4_000;
 ///
 /// Newton's method starts from `start`. If it fails, for example at a zero or infinite derivative, it restarts from
 /// points around it at increasing distances. Of the equilibria found from one distance, the one nearest to `start` is
-/// returned.
+/// returned. If all fail, the equilibrium is followed from where the fixed states and inputs are 0.
 ///
 /// # Errors
 /// If the rates are undefined at `start`, or if no equilibrium is found.
@@ -85,6 +88,11 @@ pub fn equilibrium(
         if let Some(x) = nearest {
             return Ok(x);
         }
+    }
+    // A limit that is active at the start only, such as that of a controller beside a step of its setpoint.
+    search.looked = 0;
+    if let Some(x) = search.by_continuation() {
+        return Ok(x);
     }
     // If nothing changes a rate, it may be zero up to rounding.
     search.looked = 0;
@@ -201,6 +209,52 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
         Err(no_equilibrium(&here))
     }
 
+    /// Returns the equilibrium that is reached as the fixed coordinates grow from 0 to their values, from an equilibrium near the start.
+    ///
+    /// Each step follows the tangent, so that limits that are inactive along the way stay so.
+    ///
+    /// Source: E. L. Allgower, K. Georg, Introduction to Numerical Continuation Methods (2003), chapter 2.
+    fn by_continuation(&mut self) -> Option<Vec<f64>> {
+        let origin = self.origin;
+        let fixed: Vec<usize> = (0..origin.len()).filter(|i| !self.moving.contains(i) && origin[*i] != 0.0).collect();
+        if fixed.is_empty() {
+            return None;
+        }
+        let at = |x: &[f64], share: f64| {
+            let mut x = x.to_vec();
+            fixed.iter().for_each(|&i| x[i] = share * origin[i]);
+            x
+        };
+        let mut x = self.newton(&at(origin, 0.0), false).ok()?;
+        let (mut share, mut step) = (0.0, 1.0f64);
+        while share < 1.0 {
+            let here = self.look(&x).ok()?;
+            let n = here.rates.len();
+            let weight = |i: usize| match self.moving.iter().map(|&j| here.slopes[(i, j)].abs()).fold(0.0, f64::max) {
+                0.0 => 1.0,
+                reach => 1.0 / reach,
+            };
+            let slopes = DMatrix::from_fn(n, self.moving.len(), |i, j| weight(i) * here.slopes[(i, self.moving[j])]);
+            let along = |i: usize| fixed.iter().map(|&j| here.slopes[(i, j)] * origin[j]).sum::<f64>();
+            let wanted = DVector::from_fn(n, |i, _| -weight(i) * along(i));
+            let svd = slopes.svd(true, true);
+            let threshold = 1e-10 * svd.singular_values.iter().copied().fold(0.0, f64::max);
+            let tangent = svd.solve(&wanted, threshold.max(f64::MIN_POSITIVE)).ok()?;
+            let next = loop {
+                let to = (share + step).min(1.0);
+                let mut guess = at(&x, to);
+                self.moving.iter().zip(tangent.iter()).for_each(|(&j, slope)| guess[j] += slope * (to - share));
+                match self.newton(&guess, false) {
+                    Ok(found) => break Some((found, to)),
+                    Err(_) if step > SHORTEST => step *= 0.25,
+                    Err(_) => break None,
+                }
+            };
+            (x, share) = next?;
+        }
+        Some(x)
+    }
+
     /// Returns the point with coordinates set to 0 where they are 0 up to rounding and the rates do not increase.
     fn without_rounding(&mut self, mut x: Vec<f64>, mut far: f64, distance: impl Fn(&Balance) -> f64) -> Vec<f64> {
         let largest = x.iter().map(|x| x.abs()).fold(1.0, f64::max);
@@ -303,6 +357,23 @@ mod tests {
         assert!(flat[0].abs() < 1e-8, "{flat:?}");
         let empty = scalar(|x, u| [u - x.sqrt(), if x == 0.0 { 0.0 } else { -0.5 / x.sqrt() }, 1.0]);
         assert_eq!(equilibrium(empty, &[0.37, 0.0], &[true, false]).unwrap()[0], 0.0);
+    }
+
+    #[test]
+    fn a_limit_that_is_active_at_the_start_only_does_not_stop_the_search() {
+        // A servo y' = v, v' = clip(k (r - y), -1, 1) - v: at the start the limit is active, and nothing depends on y.
+        for (gain, setpoint) in [(10.0, 3.0), (1e3, 30.0), (1e4, -200.0)] {
+            let servo = |z: &[f64]| {
+                let law: f64 = gain * (z[2] - z[0]);
+                let slope = if law.abs() < 1.0 { gain } else { 0.0 };
+                Ok(Balance {
+                    rates: vec![z[1], law.clamp(-1.0, 1.0) - z[1]],
+                    slopes: DMatrix::from_row_slice(2, 3, &[0.0, 1.0, 0.0, -slope, -1.0, slope]),
+                })
+            };
+            let x = equilibrium(servo, &[0.0, 0.0, setpoint], &[true, true, false]).unwrap();
+            assert_near(x[0], setpoint, 1e-9 * setpoint.abs());
+        }
     }
 
     #[test]

@@ -2,13 +2,7 @@
 
 use nalgebra::DMatrix;
 
-/// Returns the exponential of a square matrix.
-///
-/// # Panics
-/// If the matrix is not square.
-pub fn exponential(of: &DMatrix<f64>) -> DMatrix<f64> {
-    exponential_m1(of) + DMatrix::identity(of.nrows(), of.nrows())
-}
+use super::eigen::balance;
 
 /// Returns the exponential of a square matrix minus 1, without cancellation for a small matrix: the Taylor series of a part whose
 /// norm is at most 1/2, squared repeatedly.
@@ -20,8 +14,11 @@ pub fn exponential(of: &DMatrix<f64>) -> DMatrix<f64> {
 /// If the matrix is not square.
 pub fn exponential_m1(of: &DMatrix<f64>) -> DMatrix<f64> {
     assert!(of.is_square(), "the exponential of a square matrix");
-    let norm = of.row_iter().map(|row| row.iter().map(|x| x.abs()).sum::<f64>()).fold(0.0, f64::max);
-    let (mut squarings, mut part) = (0, of.clone());
+    // States in units of their own would cost digits; a power of two is a similarity without rounding.
+    let mut part = of.clone();
+    let scales = balance(&mut part);
+    let norm = part.row_iter().map(|row| row.iter().map(|x| x.abs()).sum::<f64>()).fold(0.0, f64::max);
+    let mut squarings = 0;
     let mut size = norm;
     while size > 0.5 && size.is_finite() {
         size *= 0.5;
@@ -36,13 +33,18 @@ pub fn exponential_m1(of: &DMatrix<f64>) -> DMatrix<f64> {
         sum += &term;
     }
     // (1 + x)^2 - 1
-    (0..squarings).fold(sum, |power, _| &power * &power + &power * 2.0)
+    let sum = (0..squarings).fold(sum, |power, _| &power * &power + &power * 2.0);
+    DMatrix::from_fn(of.nrows(), of.ncols(), |i, j| sum[(i, j)] * (scales[i] / scales[j]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math;
+
+    fn exponential(of: &DMatrix<f64>) -> DMatrix<f64> {
+        exponential_m1(of) + DMatrix::identity(of.nrows(), of.nrows())
+    }
 
     #[test]
     fn the_exponential_of_a_rotation_a_decay_and_a_chain_is_known() {

@@ -40,21 +40,27 @@ pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Stri
 /// Relative difference of the two Gramian results from which on the H2 norm is rejected.
 const DIFFERENT: f64 = 1e-6;
 
-/// Returns the H2 norm, `sqrt(1/(2 pi) integral |G(j w)|_F^2 dw)`.
+/// Returns the H2 norm, `sqrt(1/(2 pi) integral |G(j w)|_F^2 dw)`; of a system sampled with the period T, `sqrt(T/(2 pi) integral
+/// |G(e^(j w T))|_F^2 dw)` up to half of the sampling frequency.
 ///
-/// The H2 norm is the root mean square of the outputs for white noise of unit intensity at the inputs. The delay has no
-/// influence. Both the controllability and the observability Gramian are used, as a check.
+/// The H2 norm is the root mean square of the outputs for white noise of unit intensity at the inputs, or for independent
+/// samples of unit variance. The delay has no influence. Both the controllability and the observability Gramian are used, as a check.
 ///
-/// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3.
+/// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3; for sampled systems section 21.5.
 ///
 /// # Errors
-/// If the system is sampled, is not stable or has direct feedthrough: the norm is infinite. If the results from the two Gramians
+/// If the system is not stable, or is continuous and has direct feedthrough: the norm is infinite. If the results from the two Gramians
 /// differ.
 pub fn h2_norm(system: &StateSpace) -> Result<f64, String> {
-    if system.period.is_some() {
-        return Err("the H2 norm is defined here for continuous systems only".to_owned());
-    }
     check_stable(system, "H2 norm")?;
+    if let Some(period) = system.period {
+        // With w = 2/T tan(omega T/2), d omega is dw/(1 + (w T/2)^2): the norm of G(w)/(1 + w T/2) as a continuous system.
+        let image = StateSpace { period: None, ..system.clone() };
+        let (m, rate) = (system.outputs.len(), 2.0 / period);
+        let one = DMatrix::<f64>::identity(m, m);
+        let lags = StateSpace::new(&one * -rate, &one * rate, one, DMatrix::zeros(m, m));
+        return Ok(period.sqrt() * h2_norm(&image.series(&lags))?);
+    }
     if system.d.iter().any(|&d| d != 0.0) {
         return Err("the system has direct feedthrough (D is not 0): its H2 norm is infinite".to_owned());
     }
@@ -114,6 +120,26 @@ mod tests {
         let hidden = DMatrix::from_row_slice(2, 2, &[0.3, -0.1, 0.9, -0.3 - 1e-16]);
         let drifting = StateSpace { a: hidden, ..system };
         assert!(h2_norm(&drifting).is_err());
+    }
+
+    #[test]
+    fn the_norm_of_a_sampled_lag_is_that_of_its_impulse_response() {
+        // y[k+1] = a y[k] + b u[k]: the sum of squares of b a^k is b^2/(1 - a^2); with a direct part d, d^2 more.
+        for (a, b, d, period) in [(0.9f64, 0.3f64, 0.0f64, 0.01f64), (-0.5, 2.0, 1.5, 3.0)] {
+            let half = 0.5 * period;
+            let one = |x: f64| DMatrix::from_element(1, 1, x);
+            let system = StateSpace {
+                period: Some(period),
+                ..StateSpace::new(
+                    one((a - 1.0) / (a + 1.0) / half),
+                    one(b / (a + 1.0) / half),
+                    one(2.0 / (a + 1.0)),
+                    one(d - b / (a + 1.0)),
+                )
+            };
+            let exact = (b * b / (1.0 - a * a) + d * d).sqrt();
+            assert_near(h2_norm(&system).unwrap() / exact, 1.0, 1e-12);
+        }
     }
 
     #[test]

@@ -128,10 +128,10 @@ impl Loop {
     ///
     /// `crossovers` are the gain crossovers for that gain.
     pub(super) fn unstable_with(&self, gain: f64, crossovers: &[Crossing]) -> Result<Option<usize>, String> {
-        let StateSpace { c, d, delay, .. } = &self.system;
-        let without = StateSpace { c: c * gain, d: d * gain, delay: 0.0, ..self.system.clone() };
-        let unstable = without.complementary_sensitivity()?.poles()?.iter().filter(|p| p.re >= 0.0).count();
-        if *delay == 0.0 {
+        let (d, delay) = (&self.system.d, self.system.delay);
+        let without = StateSpace { delay: 0.0, ..self.system.clone() };
+        let unstable = without.closed_loop_eigenvalues(gain)?.iter().filter(|p| p.re >= 0.0).count();
+        if delay == 0.0 {
             return Ok(Some(unstable));
         }
         if gain * d[(0, 0)].abs() >= 1.0 {

@@ -11,6 +11,7 @@ mod disk_margin;
 mod eigen;
 mod equilibrium;
 mod exponential;
+mod extended;
 mod lyapunov;
 mod margins;
 mod mask;
@@ -26,6 +27,8 @@ mod roughness;
 mod sampled;
 mod schur;
 mod search;
+#[cfg(test)]
+mod series;
 mod stabilising;
 mod system;
 #[cfg(test)]
@@ -39,7 +42,7 @@ pub use controllability::check_controllable;
 pub use disk_margin::disk_margin;
 pub use eigen::{eigenvalues, undecided};
 pub use equilibrium::{Balance, NoEquilibrium, equilibrium};
-pub use exponential::exponential;
+pub use exponential::exponential_m1;
 pub use lyapunov::{h2_norm, lyapunov};
 pub use margins::{Crossing, Loop};
 pub use mask::{Mask, Masked};

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::bounded_response::{BoundedResponse, Span};
+use super::eigen::eigenvalues_of;
 use super::search::{highest, maximise};
 use super::system::{above, beside};
 use super::{Complex, FrequencyResponse, StateSpace, eigenvalues, undecided, zeros};
@@ -159,7 +160,7 @@ pub(super) fn level_frequencies(system: &StateSpace, level: f64) -> Result<Vec<f
     hamiltonian.view_mut((0, n), (n, n)).copy_from(&(b * r * b.transpose() * level));
     hamiltonian.view_mut((n, 0), (n, n)).copy_from(&(-lower / level));
     hamiltonian.view_mut((n, n), (n, n)).copy_from(&-closed.transpose());
-    Ok(eigenvalues(&hamiltonian)?.iter().filter(|z| near(z)).map(|z| z.im).collect())
+    Ok(eigenvalues_of(&hamiltonian, f64::EPSILON)?.iter().filter(|z| near(z)).map(|z| z.im).collect())
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 mod deflation;
 mod robust;
 
-use nalgebra::DMatrix;
+use nalgebra::{ComplexField, DMatrix};
 use rand::Rng;
 
 use super::controllability::{Scaled, Staircase};
@@ -250,6 +250,15 @@ fn paired(poles: &[Complex]) -> Result<Vec<Complex>, String> {
         Some(alone) => Err(format!("the pole at {alone} has no conjugate among the others")),
         None => Ok(sorted),
     }
+}
+
+/// Returns orthonormal columns that complete those of `m` to a basis; `m` has full column rank.
+pub(super) fn complement<T: ComplexField>(m: &DMatrix<T>) -> DMatrix<T> {
+    let (rows, columns) = m.shape();
+    let mut square = DMatrix::<T>::zeros(rows, rows);
+    square.columns_mut(0, columns).copy_from(m);
+    // Factor Q of the padded matrix: zero columns have trivial reflections.
+    square.qr().q().columns(columns, rows - columns).into_owned()
 }
 
 #[cfg(test)]

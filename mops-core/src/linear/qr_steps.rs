@@ -1,8 +1,9 @@
-//! QR steps with implicit double shift on a Hessenberg matrix.
+//! Hessenberg form, and QR steps with implicit double shift on it.
 
-use nalgebra::{ComplexField, DMatrix};
+use nalgebra::DMatrix;
 
 use super::Complex;
+use super::extended::{Entry, Real, norm};
 use crate::math;
 
 /// Number of steps without a new eigenvalue after which an exceptional shift is used. Source: LAPACK, `dlahqr`.
@@ -18,20 +19,49 @@ pub(super) const LENIENT: usize = 3 * EXCEPTIONAL + 1;
 /// Number of steps without a new eigenvalue after which the iteration fails.
 pub(super) const MOST: usize = 300;
 
-/// Returns the eigenvalues of a real Hessenberg matrix, or `None` without convergence. Entries below the subdiagonal
-/// are ignored.
+/// Returns the Hessenberg form of a matrix, by reflections of its columns and rows.
+///
+/// Source: G. H. Golub, C. F. Van Loan, Matrix Computations, 4th edition (2013), algorithm 7.4.2.
+pub(super) fn hessenberg<T: Real>(mut a: DMatrix<T>) -> DMatrix<T> {
+    let n = a.nrows();
+    for k in 0..n.saturating_sub(2) {
+        let mut v: Vec<T> = (k + 1..n).map(|i| a[(i, k)]).collect();
+        let (beta, factor) = reflection(&mut v);
+        if factor == T::ZERO {
+            continue;
+        }
+        a[(k + 1, k)] = beta;
+        (k + 2..n).for_each(|i| a[(i, k)] = T::ZERO);
+        for j in k + 1..n {
+            reflect(&v, factor, |i| (k + 1 + i, j), &mut a);
+        }
+        for i in 0..n {
+            reflect(&v, factor, |j| (i, k + 1 + j), &mut a);
+        }
+    }
+    a
+}
+
+/// Reflects the entries at these places, a part of a row or of a column.
+fn reflect<T: Real>(v: &[T], factor: T, place: impl Fn(usize) -> (usize, usize), a: &mut DMatrix<T>) {
+    let sum = v.iter().enumerate().fold(T::ZERO, |sum, (i, v)| sum + *v * a[place(i)]);
+    let sum = factor * sum;
+    v.iter().enumerate().for_each(|(i, v)| a[place(i)] -= *v * sum);
+}
+
+/// Returns the eigenvalues of a real Hessenberg matrix, or `None` without convergence.
 ///
 /// Source: LAPACK 3.12, description of `dlahqr`; B. T. Smith et al., Matrix Eigensystem Routines, EISPACK Guide, 2nd
 /// edition (1976), `hqr`.
-pub(super) fn hessenberg_eigenvalues(mut h: DMatrix<f64>) -> Option<Vec<Complex>> {
+pub(super) fn hessenberg_eigenvalues<T: Real>(mut h: DMatrix<T>) -> Option<Vec<Complex>> {
     let mut roots = Vec::with_capacity(h.nrows());
-    let norm = h.norm();
+    let norm = norm(&h);
     let (mut end, mut step) = (h.nrows(), 0);
     while end > 0 {
         let hi = end - 1;
         let lo = decoupled(&mut h, hi, if step >= LENIENT { norm } else { 0.0 });
         if lo + 1 >= hi {
-            let found = if lo == hi { vec![Complex::new(h[(hi, hi)], 0.0)] } else { pair(&h, lo).to_vec() };
+            let found = if lo == hi { vec![Complex::new(h[(hi, hi)].value(), 0.0)] } else { pair(&h, lo).to_vec() };
             roots.extend(found.into_iter().rev());
             (end, step) = (lo, 0);
             continue;
@@ -52,10 +82,10 @@ pub(super) fn hessenberg_eigenvalues(mut h: DMatrix<f64>) -> Option<Vec<Complex>
 ///
 /// A negligible subdiagonal entry decouples the block and is set to zero. Entries that are small relative to `norm`
 /// count too.
-pub(super) fn decoupled<T: ComplexField<RealField = f64>>(h: &mut DMatrix<T>, hi: usize, norm: f64) -> usize {
+pub(super) fn decoupled<T: Entry>(h: &mut DMatrix<T>, hi: usize, norm: f64) -> usize {
     for lo in (1..=hi).rev() {
-        if negligible(h, lo, hi) || h[(lo, lo - 1)].clone().norm1() <= f64::EPSILON * norm {
-            h[(lo, lo - 1)] = T::zero();
+        if negligible(h, lo, hi) || h[(lo, lo - 1)].size() <= T::EPSILON * norm {
+            h[(lo, lo - 1)] = T::ZERO;
             return lo;
         }
     }
@@ -67,10 +97,10 @@ pub(super) fn decoupled<T: ComplexField<RealField = f64>>(h: &mut DMatrix<T>, hi
 /// The test relates its product with the entry across the diagonal to the difference of the diagonal entries.
 ///
 /// Source: M. Ahues, F. Tisseur, A new deflation criterion for the QR algorithm, LAPACK Working Note 122 (1997).
-fn negligible<T: ComplexField<RealField = f64>>(h: &DMatrix<T>, k: usize, hi: usize) -> bool {
-    let size = |i: usize, j: usize| h[(i, j)].clone().norm1();
+fn negligible<T: Entry>(h: &DMatrix<T>, k: usize, hi: usize) -> bool {
+    let size = |i: usize, j: usize| h[(i, j)].size();
     let below = size(k, k - 1);
-    let tiny = f64::MIN_POSITIVE * (hi + 1) as f64 / f64::EPSILON;
+    let tiny = f64::MIN_POSITIVE * (hi + 1) as f64 / T::EPSILON;
     if below <= tiny {
         return true;
     }
@@ -80,22 +110,25 @@ fn negligible<T: ComplexField<RealField = f64>>(h: &DMatrix<T>, k: usize, hi: us
         around += if k >= 2 { size(k - 1, k - 2) } else { 0.0 };
         around += if k < hi { size(k + 1, k) } else { 0.0 };
     }
-    if below > f64::EPSILON * around {
+    if below > T::EPSILON * around {
         return false;
     }
     let above = size(k - 1, k);
     let (large, small) = (below.max(above), below.min(above));
-    let difference = (h[(k - 1, k - 1)].clone() - h[(k, k)].clone()).norm1();
+    let difference = (h[(k - 1, k - 1)] - h[(k, k)]).size();
     let (most, least) = (size(k, k).max(difference), size(k, k).min(difference));
     let sum = most + large;
-    small * (large / sum) <= tiny.max(f64::EPSILON * (least * (most / sum)))
+    small * (large / sum) <= tiny.max(T::EPSILON * (least * (most / sum)))
 }
 
-/// Returns the two shifts of a step, both real or a conjugate pair.
-fn shifts(h: &DMatrix<f64>, lo: usize, hi: usize, step: usize) -> [Complex; 2] {
+/// Returns the two shifts of a step, `half +- sqrt(-determinant)`, as `half` and `determinant`.
+fn shifts<T: Real>(h: &DMatrix<T>, lo: usize, hi: usize, step: usize) -> [T; 2] {
     let at = |i: usize, j: usize| h[(i, j)];
     // Exceptional shifts alternate between the lower and the upper end. Source: LAPACK, `dlahqr`.
-    let exceptional = |diagonal: f64, s: f64| [0.75 * s + diagonal, -0.4375 * s, s, 0.75 * s + diagonal];
+    let exceptional = |diagonal: T, s: T| {
+        let moved = T::from(0.75) * s + diagonal;
+        [moved, T::from(-0.4375) * s, s, moved]
+    };
     let [a, b, c, d] = if step.is_multiple_of(2 * EXCEPTIONAL) {
         exceptional(at(hi, hi), at(hi, hi - 1).abs() + at(hi - 1, hi - 2).abs())
     } else if step.is_multiple_of(EXCEPTIONAL) {
@@ -103,45 +136,37 @@ fn shifts(h: &DMatrix<f64>, lo: usize, hi: usize, step: usize) -> [Complex; 2] {
     } else {
         [at(hi - 1, hi - 1), at(hi - 1, hi), at(hi, hi - 1), at(hi, hi)]
     };
-    let s = a.abs() + b.abs() + c.abs() + d.abs();
-    if s == 0.0 {
-        return [Complex::new(0.0, 0.0); 2];
-    }
-    let [a, b, c, d] = [a, b, c, d].map(|x| x / s);
-    let half = 0.5 * (a + d);
+    let half = (a + d).scaled(0.5);
     let determinant = (a - half) * (d - half) - b * c;
-    let root = determinant.abs().sqrt();
-    if determinant >= 0.0 {
-        let shift = Complex::new(half * s, root * s);
-        return [shift, shift.conj()];
+    if determinant >= T::ZERO {
+        return [half, determinant];
     }
     // Two real shifts: the one nearer to the last entry, twice.
+    let root = (-determinant).sqrt();
     let (first, second) = (half + root, half - root);
     let nearer = if (first - d).abs() <= (second - d).abs() { first } else { second };
-    [Complex::new(nearer * s, 0.0); 2]
+    [nearer, T::ZERO]
 }
 
-/// Returns the start row of the step and the first column of `(H - first)(H - second)` there, up to a factor.
+/// Returns the start row of the step and the first column of `(H - half)^2 + determinant` there, up to a factor.
 ///
 /// The step can start where the two adjacent subdiagonal entries together are small.
-fn start(h: &DMatrix<f64>, lo: usize, hi: usize, [first, second]: [Complex; 2]) -> (usize, [f64; 3]) {
+fn start<T: Real>(h: &DMatrix<T>, lo: usize, hi: usize, [half, determinant]: [T; 2]) -> (usize, [T; 3]) {
     let mut m = hi - 2;
     loop {
-        let (z, below) = (h[(m, m)], h[(m + 1, m)]);
-        let s = (z - second.re).abs() + second.im.abs() + below.abs();
-        let b = below / s;
+        let (z, below, next) = (h[(m, m)], h[(m + 1, m)], h[(m + 1, m + 1)]);
         let v = [
-            b * h[(m, m + 1)] + (z - first.re) * ((z - second.re) / s) - first.im * (second.im / s),
-            b * (z + h[(m + 1, m + 1)] - first.re - second.re),
-            b * h[(m + 2, m + 1)],
+            below * h[(m, m + 1)] + (z - half) * (z - half) + determinant,
+            below * ((z - half) + (next - half)),
+            below * h[(m + 2, m + 1)],
         ];
-        let size: f64 = v.iter().map(|x| x.abs()).sum();
-        let v = if size > 0.0 { v.map(|x| x / size) } else { [1.0, 0.0, 0.0] };
+        let size = v.iter().fold(T::ZERO, |sum, x| sum + x.abs());
+        let v = if size > T::ZERO { v.map(|x| x / size) } else { [T::from(1.0), T::ZERO, T::ZERO] };
         if m == lo {
             return (m, v);
         }
-        let around = h[(m - 1, m - 1)].abs() + z.abs() + h[(m + 1, m + 1)].abs();
-        if h[(m, m - 1)].abs() * (v[1].abs() + v[2].abs()) <= f64::EPSILON * v[0].abs() * around {
+        let around = h[(m - 1, m - 1)].size() + z.size() + next.size();
+        if h[(m, m - 1)].size() * (v[1].size() + v[2].size()) <= T::EPSILON * v[0].size() * around {
             return (m, v);
         }
         m -= 1;
@@ -149,59 +174,58 @@ fn start(h: &DMatrix<f64>, lo: usize, hi: usize, [first, second]: [Complex; 2]) 
 }
 
 /// Performs one implicit step on rows and columns `lo` to `hi`: reflections chase a bulge down from row `m`.
-fn double_step(h: &mut DMatrix<f64>, lo: usize, hi: usize, (m, column): (usize, [f64; 3])) {
+fn double_step<T: Real>(h: &mut DMatrix<T>, lo: usize, hi: usize, (m, column): (usize, [T; 3])) {
     for k in m..hi {
         let rows = (hi - k + 1).min(3);
-        let mut v = if k > m { [h[(k, k - 1)], h[(k + 1, k - 1)], 0.0] } else { column };
-        if k > m && rows == 3 {
-            v[2] = h[(k + 2, k - 1)];
-        }
-        if rows == 2 {
-            v[2] = 0.0;
-        }
+        let mut v = if k > m { (0..rows).map(|i| h[(k + i, k - 1)]).collect() } else { column[..rows].to_vec() };
         let (beta, factor) = reflection(&mut v);
         if k > m {
             h[(k, k - 1)] = beta;
-            (1..rows).for_each(|i| h[(k + i, k - 1)] = 0.0);
+            (1..rows).for_each(|i| h[(k + i, k - 1)] = T::ZERO);
         } else if m > lo {
-            h[(k, k - 1)] *= 1.0 - factor;
+            let before = h[(k, k - 1)];
+            h[(k, k - 1)] -= factor * before;
         }
         for j in k..=hi {
-            let sum: f64 = (0..rows).map(|i| v[i] * h[(k + i, j)]).sum();
-            (0..rows).for_each(|i| h[(k + i, j)] -= factor * v[i] * sum);
+            reflect(&v, factor, |i| (k + i, j), h);
         }
         for i in lo..=hi.min(k + 3) {
-            let sum: f64 = (0..rows).map(|j| v[j] * h[(i, k + j)]).sum();
-            (0..rows).for_each(|j| h[(i, k + j)] -= factor * v[j] * sum);
+            reflect(&v, factor, |j| (i, k + j), h);
         }
     }
 }
 
 /// Replaces `x` by the vector `v`, with a first entry of 1, of the reflection `1 - factor v v^T` that maps `x` to
-/// `(beta, 0, 0)`. Returns `beta` and `factor`.
-fn reflection(x: &mut [f64; 3]) -> (f64, f64) {
-    let rest = math::hypot(x[1], x[2]);
-    if rest == 0.0 {
-        let beta = x[0];
-        *x = [1.0, 0.0, 0.0];
-        return (beta, 0.0);
+/// `(beta, 0, ...)`. Returns `beta` and `factor`.
+pub(super) fn reflection<T: Real>(x: &mut [T]) -> (T, T) {
+    let largest = x[1..].iter().map(|x| x.size()).fold(0.0, f64::max);
+    let first = x[0];
+    x[0] = T::from(1.0);
+    if largest == 0.0 {
+        return (first, T::ZERO);
     }
-    let beta = -math::hypot(x[0], rest).copysign(x[0]);
-    let (factor, divisor) = ((beta - x[0]) / beta, x[0] - beta);
-    *x = [1.0, x[1] / divisor, x[2] / divisor];
-    (beta, factor)
+    // A power of two keeps squares within the number range.
+    let scale = math::exp2(math::log2(largest.max(first.size())).floor());
+    let squares = x[1..].iter().map(|x| x.scaled(1.0 / scale)).fold(T::ZERO, |sum, x| sum + x * x);
+    let small = first.scaled(1.0 / scale);
+    let length = (small * small + squares).sqrt().scaled(scale);
+    let beta = if first < T::ZERO { length } else { -length };
+    let divisor = first - beta;
+    x[1..].iter_mut().for_each(|x| *x = *x / divisor);
+    (beta, (beta - first) / beta)
 }
 
 /// Returns the eigenvalues of the 2 x 2 block at row `k`.
-fn pair(h: &DMatrix<f64>, k: usize) -> [Complex; 2] {
+fn pair<T: Real>(h: &DMatrix<T>, k: usize) -> [Complex; 2] {
     let (y, x, w) = (h[(k, k)], h[(k + 1, k + 1)], h[(k + 1, k)] * h[(k, k + 1)]);
-    let p = 0.5 * (y - x);
+    let p = (y - x).scaled(0.5);
     let q = p * p + w;
     let root = q.abs().sqrt();
-    if q >= 0.0 {
-        let z = p + root.copysign(p);
-        [x + z, if z == 0.0 { x + z } else { x - w / z }].map(|re| Complex::new(re, 0.0))
+    if q >= T::ZERO {
+        let z = if p < T::ZERO { p - root } else { p + root };
+        let other = if z == T::ZERO { x + z } else { x - w / z };
+        [x + z, other].map(|re| Complex::new(re.value(), 0.0))
     } else {
-        [Complex::new(x + p, root), Complex::new(x + p, -root)]
+        [Complex::new((x + p).value(), root.value()), Complex::new((x + p).value(), -root.value())]
     }
 }

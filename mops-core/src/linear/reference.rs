@@ -77,19 +77,23 @@ impl Div for Double {
 /// Complex double-double number.
 pub type Exact = nalgebra::Complex<Double>;
 
-fn complex(z: Complex) -> Exact {
+/// Converts a number exactly.
+pub fn exact(z: Complex) -> Exact {
     Exact { re: z.re.into(), im: z.im.into() }
 }
 
-fn product(a: Exact, b: Exact) -> Exact {
+/// Returns the product of two numbers.
+pub fn product(a: Exact, b: Exact) -> Exact {
     Exact { re: a.re * b.re - a.im * b.im, im: a.re * b.im + a.im * b.re }
 }
 
-fn sum(a: Exact, b: Exact) -> Exact {
+/// Returns the sum of two numbers.
+pub fn sum(a: Exact, b: Exact) -> Exact {
     Exact { re: a.re + b.re, im: a.im + b.im }
 }
 
-fn inverse(a: Exact) -> Exact {
+/// Returns the inverse of a number.
+pub fn inverse(a: Exact) -> Exact {
     let square = a.re * a.re + a.im * a.im;
     Exact { re: a.re / square, im: -a.im / square }
 }
@@ -140,10 +144,9 @@ pub fn roots(coefficients: &[Double]) -> Vec<Complex> {
     let leading = coefficients[n];
     let monic: Vec<Double> = coefficients.iter().map(|&c| c / leading).collect();
     let radius = (0..n).map(|i| math::powf(monic[i].0.abs(), 1.0 / (n - i) as f64)).fold(0.0, f64::max);
-    let mut z: Vec<Exact> = (0..n)
-        .map(|i| complex(complex::from_polar(radius, 0.4 + std::f64::consts::TAU * i as f64 / n as f64)))
-        .collect();
-    let zero = complex(Complex::new(0.0, 0.0));
+    let mut z: Vec<Exact> =
+        (0..n).map(|i| exact(complex::from_polar(radius, 0.4 + std::f64::consts::TAU * i as f64 / n as f64))).collect();
+    let zero = exact(Complex::new(0.0, 0.0));
     for _ in 0..2000 {
         let mut moved = 0.0f64;
         for i in 0..n {

@@ -8,6 +8,11 @@ use super::{Complex, Schur, eigenvalues, lyapunov, undecided};
 /// Relative residual up to which a Riccati equation counts as solved.
 const SOLVED: f64 = 1e-8;
 
+/// Part of the norm of the scaled matrix by which a mode without weight, or without input, may lie off the imaginary axis: the errors of
+/// its separation from the others. The Hamiltonian matrix has a double eigenvalue there, which rounding moves by the square root, and
+/// a multiple one by higher roots, to either side.
+const UNDECIDED: f64 = 1e-12;
+
 /// Maximum number of Newton steps. Each doubles the number of correct digits, so further steps bring no gain.
 const STEPS: usize = 20;
 
@@ -37,6 +42,11 @@ pub fn riccati(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix
         return Err("the weights of the states must be positive semidefinite".to_owned());
     }
     let scaled = Scaled::of(a, b);
+    let weighted = Scaled::of(&a.transpose(), q);
+    let size = |scaled: &Scaled| UNDECIDED * scaled.a.norm();
+    if scaled.leaves_unstable(size(&scaled))? || weighted.leaves_undamped(size(&weighted))? {
+        return Err(no_solution());
+    }
     // In the scaled system B R^-1 B^T is D^-1 (B R^-1 B^T) D^-1, and Q is D Q D.
     let equation =
         Equation { g: scaled.per_states(&(b * inverse * b.transpose())), q: scaled.by_states(q), a: scaled.a.clone() };
@@ -237,6 +247,75 @@ mod tests {
             } else {
                 // Random systems are controllable, and observable from all states.
                 prop_assert!(zeros > 0 || decades.abs() > 4.0, "{} {}", a, b);
+            }
+        }
+    }
+
+    /// Returns block diagonal matrices in other coordinates: states permuted and in units of up to 100, or turned.
+    fn beside(mode: &DMatrix<f64>, n: usize, seed: u64) -> (DMatrix<f64>, DMatrix<f64>) {
+        let m = mode.nrows();
+        let (block, turn) = (random(n, n, seed), random(n + m, n + m, seed + 1));
+        let mut a = DMatrix::zeros(n + m, n + m);
+        a.view_mut((0, 0), (n, n)).copy_from(&block);
+        a.view_mut((n, n), (m, m)).copy_from(mode);
+        let to = if seed.is_multiple_of(2) {
+            turn.qr().q()
+        } else {
+            let order: Vec<usize> = (0..n + m).map(|i| (i * 5 + 1) % (n + m)).collect();
+            let unit = |i: usize| math::powf(100.0, turn[(0, i)]);
+            if order.iter().collect::<std::collections::BTreeSet<_>>().len() < n + m {
+                DMatrix::identity(n + m, n + m)
+            } else {
+                DMatrix::from_fn(n + m, n + m, |i, j| if order[i] == j { unit(i) } else { 0.0 })
+            }
+        };
+        (a, to)
+    }
+
+    #[test]
+    fn an_unweighted_mode_on_the_axis_is_refused_whatever_its_multiplicity() {
+        let chain = |n: usize| DMatrix::from_fn(n, n, |i, j| f64::from(u8::from(j == i + 1)));
+        let oscillator = |w: f64| DMatrix::from_row_slice(2, 2, &[0.0, w, -w, 0.0]);
+        let double = {
+            let mut m = DMatrix::zeros(4, 4);
+            m.view_mut((0, 0), (2, 2)).copy_from(&oscillator(2.0));
+            m.view_mut((2, 2), (2, 2)).copy_from(&oscillator(2.0));
+            m.view_mut((0, 2), (2, 2)).copy_from(&DMatrix::identity(2, 2));
+            m
+        };
+        for (kind, mode) in
+            [chain(1), chain(2), chain(3), chain(4), oscillator(2.0), oscillator(300.0), double].iter().enumerate()
+        {
+            for seed in 0..24 {
+                let n = 2 + (seed % 5) as usize;
+                let (a, to) = beside(mode, n, 100 * kind as u64 + seed);
+                let m = mode.nrows();
+                let back = to.clone().try_inverse().unwrap();
+                let all = random(n + m, 1, seed + 7);
+                let weights = |of_mode: f64| {
+                    let q = DMatrix::from_fn(n + m, n + m, |i, j| match i == j {
+                        true => {
+                            if i < n {
+                                1.0
+                            } else {
+                                of_mode
+                            }
+                        }
+                        false => 0.0,
+                    });
+                    let q = back.transpose() * q * &back;
+                    (&q + q.transpose()) * 0.5
+                };
+                let (a, b) = (&to * &a * &back, &to * &all);
+                let one = DMatrix::identity(1, 1);
+                assert!(riccati(&a, &b, &weights(0.0), &one).is_err(), "{kind} {seed}");
+                let weighted = riccati(&a, &b, &weights(1.0), &one);
+                let refused = weighted.is_err_and(|why| why.contains("no stabilising solution"));
+                assert!(!refused, "{kind} {seed}: with weight");
+                // The input that does not reach the mode.
+                let mut part = all.clone();
+                part.rows_mut(n, m).fill(0.0);
+                assert!(riccati(&a, &(&to * part), &weights(1.0), &one).is_err(), "{kind} {seed}: without input");
             }
         }
     }

@@ -18,6 +18,8 @@ use std::ops::Range;
 use equivalent::Equivalent;
 use nalgebra::DMatrix;
 
+use super::components::paths;
+use super::extended::{Entry, Extended, Real, extended, product, rounded, solved, sum};
 use super::{Complex, StateSpace};
 use crate::math::{self, complex};
 
@@ -131,18 +133,26 @@ fn without_rounding(matrix: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Returns the bilinear image of a sampled system, with the given `A - 1` and the other matrices of its difference equation.
+///
+/// Its entries are rounded once, so that zeros stay zeros, and poles that are equal, or equal to 1, stay so.
 fn bilinear(difference: &DMatrix<f64>, of: StateSpace) -> Result<StateSpace, String> {
     let n = difference.nrows();
-    let sum = difference + DMatrix::identity(n, n) * 2.0;
-    let inverse = sum.try_inverse().filter(|inverse| inverse.iter().all(|x| x.is_finite()));
+    let one = extended(&DMatrix::identity(n, n));
+    let difference = extended(difference);
+    let moved = sum(&difference, &one.map(|x| x.scaled(2.0)));
+    let inverse = solved(moved.clone(), one);
     let inverse = inverse.ok_or("a pole of the sampled system lies at z = -1, at half of the sampling frequency")?;
+    // An entry without a path from its column to its row is 0, whatever the elimination leaves of it.
+    let path = paths(&moved);
+    let inverse = inverse.zip_map(&path, |x, path| if path { x } else { Extended::ZERO });
     let rate = 2.0 / of.period.expect("a sampled system");
-    let b = &inverse * &of.b;
+    let b = product(&inverse, &extended(&of.b));
+    let direct = product(&extended(&of.c), &b).map(|x| -x);
     Ok(StateSpace {
-        a: &inverse * difference * rate,
-        d: &of.d - &of.c * &b,
-        c: &of.c * &inverse * 2.0,
-        b: b * rate,
+        a: rounded(&product(&inverse, &difference)) * rate,
+        d: rounded(&sum(&extended(&of.d), &direct)),
+        c: rounded(&product(&extended(&of.c), &inverse)) * 2.0,
+        b: rounded(&b) * rate,
         ..of
     })
 }

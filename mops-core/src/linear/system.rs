@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::eigen::balance;
+use super::eigen::{balance, eigenvalues_of};
+use super::extended::{Entry, Extended, extended, product, solved, sum};
 use super::{Complex, StateSpace, eigenvalues};
 
 /// Failure of several loops with a delay.
@@ -33,6 +34,25 @@ impl StateSpace {
     /// If an entry is not finite.
     pub fn poles(&self) -> Result<Vec<Complex>, String> {
         Ok(self.in_seconds(eigenvalues(&self.a)?))
+    }
+
+    /// Returns the poles, 1/s, of the closed loop with unity negative feedback, when the loop transfer function is multiplied by `gain`.
+    ///
+    /// # Errors
+    /// See [`StateSpace::complementary_sensitivity`].
+    pub fn closed_loop_poles(&self, gain: f64) -> Result<Vec<Complex>, String> {
+        Ok(self.in_seconds(self.closed_loop_eigenvalues(gain)?))
+    }
+
+    /// Returns the eigenvalues of `A - gain B (1 + gain D)^-1 C`, whose rounding errors would move poles in badly scaled coordinates.
+    pub(super) fn closed_loop_eigenvalues(&self, gain: f64) -> Result<Vec<Complex>, String> {
+        self.check_closable()?;
+        let by = |m: &DMatrix<f64>| m.map(|x| Extended::from(x) * Extended::from(gain));
+        let n = self.d.nrows();
+        let outer =
+            solved(sum(&extended(&DMatrix::identity(n, n)), &by(&self.d)), by(&self.c)).ok_or_else(not_well_posed)?;
+        let fed_back = product(&extended(&self.b), &outer).map(|x| -x);
+        eigenvalues_of(&sum(&extended(&self.a), &fed_back), f64::EPSILON)
     }
 
     /// Returns true if every pole lies in the open left half-plane, or in the unit circle.
@@ -181,23 +201,32 @@ impl StateSpace {
 
     /// Returns `(1 + D)^-1`.
     fn loop_inverse(&self) -> Result<DMatrix<f64>, String> {
+        self.check_closable()?;
+        let inverse = (DMatrix::identity(self.d.nrows(), self.d.nrows()) + &self.d).try_inverse();
+        inverse.ok_or_else(not_well_posed)
+    }
+
+    /// Checks that the closed loop is a system with a finite number of poles.
+    fn check_closable(&self) -> Result<(), String> {
         if self.delay != 0.0 {
             return Err("a closed loop with a delay has infinitely many poles".to_owned());
         }
         if !self.d.is_square() {
             return Err("unity feedback needs as many outputs as inputs".to_owned());
         }
-        let inverse = (DMatrix::identity(self.d.nrows(), self.d.nrows()) + &self.d).try_inverse();
-        inverse.ok_or_else(|| "the loop is not well-posed: L is -1 at infinite frequency".to_owned())
+        Ok(())
     }
 }
 
+fn not_well_posed() -> String {
+    "the loop is not well-posed: L is -1 at infinite frequency".to_owned()
+}
+
 /// Stacks two matrices vertically.
-pub(super) fn above(top: &DMatrix<f64>, bottom: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut both = DMatrix::zeros(top.nrows() + bottom.nrows(), top.ncols());
-    both.rows_mut(0, top.nrows()).copy_from(top);
-    both.rows_mut(top.nrows(), bottom.nrows()).copy_from(bottom);
-    both
+pub(super) fn above<T: Entry>(top: &DMatrix<T>, bottom: &DMatrix<T>) -> DMatrix<T> {
+    let n = top.nrows();
+    let entry = |i: usize, j: usize| if i < n { top[(i, j)] } else { bottom[(i - n, j)] };
+    DMatrix::from_fn(n + bottom.nrows(), top.ncols(), entry)
 }
 
 /// Stacks two matrices horizontally.

@@ -1,20 +1,96 @@
 //! Zeros of a linear system.
 
-use nalgebra::{ComplexField, DMatrix};
+use nalgebra::DMatrix;
 
-use super::eigen::{balancing_factor, eigenvalues};
+use super::eigen::{balancing_factor, eigenvalues_of};
+use super::extended::{Entry, Extended, Real, extended, product, solved, sum};
+use super::qr_steps::reflection;
+use super::system::above;
 use super::{Complex, StateSpace};
 use crate::math;
 
-/// Magnitude below which an entry counts as zero, relative to the norm of the balanced system.
-const SMALL: f64 = 1e-13;
+/// Relative rounding error of the given entries, up to which their sums count as zero: some tens of the standard deviation of a
+/// rounding, which is `2^-53/sqrt(3)`.
+const GIVEN: f64 = 1e-14;
+
+/// Relative error of the computation itself, up to which sums of numbers that count as exact are zero: some hundred roundings.
+const COMPUTED: f64 = 100.0 * <Extended as Entry>::EPSILON;
+
+/// Matrix with twice the digits.
+type Matrix = DMatrix<Extended>;
+
+/// Matrix with the squares of the errors that the rounding of the given entries causes in its own. The errors are independent, so that
+/// the squares add up.
+#[derive(Clone)]
+struct Known {
+    entries: Matrix,
+    squares: DMatrix<f64>,
+}
+
+impl Known {
+    /// Wraps a given matrix, with this relative error of its entries.
+    fn given(m: &DMatrix<f64>, rounding: f64) -> Self {
+        Self { entries: extended(m), squares: m.map(|x| rounding * x * rounding * x) }
+    }
+
+    fn map(&self, entries: impl Fn(&Matrix) -> Matrix, squares: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
+        Self { entries: entries(&self.entries), squares: squares(&self.squares) }
+    }
+
+    fn transposed(&self) -> Self {
+        self.map(DMatrix::transpose, DMatrix::transpose)
+    }
+
+    fn part(&self, (row, column): (usize, usize), (rows, columns): (usize, usize)) -> Self {
+        let (from, size) = ((row, column), (rows, columns));
+        self.map(|m| m.view(from, size).into_owned(), |m| m.view(from, size).into_owned())
+    }
+
+    fn above(&self, other: &Self) -> Self {
+        Self { entries: above(&self.entries, &other.entries), squares: above(&self.squares, &other.squares) }
+    }
+
+    /// Reflects the columns of the matrix.
+    fn reflect(&mut self, by: &Reflection) {
+        let Reflection { first, v, factor } = by;
+        for j in 0..self.entries.ncols() {
+            let along =
+                v.iter().enumerate().fold(Extended::ZERO, |sum, (i, v)| sum + *v * self.entries[(first + i, j)]);
+            let along = *factor * along;
+            v.iter().enumerate().for_each(|(i, v)| self.entries[(first + i, j)] -= *v * along);
+            // The squares of the entries of the reflection.
+            let squared = |i: usize| v[i].value() * v[i].value();
+            let all: f64 = (0..v.len()).map(|i| squared(i) * self.squares[(first + i, j)]).sum();
+            for i in 0..v.len() {
+                let (own, f) = (self.squares[(first + i, j)], factor.value());
+                let kept = 1.0 - f * squared(i);
+                let others = (all - squared(i) * own).max(0.0);
+                self.squares[(first + i, j)] = kept * kept * own + f * f * squared(i) * others;
+            }
+        }
+    }
+
+    /// Reflects the rows of the matrix.
+    fn reflect_rows(&mut self, by: &Reflection) {
+        let mut turned = self.transposed();
+        turned.reflect(by);
+        *self = turned.transposed();
+    }
+}
+
+/// Reflection `1 - factor v v^T` of the entries from the first one on.
+struct Reflection {
+    first: usize,
+    v: Vec<Extended>,
+    factor: Extended,
+}
 
 /// System matrices during the reduction to fewer states.
 struct Quadruple {
-    a: DMatrix<f64>,
-    b: DMatrix<f64>,
-    c: DMatrix<f64>,
-    d: DMatrix<f64>,
+    a: Known,
+    b: Known,
+    c: Known,
+    d: Known,
 }
 
 /// Returns the zeros of a system, 1/s: numbers s at which `[A - s, B; C, D]` has less than its normal rank.
@@ -29,126 +105,136 @@ struct Quadruple {
 /// # Errors
 /// If an entry is not finite.
 pub fn zeros(system: &StateSpace) -> Result<Vec<Complex>, String> {
+    zeros_up_to(system, GIVEN)
+}
+
+/// Returns the zeros of the given numbers as they stand, also those that only their rounding causes, far above all poles. See [`zeros`].
+///
+/// # Errors
+/// See [`zeros`].
+pub(super) fn zeros_as_given(system: &StateSpace) -> Result<Vec<Complex>, String> {
+    zeros_up_to(system, COMPUTED)
+}
+
+fn zeros_up_to(system: &StateSpace, rounding: f64) -> Result<Vec<Complex>, String> {
     let StateSpace { a, b, c, d, .. } = system;
     if [a, b, c, d].iter().any(|m| m.iter().any(|x| !x.is_finite())) {
         return Err("a system with an entry that is not finite has no zeros".to_owned());
     }
-    let balanced = Quadruple { a: a.clone(), b: b.clone(), c: c.clone(), d: d.clone() }.balanced();
-    let small = SMALL * (balanced.a.norm() + balanced.b.norm() + balanced.c.norm() + balanced.d.norm());
-    let Quadruple { a, b, c, d } = balanced.reduced(small).transposed().reduced(small).transposed();
+    let [a, b, c, d] = balanced([a, b, c, d].map(DMatrix::clone)).map(|m| Known::given(&m, rounding));
+    let Quadruple { a, b, c, d } = Quadruple { a, b, c, d }.reduced().transposed().reduced().transposed();
+    let [a, b, c, d] = [a, b, c, d].map(|known| known.entries);
     if a.nrows() == 0 || d.is_empty() {
-        return eigenvalues(&a);
+        return eigenvalues_of(&a, Extended::EPSILON);
     }
-    // [A - s, B; C, D] with D square and invertible: column combinations transform [C, D] to [0, D'].
-    let (n, m) = (a.nrows(), d.nrows());
-    let mut lower = DMatrix::zeros(n + m, m);
-    lower.rows_mut(0, n).copy_from(&c.transpose());
-    lower.rows_mut(n, m).copy_from(&d.transpose());
-    let w = complement(&lower);
-    let (w1, w2) = (w.rows(0, n).into_owned(), w.rows(n, m).into_owned());
-    let left = &a * &w1 + &b * w2;
-    match w1.lu().solve(&left) {
-        Some(quotient) => eigenvalues(&quotient),
+    // [A - s, B; C, D] with D square and invertible: the zeros are the poles of the inverse system.
+    match solved(d, c) {
+        Some(quotient) => eigenvalues_of(&sum(&a, &product(&b, &quotient).map(|x| -x)), Extended::EPSILON),
         None => Err("the zeros were not found: the system is singular".to_owned()),
     }
 }
 
-/// Returns orthonormal columns that complete those of `m` to a basis; `m` has full column rank.
-pub(super) fn complement<T: ComplexField>(m: &DMatrix<T>) -> DMatrix<T> {
-    let (rows, columns) = m.shape();
-    let mut square = DMatrix::<T>::zeros(rows, rows);
-    square.columns_mut(0, columns).copy_from(m);
-    // Factor Q of the padded matrix: zero columns have trivial reflections.
-    square.qr().q().columns(columns, rows - columns).into_owned()
+/// Scales states, inputs and outputs by powers of two, so that the entries have similar magnitude.
+fn balanced([mut a, mut b, mut c, mut d]: [DMatrix<f64>; 4]) -> [DMatrix<f64>; 4] {
+    for _ in 0..50 {
+        let mut changed = false;
+        for i in 0..a.nrows() {
+            let own = a[(i, i)].abs();
+            let column = a.column(i).lp_norm(1) - own + c.column(i).lp_norm(1);
+            let row = a.row(i).lp_norm(1) - own + b.row(i).lp_norm(1);
+            let factor = balancing_factor(row, column);
+            if factor != 1.0 {
+                changed = true;
+                a.row_mut(i).unscale_mut(factor);
+                b.row_mut(i).unscale_mut(factor);
+                a.column_mut(i).scale_mut(factor);
+                c.column_mut(i).scale_mut(factor);
+            }
+        }
+        if !changed {
+            break;
+        }
+    }
+    // Scaling of inputs and outputs does not move zeros; both are scaled to the magnitude of A.
+    let size = if a.norm() > 0.0 { a.norm() } else { 1.0 };
+    let power = |norm: f64| if norm > 0.0 { math::exp2(math::log2(size / norm).round()) } else { 1.0 };
+    let (input, output) = (power(b.norm()), power(c.norm()));
+    b *= input;
+    c *= output;
+    d *= input * output;
+    [a, b, c, d]
 }
 
 impl Quadruple {
-    /// Scales states, inputs and outputs by powers of two, so that the entries have similar magnitude.
-    fn balanced(mut self) -> Self {
-        for _ in 0..50 {
-            let mut changed = false;
-            for i in 0..self.a.nrows() {
-                let own = self.a[(i, i)].abs();
-                let column = self.a.column(i).lp_norm(1) - own + self.c.column(i).lp_norm(1);
-                let row = self.a.row(i).lp_norm(1) - own + self.b.row(i).lp_norm(1);
-                let factor = balancing_factor(row, column);
-                if factor != 1.0 {
-                    changed = true;
-                    self.a.row_mut(i).unscale_mut(factor);
-                    self.b.row_mut(i).unscale_mut(factor);
-                    self.a.column_mut(i).scale_mut(factor);
-                    self.c.column_mut(i).scale_mut(factor);
-                }
-            }
-            if !changed {
-                break;
-            }
-        }
-        // Scaling of inputs and outputs does not move zeros; both are scaled to the magnitude of A.
-        let size = if self.a.norm() > 0.0 { self.a.norm() } else { 1.0 };
-        let power = |norm: f64| if norm > 0.0 { math::exp2(math::log2(size / norm).round()) } else { 1.0 };
-        let (input, output) = (power(self.b.norm()), power(self.c.norm()));
-        self.b *= input;
-        self.c *= output;
-        self.d *= input * output;
-        self
-    }
-
     fn transposed(self) -> Self {
-        Self { a: self.a.transpose(), b: self.c.transpose(), c: self.b.transpose(), d: self.d.transpose() }
+        Self { a: self.a.transposed(), b: self.c.transposed(), c: self.b.transposed(), d: self.d.transposed() }
     }
 
     /// Removes states until `D` has full row rank: those that a vanishing output forces to zero.
-    fn reduced(mut self, small: f64) -> Self {
+    fn reduced(mut self) -> Self {
         loop {
-            let Self { a, b, c, d } = self;
-            let (n, outputs) = (a.nrows(), c.nrows());
+            let Self { mut a, mut b, mut c, mut d } = self;
+            let (n, outputs, inputs) = (a.entries.nrows(), c.entries.nrows(), b.entries.ncols());
             if outputs == 0 {
                 return Self { a, b, c, d };
             }
             // Step 1: independent rows of D, and rows that vanish.
-            let (u, rank) = row_compression(&d, small);
-            let (c, d) = (&u * c, &u * d);
+            let independent = row_compression(&d);
+            independent.iter().for_each(|by| {
+                c.reflect(by);
+                d.reflect(by);
+            });
+            let rank = independent.len();
             if rank == outputs {
                 return Self { a, b, c, d };
             }
-            let (upper_c, upper_d) = (c.rows(0, rank).into_owned(), d.rows(0, rank).into_owned());
-            let lower = c.rows(rank, outputs - rank).into_owned();
-            // Step 2: the states observed by these rows of C, moved to the end.
-            let (v, seen) = row_compression(&lower.transpose(), small);
+            let (mut upper_c, upper_d) = (c.part((0, 0), (rank, n)), d.part((0, 0), (rank, inputs)));
+            // Step 2: the states observed by these rows of C, moved to the front.
+            let observed = row_compression(&c.part((rank, 0), (outputs - rank, n)).transposed());
+            let (seen, left) = (observed.len(), n - observed.len());
             if seen == 0 {
                 return Self { a, b, c: upper_c, d: upper_d };
             }
-            let v = DMatrix::from_fn(n, n, |i, j| v[((i + seen) % n, j)]);
-            let (a, b, upper_c) = (&v * a * v.transpose(), &v * b, upper_c * v.transpose());
-            let left = n - seen;
+            observed.iter().for_each(|by| {
+                a.reflect(by);
+                a.reflect_rows(by);
+                b.reflect(by);
+                upper_c.reflect_rows(by);
+            });
             // Step 3: these states and their derivatives are zero, which gives new outputs.
             self = Self {
-                a: a.view((0, 0), (left, left)).into_owned(),
-                b: b.rows(0, left).into_owned(),
-                c: super::system::above(
-                    &upper_c.columns(0, left).into_owned(),
-                    &a.view((left, 0), (seen, left)).into_owned(),
-                ),
-                d: super::system::above(&upper_d, &b.rows(left, seen).into_owned()),
+                a: a.part((seen, seen), (left, left)),
+                b: b.part((seen, 0), (left, inputs)),
+                c: upper_c.part((0, seen), (rank, left)).above(&a.part((0, seen), (seen, left))),
+                d: upper_d.above(&b.part((0, 0), (seen, inputs))),
             };
         }
     }
 }
 
-/// Returns an orthogonal matrix whose product with `m` has the independent rows first and zero rows after them, and the
-/// rank.
-fn row_compression(m: &DMatrix<f64>, small: f64) -> (DMatrix<f64>, usize) {
-    let n = m.nrows();
-    if m.is_empty() {
-        return (DMatrix::identity(n, n), 0);
+/// Returns the reflections after which `m` has its independent rows first and rows that are zero up to the errors after them; as many as
+/// its rank.
+///
+/// Source: G. H. Golub, C. F. Van Loan, Matrix Computations, 4th edition (2013), section 5.4.2 (reflections with column pivoting).
+fn row_compression(m: &Known) -> Vec<Reflection> {
+    let (mut m, n) = (m.clone(), m.entries.nrows());
+    let mut found = Vec::new();
+    while found.len() < n.min(m.entries.ncols()) {
+        let first = found.len();
+        let square = |i: usize, j: usize| m.entries[(i, j)].size() * m.entries[(i, j)].size();
+        let is_zero = |j: usize| (first..n).all(|i| square(i, j) <= m.squares[(i, j)]);
+        let size = |j: usize| (first..n).map(|i| square(i, j)).sum::<f64>();
+        let candidates = (first..m.entries.ncols()).filter(|&j| !is_zero(j));
+        let Some(largest) = candidates.max_by(|&j, &k| size(j).total_cmp(&size(k))) else { break };
+        m.entries.swap_columns(first, largest);
+        m.squares.swap_columns(first, largest);
+        let mut v: Vec<Extended> = (first..n).map(|i| m.entries[(i, first)]).collect();
+        let (_, factor) = reflection(&mut v);
+        let by = Reflection { first, v, factor };
+        m.reflect(&by);
+        found.push(by);
     }
-    // Padded to a square matrix, so that the left singular vectors form a complete basis.
-    let mut square = DMatrix::zeros(n, n.max(m.ncols()));
-    square.columns_mut(0, m.ncols()).copy_from(m);
-    let svd = square.svd(true, false);
-    let rank = svd.singular_values.iter().filter(|&&s| s > small).count();
-    (svd.u.expect("the SVD computes U").transpose(), rank)
+    found
 }
 
 #[cfg(test)]
@@ -203,7 +289,7 @@ mod tests {
         let out = DMatrix::from_row_slice(1, 4, &[1.0, 0.0, 0.0, 0.0]);
         let system = StateSpace::new(a, b, out, DMatrix::zeros(1, 1));
         let (p, q) = (0.0458 - 1008.5 * 0.0255 / 1444.1, -45.7597 + 1008.5 * 25.4814 / 1444.1);
-        let root = (0.25 * p * p - q).sqrt();
+        let root = f64::sqrt(0.25 * p * p - q);
         assert_same_set(&zeros(&system).unwrap(), &[c(-0.5 * p + root, 0.0), c(-0.5 * p - root, 0.0)], 1e-11);
     }
 }

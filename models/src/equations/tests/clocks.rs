@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::linear::Complex;
+use mops_core::linear::{Complex, Loop};
 use mops_core::math::complex;
 use mops_core::{Linearise, Linearised, StateSpace};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -387,7 +387,7 @@ fn a_loop_that_is_cut_between_the_instants_is_refused() {
     let fast = linearised(&text, Some("v"), &gains()).unwrap_err();
     assert!(fast.contains("slowest clock"), "{fast}");
     let continuous = linearised(&text, Some("back"), &gains()).unwrap_err();
-    assert!(continuous.contains("`back` changes between the instants"), "{continuous}");
+    assert!(continuous.contains("`back` follows the state `w` between the instants"), "{continuous}");
     let unknown = linearised(&text, Some("i"), &gains()).unwrap_err();
     assert!(unknown.contains("or at the memory of a clock, not at `i`"), "{unknown}");
     let delayed = text.replace("back = 'K*w'", "back = \"K*delay(w, '1 ms')\"");
@@ -412,4 +412,61 @@ fn a_condition_on_the_time_is_met_at_the_instant_itself() {
             assert_eq!(counts, [f64::from(401 - k), f64::from(k)], "{every} ms, {offset} ms, {time} s");
         }
     }
+}
+
+#[test]
+fn margins_do_not_depend_on_the_unit_of_memory() {
+    // A double integrator with a lag, PD by the last sample. From its frequency response, by the matrix exponential and bisection of
+    // |L| = 1: crossover 0.320_978_712_9 rad/s, phase margin 16.642_429_756 deg; on a grid: maximum sensitivity 3.454_886.
+    for unit in ["1", "1000", "1e6", "1e-3"] {
+        let text = format!(
+            "states = {{ x1 = '1', x2 = '1', x3 = '1' }}\ninputs = {{ r = '1' }}\nparameters = {{ k = '1' }}\n\
+             der = {{ x1 = 'u/1 [s]', x2 = '(x1 + 0.7*u)/1 [s]', x3 = '(x2 - x3)/0.05747126436781609 [s]' }}\n\
+             clocks.c = {{ every = '0.05 s', memory = {{ u = '1', last = '1' }}, \
+             next = {{ last = '{unit}*x3', u = 'k*(r - x3) - k*6.0*(x3 - last/{unit})' }} }}"
+        );
+        let found = Loop::new(linearised(&text, Some("u"), &[("k", 0.1)]).unwrap()).unwrap();
+        let peak = found.peak_sensitivity().unwrap();
+        assert!((peak - 3.454_886).abs() < 2e-6, "{unit}: {peak}");
+        let phase = found.phase_margin().unwrap().to_degrees();
+        assert!((phase - 16.642_429_756).abs() < 1e-6, "{unit}: {phase}");
+        let crossover = found.gain_crossovers[0].frequency;
+        assert!((crossover - 0.320_978_712_9).abs() < 1e-8, "{unit}: {crossover}");
+    }
+}
+
+#[test]
+fn margins_of_a_cascade_have_a_value_wherever_its_gains_are() {
+    let text = "states = { i = 'A', th = 'rad', w = 'rad/s' }\ninputs = { r = 'rad' }\n\
+                parameters = { kp = '1/s', kv = 'V s/rad', Ti = 's' }\n\
+                constants = { R = '1.2 ohm', L = '1 mH', K = '0.05 N m/A', J = '2.8e-5 kg m2', N = '50', b = '1e-5 N m s/rad', T = '1 ms' }\n\
+                der = { i = \"L*i' = u - R*i - K*w\", th = 'w', w = \"J*w' = K*i - b*w\" }\n\
+                let = { y = 'th/N', wm = 'N*(y - last)/T', e = 'N*kp*(r - y) - wm', v = 'kv*e + sum', vs = 'clip(v, -24 [V], 24 [V])' }\n\
+                clocks.c = { every = 'T', delay = '1 ms', memory = { u = 'V', last = 'rad', sum = 'V' }, \
+                next = { u = 'vs', last = 'y', sum = 'sum + T/Ti*(kv*e) + vs - v' } }";
+    for kp in [2.0, 10.0, 40.0, 100.0] {
+        for kv in [0.02, 0.06, 0.2] {
+            for integral in [0.01, 0.03, 0.1, 0.3] {
+                let open = linearised(text, Some("u"), &[("kp", kp), ("kv", kv), ("Ti", integral)]).unwrap();
+                assert!(Loop::new(open).is_ok(), "{kp} {kv} {integral}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_limit_opens_the_loop_whatever_acts_beside_it() {
+    // v is 3 at the start, beyond its limit; the anti-windup closes another loop.
+    let text = "states = { x = 'm' }\nparameters = { g = '1/s' }\nstart = { v = 3 }\nder = { x = '-clip(v, -1, 1)' }\n\
+                clocks.c = { every = '0.1 s', memory = { v = 'm/s', sum = 'm/s' }, \
+                next = { v = 'g*x + sum', sum = 'sum + 0.2*(clip(v, -1, 1) - v)' } }";
+    let refused = linearised(text, Some("v"), &[("g", 1.0)]).unwrap_err();
+    assert!(refused.contains("a limit is active at the operating point (`clip` in"), "{refused}");
+    let within = text.replace("v = 3 }", "v = 0 }");
+    assert!(linearised(&within, Some("v"), &[("g", 1.0)]).is_ok());
+    // A limit of the plant that does not follow the cut variable at once, such as dry friction at a speed.
+    let moving = "states = { w = '1/s' }\nparameters = { g = '1' }\nstart = { w = 5 }\n\
+                  der = { w = '(u - clip(w/0.1, -1, 1))/1 [s]' }\n\
+                  clocks.c = { every = '0.1 s', memory = { u = '1/s' }, next = { u = '-g*w' } }";
+    assert!(linearised(moving, Some("u"), &[("g", 1.0)]).is_ok());
 }

@@ -1,5 +1,8 @@
 //! Filters of clocks, compared with difference equations and with continuous systems.
 
+use mops_core::linear::Complex;
+use mops_core::math::complex;
+
 use super::*;
 
 fn simulated(text: &str, parameters: &[f64], signal: &str, horizon: f64, input: Input) -> mops_core::Trace {
@@ -125,4 +128,105 @@ fn a_number_beside_coefficients_of_another_convention_is_named() {
     );
     assert!(read(&sampled(&low_pass("'1 [1]'"), parameters)).is_ok());
     assert!(read(&sampled("continuous = { numerator = [1], denominator = ['1/w', 1] }", parameters)).is_ok());
+}
+
+/// Coefficients, in descending powers, of the denominator of a Butterworth low pass with gain 1.
+fn butterworth(order: usize, w: f64) -> Vec<f64> {
+    let times = |a: &[f64], b: &[f64]| {
+        let mut product = vec![0.0; a.len() + b.len() - 1];
+        a.iter().enumerate().for_each(|(i, x)| b.iter().enumerate().for_each(|(j, y)| product[i + j] += x * y));
+        product
+    };
+    let mut all = if order % 2 == 1 { vec![1.0 / w, 1.0] } else { vec![1.0] };
+    for damping in dampings(order) {
+        all = times(&all, &[1.0 / (w * w), 2.0 * damping / w, 1.0]);
+    }
+    all
+}
+
+/// Damping ratios of the sections of a Butterworth filter.
+fn dampings(order: usize) -> Vec<f64> {
+    (0..order / 2).map(|i| math::sin(std::f64::consts::PI * (2 * i + 1) as f64 / (2 * order) as f64)).collect()
+}
+
+#[test]
+fn a_filter_in_s_keeps_its_digits_at_fast_sampling() {
+    // Against sections of order 1 and 2 of the bilinear image, whose errors are those of 1e-16/(w T)^2.
+    for (order, hertz, period) in
+        [(3, 0.05, 2e-3), (4, 1.0, 2e-4), (5, 1.0, 2e-4), (6, 1.0, 1e-3), (6, 1.0, 1e-4), (8, 1.0, 1e-3)]
+    {
+        let (w, rate) = (std::f64::consts::TAU * hertz, 2.0 / period);
+        let filter = format!("continuous = {{ numerator = [1], denominator = {:?} }}", butterworth(order, w));
+        let text = sampled(&filter, "").replace("100 ms", &format!("{period:?} s"));
+        let steps = (2.5 / hertz / period).min(25_000.0) as usize;
+        let u = simulated(&text, &[], "u", period * steps as f64, Input::Constant(1.0));
+        let mut sections: Vec<([f64; 3], [f64; 3], [f64; 2])> = dampings(order)
+            .into_iter()
+            .map(|damping| {
+                let (square, cross) = (rate * rate, 2.0 * damping * w * rate);
+                let leading = square + cross + w * w;
+                let below = [1.0, 2.0 * (w * w - square) / leading, (square - cross + w * w) / leading];
+                ([1.0, 2.0, 1.0].map(|b| b * w * w / leading), below, [0.0; 2])
+            })
+            .collect();
+        if order % 2 == 1 {
+            let above = [w / (rate + w), w / (rate + w), 0.0];
+            sections.push((above, [1.0, (w - rate) / (w + rate), 0.0], [0.0; 2]));
+        }
+        for k in 0..steps {
+            let exact = sections.iter_mut().fold(1.0, |e, (above, below, m)| {
+                let y = above[0] * e + m[0];
+                *m = [above[1] * e - below[1] * y + m[1], above[2] * e - below[2] * y];
+                y
+            });
+            if k % 97 == 0 {
+                let found = u.at(period * (k as f64 + 0.5));
+                assert!((found - exact).abs() < 1e-8, "order {order} at {hertz} Hz, {k}: {found} {exact}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_zero_order_hold_keeps_its_digits_at_fast_sampling() {
+    // The response to a step is that of the continuous filter, 1 + sum of r exp(p t) over its poles p with the residues r.
+    for (order, hertz, period) in [(4, 1.0, 2e-4), (6, 1.0, 1e-3), (7, 0.2, 1e-3)] {
+        let w = std::f64::consts::TAU * hertz;
+        let mut poles: Vec<Complex> = dampings(order)
+            .into_iter()
+            .flat_map(|damping| {
+                let pole = Complex::new(-damping, (1.0 - damping * damping).sqrt()) * w;
+                [pole, pole.conj()]
+            })
+            .collect();
+        poles.extend((order % 2 == 1).then_some(Complex::new(-w, 0.0)));
+        let exact = |t: f64| {
+            let residue = |i: usize| {
+                let others = (0..order).filter(|&j| j != i).map(|j| -poles[j] / (poles[i] - poles[j]));
+                others.product::<Complex>()
+            };
+            1.0 - (0..order).map(|i| (residue(i) * complex::exp(poles[i] * t)).re).sum::<f64>()
+        };
+        let filter = format!(
+            "continuous = {{ numerator = [1], denominator = {:?} }}, method = 'zero-order-hold'",
+            butterworth(order, w)
+        );
+        let text = sampled(&filter, "").replace("100 ms", &format!("{period:?} s"));
+        let u = simulated(&text, &[], "u", 2.0 / hertz, Input::Constant(1.0));
+        for k in (0..(1.9 / hertz / period) as usize).step_by(61) {
+            let t = period * k as f64;
+            let found = u.at(t + 0.5 * period);
+            assert!((found - exact(t)).abs() < 1e-8, "order {order}, {t}: {found} {}", exact(t));
+        }
+    }
+}
+
+#[test]
+fn a_filter_in_z_that_loses_its_digits_has_a_note() {
+    let notes = |filter: &str| read(&sampled(filter, "")).unwrap().notes();
+    assert!(notes("z = { numerator = [1], denominator = [1, -0.9] }").iter().all(|note| !note.contains("digits")));
+    // (z - 0.999)^4.
+    let fourth = "z = { numerator = [1], denominator = [1, -3.996, 5.988006, -3.988011996, 0.996005996001] }";
+    let found = notes(fourth);
+    assert!(found.iter().any(|note| note.starts_with("filter `u`") && note.contains("to 2 digits")), "{found:?}");
 }

@@ -7,8 +7,10 @@
 //! Source (running error analysis): N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd edition (2002),
 //! section 3.3.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
+use crate::linear::components::block;
+use crate::linear::extended::Real;
 use crate::math;
 
 /// Number of roundings assumed in the given entries, which are computed from parameters in a few operations.
@@ -21,22 +23,27 @@ const CLEAR: f64 = 1e-8;
 
 /// Matrix whose entries are known up to rounding.
 #[derive(Debug, Clone)]
-pub(super) struct Rounded {
-    pub entries: DMatrix<f64>,
+pub(super) struct Rounded<T: Real> {
+    pub entries: DMatrix<T>,
     /// Bounds of the absolute errors of the entries.
     pub errors: DMatrix<f64>,
 }
 
-impl Rounded {
-    /// Wraps a given matrix, assuming a few roundings per entry.
-    pub fn given(entries: DMatrix<f64>) -> Self {
-        let errors = entries.map(|x| ROUNDINGS * f64::EPSILON * x.abs());
+impl<T: Real> Rounded<T> {
+    /// Wraps a given matrix, assuming a few roundings per entry of this relative size.
+    pub fn given(entries: DMatrix<T>, rounding: f64) -> Self {
+        let errors = entries.map(|x| ROUNDINGS * rounding * x.size());
         Self { entries, errors }
     }
 
-    /// Applies `f` to the entries and to the error bounds.
-    pub fn map(&self, f: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
-        Self { entries: f(&self.entries), errors: f(&self.errors) }
+    /// Returns the rows and columns with these indices.
+    pub fn block(&self, indices: &[usize]) -> Self {
+        Self { entries: block(&self.entries, indices), errors: block(&self.errors, indices) }
+    }
+
+    /// Returns the product with a power of two.
+    pub fn scaled(&self, power: f64) -> Self {
+        Self { entries: self.entries.map(|x| x.scaled(power)), errors: &self.errors * power }
     }
 
     /// Returns a matrix with the same eigenvalues except one zero, or `None` if the rows are independent.
@@ -46,30 +53,30 @@ impl Rounded {
     pub fn without_zero(&self) -> Option<Self> {
         let n = self.entries.nrows();
         let (y, dy) = Elimination::of(self).dependency()?;
-        let out = y.iamax();
+        let out = (0..n).fold(0, |best, i| if y[i].size() > y[best].size() { i } else { best });
         let kept = |i: usize| if i < out { i } else { i + 1 };
         let share = |j: usize| y[kept(j)] / y[out];
-        let doubt = |j: usize| (dy[kept(j)] + share(j).abs() * dy[out]) / y[out].abs();
+        let doubt = |j: usize| (dy[kept(j)] + share(j).size() * dy[out]) / y[out].size();
         let entries = DMatrix::from_fn(n - 1, n - 1, |i, j| {
             self.entries[(kept(i), kept(j))] - self.entries[(kept(i), out)] * share(j)
         });
         let errors = DMatrix::from_fn(n - 1, n - 1, |i, j| {
-            let (taken, error) = (self.entries[(kept(i), out)].abs(), self.errors[(kept(i), out)]);
-            let rounding = f64::EPSILON * (taken * share(j).abs() + entries[(i, j)].abs());
-            self.errors[(kept(i), kept(j))] + error * share(j).abs() + taken * doubt(j) + rounding
+            let (taken, error) = (self.entries[(kept(i), out)].size(), self.errors[(kept(i), out)]);
+            let rounding = T::EPSILON * (taken * share(j).size() + entries[(i, j)].size());
+            self.errors[(kept(i), kept(j))] + error * share(j).size() + taken * doubt(j) + rounding
         });
         let cleared = DMatrix::from_fn(n - 1, n - 1, |i, j| {
             let (entry, error) = (entries[(i, j)], errors[(i, j)]);
-            let terms = self.entries[(kept(i), kept(j))].abs();
-            if entry.abs() <= error && error <= CLEAR * terms { 0.0 } else { entry }
+            let terms = self.entries[(kept(i), kept(j))].size();
+            if entry.size() <= error && error <= CLEAR * terms { T::ZERO } else { entry }
         });
         Some(Self { entries: cleared, errors })
     }
 }
 
 /// Elimination of the transposed matrix with complete pivoting; its columns are the rows of the matrix.
-struct Elimination {
-    m: DMatrix<f64>,
+struct Elimination<T: Real> {
+    m: DMatrix<T>,
     errors: DMatrix<f64>,
     /// Row of the matrix for each column.
     order: Vec<usize>,
@@ -77,25 +84,25 @@ struct Elimination {
     sizes: Vec<f64>,
 }
 
-impl Elimination {
-    fn of(a: &Rounded) -> Self {
+impl<T: Real> Elimination<T> {
+    fn of(a: &Rounded<T>) -> Self {
         let n = a.entries.nrows();
-        let Rounded { entries: mut m, mut errors } = a.map(DMatrix::transpose);
-        let sizes: Vec<f64> = (0..n).map(|j| power_of_two(m.column(j).amax())).collect();
-        for j in 0..n {
-            m.column_mut(j).unscale_mut(sizes[j]);
-            errors.column_mut(j).unscale_mut(sizes[j]);
-        }
-        for i in 0..n {
-            let size = power_of_two(m.row(i).amax());
-            m.row_mut(i).unscale_mut(size);
-            errors.row_mut(i).unscale_mut(size);
-        }
+        let (mut m, mut errors) = (a.entries.transpose(), a.errors.transpose());
+        let divide = |m: &mut DMatrix<T>, errors: &mut DMatrix<f64>, at: &dyn Fn(usize) -> (usize, usize)| {
+            let size = power_of_two((0..n).map(|i| m[at(i)].size()).fold(0.0, f64::max));
+            (0..n).for_each(|i| m[at(i)] = m[at(i)].scaled(1.0 / size));
+            (0..n).for_each(|i| errors[at(i)] /= size);
+            size
+        };
+        let sizes = (0..n).map(|j| divide(&mut m, &mut errors, &|i| (i, j))).collect();
+        (0..n).for_each(|i| {
+            divide(&mut m, &mut errors, &|j| (i, j));
+        });
         Self { m, errors, order: (0..n).collect(), sizes }
     }
 
     /// Returns factors `y` with `y'A = 0` and bounds of their errors, or `None` if the rows are independent.
-    fn dependency(mut self) -> Option<(DVector<f64>, DVector<f64>)> {
+    fn dependency(mut self) -> Option<(Vec<T>, Vec<f64>)> {
         let n = self.order.len();
         for k in 0..n {
             let Some((i, j)) = self.pivot(k) else {
@@ -118,7 +125,7 @@ impl Elimination {
         let mut best = (0.0, None);
         for j in k..n {
             for i in k..n {
-                let size = self.m[(i, j)].abs();
+                let size = self.m[(i, j)].size();
                 if size > self.errors[(i, j)] && size > best.0 {
                     best = (size, Some((i, j)));
                 }
@@ -132,43 +139,42 @@ impl Elimination {
         let (pivot, own) = (self.m[(k, k)], self.errors[(k, k)]);
         for i in k + 1..n {
             let factor = self.m[(i, k)] / pivot;
-            let doubt = (self.errors[(i, k)] + factor.abs() * own) / pivot.abs() + f64::EPSILON * factor.abs();
-            if factor == 0.0 && doubt == 0.0 {
+            let size = factor.size();
+            let doubt = (self.errors[(i, k)] + size * own) / pivot.size() + T::EPSILON * size;
+            if size == 0.0 && doubt == 0.0 {
                 continue;
             }
             for j in k + 1..n {
                 let (above, error) = (self.m[(k, j)], self.errors[(k, j)]);
                 self.m[(i, j)] -= factor * above;
-                let rounding = f64::EPSILON * ((factor * above).abs() + self.m[(i, j)].abs());
-                self.errors[(i, j)] += factor.abs() * error + doubt * above.abs() + rounding;
+                let rounding = T::EPSILON * (size * above.size() + self.m[(i, j)].size());
+                self.errors[(i, j)] += size * error + doubt * above.size() + rounding;
             }
         }
     }
 
     /// Returns the linear combination that expresses column `rank` by the columns before it.
-    fn combination(&self, rank: usize) -> (DVector<f64>, DVector<f64>) {
+    fn combination(&self, rank: usize) -> (Vec<T>, Vec<f64>) {
         let n = self.order.len();
-        let (mut y, mut dy) = (vec![0.0; n], vec![0.0; n]);
-        y[rank] = 1.0;
+        let (mut y, mut dy) = (vec![T::ZERO; n], vec![0.0; n]);
+        y[rank] = T::from(1.0);
         for i in (0..rank).rev() {
-            let (mut sum, mut error) = (0.0, 0.0);
+            let (mut sum, mut error) = (T::ZERO, 0.0);
             for j in i + 1..=rank {
                 let (m, e) = (self.m[(i, j)], self.errors[(i, j)]);
                 sum += m * y[j];
-                error += e * y[j].abs() + m.abs() * dy[j] + f64::EPSILON * (m * y[j]).abs();
+                error += e * y[j].size() + m.size() * dy[j] + T::EPSILON * (m * y[j]).size();
             }
             let pivot = self.m[(i, i)];
             y[i] = -sum / pivot;
-            dy[i] = (error + self.errors[(i, i)] * y[i].abs()) / pivot.abs() + f64::EPSILON * y[i].abs();
+            dy[i] = (error + self.errors[(i, i)] * y[i].size()) / pivot.size() + T::EPSILON * y[i].size();
         }
-        let own = |y: &[f64]| {
-            let mut own = DVector::zeros(n);
-            for (k, &row) in self.order.iter().enumerate() {
-                own[row] = y[k] / self.sizes[row];
-            }
-            own
-        };
-        (own(&y), own(&dy))
+        let (mut own, mut errors) = (vec![T::ZERO; n], vec![0.0; n]);
+        for (k, &row) in self.order.iter().enumerate() {
+            own[row] = y[k].scaled(1.0 / self.sizes[row]);
+            errors[row] = dy[k] / self.sizes[row];
+        }
+        (own, errors)
     }
 }
 

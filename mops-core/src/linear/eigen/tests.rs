@@ -3,6 +3,7 @@ use proptest::prelude::*;
 use rand::Rng;
 
 use super::*;
+use crate::linear::components::block;
 use crate::linear::reference;
 use crate::linear::testing::{assert_same_set, c, random};
 use crate::math::{self, complex};

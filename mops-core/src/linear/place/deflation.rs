@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::complement;
 use super::robust::most_independent;
 use crate::linear::Complex;
-use crate::linear::zeros::complement;
 
 /// Returns the feedback that places one pole after the other.
 ///

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::complement;
 use crate::linear::Complex;
 use crate::linear::system::beside;
-use crate::linear::zeros::complement;
 use crate::math::complex;
 
 /// Returns the closed loop `A - B K` with eigenvectors as independent as possible; `range` spans the columns of `B`.
