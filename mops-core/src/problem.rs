@@ -364,12 +364,10 @@ impl Problem {
     /// Returns true if cached derivatives contain everything that this problem needs.
     fn suffice(&self, known: &KnownSlopes) -> bool {
         let n = self.active.len();
-        self.shape.rows.iter().enumerate().all(|(index, (usage, _))| {
-            match entry(known, index) {
-                _ if *usage == Usage::Monitor => true,
-                None => false,
-                Some(along) => along.len() == n,
-            }
+        self.shape.rows.iter().enumerate().all(|(index, (usage, _))| match entry(known, index) {
+            _ if *usage == Usage::Monitor => true,
+            None => false,
+            Some(along) => along.len() == n,
         })
     }
 

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use mops_core::{
     AddedReport, Budget, Ending, Evaluation, FEASIBLE, Halt, Oracle, Pareto, Patience, Problem, Record, RobustReport,
-    RobustTask, RoundReport, Run, RunState, Scenario, StartReport, Stop, Store, Study, Usage, Watch, conclude,
-    uncertain_reports,
+    RobustTask, RoundReport, Run, RunState, Scenario, StartReport, Stop, Store, Study, Uncertain, Usage, Watch,
+    conclude, uncertain_reports,
 };
 
 use super::batches::Stage;
@@ -99,6 +99,12 @@ const LEAST_PATIENCE: usize = 30;
 
 /// Patience with the last design, relative to that with the design of a round.
 const THOROUGH: usize = 5;
+
+/// Distance of two worst cases of a criterion up to which they lie side by side, as a share of the box.
+const BESIDE: f64 = 0.05;
+
+/// Steps between two such cases by which a further one lies beyond them.
+const FARTHER: f64 = 10.0;
 
 /// Relative difference of two values of an uncertain parameter up to which they are one: the rounding of a ratio.
 const SAME: f64 = 1e-12;
@@ -210,6 +216,7 @@ impl Rounds {
                 .iter()
                 .any(|known| known.case == scenario.case && known.values.iter().zip(&scenario.values).all(is_same));
             if !known {
+                let beyond = self.beyond(&scenario, &worst.subject.criterion);
                 added.push(AddedReport {
                     name: scenario.name.clone(),
                     criterion: worst.subject.criterion.clone(),
@@ -217,6 +224,10 @@ impl Rounds {
                     at,
                 });
                 self.scenarios.push(scenario);
+                if let Some(values) = beyond {
+                    let name = self.name(&worst.subject.criterion);
+                    self.scenarios.push(Scenario { name, case: worst.case, values });
+                }
             }
         }
         let any = !added.is_empty();
@@ -233,6 +244,29 @@ impl Rounds {
         });
         self.worst.push(worst);
         any
+    }
+
+    /// Returns the values beyond a new worst case that lies beside the last one of its criterion, in the direction from the last one to the
+    /// new one and within the box; `None` if it lies elsewhere.
+    ///
+    /// Cases side by side lie at the edge of a jump, which each design moves by a little: one by one, they would not come to an end.
+    fn beyond(&self, new: &Scenario, criterion: &str) -> Option<Vec<f64>> {
+        let before =
+            self.done.iter().rev().flat_map(|round| &round.added).find(|added| added.criterion == criterion)?;
+        let before = self.scenarios.iter().find(|known| known.name == before.name && known.case == new.case)?;
+        let ends = |uncertain: &Uncertain| match (uncertain.tuner, uncertain.tolerance) {
+            (Some(_), Some(tolerance)) => [1.0 - tolerance, 1.0 + tolerance],
+            _ => uncertain.bounds,
+        };
+        let mut values = Vec::new();
+        for ((now, before), uncertain) in new.values.iter().zip(&before.values).zip(&self.study.tasks().uncertain) {
+            let ([low, high], step) = (ends(uncertain), now - before);
+            if !(step.abs() <= BESIDE * (high - low)) {
+                return None;
+            }
+            values.push((now + FARTHER * step).clamp(low, high));
+        }
+        (values != new.values).then_some(values)
     }
 
     /// Returns the values of a scenario: those of tuners with a tolerance relative to the design.

@@ -11,6 +11,11 @@ use mops_core::math;
 /// Simulated calibrations of each kind.
 const CALIBRATIONS: u32 = 2000;
 
+/// Returns true if every series is counted in full, also those that take minutes: `MOPS_COVERAGE=all`.
+fn counts_all() -> bool {
+    std::env::var("MOPS_COVERAGE").is_ok_and(|which| which == "all")
+}
+
 /// Shares that count as 95 %.
 const RIGHT: [f64; 2] = [0.93, 0.97];
 
@@ -30,7 +35,10 @@ fn hits(calibration: &Calibration, truth: &[(&str, f64)], count: u32) -> Vec<usi
 
 /// Checks that the share of all calibrations is within [`RIGHT`]; for fewer, within the bounds of chance (one in a thousand).
 fn assert_covers(calibration: &Calibration, truth: &[(&str, f64)]) {
-    let count = mops_tiers::cases(CALIBRATIONS);
+    assert_covers_in(mops_tiers::cases(CALIBRATIONS), calibration, truth);
+}
+
+fn assert_covers_in(count: u32, calibration: &Calibration, truth: &[(&str, f64)]) {
     for ((name, _), hits) in truth.iter().zip(hits(calibration, truth, count)) {
         let share = hits as f64 / f64::from(count);
         println!("{name}: {hits} of {count} intervals hold the truth");
@@ -138,17 +146,22 @@ fn with_spikes(loss: Loss, share: f64, upwards: bool) -> Calibration {
 
 const DECAY: [(&str, f64); 3] = [("k", 0.9), ("o", 0.4), ("x0", 2.0)];
 
+/// Returns the number of calibrations with a robust loss, whose searches take longer.
+fn robust_calibrations() -> u32 {
+    if counts_all() { CALIBRATIONS } else { mops_tiers::cases(CALIBRATIONS / 10) }
+}
+
 #[test]
 fn intervals_of_hubers_loss_cover_the_truth_beside_outliers() {
     for share in [0.0, 0.03, 0.1] {
-        assert_covers(&with_spikes(Loss::Huber, share, false), &DECAY);
+        assert_covers_in(robust_calibrations(), &with_spikes(Loss::Huber, share, false), &DECAY);
     }
 }
 
 #[test]
 fn intervals_of_students_loss_cover_the_truth_beside_outliers() {
     for share in [0.03, 0.1] {
-        assert_covers(&with_spikes(Loss::Student, share, false), &DECAY);
+        assert_covers_in(robust_calibrations(), &with_spikes(Loss::Student, share, false), &DECAY);
     }
 }
 
@@ -157,7 +170,7 @@ fn intervals_of_students_loss_cover_the_truth_beside_outliers() {
 fn outliers_on_one_side_are_reported_with_what_they_shift() {
     for loss in [Loss::Huber, Loss::Student] {
         let calibration = with_spikes(loss, 0.1, true);
-        let count = mops_tiers::cases(CALIBRATIONS);
+        let count = robust_calibrations();
         for ((name, _), hits) in DECAY.iter().zip(hits(&calibration, &DECAY, count)) {
             println!("{loss:?}, spikes upwards, {name}: {hits} of {count} intervals hold the truth");
         }
@@ -168,13 +181,12 @@ fn outliers_on_one_side_are_reported_with_what_they_shift() {
     }
 }
 
-/// Sets of 200 replicates whose bootstrap intervals are counted; `MOPS_BOOTSTRAP=all` counts ten times as many.
-const SETS: u32 = 20;
+/// Sets of 200 replicates whose bootstrap intervals are counted.
+const SETS: u32 = 200;
 
 #[test]
 fn bootstrap_intervals_beside_outliers_cover_the_truth() {
-    let all = std::env::var("MOPS_BOOTSTRAP").is_ok_and(|which| which == "all");
-    let count = if all { 10 * SETS } else { mops_tiers::cases(SETS) };
+    let count = if counts_all() { SETS } else { mops_tiers::cases(SETS / 20) };
     for (loss, share) in [(Loss::Huber, 0.03), (Loss::Huber, 0.1), (Loss::Student, 0.1)] {
         let task = UncertaintyTask { profile: Chosen::None, bootstrap: 200, block: None, bands: false, level: 0.95 };
         let calibration = Calibration { uncertainty: Some(task), ..with_spikes(loss, share, false) };
@@ -182,9 +194,8 @@ fn bootstrap_intervals_beside_outliers_cover_the_truth() {
         for seed in 0..count {
             let outcome = calibration.run(u64::from(seed));
             let found = outcome.found.uncertainty.unwrap().bootstrap.unwrap();
-            for (k, ((name, truth), hits)) in DECAY.iter().zip(&mut hits).enumerate() {
-                let one = &found.parameters[k];
-                assert_eq!(one.parameter, *name);
+            for (((name, truth), hits), one) in DECAY.iter().zip(&mut hits).zip(&found.parameters) {
+                assert!(one.parameter.ends_with(name), "{}", one.parameter);
                 let [low, high] = one.interval;
                 assert!(low < one.value && one.value < high, "{loss:?} {name}: {low} to {high}");
                 *hits += usize::from(low <= *truth && *truth <= high);
@@ -192,8 +203,8 @@ fn bootstrap_intervals_beside_outliers_cover_the_truth() {
         }
         for ((name, _), hits) in DECAY.iter().zip(hits) {
             println!("bootstrap, {loss:?}, {share} spikes, {name}: {hits} of {count} intervals hold the truth");
-            let [low, high] =
-                if all { [hits as f64 / f64::from(count); 2] } else { share_interval(hits, count as usize, 0.999) };
+            let share = hits as f64 / f64::from(count);
+            let [low, high] = if counts_all() { [share; 2] } else { share_interval(hits, count as usize, 0.999) };
             assert!(high >= 0.9 && low <= 0.99, "{loss:?} {name}: {hits} of {count}");
         }
     }

@@ -74,7 +74,7 @@ impl Scaled {
 
     /// Returns the norm of the smallest change of `A` and `B` after which the inputs leave a mode near this one, and that mode.
     ///
-    /// It is the smallest singular value of `[A - s, B]`, over s near the mode, or over s on the imaginary axis (Eising). In turns, a
+    /// The norm is the smallest singular value of `[A - s, B]`, over s near the mode, or over s on the imaginary axis (Eising). In turns, a
     /// unit vector y with the least `|y^H [A - s, B]|` is sought for s, and the best s for y, which is `y^H A y`.
     ///
     /// Source: R. Eising, Between controllable and uncontrollable, Systems & Control Letters 4 (1984) 263-264.
