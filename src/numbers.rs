@@ -60,7 +60,11 @@ pub(crate) fn percent(share: f64) -> String {
 
 /// Formats a count with its noun: `1 case`, `3 cases`.
 pub(crate) fn counted(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+    match (count, noun) {
+        (1, _) => format!("1 {noun}"),
+        (_, "criterion") => format!("{count} criteria"),
+        _ => format!("{count} {noun}s"),
+    }
 }
 
 /// Returns a portable file name: letters and digits of all scripts, `_` and `.` stay, each run of other characters becomes one

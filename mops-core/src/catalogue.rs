@@ -1,7 +1,8 @@
 //! Catalogue of all kinds of models, criteria and solvers that a study file can name, and of the shipped studies.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
@@ -262,6 +263,14 @@ pub fn schema_of<T: JsonSchema>() -> Schema {
     settings.inline_subschemas = true;
     settings.meta_schema = None;
     settings.into_generator().into_root_schema_for::<T>()
+}
+
+/// Returns a schema that is made once: a study has as many entries of one kind as it likes.
+pub fn schema_once(of: fn() -> Schema) -> Arc<Schema> {
+    static MADE: Mutex<BTreeMap<usize, Arc<Schema>>> = Mutex::new(BTreeMap::new());
+    // Functions at one address are the same.
+    let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+    made.entry(of as usize).or_insert_with(|| Arc::new(of())).clone()
 }
 
 #[cfg(test)]

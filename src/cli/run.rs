@@ -12,6 +12,7 @@ use mops_core::{Catalogue, Diagnostic, SolverChoice, Stop, Study, StudyError, Ta
 use super::run_files::{DISK_TIMEOUT, RunFiles, check_run};
 use super::study::{StudyArguments, home, open_as, outputs, without_settings};
 use super::{default_folder, diagnosis, findings, reading, resume, tables};
+use crate::numbers::counted;
 use crate::search::{DEFAULT_EVALUATIONS, Options, Solved, solves, suits};
 use crate::store::Start;
 use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, eprint_line, print, print_json};
@@ -350,15 +351,18 @@ fn introduction(study: &Study, options: &Options) -> String {
         let (count, channels) = experiments.fold((0, 0), |(n, m), e| (n + 1, m + e.channels.len()));
         let model = &study.name();
         return format!(
-            "{model}: {active} tuners, {count} experiments with {channels} channels; searching for missing effects\n"
+            "{model}: {}, {} with {}; searching for missing effects\n",
+            counted(active, "tuner"),
+            counted(count, "experiment"),
+            counted(channels, "channel")
         );
     }
     format!(
-        "{}: {} tuners, {} criteria over {} cases, solver {}\n",
+        "{}: {}, {} over {}, solver {}\n",
         study.name(),
-        active,
-        study.rows().len(),
-        study.cases().len(),
+        counted(active, "tuner"),
+        counted(study.rows().len(), "criterion"),
+        counted(study.cases().len(), "case"),
         if solves(study) { options.solver.kind } else { "none (no optimisation)" }
     )
 }

@@ -261,7 +261,7 @@ impl Rounds {
         let mut values = Vec::new();
         for ((now, before), uncertain) in new.values.iter().zip(&before.values).zip(&self.study.tasks().uncertain) {
             let ([low, high], step) = (ends(uncertain), now - before);
-            if !(step.abs() <= BESIDE * (high - low)) {
+            if !(high - low).is_finite() || step.abs() > BESIDE * (high - low) {
                 return None;
             }
             values.push((now + FARTHER * step).clamp(low, high));

@@ -31,7 +31,7 @@ pub use manual::{Entry, about, describe, entries, places_of};
 pub use parts::{cases, criterion, experiments, model};
 pub use schema::{study_schema, tables};
 
-use crate::catalogue::{Catalogue, SolverChoice};
+use crate::catalogue::{Catalogue, SolverChoice, schema_once};
 use crate::catalogue_study::Shipped;
 use crate::criterion::{Other, Usage};
 use crate::data::read_regular;
@@ -351,7 +351,7 @@ fn read_seconds(node: &Node<'_>, key: &str, quantity: Option<&Quantity>) -> Resu
 fn read_criterion(catalogue: &Catalogue, node: &Node<'_>) -> Result<CriterionBuilder, Diagnostic> {
     let (kind, options) = kind(node, CriterionCommon::KEYS, &catalogue.criteria, |k| k.name, "criterion")?;
     let common: CriterionCommon = node.only(CriterionCommon::KEYS).read()?;
-    let criterion = options.read_with(&(kind.schema)(), kind.read)?;
+    let criterion = options.read_with(&schema_once(kind.schema), kind.read)?;
     Ok(CriterionBuilder {
         criterion: Box::new(Located { inner: criterion, kind: kind.name }),
         model: common.model,
@@ -426,5 +426,5 @@ fn read_solver(catalogue: &Catalogue, root: &Node<'_>) -> Result<(SolverChoice, 
         return Ok((default(), common.max_evaluations));
     }
     let (kind, options) = kind(&node, SolverCommon::KEYS, &catalogue.solvers, |k| k.name, "solver")?;
-    Ok((options.read_with(&(kind.schema)(), kind.read)?, common.max_evaluations))
+    Ok((options.read_with(&schema_once(kind.schema), kind.read)?, common.max_evaluations))
 }

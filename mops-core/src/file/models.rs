@@ -4,7 +4,7 @@ use super::effects;
 use super::sections::{ModelCommon, OneOrMore};
 use super::tree::Node;
 use super::{Files, kind};
-use crate::catalogue::Catalogue;
+use crate::catalogue::{Catalogue, schema_once};
 use crate::diagnostic::{Diagnostic, suggestion};
 use crate::joined::Joined;
 use crate::linearised::{Linearise, Linearised};
@@ -54,7 +54,7 @@ pub(super) fn read_model(
             .locate(&StudyError::new("like", format!("`{like}` is a model of a study, and this is a single model")))
             .with_help("give all keys of the model"));
     }
-    let model = options.read_with(&(kind.schema)(), |value| (kind.read)(value, files))?;
+    let model = options.read_with(&schema_once(kind.schema), |value| (kind.read)(value, files))?;
     let mut model = model.map_err(|mistake| options.locate(&mistake))?;
     if let Some(place) = node.child("effects") {
         model = effects::add(catalogue, model, common.effects, &place)?;

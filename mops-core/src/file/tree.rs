@@ -12,7 +12,7 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 use super::schema::documentation;
 use super::{UNIT_HELP, shape, syntax};
-use crate::catalogue::schema_of;
+use crate::catalogue::{schema_of, schema_once};
 use crate::diagnostic::{Diagnostic, Source, suggestion};
 use crate::study_error::StudyError;
 use crate::unit::Quantity;
@@ -216,7 +216,7 @@ impl<'t> Node<'t> {
 
     /// Reads the value as a `T`; unknown keys and wrong types are rejected at their position.
     pub fn read<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, Diagnostic> {
-        self.read_with(&schema_of::<T>(), T::deserialize)
+        self.read_with(&schema_once(schema_of::<T>), T::deserialize)
     }
 
     /// Reads the value with a reader and its schema.

@@ -7,6 +7,7 @@ mod ties;
 mod tuners;
 mod values;
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use crate::case::Case;
@@ -254,17 +255,16 @@ fn temperatures_of_nothing(study: &Study) -> Vec<String> {
 
 /// Checks that names are given and differ; those of a study file always differ.
 fn distinct<'n>(table: &str, names: impl Iterator<Item = &'n String>) -> Result<(), StudyError> {
-    let mut known = Vec::new();
+    let mut known = HashSet::new();
     for name in names {
         if name.is_empty() {
             return Err(StudyError::here("a name is empty").within(table).with_help("name every entry"));
         }
-        if known.contains(&name) {
+        if !known.insert(name) {
             return Err(StudyError::new(name, format!("duplicate name `{name}`"))
                 .within(table)
                 .with_help("rename one of them: studies and results use these names"));
         }
-        known.push(name);
     }
     Ok(())
 }
