@@ -297,7 +297,7 @@ fn two_points_that_fit_equally_well_are_not_one_optimum() {
     let (result, text) = run(study.to_str().unwrap(), folder.path(), &[]);
     let doubt = result["end"]["doubt"].as_str().unwrap_or_else(|| panic!("{text}"));
     assert!(doubt.starts_with("Not unique") && doubt.contains("p = ") && !doubt.contains("tau"), "{doubt}");
-    assert!(!text.contains("all in 1 optimum"), "{text}");
+    assert!(!text.contains("found 1 optimum"), "{text}");
     // The report says that the residuals exceed the noise.
     let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
     assert!(page.contains("times the stated noise"), "a misfit is not green");

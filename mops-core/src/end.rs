@@ -203,7 +203,7 @@ impl End {
                     )
                 });
                 Some(format!(
-                    "Of {searches} local searches, {} ended here, all in {of_optima}{}.",
+                    "Of {searches} local searches, {} ended here; together they found {of_optima}{}.",
                     none_or(arrived),
                     share.unwrap_or_default()
                 ))
@@ -295,7 +295,7 @@ mod tests {
     fn two_searches_that_agree_give_no_estimate_and_no_doubt() {
         let end = End::new(Optimality::Stationary, merit(1.0), &[merit(1.0); 2], Stop::Converged, false);
         assert_eq!((end.basins.unseen, end.doubt), (None, None));
-        assert_eq!(end.words[1], "Of 2 local searches, 2 ended here, all in 1 optimum.");
+        assert_eq!(end.words[1], "Of 2 local searches, 2 ended here; together they found 1 optimum.");
     }
 
     #[test]

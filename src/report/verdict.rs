@@ -167,8 +167,8 @@ fn doubts_of_fit(outcome: &Outcome) -> String {
         && ratio(channel) > MISFIT
     {
         text += &format!(
-            "The residuals of `{}` in `{}` are {} times the stated noise: the model does not describe the data, or the noise is \
-             larger. ",
+            "The residuals of `{}` in `{}` are {} times the stated noise: the model does not describe the data, the noise is \
+             larger, or the data have outliers. ",
             channel.name,
             experiment.name,
             significant(ratio(channel), 3)
@@ -181,7 +181,7 @@ fn doubts_of_fit(outcome: &Outcome) -> String {
     let bounds: Vec<String> =
         outcome.tuners.iter().filter(|t| t.at_bound.is_some()).map(|tuner| format!("`{}`", tuner.name)).collect();
     if !bounds.is_empty() {
-        text += &format!("At a bound of its range: {}. ", bounds.join(", "));
+        text += &format!("At a bound: {}. ", bounds.join(", "));
     }
     text
 }

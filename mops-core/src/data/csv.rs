@@ -388,6 +388,9 @@ impl DecimalMarks {
         if !self.with_commas || !cell.iter().all(|byte| b"0123456789+-.,eE \"".contains(byte)) {
             return Ok(());
         }
+        if is_dotted_date(cell) {
+            return Ok(());
+        }
         self.point |= cell.contains(&b'.');
         self.comma |= cell.contains(&b',');
         if !(self.point && self.comma) {
@@ -397,6 +400,16 @@ impl DecimalMarks {
             .with_help("use one decimal mark, and no thousands separators")
             .at(source, span().unwrap_or(0..0)))
     }
+}
+
+/// Returns true for a date such as `12.03.2026`: three groups of digits between points, none of them three digits long as those of
+/// thousands are.
+fn is_dotted_date(cell: &[u8]) -> bool {
+    let text = cell.trim_ascii();
+    let text = text.strip_prefix(b"\"").and_then(|text| text.strip_suffix(b"\"")).unwrap_or(text);
+    let groups: Vec<&[u8]> = text.split(|byte| *byte == b'.').collect();
+    let is_group = |group: &&[u8]| matches!(group.len(), 1 | 2 | 4) && group.iter().all(u8::is_ascii_digit);
+    groups.len() == 3 && groups.iter().all(is_group)
 }
 
 /// Returns the number in a cell, NaN for a gap, or `None` for text.

@@ -331,6 +331,11 @@ mod csv {
         assert_eq!(file.time_column().as_deref(), Some("Uhrzeit"));
         assert_same(values(&file, "Uhrzeit"), &[0.0, 2.0]);
         assert_eq!(file.skipped, ["Datum: joined with `Uhrzeit`"]);
+        // As a logger writes it: lines of its own, points in dates and commas in numbers.
+        let file = read(
+            "Messgerät: LG-40\nPrüfer: Müller, Ofen 3\nDatum;Uhrzeit;P / W;T\n12.03.2026;23:59:50;0,0;21,95\n13.03.2026;00:00:00;0,5;22,10\n",
+        );
+        assert_eq!(file.skipped[0], "Datum: joined with `Uhrzeit`");
         assert_eq!(file.column("Uhrzeit").unwrap().origin.unwrap().reference, Reference::Local);
     }
 

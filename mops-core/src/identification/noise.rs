@@ -53,6 +53,9 @@ pub(super) struct OneSided {
     pub changes: Vec<f64>,
 }
 
+/// Ratio of the samples to the large deviations below which these are no outliers: the model does not describe the data.
+const OUTLIERS: usize = 5;
+
 /// Probability below which large deviations are on one side by more than chance.
 const BY_CHANCE: f64 = 0.01;
 
@@ -303,7 +306,8 @@ impl OneSided {
         let tail = of.record.tail.as_ref()?;
         let count = tail.samples.len();
         let rare = tail.above.min(count - tail.above);
-        if 2.0 * half_binomial(count, rare) >= BY_CHANCE {
+        // Where a good part of the samples is that far off, the model is, and not the samples.
+        if OUTLIERS * count > of.record.len() || 2.0 * half_binomial(count, rare) >= BY_CHANCE {
             return None;
         }
         let n = of.slopes.ncols();

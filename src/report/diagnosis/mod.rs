@@ -114,7 +114,7 @@ fn missing(diagnosis: &Diagnosis) -> Markup {
             p { "The term " (rich(&words::term(dropped))) " of the nominal model is not needed and was dropped." }
         }
         p {
-            "The recalibrated study is " code { "repaired.toml" } ", next to this page; it runs by itself. Its predictions are in "
+            "The recalibrated study is " code { "repaired.toml" } ", next to this page. Its predictions are in "
             "the folder " code { "predictions" } "."
         }
     }

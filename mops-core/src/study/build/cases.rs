@@ -292,16 +292,14 @@ pub(super) fn outliers(experiment: &str, channel: &Channel) -> Option<String> {
         spread > 0.0 && off(k) > OUTLYING * spread && around < 0.6 * off(k)
     };
     let alone: Vec<usize> = (1..v.len() - 1).filter(is_outlier).collect();
-    let first = *alone.first()?;
+    // Times are sums of rounded numbers; a nanosecond is below the spacing of any samples.
+    let at = (1e9 * channel.times[*alone.first()?]).round() / 1e9;
     let count = match alone.len() {
         1 => {
-            format!("the sample at {} s of `{}` in `{experiment}` is an outlier", channel.times[first], channel.signal)
+            format!("the sample at {at} s of `{}` in `{experiment}` is an outlier", channel.signal)
         }
         n => {
-            format!(
-                "{n} samples of `{}` in `{experiment}` (the first at {} s) are outliers",
-                channel.signal, channel.times[first]
-            )
+            format!("{n} samples of `{}` in `{experiment}` (the first at {at} s) are outliers", channel.signal)
         }
     };
     Some(format!("{count}: loss = \"huber\" or \"student\" of `normalised-error` limits the influence of outliers"))
