@@ -183,7 +183,8 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
     let demands = match (outcome.task, counts(&[Usage::Minimise], true)) {
         (Task::Calibration, _) => String::new(),
         _ if counts(&[Usage::Minimise], false) == 0 => "nothing to minimise; ".to_owned(),
-        (_, 0) => "all demands met; ".to_owned(),
+        (_, 0) if outcome.feasible => "all demands met; ".to_owned(),
+        (_, 0) => "all other demands met; ".to_owned(),
         (_, 1) => "1 demand missed; ".to_owned(),
         (_, n) => format!("{n} demands missed; "),
     };

@@ -27,8 +27,8 @@ pub(super) fn section(found: &JumpsReport) -> Markup {
     };
     html! {
         p {
-            "Each tuner was moved by 1 % of its range, each constant and initial value by 1 % of itself (where that is 0, of the scale "
-            "of its state), and criteria that then rise by at least 2 % were followed back to where they jump. "
+            "Each tuner was moved by 1 % of its range, each constant and initial value by 1 % of itself (an initial value of 0: of the "
+            "scale of its state, if it has one), and criteria that then rise by at least 2 % were followed back to where they jump. "
             "Looked at: " (found.quantities) " of " (found.quantities + found.left_out.len()) ", with "
             (counted(found.evaluations, "evaluation")) "."
             @if found.found.is_empty() { " No jump was found." }

@@ -119,7 +119,10 @@ fn tuners(problem: &Problem, point: &Design) -> Vec<f64> {
 fn words(problem: &Problem, front: &[Certified], found: &TradeOffs, stop: Stop) -> Vec<String> {
     let ends = found.criteria.iter().enumerate().map(|(k, criterion)| {
         let [best, worst] = [criterion.best, criterion.worst].map(|value| amount(value, &criterion.unit));
-        format!("{} from {best} to {worst}", name(found, k))
+        match criterion.worst.is_finite() {
+            true => format!("{} from {best} to {worst}", name(found, k)),
+            false => format!("{} from {best} on, and without a value at some points", name(found, k)),
+        }
     });
     let mut words = vec![format!(
         "The Pareto front has {}: {}.{}",
@@ -174,6 +177,11 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs, stop: Stop) 
     let at_jumps = found.points.iter().filter(|point| point.is_beside_jump).count();
     let why =
         if at_jumps > 0 { format!(", {at_jumps} of them as a criterion jumps beside them") } else { String::new() };
+    if of(Pareto::NotShown) == found.points.len() {
+        let points = counted(found.points.len(), "point");
+        words.push(format!("At none of the {points} the first-order Pareto conditions could be checked{why}."));
+        return words;
+    }
     words.push(format!(
         "{} of {} points satisfy the first-order Pareto conditions; {} could not be checked{why}; at {} a step of a thousandth of the \
          box improves one criterion by more than 0.005 % and worsens no other.",

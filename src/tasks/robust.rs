@@ -87,8 +87,8 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
 }
 
 /// Doubt about a design whose worst cases are unknown.
-const NOT_SEARCHED: &str = "The uncertain parameters were not searched for worst cases: the values hold for the given cases only; \
-                            continue the run (--resume).";
+const NOT_SEARCHED: &str = "No search for worst cases was completed: the values hold for the given cases only; continue the run with \
+                            a higher limit (--resume).";
 
 /// Share of the remaining budget that a round may spend: one part of so many.
 const ROUND_SHARE: usize = 3;
@@ -311,6 +311,7 @@ impl Rounds {
         let chosen = self.chosen().filter(|&chosen| !self.worst[chosen].is_empty());
         let Some(chosen) = chosen else {
             let mut outcome = last.outcome;
+            outcome.stop = stop;
             if let Some(end) = &mut outcome.end {
                 end.doubt = Some(NOT_SEARCHED.to_owned());
             }
@@ -324,14 +325,24 @@ impl Rounds {
         let mut run = Run::new(&problem, Budget { evaluations: 1 }, &());
         if run.evaluate(&[problem.point_of(design)]).is_err() {
             // Cancelled: returns the result of the last round.
-            return Solved { archive: Vec::new(), ..last };
+            let mut outcome = last.outcome;
+            outcome.stop = stop;
+            return Solved { outcome, archive: Vec::new(), ..last };
         }
         let pareto = if chosen + 1 == self.done.len() { last.outcome.pareto } else { Pareto::NotShown };
         let end = last.outcome.end.clone().filter(|_| chosen + 1 == self.done.len());
         let (mut outcome, best) = conclude(&run, &options.solver, Ending { stop, end, pareto, seconds: 0.0 });
         drop(run);
         // The run has the design only.
-        outcome.start = StartReport::of(problem.study(), &problem.evaluate_at(&problem.study().start()));
+        let start = problem.evaluate_at(&problem.study().start());
+        outcome.start = StartReport::of(problem.study(), &start);
+        if !settled && start.scaled.is_some() && start.merit.is_better_than(&best.merit) {
+            outcome.warnings.push(
+                "over the cases found, the initial guess is better than the reported design: no round was completed that shows \
+                 a better one; continue the run (--resume)"
+                    .to_owned(),
+            );
+        }
         (outcome.failures, outcome.methods) = (last.outcome.failures, last.outcome.methods);
         let effort = Effort { samples: 1, starts: 1 };
         let region = Region::new(&self.study, design, |_| true, effort);
@@ -418,11 +429,13 @@ fn words(report: &RobustReport, over_all: f64, end: End) -> Vec<String> {
     }
     let best = report.rounds.iter().map(|round| round.for_cases).filter(|v| v.is_finite()).fold(f64::NAN, f64::max);
     if best.is_finite() && round.found.is_finite() {
-        words.push(format!(
-            "Lower bound {} (if the solver found the optimum for the added cases); gap {}.",
-            number(best),
-            number((found - best).max(0.0))
-        ));
+        // A design that violates a constraint is no upper bound.
+        let gap = match round.violation_found <= report.tolerance {
+            true => format!("; gap {}", number((found - best).max(0.0))),
+            false => String::new(),
+        };
+        let condition = "if the solver found the optimum for the cases of every round";
+        words.push(format!("Lower bound {} ({condition}){gap}.", number(best)));
     }
     words.extend(report.criteria.iter().map(sentence));
     words.push(NO_GUARANTEE.to_owned());
