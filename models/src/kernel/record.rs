@@ -1,6 +1,5 @@
 //! Traces of signals from the dense output of steps, with their tangents.
 
-use mops_core::enclosure::Enclosure;
 use mops_core::{
     Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Past, Response, Scalar, Trace, WithTangents,
 };
@@ -83,10 +82,6 @@ struct Recorder<'a, S> {
     states: [Vec<S>; 5],
     resolved: Vec<Resolved>,
     tolerance: &'a Tolerance,
-    /// Simulated time, s.
-    span: f64,
-    /// Bounds of the states over a part of a step.
-    bounds: Vec<Enclosure>,
 }
 
 /// Resolution of a computed signal by the steps.
@@ -98,19 +93,7 @@ struct Resolved {
     slope: f64,
     /// Longest step whose quartic agreed with the signal when compared, s.
     longest: f64,
-    /// Number of bounds that may still be computed to find what hides between the values.
-    looks: usize,
 }
-
-/// Bounds of a signal over a part of a step, as a multiple of the spread of its values there, from which something narrow may hide
-/// between them, such as a pulse over a position. Bounds of products and quotients of smooth quantities are a few times too wide.
-const WIDE: f64 = 8.0;
-
-/// Number of bounds of a signal in a simulation that find nothing; each place found gives as many again. A pulse takes some 30.
-const LOOKS: usize = 64;
-
-/// Part of the simulated time up to which nothing is sought within a step: shorter steps follow what there is.
-const SHORT: f64 = 2e-3;
 
 /// Permitted deviation of the quartic in units of the tolerance: the dense output of the states is no more accurate.
 const OFF: f64 = 10.0;
@@ -223,64 +206,30 @@ impl<S: Scalar> Recorder<'_, S> {
         length > LONGER * self.resolved[index].longest || off.is_nan() || off > self.allowed(index, largest(values))
     }
 
-    /// Returns true if the bounds of a signal over the part `[from, to]` of a step are so much wider than the values there that something
-    /// may hide between them.
-    fn hides<D: Dynamics<S> + ?Sized>(
-        &mut self,
-        (step, dynamics): (&Step<S>, &D),
-        index: usize,
-        [from, to]: [f64; 2],
-        values: &[S; 5],
-    ) -> bool {
-        if !dynamics.has_bounds()
-            || self.resolved[index].looks == 0
-            || (to - from) * step.taken <= SHORT * self.span
-            || step.taken <= 0.0
-        {
-            return false;
-        }
-        self.resolved[index].looks -= 1;
-        let share = step.taken / step.length;
-        step.enclose(from * share, to * share, &mut self.bounds);
-        let time = [from, to].map(|s| step.start + s * step.taken);
-        let over = dynamics.enclose_signal(self.signals[index].0, Enclosure::of_time(time[0], time[1]), &self.bounds);
-        let values = values.map(Scalar::value);
-        let spread = values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-            - values.iter().copied().fold(f64::INFINITY, f64::min);
-        let width = over.value.high - over.value.low;
-        let size = over.value.high.abs().max(over.value.low.abs());
-        width.is_finite() && width > WIDE * (spread + self.allowed(index, size))
-    }
-
     /// Adds the part `[from, to]` of a step to the traces of a signal, halved until one quartic per part suffices.
-    fn refine<D: Dynamics<S> + ?Sized>(
+    fn refine(
         &mut self,
-        (step, dynamics): (&Step<S>, &D),
+        step: &Step<S>,
         index: usize,
         [from, to]: [f64; 2],
         halvings: u32,
+        signal: &impl Fn(f64, &[S]) -> S,
     ) {
-        let which = self.signals[index].0;
-        let signal = |t: f64, x: &[S]| dynamics.signal(which, t, x);
         let mut state = self.states[0].clone();
         let mut at = |s: f64, at: At| {
             let s = from + s * (to - from);
             step.state(s, &mut state);
-            at.signal(step.start + s * step.taken, &state, &signal)
+            at.signal(step.start + s * step.taken, &state, signal)
         };
         let values = Trace::NODES.map(|s| at(s, At::State));
-        let ends = halvings == 0 || self.taken > self.room || self.cancellation.requested().is_some();
-        let agrees = ends || self.agrees(index, &values, &mut at);
-        if agrees && (ends || !self.hides((step, dynamics), index, [from, to], &values)) {
+        let ends = self.taken > self.room || self.cancellation.requested().is_some();
+        if halvings == 0 || ends || self.agrees(index, &values, &mut at) {
             self.push(index, step.start + to * step.taken, &values);
             return;
         }
-        if !agrees {
-            self.resolved[index].looks = LOOKS;
-        }
         let middle = 0.5 * (from + to);
         for half in [[from, middle], [middle, to]] {
-            self.refine((step, dynamics), index, half, halvings - 1);
+            self.refine(step, index, half, halvings - 1, signal);
         }
     }
 }
@@ -327,26 +276,22 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
             let time = |s: f64| step.start + s * step.taken;
             let values = dynamics.signal_at(*signal, &Trace::NODES.map(time), &self.states);
             self.resolved[i].size = self.resolved[i].size.max(largest(&values));
-            let mut is_resolved = true;
             if self.must_compare(i, step.taken, &values) {
                 let mut state = self.states[0].clone();
                 let inside = |s: f64, at: At| {
                     step.state(s, &mut state);
                     at.signal(time(s), &state, &computed)
                 };
-                is_resolved = self.agrees(i, &values, inside);
-                if is_resolved {
-                    let longest = &mut self.resolved[i].longest;
-                    *longest = longest.max(step.taken);
+                if !self.agrees(i, &values, inside) {
+                    for half in [[0.0, 0.5], [0.5, 1.0]] {
+                        self.refine(step, i, half, HALVINGS, &computed);
+                    }
+                    continue;
                 }
+                let longest = &mut self.resolved[i].longest;
+                *longest = longest.max(step.taken);
             }
-            if is_resolved && !self.hides((step, dynamics), i, [0.0, 1.0], &values) {
-                self.push(i, end, &values);
-                continue;
-            }
-            for half in [[0.0, 0.5], [0.5, 1.0]] {
-                self.refine((step, dynamics), i, half, HALVINGS);
-            }
+            self.push(i, end, &values);
         }
     }
 
@@ -434,10 +379,8 @@ fn record_within<S: Scalar, D: Dynamics<S> + ?Sized>(
         events: Vec::new(),
         restarts: Vec::new(),
         states: std::array::from_fn(|_| start.to_vec()),
-        resolved: vec![Resolved { size: 0.0, slope: f64::NAN, longest: 0.0, looks: LOOKS }; signals.len()],
+        resolved: vec![Resolved { size: 0.0, slope: f64::NAN, longest: 0.0 }; signals.len()],
         tolerance,
-        span: end,
-        bounds: Vec::new(),
     };
     let (_, work) = integrate(dynamics, 0.0, end, start, tolerance, &mut recorder)?;
     for direction in 0..S::DIRECTIONS {
