@@ -210,12 +210,7 @@ impl Rounds {
             let at = region.coordinates(&values);
             let values = self.relative(values, &solved.best.tuners);
             let scenario = Scenario { name: self.name(&worst.subject.criterion), case: worst.case, values };
-            let is_same = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * a.abs();
-            let known = self
-                .scenarios
-                .iter()
-                .any(|known| known.case == scenario.case && known.values.iter().zip(&scenario.values).all(is_same));
-            if !known {
+            if !self.is_known(&scenario) {
                 let beyond = self.beyond(&scenario, &worst.subject.criterion);
                 added.push(AddedReport {
                     name: scenario.name.clone(),
@@ -226,7 +221,10 @@ impl Rounds {
                 self.scenarios.push(scenario);
                 if let Some(values) = beyond {
                     let name = self.name(&worst.subject.criterion);
-                    self.scenarios.push(Scenario { name, case: worst.case, values });
+                    let beyond = Scenario { name, case: worst.case, values };
+                    if !self.is_known(&beyond) {
+                        self.scenarios.push(beyond);
+                    }
                 }
             }
         }
@@ -244,6 +242,13 @@ impl Rounds {
         });
         self.worst.push(worst);
         any
+    }
+
+    /// Returns true if a scenario of these values was added before.
+    fn is_known(&self, scenario: &Scenario) -> bool {
+        let is_same = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * a.abs();
+        let same = |known: &Scenario| known.values.iter().zip(&scenario.values).all(is_same);
+        self.scenarios.iter().any(|known| known.case == scenario.case && same(known))
     }
 
     /// Returns the values beyond a new worst case that lies beside the last one of its criterion, in the direction from the last one to the

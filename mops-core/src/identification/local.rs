@@ -78,6 +78,7 @@ pub fn local(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>)
     });
     let mut at = found.at.residuals.clone();
     let mut records = records(problem, tuners).filter(|_| residuals);
+    let given = jacobian.clone();
     let holds = |record: &mut Record| match point {
         Point::Minimum => record.as_squares(&mut at, &mut jacobian),
         Point::Elsewhere => {
@@ -86,7 +87,7 @@ pub fn local(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>)
         }
     };
     if !records.iter_mut().flatten().all(holds) {
-        records = None;
+        (records, jacobian) = (None, given);
     }
     let zero = zero.unwrap_or(if exact { TANGENTS } else { DIFFERENCES });
     let mut sensitivity = Sensitivity::of(&jacobian, coordinates.collect(), zero);

@@ -1,5 +1,6 @@
 //! Records: the measured samples behind the entries of a residual vector.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
@@ -31,7 +32,7 @@ pub struct Record {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Tail {
     /// Samples of the record with such a deviation.
-    pub samples: Vec<usize>,
+    pub samples: BTreeSet<usize>,
     /// Number of them with a measured value above the simulated one.
     pub above: usize,
 }
@@ -83,7 +84,7 @@ impl Record {
     /// With the score `psi` and the deviation `e`, in the unit of the loss, the deviation becomes `psi(e)/mean(psi')` and the weight
     /// of its square `mean(psi')`. White residuals then give the covariance `s^2 mean(psi^2)/mean(psi')^2 (J'J)^-1`, and the ratio of
     /// likelihoods becomes `(S - S_min) mean(psi')/mean(psi^2)`. Their size shows the noise, so that none is declared. Returns
-    /// false if `mean(psi')` is not positive: most samples are outliers, and the theory does not hold.
+    /// false if `mean(psi')` is not positive: most samples are outliers, and the theory does not hold; the numbers are then of no use.
     ///
     /// Source: P. J. Huber, E. M. Ronchetti, Robust Statistics (2nd ed., 2009), sections 6.3, 7.6; F. R. Hampel et al., Robust
     /// Statistics (1986), section 7.2 (tests).
@@ -104,8 +105,7 @@ impl Record {
                 jacobian.row_mut(block.first + i).apply(|x| *x *= mean.sqrt() / loss.residual(*e)[1]);
                 block.weights[i] = weight;
                 let sample = block.sample + i - self.samples.start;
-                if e.abs() > FAR && !tail.samples.contains(&sample) {
-                    tail.samples.push(sample);
+                if e.abs() > FAR && tail.samples.insert(sample) {
                     tail.above += usize::from(*e < 0.0);
                 }
             }

@@ -242,6 +242,6 @@ pub(super) fn angle_to_minus_one(response: Complex) -> f64 {
 }
 
 #[cfg(test)]
-mod by_grid;
+pub(super) mod by_grid;
 #[cfg(test)]
 mod tests;

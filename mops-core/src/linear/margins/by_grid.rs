@@ -147,7 +147,7 @@ impl Factored {
 }
 
 /// Returns the end of the subrange in which `like_low` is true.
-fn bisect(range: &[f64], like_low: impl Fn(f64) -> bool) -> f64 {
+pub fn bisect(range: &[f64], like_low: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (range[0], range[1]);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);

@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::linear::Complex;
+use crate::linear::margins::by_grid::bisect;
 use crate::math::{self, complex};
 
 /// Ratio of successive frequencies of a grid.
@@ -104,14 +105,4 @@ impl OnGrid<'_> {
         }
         best
     }
-}
-
-/// Returns the end of the subrange in which `like_low` is true.
-fn bisect(range: &[f64], like_low: impl Fn(f64) -> bool) -> f64 {
-    let (mut low, mut high) = (range[0], range[1]);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if like_low(middle) { low = middle } else { high = middle }
-    }
-    low
 }
