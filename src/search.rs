@@ -209,7 +209,11 @@ pub(crate) fn search_within(
     } else {
         stop
     };
-    let near = run.best().and_then(|best| linearised(best, &mut probe, watch));
+    // An evaluated point may be evaluated again for its exact derivatives, whatever the budget: no new point counts.
+    let mut again = Run::new(&problem, Budget { evaluations: 1 }, &quiet);
+    let near = run.best();
+    let near =
+        near.and_then(|best| linearised(best, &mut probe, watch).or_else(|| linearised(best, &mut again, watch)));
     let derivatives = near.as_ref().filter(|(_, is_exact)| *is_exact);
     let derivatives = derivatives.map(|(found, _)| DerivativesReport::of(&problem, &mut probe, found));
     let contradiction = derivatives.as_ref().and_then(contradiction);
@@ -236,7 +240,8 @@ pub(crate) fn search_within(
     outcome.end = end;
     outcome.methods = solver.methods().to_vec();
     outcome.evaluations += probe.archive().len();
-    outcome.simulations += (probe.archive().len() + probe.linearisations()) * problem.simulations();
+    let simulated: usize = [&probe, &again].iter().map(|run| run.archive().len() + run.linearisations()).sum();
+    outcome.simulations += simulated * problem.simulations();
     outcome.found.slopes = slopes;
     outcome.found.derivatives = derivatives;
     outcome.seconds = started.elapsed().as_secs_f64();

@@ -484,6 +484,8 @@ fn a_constant_that_is_no_finite_number_is_a_mistake_of_the_study() {
         ("1/0", "infinite"),
         ("l + ln(0)", "infinite"),
         ("asin(2)*l", "not a number"),
+        ("1e200*1e200*l", "infinite"),
+        ("1e200*l*1e200", "infinite"),
     ] {
         place.write("study.toml", &DESIGN.replace("NAME", "n").replace("-k*x + l", expression));
         let run = place.mops(&["check", "study.toml"]);

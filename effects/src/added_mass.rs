@@ -36,4 +36,8 @@ impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
     fn value(&self, at: &PortState<'_, S>, _: &[S]) -> S {
         -self.m * at.a / (self.m * at.mobility + 1.0)
     }
+
+    fn inertia(&self, _: &PortState<'_, S>) -> S {
+        self.m
+    }
 }

@@ -36,4 +36,8 @@ impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
         let left = -gone * at.mobility + 1.0;
         if left.value() > 0.05 { gone * at.a / left } else { at.a / at.mobility * 19.0 }
     }
+
+    fn inertia(&self, at: &PortState<'_, S>) -> S {
+        -self.r * at.t
+    }
 }

@@ -195,7 +195,7 @@ fn bound_warnings(study: &Study, problem: &Problem, best: &Evaluation) -> Vec<St
         Some(format!(
             "`{}` is at its {side} bound {}: the optimum depends on this bound",
             tuner.name,
-            tuner.unit.amount(rounded(best.tuners[i]))
+            tuner.unit.amount(rounded(tuner.bounds[usize::from(side == "upper")]))
         ))
     };
     problem.active().iter().filter_map(at_bound).collect()

@@ -443,6 +443,12 @@ pub trait BoundEffect<S: Scalar> {
     /// positive forward. At an actuator: the input that reaches the plant. At a sensor: the measured value.
     fn value(&self, at: &PortState<'_, S>, z: &[S]) -> S;
 
+    /// Returns the mass or inertia that an effect with [`Effect::is_inertial`] adds to the joint; negative for a loss. Those of all
+    /// effects at a joint add up, and at most 95 % of the moving mass is lost.
+    fn inertia(&self, _at: &PortState<'_, S>) -> S {
+        S::from(0.0)
+    }
+
     /// Returns the term added to the equation of the second port, if both ports are joints or processes.
     fn onward(&self, _at: &PortState<'_, S>, _z: &[S]) -> S {
         S::from(0.0)
@@ -558,6 +564,17 @@ pub trait Effect: Send + Sync {
     /// between -1 and 1.
     fn free_starts(&self) -> &'static [Dimension] {
         &[]
+    }
+
+    /// Returns true if the value that the effect passes on is a staircase.
+    fn is_staircase(&self) -> bool {
+        self.parameters().iter().any(|parameter| matches!(parameter.grid, InitialGrid::Steps))
+    }
+
+    /// Returns true if the value that the effect passes on depends on the way to it, as that of a play or a rate limit.
+    fn is_path_dependent(&self) -> bool {
+        self.hysteresis_states() > 0
+            && self.ports().iter().any(|port| matches!(port, PortKind::Actuator | PortKind::Sensor))
     }
 
     /// Returns true if the effect needs the acceleration because its force is proportional to it.

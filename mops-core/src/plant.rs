@@ -114,13 +114,18 @@ pub trait Plant<S: Scalar> {
         ""
     }
 
-    /// Returns true if the plant provides bounds of its guards.
+    /// Returns true if the plant provides bounds of its guards and signals.
     fn has_bounds(&self) -> bool {
         false
     }
 
     /// Returns bounds of a guard and of its rate over a time interval; called only if [`Plant::has_bounds`].
     fn enclose_guard(&self, _index: usize, _over: &Span<'_>) -> Enclosure {
+        Enclosure::UNKNOWN
+    }
+
+    /// Returns bounds of a signal and of its rate over a time interval; called only if [`Plant::has_bounds`].
+    fn enclose_signal(&self, _signal: usize, _over: &Span<'_>) -> Enclosure {
         Enclosure::UNKNOWN
     }
 
@@ -269,6 +274,9 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Plant<S> for Box<P> {
     }
     fn enclose_guard(&self, index: usize, over: &Span<'_>) -> Enclosure {
         (**self).enclose_guard(index, over)
+    }
+    fn enclose_signal(&self, signal: usize, over: &Span<'_>) -> Enclosure {
+        (**self).enclose_signal(signal, over)
     }
     fn rest(&mut self, index: usize, event: &EventInstant<'_, S>, close: f64, x: &mut [S]) -> Result<&str, String> {
         (**self).rest(index, event, close, x)

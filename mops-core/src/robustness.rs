@@ -243,8 +243,8 @@ pub struct AddedReport {
     pub name: String,
     /// Criterion for which it is a worst case.
     pub criterion: String,
-    /// Scaled value of the criterion in the case.
-    pub scaled: f64,
+    /// Scaled value of the criterion in the case; null for a case beyond the edge of a jump, at which the criterion was not computed.
+    pub scaled: Option<f64>,
     /// Values of the uncertain parameters.
     pub at: Vec<CoordinateReport>,
 }

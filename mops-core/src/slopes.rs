@@ -39,6 +39,12 @@ const BESIDE: f64 = 2e-4;
 /// Difference of the derivatives of both sides, relative to the larger one, from which they are reported apart.
 const APART: f64 = 0.1;
 
+/// Ratio of the two steps by which a kink is told from a strong curvature.
+const CLOSER: f64 = 4.0;
+
+/// Part of the difference of the sides that remains at the shorter step at a kink or a jump; a quarter remains of a curvature.
+const REMAINS: f64 = 0.6;
+
 /// Change over the whole range of a tuner, in scaled values, whose sides are not reported apart.
 const SMALL: f64 = 1e-3;
 
@@ -56,35 +62,75 @@ impl SlopesReport {
         }
     }
 
-    /// Adds the derivatives of both sides, by differences: two points for every tuner. Without enough budget, nothing is added.
+    /// Adds the derivatives of both sides where they differ, by differences with two steps: the difference of the sides of a smooth
+    /// criterion shrinks with the step, that at a kink remains, and that at a jump grows. Takes two points for every tuner, and two more
+    /// for every tuner with different sides. Without enough budget, nothing is added.
     pub fn add_sides(&mut self, problem: &Problem, oracle: &mut dyn Oracle, at: &Evaluation) {
-        let moved = |j: usize, step: f64| {
-            let mut point = at.point.clone();
-            point[j] += step;
-            (0.0..=1.0).contains(&point[j]).then_some(point)
+        let tuners: Vec<usize> = (0..at.point.len()).collect();
+        let Some(wide) = pairs(oracle, at, &tuners, BESIDE) else { return };
+        let counts = || (0..problem.study().rows.len()).filter(|i| problem.shape().rows[*i].0 != Usage::Monitor);
+        let differs = |pair: &Pair, row: usize| {
+            pair.sides(at, row, BESIDE).filter(|both| distance(both) > APART * both[0].abs().max(both[1].abs()) + SMALL)
         };
-        let pairs: Vec<(usize, [Vec<f64>; 2])> =
-            (0..at.point.len()).filter_map(|j| Some((j, [moved(j, -BESIDE)?, moved(j, BESIDE)?]))).collect();
-        let points: Vec<Vec<f64>> = pairs.iter().flat_map(|(_, pair)| pair.clone()).collect();
-        if oracle.remaining() < points.len() {
-            return;
-        }
-        let Ok(found) = oracle.evaluate(&points) else { return };
-        let counts = (0..problem.study().rows.len()).filter(|i| problem.shape().rows[*i].0 != Usage::Monitor);
-        for (i, criterion) in counts.zip(&mut self.criteria) {
+        let bent: Vec<usize> = wide
+            .iter()
+            .filter(|pair| counts().any(|row| differs(pair, row).is_some()))
+            .map(|pair| pair.tuner)
+            .collect();
+        let Some(close) = pairs(oracle, at, &bent, BESIDE / CLOSER) else { return };
+        for (row, criterion) in counts().zip(&mut self.criteria) {
             let mut sides = vec![None; at.point.len()];
-            for ((j, _), pair) in pairs.iter().zip(found.chunks(2)) {
-                let value = |of: &Evaluation| of.scaled.as_ref().map(|scaled| scaled[i]);
-                let (Some(here), Some(left), Some(right)) = (value(at), value(&pair[0]), value(&pair[1])) else {
-                    continue;
-                };
-                let both = [(here - left) / BESIDE, (right - here) / BESIDE];
-                let larger = both[0].abs().max(both[1].abs());
-                if (both[0] - both[1]).abs() > APART * larger + SMALL {
-                    sides[*j] = Some(both);
+            for near in &close {
+                let far = wide.iter().find(|far| far.tuner == near.tuner).and_then(|far| differs(far, row));
+                let (Some(far), Some(near_sides)) = (far, near.sides(at, row, BESIDE / CLOSER)) else { continue };
+                if distance(&near_sides) > REMAINS * distance(&far) {
+                    sides[near.tuner] = Some(near_sides);
                 }
             }
             criterion.sides = sides.iter().any(Option::is_some).then_some(sides);
         }
     }
+}
+
+/// Points on both sides of a point along a tuner.
+struct Pair {
+    tuner: usize,
+    below: Evaluation,
+    above: Evaluation,
+}
+
+impl Pair {
+    /// Returns the derivatives of a criterion to the left and to the right.
+    fn sides(&self, at: &Evaluation, row: usize, step: f64) -> Option<[f64; 2]> {
+        let [below, here, above] =
+            [&self.below, at, &self.above].map(|of| of.scaled.as_ref().map(|scaled| scaled[row]));
+        Some([(here? - below?) / step, (above? - here?) / step])
+    }
+}
+
+fn distance([left, right]: &[f64; 2]) -> f64 {
+    (right - left).abs()
+}
+
+/// Evaluates the points at a step on both sides along the tuners, without those that are closer to a bound. Returns `None` if the budget
+/// does not suffice.
+fn pairs(oracle: &mut dyn Oracle, at: &Evaluation, tuners: &[usize], step: f64) -> Option<Vec<Pair>> {
+    let moved = |j: usize, step: f64| {
+        let mut point = at.point.clone();
+        point[j] += step;
+        (0.0..=1.0).contains(&point[j]).then_some(point)
+    };
+    let within: Vec<(usize, [Vec<f64>; 2])> =
+        tuners.iter().filter_map(|&j| Some((j, [moved(j, -step)?, moved(j, step)?]))).collect();
+    let points: Vec<Vec<f64>> = within.iter().flat_map(|(_, pair)| pair.clone()).collect();
+    if oracle.remaining() < points.len() {
+        return None;
+    }
+    let mut found = oracle.evaluate(&points).ok()?.into_iter();
+    Some(
+        within
+            .iter()
+            .map_while(|(tuner, _)| Some(Pair { tuner: *tuner, below: found.next()?, above: found.next()? }))
+            .collect(),
+    )
 }

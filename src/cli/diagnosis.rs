@@ -44,7 +44,7 @@ pub(super) fn text(diagnosis: &Diagnosis, seconds: f64) -> String {
     if !diagnosis.notes.is_empty() {
         text += "\n";
     }
-    let [probability, chance] = [words::probability(diagnosis.probability), significant(diagnosis.p_value, 2)];
+    let [probability, chance] = [words::probability(diagnosis.probability), words::chance(diagnosis.p_value)];
     let of = words::of_what(diagnosis);
     text += &format!(
         "\nprobability {of} {probability}; p-value without a missing effect {chance}; {} simulations, {seconds:.2} s\n",

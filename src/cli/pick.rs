@@ -8,7 +8,7 @@ use std::sync::Arc;
 use clap::Args;
 use mops_core::file::StudyFile;
 use mops_core::{
-    Budget, Catalogue, Diagnostic, Evaluation, Oracle, Problem, Run, Study, Usage, criterion_reports, suggestion,
+    Budget, Catalogue, Diagnostic, Evaluation, Oracle, Problem, Run, Stop, Study, Usage, criterion_reports, suggestion,
 };
 use serde_json::Value;
 
@@ -85,11 +85,15 @@ pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     let demands = in_units(&before, &arguments.demands);
     let setting = |(name, value): &(String, String)| format!("criteria.{}.demand={}", key(name), written(value));
     let mut file = open(demands.iter().map(setting).collect())?;
-    file.study.cancelled_by(&cancel_after(arguments.limit));
+    let limit = cancel_after(arguments.limit);
+    file.study.cancelled_by(&limit);
     let problem = Problem::new(Arc::new(file.study.clone()));
     let (index, at) = nearest(&problem, &front, &path)?;
-    let refined = if arguments.no_refine { None } else { refined(catalogue, &problem, &at) };
+    let (refined, stop) = if arguments.no_refine { (None, None) } else { refined(catalogue, &problem, &at) };
     print(&comparison(&file.study, (index, front.len()), &at, refined.as_ref()))?;
+    if let Some(why) = limit.requested().map(Stop::from).or(stop).and_then(cut_off) {
+        print(&format!("\n{why}\n"))?;
+    }
     let chosen = refined.as_ref().unwrap_or(&at);
     let text =
         fs::read_to_string(&path).map_err(|error| CommandError::Failure(format!("{}: {error}", path.display())))?;
@@ -186,15 +190,29 @@ fn nearest(problem: &Problem, front: &[Value], study: &Path) -> Result<(usize, E
     Ok(best.expect("a front has points"))
 }
 
-/// Solves the min-max problem from a point; returns `None` if no better point is found.
-fn refined(catalogue: &Catalogue, problem: &Problem, from: &Evaluation) -> Option<Evaluation> {
-    let sqp = catalogue.solvers.iter().find(|kind| kind.name == "sqp")?.default_choice();
-    let mut solver = sqp.make();
-    solver.accepts(problem.shape()).ok()?;
+/// Solves the min-max problem from a point. Returns the better point, if one was found, and how the search stopped, if there was one.
+fn refined(catalogue: &Catalogue, problem: &Problem, from: &Evaluation) -> (Option<Evaluation>, Option<Stop>) {
+    let Some(sqp) = catalogue.solvers.iter().find(|kind| kind.name == "sqp") else { return (None, None) };
+    let mut solver = sqp.default_choice().make();
+    if solver.accepts(problem.shape()).is_err() {
+        return (None, None);
+    }
     let mut run = Run::new(problem, Budget { evaluations: REFINEMENT_BUDGET }, &());
-    run.solve(solver.as_mut(), &from.point);
-    let best = run.best()?;
-    best.merit.is_better_than(&from.merit).then(|| problem.concluding().evaluate_at(&best.tuners))
+    let stop = run.solve(solver.as_mut(), &from.point);
+    let better = run.best().filter(|best| best.merit.is_better_than(&from.merit));
+    (better.map(|best| problem.concluding().evaluate_at(&best.tuners)), Some(stop))
+}
+
+/// Returns the sentence for a search that ended before its optimum.
+fn cut_off(stop: Stop) -> Option<String> {
+    let (cause, way) = match stop {
+        Stop::Converged | Stop::Stalled => return None,
+        Stop::Budget => (format!("after {REFINEMENT_BUDGET} evaluations"), "run the new study to go on"),
+        Stop::TimeLimit | Stop::Interrupted => {
+            ("at the time limit".to_owned(), "increase --time-limit, or run the new study to go on")
+        }
+    };
+    Some(format!("the refinement ended {cause}, before it found an optimum; {way}"))
 }
 
 /// Formats the point of the front and its refinement side by side.

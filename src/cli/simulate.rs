@@ -13,7 +13,7 @@ use super::families::{folded, runs, spelled};
 use super::study::{StudyArguments, home, open, outputs};
 use super::tables::criteria;
 use crate::files::{Outputs, write_header};
-use crate::numbers::FileNames;
+use crate::numbers::{FileNames, counted};
 use crate::report::{Color, Curve, Plot, points};
 use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 
@@ -162,9 +162,11 @@ fn summary(study: &Study, model: usize, response: &Response) -> String {
     let header = ["signal", "unit", "start", "min", "at s", "max", "at s", "end"];
     let mut text = table(&header, &[2, 3, 4, 5, 6, 7], folded(rows.collect(), 0));
     let work = response.work;
-    text += &format!("\n{} steps, {} rejected, {} derivatives\n", work.steps, work.rejected, work.derivatives);
+    let [steps, derivatives] =
+        [(work.steps, "step"), (work.derivatives, "derivative")].map(|(n, noun)| counted(n, noun));
+    text += &format!("\n{steps}, {} rejected, {derivatives}\n", work.rejected);
     if work.rough > 0 {
-        text += &format!("accuracy limited by rounding in {} steps\n", work.rough);
+        text += &format!("accuracy limited by rounding in {}\n", counted(work.rough, "step"));
     }
     for event in response.events.iter().take(20) {
         text += &format!("{:>12} s  {}\n", number(event.time), event.what);

@@ -204,8 +204,10 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
     let nominal = if nominal { "without uncertainty: " } else { "" };
     let stop = if solved { stop } else { "start values only, no optimisation" };
     text += &format!(
-        "\n{nominal}{constraints}{demands}{reached}{stop}; {} evaluations, {} simulations, {:.2} s\n",
-        outcome.evaluations, outcome.simulations, outcome.seconds
+        "\n{nominal}{constraints}{demands}{reached}{stop}; {}, {}, {:.2} s\n",
+        counted(outcome.evaluations, "evaluation"),
+        counted(outcome.simulations, "simulation"),
+        outcome.seconds
     );
     text
 }

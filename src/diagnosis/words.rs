@@ -160,13 +160,21 @@ pub(crate) fn failed(rule: Rule) -> &'static str {
     }
 }
 
+/// Smallest p-value that is shown as a number.
+const LEAST_P: f64 = 1e-4;
+
 /// Returns a p-value as `p = 0.43` or `p < 0.0001`.
 fn p_value(p: f64) -> String {
     match p {
         p if p.is_nan() => "p not known".to_owned(),
-        p if p < 1e-4 => "p < 0.0001".to_owned(),
+        p if p < LEAST_P => format!("p < {LEAST_P}"),
         p => format!("p = {}", significant(p, 2)),
     }
+}
+
+/// Returns a p-value in a table or a list: `0.43`, `below 0.0001`, `n/a`.
+pub(crate) fn chance(p: f64) -> String {
+    if p < LEAST_P { format!("below {LEAST_P}") } else { significant(p, 2) }
 }
 
 /// Returns `the error falls from 2.10 to 1.00 times the noise level on calibration data and from 15.40 to 1.00 on validation

@@ -33,7 +33,8 @@ pub(super) fn section(found: &SensitivityReport) -> Markup {
             (if measured { "weighted residuals" } else { "scaled criteria" }) ", per relative change of the tuner. "
             @if measured {
                 "Alone: standard error if all other tuners were known. Factor: increase of the standard error because they are "
-                "not known. Relative error: share of the value; for initial states, which may be near zero, share of the range."
+                "not known. Relative error: share of the value; for initial states, which may be near zero, and for temperatures in degC or \
+                 degF, share of the range."
             } @else {
                 "Factor: effect divided by its part that the other tuners cannot compensate; 1 if they compensate nothing."
             }

@@ -1,5 +1,6 @@
 //! Robust design with `[robust]`: worst cases in a box are searched and added until none is worse.
 
+use std::iter;
 use std::sync::Arc;
 
 use mops_core::{
@@ -207,25 +208,18 @@ impl Rounds {
                 None if excess > self.task.tolerance => worst.at.clone(),
                 None => continue,
             };
-            let at = region.coordinates(&values);
+            let (criterion, case) = (&worst.subject.criterion, worst.case);
             let values = self.relative(values, &solved.best.tuners);
-            let scenario = Scenario { name: self.name(&worst.subject.criterion), case: worst.case, values };
-            if !self.is_known(&scenario) {
-                let beyond = self.beyond(&scenario, &worst.subject.criterion);
-                added.push(AddedReport {
-                    name: scenario.name.clone(),
-                    criterion: worst.subject.criterion.clone(),
-                    scaled: worst.scaled,
-                    at,
-                });
-                self.scenarios.push(scenario);
-                if let Some(values) = beyond {
-                    let name = self.name(&worst.subject.criterion);
-                    let beyond = Scenario { name, case: worst.case, values };
-                    if !self.is_known(&beyond) {
-                        self.scenarios.push(beyond);
-                    }
+            let beyond = self.beyond(case, &values, criterion);
+            for (values, scaled) in iter::once((values, Some(worst.scaled))).chain(beyond.map(|values| (values, None)))
+            {
+                let scenario = Scenario { name: self.name(criterion), case, values };
+                if self.is_known(&scenario) {
+                    break;
                 }
+                let at = region.coordinates(&self.absolute(&scenario.values, &solved.best.tuners));
+                added.push(AddedReport { name: scenario.name.clone(), criterion: criterion.clone(), scaled, at });
+                self.scenarios.push(scenario);
             }
         }
         let any = !added.is_empty();
@@ -255,23 +249,23 @@ impl Rounds {
     /// new one and within the box; `None` if it lies elsewhere.
     ///
     /// Cases side by side lie at the edge of a jump, which each design moves by a little: one by one, they would not come to an end.
-    fn beyond(&self, new: &Scenario, criterion: &str) -> Option<Vec<f64>> {
+    fn beyond(&self, case: usize, new: &[f64], criterion: &str) -> Option<Vec<f64>> {
         let before =
             self.done.iter().rev().flat_map(|round| &round.added).find(|added| added.criterion == criterion)?;
-        let before = self.scenarios.iter().find(|known| known.name == before.name && known.case == new.case)?;
+        let before = self.scenarios.iter().find(|known| known.name == before.name && known.case == case)?;
         let ends = |uncertain: &Uncertain| match (uncertain.tuner, uncertain.tolerance) {
             (Some(_), Some(tolerance)) => [1.0 - tolerance, 1.0 + tolerance],
             _ => uncertain.bounds,
         };
         let mut values = Vec::new();
-        for ((now, before), uncertain) in new.values.iter().zip(&before.values).zip(&self.study.tasks().uncertain) {
+        for ((now, before), uncertain) in new.iter().zip(&before.values).zip(&self.study.tasks().uncertain) {
             let ([low, high], step) = (ends(uncertain), now - before);
             if !(high - low).is_finite() || step.abs() > BESIDE * (high - low) {
                 return None;
             }
             values.push((now + FARTHER * step).clamp(low, high));
         }
-        (values != new.values).then_some(values)
+        (values != new).then_some(values)
     }
 
     /// Returns the values of a scenario: those of tuners with a tolerance relative to the design.
@@ -282,6 +276,12 @@ impl Rounds {
             }
         }
         values
+    }
+
+    /// Returns the values of a scenario at a design, the inverse of [`Rounds::relative`].
+    fn absolute(&self, values: &[f64], tuners: &[f64]) -> Vec<f64> {
+        let of = |(value, uncertain): (&f64, &Uncertain)| value * uncertain.tuner.map_or(1.0, |tuner| tuners[tuner]);
+        values.iter().zip(&self.study.tasks().uncertain).map(of).collect()
     }
 
     /// Returns an unused case name.

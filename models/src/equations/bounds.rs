@@ -11,20 +11,22 @@ impl Program {
     pub fn enclose(&self, r: &mut [Enclosure]) {
         use Instruction as I;
         let at = usize::from;
+        // A product with itself is never negative.
+        let product = |r: &[Enclosure], a, b| if a == b { r[at(a)].square() } else { r[at(a)] * r[at(b)] };
         for instruction in &self.instructions {
             let (to, value) = match *instruction {
                 I::Set(o, k) => (o, Enclosure::from(self.numbers[at(k)])),
                 I::Copy(o, a) => (o, r[at(a)]),
                 I::Add(o, a, b) => (o, r[at(a)] + r[at(b)]),
                 I::Sub(o, a, b) => (o, r[at(a)] - r[at(b)]),
-                I::Mul(o, a, b) => (o, r[at(a)] * r[at(b)]),
+                I::Mul(o, a, b) => (o, product(r, a, b)),
                 I::Div(o, a, b) => (o, r[at(a)] / r[at(b)]),
                 I::Neg(o, a) => (o, -r[at(a)]),
-                I::MulAdd(o, a, b, c) => (o, r[at(a)] * r[at(b)] + r[at(c)]),
-                I::MulSub(o, a, b, c) => (o, r[at(a)] * r[at(b)] - r[at(c)]),
-                I::SubMul(o, a, b, c) => (o, r[at(c)] - r[at(a)] * r[at(b)]),
-                I::Dot(o, a, b, c, d) => (o, r[at(a)] * r[at(b)] + r[at(c)] * r[at(d)]),
-                I::Cross(o, a, b, c, d) => (o, r[at(a)] * r[at(b)] - r[at(c)] * r[at(d)]),
+                I::MulAdd(o, a, b, c) => (o, product(r, a, b) + r[at(c)]),
+                I::MulSub(o, a, b, c) => (o, product(r, a, b) - r[at(c)]),
+                I::SubMul(o, a, b, c) => (o, r[at(c)] - product(r, a, b)),
+                I::Dot(o, a, b, c, d) => (o, product(r, a, b) + product(r, c, d)),
+                I::Cross(o, a, b, c, d) => (o, product(r, a, b) - product(r, c, d)),
                 I::SinCos(s, c, a) => {
                     let angle = r[at(a)];
                     r[at(s)] = angle.sin();

@@ -76,6 +76,8 @@ const TAKEN_APART: usize = 1000;
 pub struct Graph {
     nodes: Vec<(Op, Level)>,
     known: HashMap<Op, Id>,
+    /// Last constant computed that is infinite or not a number, also one within a product.
+    pub not_finite: Option<f64>,
     /// Blocks of linear equations.
     pub blocks: Vec<Block>,
 }
@@ -137,6 +139,7 @@ impl Graph {
     /// Adds a number.
     pub fn number(&mut self, value: f64) -> Id {
         // -0.0 and 0.0 are the same number here.
+        self.not_finite = if value.is_finite() { self.not_finite } else { Some(value) };
         self.add_op(Op::Constant((value + 0.0).to_bits()))
     }
 

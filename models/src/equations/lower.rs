@@ -343,11 +343,11 @@ impl<'d> Lowering<'d> {
         let found = self.form(text, node, kinks);
         self.depth -= 1;
         let found = found?;
-        match self.graph.constant(found.rest).filter(|value| !value.is_finite()) {
+        match self.graph.not_finite.take() {
             None => Ok(found),
             Some(value) => {
                 let what = if value.is_nan() { "not a number" } else { "infinite" };
-                let mistake = StudyError::here(format!("this constant is {what}"));
+                let mistake = StudyError::here(format!("a constant in this expression is {what}"));
                 let mistake =
                     mistake.with_help("correct it; its value does not depend on the state, the time or a parameter");
                 Err(under(&text.path, mistake.at(node.span.clone())))

@@ -1,6 +1,6 @@
 //! Compiled model as a plant, with its current values and modes.
 
-use std::cell::RefCell;
+use std::cell::{RefCell, RefMut};
 
 use mops_core::enclosure::Enclosure;
 use mops_core::expression::Comparison;
@@ -164,7 +164,8 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         }
     }
 
-    fn enclose(&self, index: usize, Span { time, x, u, w }: &Span<'_>) -> Enclosure {
+    /// Returns the registers with the bounds of an interval.
+    fn load_bounds(&self, Span { time, x, u, w }: &Span<'_>) -> RefMut<'_, Vec<Enclosure>> {
         let layout = &self.model.layout;
         let mut registers = self.bounds.borrow_mut();
         if registers.is_empty() {
@@ -182,6 +183,11 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
             registers[usize::from(layout.input(first + k))] = Enclosure::UNKNOWN;
         }
         registers[usize::from(layout.time())] = *time;
+        registers
+    }
+
+    fn enclose(&self, index: usize, over: &Span<'_>) -> Enclosure {
+        let mut registers = self.load_bounds(over);
         match self.kind(index) {
             Guard::Joint(j) if self.frictionless[j] => Enclosure::from(1.0),
             Guard::Joint(j) => {
@@ -192,7 +198,7 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
                     let zero = Enclosure::from(0.0);
                     limit - torque.holds(Comparison::AtLeast, zero).choose(torque, -torque)
                 } else {
-                    x[joint.contact.velocity] * Enclosure::from(self.modes[joint.contact.direction])
+                    over.x[joint.contact.velocity] * Enclosure::from(self.modes[joint.contact.direction])
                 }
             }
             Guard::Switch(k) => {
@@ -327,6 +333,18 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
 
     fn enclose_guard(&self, index: usize, over: &Span<'_>) -> Enclosure {
         self.enclose(index, over)
+    }
+
+    fn enclose_signal(&self, signal: usize, over: &Span<'_>) -> Enclosure {
+        match &self.model.signals[signal] {
+            Signal::State(state) => over.x[*state],
+            Signal::Input(input) => over.u[*input],
+            Signal::Tape(tape) => {
+                let mut registers = self.load_bounds(over);
+                tape.enclose(&mut registers);
+                registers[usize::from(tape.results[0])]
+            }
+        }
     }
 
     fn rest(&mut self, index: usize, event: &EventInstant<'_, S>, close: f64, x: &mut [S]) -> Result<&str, String> {

@@ -84,6 +84,16 @@ impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
         at(&self.plant, &Instant { t, x, u: &inputs, w: &self.forces })
     }
 
+    /// Evaluates bounds by the plant over a time span in which the states stay within `x`.
+    fn over(&self, time: Enclosure, x: &[Enclosure], bounds_of: impl FnOnce(&P, &Span<'_>) -> Enclosure) -> Enclosure {
+        let mut bounds = self.bounds.borrow_mut();
+        bounds.clear();
+        bounds.extend(self.drives.iter().map(|drive| drive.enclose(time)));
+        bounds.resize(self.drives.len() + self.forces.len(), Enclosure::from(0.0));
+        let (u, w) = bounds.split_at(self.drives.len());
+        bounds_of(&self.plant, &Span { time, x, u, w })
+    }
+
     #[inline(always)]
     fn take_inputs(&self, t: f64, inputs: &mut [S]) {
         for (u, drive) in inputs.iter_mut().zip(&self.drives) {
@@ -179,12 +189,11 @@ impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
     }
 
     fn enclose_guard(&self, index: usize, time: Enclosure, x: &[Enclosure]) -> Enclosure {
-        let mut bounds = self.bounds.borrow_mut();
-        bounds.clear();
-        bounds.extend(self.drives.iter().map(|drive| drive.enclose(time)));
-        bounds.resize(self.drives.len() + self.forces.len(), Enclosure::from(0.0));
-        let (u, w) = bounds.split_at(self.drives.len());
-        self.plant.enclose_guard(index, &Span { time, x, u, w })
+        self.over(time, x, |plant, span| plant.enclose_guard(index, span))
+    }
+
+    fn enclose_signal(&self, signal: usize, time: Enclosure, x: &[Enclosure]) -> Enclosure {
+        self.over(time, x, |plant, span| plant.enclose_signal(signal, span))
     }
 
     fn rest(&mut self, index: usize, t: f64, close: f64, x: &mut [S]) -> Result<&str, String> {

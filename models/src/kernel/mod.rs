@@ -141,7 +141,7 @@ pub trait Dynamics<S: Scalar> {
         None
     }
 
-    /// Returns true if bounds of the guards are available from [`Dynamics::enclose_guard`].
+    /// Returns true if bounds are available from [`Dynamics::enclose_guard`] and [`Dynamics::enclose_signal`].
     fn has_bounds(&self) -> bool {
         false
     }
@@ -149,6 +149,11 @@ pub trait Dynamics<S: Scalar> {
     /// Returns bounds of a guard and of its rate over a time span in which the states stay within their bounds `x`.
     /// Called only if [`Dynamics::has_bounds`] returns true.
     fn enclose_guard(&self, _index: usize, _time: Enclosure, _x: &[Enclosure]) -> Enclosure {
+        Enclosure::UNKNOWN
+    }
+
+    /// Returns bounds of a signal and of its rate, as [`Dynamics::enclose_guard`] does of a guard.
+    fn enclose_signal(&self, _signal: usize, _time: Enclosure, _x: &[Enclosure]) -> Enclosure {
         Enclosure::UNKNOWN
     }
 

@@ -1,5 +1,6 @@
 //! Traces of signals from the dense output of steps, with their tangents.
 
+use mops_core::enclosure::Enclosure;
 use mops_core::{
     Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Past, Response, Scalar, Trace, WithTangents,
 };
@@ -82,6 +83,10 @@ struct Recorder<'a, S> {
     states: [Vec<S>; 5],
     resolved: Vec<Resolved>,
     tolerance: &'a Tolerance,
+    /// Simulated time, s.
+    span: f64,
+    /// Bounds of the states over a part of a step.
+    bounds: Vec<Enclosure>,
 }
 
 /// Resolution of a computed signal by the steps.
@@ -93,7 +98,26 @@ struct Resolved {
     slope: f64,
     /// Longest step whose quartic agreed with the signal when compared, s.
     longest: f64,
+    /// Largest width of the bounds of the signal over a part of a step so far.
+    reach: f64,
+    /// Number of parts that may still be halved for their bounds alone.
+    looks: usize,
 }
+
+/// Width of the bounds of a signal over a part of a step, as a multiple of the spread of its values there, from which something narrow may
+/// hide between them, such as a pulse over a position. Bounds of products and quotients of smooth quantities are a few times too wide.
+const WIDE: f64 = 8.0;
+
+/// Width of bounds, as a part of the largest width so far, up to which nothing hides: what bounds are too wide by shrinks with the part,
+/// and what is sought is as high as the bounds of the first part that contains it.
+const NARROW: f64 = 1e-3;
+
+/// Number of parts of a signal that are halved in vain in a simulation; each place found gives as many again. A pulse of 1 ms in a step of
+/// 10 s takes some 30.
+const LOOKS: usize = 64;
+
+/// Part of the simulated time up to which nothing is sought within a step, which bounds the number of bounds that are computed.
+const SHORT: f64 = 2e-3;
 
 /// Permitted deviation of the quartic in units of the tolerance: the dense output of the states is no more accurate.
 const OFF: f64 = 10.0;
@@ -187,11 +211,19 @@ impl<S: Scalar> Recorder<'_, S> {
     /// signal. Values that are not finite count as agreeing. `signal` returns the signal at a position, at the state or at
     /// the [`perturbed`] state.
     fn agrees(&self, index: usize, values: &[S; 5], mut signal: impl FnMut(f64, At) -> S) -> bool {
+        self.fit(index, values, &mut signal) != Fit::Off
+    }
+
+    fn fit(&self, index: usize, values: &[S; 5], mut signal: impl FnMut(f64, At) -> S) -> Fit {
         let checks = Trace::CHECKS.map(|s| signal(s, At::State).value());
         let off = Trace::deviation(values.map(Scalar::value), checks);
         let allowed = self.allowed(index, checks.iter().fold(largest(values), |most, check| most.max(check.abs())));
         // The node at the middle is one of the values.
-        off.is_nan() || off <= allowed || off <= allowed + (signal(0.5, At::Perturbed) - values[2]).value().abs()
+        match off {
+            off if off.is_nan() || off <= allowed => Fit::Quartic,
+            off if off <= allowed + (signal(0.5, At::Perturbed) - values[2]).value().abs() => Fit::Rough,
+            _ => Fit::Off,
+        }
     }
 
     /// Returns true if the quartic of a step of this length must be compared with the signal. Reasons: the step is
@@ -206,32 +238,83 @@ impl<S: Scalar> Recorder<'_, S> {
         length > LONGER * self.resolved[index].longest || off.is_nan() || off > self.allowed(index, largest(values))
     }
 
-    /// Adds the part `[from, to]` of a step to the traces of a signal, halved until one quartic per part suffices.
-    fn refine(
+    /// Returns true if the bounds of a signal over the part `[from, to]` of a step are so much wider than the values there that something
+    /// may hide between them.
+    fn hides<D: Dynamics<S> + ?Sized>(
         &mut self,
-        step: &Step<S>,
+        (step, dynamics): (&Step<S>, &D),
+        index: usize,
+        [from, to]: [f64; 2],
+        values: &[S; 5],
+    ) -> bool {
+        if !dynamics.has_bounds() || self.resolved[index].looks == 0 || step.taken <= SHORT * self.span {
+            return false;
+        }
+        let share = step.taken / step.length;
+        step.enclose(from * share, to * share, &mut self.bounds);
+        let time = [from, to].map(|s| step.start + s * step.taken);
+        let over =
+            dynamics.enclose_signal(self.signals[index].0, Enclosure::of_time(time[0], time[1]), &self.bounds).value;
+        let width = over.high - over.low;
+        if !width.is_finite() {
+            return false;
+        }
+        let resolved = &mut self.resolved[index];
+        resolved.reach = resolved.reach.max(width);
+        let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| {
+            (least.min(value.value()), most.max(value.value()))
+        });
+        let expected = (WIDE * (most - least)).max(NARROW * resolved.reach);
+        let hides = width > expected + self.allowed(index, over.high.abs().max(over.low.abs()));
+        self.resolved[index].looks -= usize::from(hides);
+        hides
+    }
+
+    /// Adds the part `[from, to]` of a step to the traces of a signal, halved until one quartic per part suffices.
+    fn refine<D: Dynamics<S> + ?Sized>(
+        &mut self,
+        (step, dynamics): (&Step<S>, &D),
         index: usize,
         [from, to]: [f64; 2],
         halvings: u32,
-        signal: &impl Fn(f64, &[S]) -> S,
     ) {
+        let which = self.signals[index].0;
+        let signal = |t: f64, x: &[S]| dynamics.signal(which, t, x);
         let mut state = self.states[0].clone();
         let mut at = |s: f64, at: At| {
             let s = from + s * (to - from);
             step.state(s, &mut state);
-            at.signal(step.start + s * step.taken, &state, signal)
+            at.signal(step.start + s * step.taken, &state, &signal)
         };
         let values = Trace::NODES.map(|s| at(s, At::State));
-        let ends = self.taken > self.room || self.cancellation.requested().is_some();
-        if halvings == 0 || ends || self.agrees(index, &values, &mut at) {
-            self.push(index, step.start + to * step.taken, &values);
+        let ends = halvings == 0 || self.taken > self.room || self.cancellation.requested().is_some();
+        let fit = self.fit(index, &values, &mut at);
+        if ends || fit != Fit::Off && !self.hides((step, dynamics), index, [from, to], &values) {
+            // Where a signal jumps, a quartic would exceed its values.
+            let line = |s: f64| values[0] + (values[4] - values[0]) * s;
+            let recorded = if fit == Fit::Quartic { values } else { Trace::NODES.map(line) };
+            self.push(index, step.start + to * step.taken, &recorded);
             return;
+        }
+        if fit == Fit::Off {
+            self.resolved[index].looks = LOOKS;
         }
         let middle = 0.5 * (from + to);
         for half in [[from, middle], [middle, to]] {
-            self.refine(step, index, half, halvings - 1, signal);
+            self.refine((step, dynamics), index, half, halvings - 1);
         }
     }
+}
+
+/// How the quartic through the values of a signal agrees with it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fit {
+    /// Within tolerance.
+    Quartic,
+    /// Within the rounding of the signal.
+    Rough,
+    /// Not at all.
+    Off,
 }
 
 /// State at which a signal is evaluated.
@@ -276,22 +359,26 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
             let time = |s: f64| step.start + s * step.taken;
             let values = dynamics.signal_at(*signal, &Trace::NODES.map(time), &self.states);
             self.resolved[i].size = self.resolved[i].size.max(largest(&values));
+            let mut is_resolved = true;
             if self.must_compare(i, step.taken, &values) {
                 let mut state = self.states[0].clone();
                 let inside = |s: f64, at: At| {
                     step.state(s, &mut state);
                     at.signal(time(s), &state, &computed)
                 };
-                if !self.agrees(i, &values, inside) {
-                    for half in [[0.0, 0.5], [0.5, 1.0]] {
-                        self.refine(step, i, half, HALVINGS, &computed);
-                    }
-                    continue;
+                is_resolved = self.agrees(i, &values, inside);
+                if is_resolved {
+                    let longest = &mut self.resolved[i].longest;
+                    *longest = longest.max(step.taken);
                 }
-                let longest = &mut self.resolved[i].longest;
-                *longest = longest.max(step.taken);
             }
-            self.push(i, end, &values);
+            if is_resolved && !self.hides((step, dynamics), i, [0.0, 1.0], &values) {
+                self.push(i, end, &values);
+                continue;
+            }
+            for half in [[0.0, 0.5], [0.5, 1.0]] {
+                self.refine((step, dynamics), i, half, HALVINGS);
+            }
         }
     }
 
@@ -379,8 +466,10 @@ fn record_within<S: Scalar, D: Dynamics<S> + ?Sized>(
         events: Vec::new(),
         restarts: Vec::new(),
         states: std::array::from_fn(|_| start.to_vec()),
-        resolved: vec![Resolved { size: 0.0, slope: f64::NAN, longest: 0.0 }; signals.len()],
+        resolved: vec![Resolved { size: 0.0, slope: f64::NAN, longest: 0.0, reach: 0.0, looks: LOOKS }; signals.len()],
         tolerance,
+        span: end,
+        bounds: Vec::new(),
     };
     let (_, work) = integrate(dynamics, 0.0, end, start, tolerance, &mut recorder)?;
     for direction in 0..S::DIRECTIONS {

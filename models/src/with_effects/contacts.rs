@@ -209,7 +209,7 @@ impl<S: Opening> Driven<'_, S> {
 }
 
 /// Solves `columns f = -free`; the systems are small.
-fn solve<S: Scalar>(columns: &[Vec<S>], free: &[S]) -> Vec<S> {
+pub(super) fn solve<S: Scalar>(columns: &[Vec<S>], free: &[S]) -> Vec<S> {
     let n = free.len();
     match n {
         0 => return Vec::new(),

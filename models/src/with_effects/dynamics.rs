@@ -9,11 +9,14 @@ use mops_core::{
 };
 
 use super::command::Command;
-use super::contacts::Contacts;
+use super::contacts::{Contacts, solve};
 use super::edges::BLINK;
 use super::{Place, Site, WithEffects};
 use crate::kernel::drive::Drive;
 use crate::kernel::{Dynamics, shift, shown};
+
+/// Largest part of the moving mass of a joint that effects take away, so that some mass remains.
+const MOST_LOST: f64 = 0.95;
 
 /// Effect in a simulation.
 pub(super) struct Actor<S> {
@@ -204,14 +207,17 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
         let force_per_rate = |k: usize| S::from(1.0) / self.mobility(&x, &u, k, self.balances[k]);
         self.force_per_rate = (0..self.disturbances.len()).map(force_per_rate).collect();
-        for index in 0..self.actors.len() {
+        let is_at_sensor = |of: &Self, index: usize| matches!(of.actors[index].place.site, Site::Sensor { .. });
+        let (last, first): (Vec<usize>, Vec<usize>) =
+            (0..self.actors.len()).partition(|&index| is_at_sensor(self, index));
+        // What sensors measure depends on all other effects, and on the sensor effects before.
+        for index in first.into_iter().chain(last) {
             let actor = &self.actors[index];
             if actor.is_at_actuator() {
                 continue;
             }
             let (first, count) = actor.z;
-            let value = self.passing(index, 0.0, &x, &u, &w);
-            let at = self.at(actor, 0.0, &x, &u, value);
+            let at = self.at(actor, 0.0, &x, &u, self.arriving(index, 0.0, &x));
             let mut z = vec![S::from(0.0); count];
             actor.acting.start(&at, &mut z);
             if actor.acting.friction(&at, &z).is_some() {
@@ -225,9 +231,12 @@ impl<'a, S: Opening> Driven<'a, S> {
                 self.actors[index].ahead = parameters[starts];
             }
             x[first..first + count].copy_from_slice(&z);
+            if !self.actors[index].memory.is_empty() {
+                self.update_hysteresis_of(index, 0.0, &x);
+            }
         }
         self.update_hysteresis(0.0, &x, |_| true);
-        self.settle_gaps(0.0, &x, |_| true);
+        self.settle_gaps(0.0, &x);
         let before = self.commands.clone();
         self.commands.iter_mut().for_each(|command| command.pass_break(0.0));
         self.inputs(0.0, &x, &mut u);
@@ -409,20 +418,54 @@ impl<'a, S: Opening> Driven<'a, S> {
         self.plant.rates(&Instant { t, x: &x[..self.own], u, w }, dx);
     }
 
-    /// Computes the rates of the plant, after adding the forces proportional to the acceleration.
+    /// Computes the rates of the plant, after adding the forces proportional to the acceleration: with the masses `m` that effects add
+    /// to joints, the forces `w` are `-m q''`, where `q'' = a + B w`.
     pub(super) fn moved(&self, t: f64, x: &[S], u: &[S], w: &mut [S], dx: &mut [S]) {
+        self.own_rates(t, x, u, w, dx);
+        let mut joints: Vec<(usize, usize)> = Vec::new();
         for actor in self.actors.iter().filter(|actor| actor.inertial) {
             let Site::Joint { w: k, velocity, .. } = actor.place.site else { continue };
-            self.own_rates(t, x, u, w, dx);
-            let free = dx[velocity];
+            if !joints.contains(&(k, velocity)) {
+                joints.push((k, velocity));
+            }
+        }
+        if joints.is_empty() {
+            return;
+        }
+        let free: Vec<S> = joints.iter().map(|&(_, velocity)| dx[velocity]).collect();
+        let mut moved_by_unit = Vec::with_capacity(joints.len());
+        for &(k, _) in &joints {
             w[k] += S::from(self.forward[k]);
             self.own_rates(t, x, u, w, dx);
             w[k] += S::from(-self.forward[k]);
-            let mut at = self.at(actor, t, x, u, S::from(0.0));
-            (at.a, at.mobility) = (free, dx[velocity] - free);
-            w[k] += actor.acting.value(&at, self.states(actor, x)) * self.forward[k];
+            moved_by_unit.push(joints.iter().zip(&free).map(|(&(_, v), &free)| dx[v] - free).collect::<Vec<S>>());
+        }
+        let mass = |i: usize| self.added_mass(joints[i].0, moved_by_unit[i][i], t, x, u);
+        let masses: Vec<S> = (0..joints.len()).map(mass).collect();
+        for (j, column) in moved_by_unit.iter_mut().enumerate() {
+            column.iter_mut().zip(&masses).for_each(|(moved, &mass)| *moved = mass * *moved);
+            column[j] += S::from(1.0);
+        }
+        let pushed: Vec<S> = masses.iter().zip(&free).map(|(&mass, &free)| mass * free).collect();
+        for (&(k, _), &force) in joints.iter().zip(&solve(&moved_by_unit, &pushed)) {
+            w[k] += force * self.forward[k];
         }
         self.own_rates(t, x, u, w, dx);
+    }
+
+    /// Returns the mass that effects add to a joint, where a unit force moves it with this acceleration.
+    fn added_mass(&self, k: usize, mobility: S, t: f64, x: &[S], u: &[S]) -> S {
+        let (mut added, mut lost) = (S::from(0.0), S::from(0.0));
+        let here = |actor: &&Actor<S>| actor.inertial && matches!(actor.place.site, Site::Joint { w, .. } if w == k);
+        for actor in self.actors.iter().filter(here) {
+            let mass = actor.acting.inertia(&self.at(actor, t, x, u, S::from(0.0)));
+            *(if mass.value() < 0.0 { &mut lost } else { &mut added }) += mass;
+        }
+        if lost.value() == 0.0 {
+            return added + lost;
+        }
+        let most = -(S::from(1.0) / mobility + added) * MOST_LOST;
+        added + if lost.value() > most.value() { lost } else { most }
     }
 
     /// Computes inputs, forces including the friction of stuck joints, and the rates of the plant. Returns the friction
@@ -471,8 +514,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
         self.update_hysteresis(t, x, |_| true);
         due(self);
-        self.update_hysteresis(t, x, |_| true);
-        self.settle_gaps(t, x, Actor::is_at_actuator);
+        self.follow(t, x, 0, Actor::is_at_actuator);
         if moves {
             self.late = S::from(0.0);
             shift(self, t, x, &mut rates, -late);
@@ -554,7 +596,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         let before = x[..self.own].to_vec();
         let event = EventInstant { at: Instant { t, x: &before, u: &u, w: &w }, du: &self.still, delay: self.late };
         self.plant.switch(index, &event, &mut x[..self.own]).clone_into(&mut self.happened);
-        self.settle_gaps(t, x, |_| true);
+        self.settle_gaps(t, x);
         &self.happened
     }
 
@@ -595,7 +637,7 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
         let before = x[..self.own].to_vec();
         let event = EventInstant { at: Instant { t, x: &before, u: &u, w: &w }, du: &self.still, delay: self.late };
         self.plant.rest(index, &event, close, &mut x[..self.own])?.clone_into(&mut self.happened);
-        self.settle_gaps(t, x, |_| true);
+        self.settle_gaps(t, x);
         Ok(&self.happened)
     }
 

@@ -10,6 +10,9 @@ use super::dynamics::{Actor, Driven};
 /// 10,000 oscillations, and rounding of the value changes the rate by 1e-9 of the value per horizon.
 pub(super) const BLINK: f64 = 1e-7;
 
+/// Change of a value at an edge, relative to the value, that is more than rounding: an edge is located to some 1e-12 of a step.
+const JUMP: f64 = 1e-6;
+
 /// Number of parts of a time span before time 0, at whose ends hysteresis guards are read: commands are polynomials within it.
 const RUN_UP_PARTS: f64 = 16.0;
 
@@ -47,7 +50,7 @@ impl<S: Opening> Driven<'_, S> {
     }
 
     /// Returns the value that reaches an effect at an actuator or a sensor; 0 for other effects.
-    fn arriving(&self, index: usize, t: f64, x: &[S]) -> S {
+    pub(super) fn arriving(&self, index: usize, t: f64, x: &[S]) -> S {
         match self.actors[index].place.site {
             Site::Actuator { .. } => {
                 self.inputs(t, x, &mut Vec::new());
@@ -89,17 +92,30 @@ impl<S: Opening> Driven<'_, S> {
         if actor.closed == Some(true) { -gap } else { gap }
     }
 
-    /// Finds the side of their edges on which some effects are: all at the start and after a jump of the plant state; those at
-    /// actuators after a jump of the command.
-    pub(super) fn settle_gaps(&mut self, t: f64, x: &[S], which: impl Fn(&Actor<S>) -> bool) {
-        for index in 0..self.actors.len() {
-            if !which(&self.actors[index]) {
-                continue;
+    /// Finds the side of their edges on which all effects are: at the start, and after a jump of the plant state.
+    pub(super) fn settle_gaps(&mut self, t: f64, x: &[S]) {
+        (0..self.actors.len()).for_each(|index| self.settle_gap(index, t, x));
+    }
+
+    fn settle_gap(&mut self, index: usize, t: f64, x: &[S]) {
+        // The sign decides where the side is unknown.
+        self.actors[index].closed = None;
+        let gap = self.actors[index].acting.gap(&self.at_edge(index, t, x));
+        self.actors[index].closed = gap.map(|gap| gap.value() < 0.0);
+    }
+
+    /// Takes the effects from `first` on to the values that they receive after a jump, in their order, as each receives the output of those
+    /// before it: their hysteresis states, and of some the side of the edge.
+    pub(super) fn follow(&mut self, t: f64, x: &[S], first: usize, settles: impl Fn(&Actor<S>) -> bool) {
+        for index in first..self.actors.len() {
+            let actor = &self.actors[index];
+            let passes = matches!(actor.place.site, Site::Actuator { .. } | Site::Sensor { .. });
+            if passes && actor.closed.is_some() && settles(actor) {
+                self.settle_gap(index, t, x);
             }
-            // The sign decides where the side is unknown.
-            self.actors[index].closed = None;
-            let gap = self.actors[index].acting.gap(&self.at_edge(index, t, x));
-            self.actors[index].closed = gap.map(|gap| gap.value() < 0.0);
+            if !self.actors[index].memory.is_empty() {
+                self.update_hysteresis_of(index, t, x);
+            }
         }
     }
 
@@ -110,10 +126,17 @@ impl<S: Opening> Driven<'_, S> {
             self.update_hysteresis_of(index, t, x);
             return "";
         }
-        let actor = &mut self.actors[index];
-        let closed = actor.closed.as_mut().expect("the effect has a gap");
-        *closed = !*closed;
-        match (actor.place.site, *closed) {
+        let before = self.onward_of(index, t, x);
+        self.cross(index);
+        if (self.onward_of(index, t, x) - before).value().abs() > JUMP * before.value().abs() {
+            // The value that is passed on jumps, as that of a sensor with a gap: what comes after goes up to the jump, then over it.
+            self.cross(index);
+            self.update_hysteresis(t, x, |_| true);
+            self.cross(index);
+            self.follow(t, x, index + 1, |_| true);
+        }
+        let actor = &self.actors[index];
+        match (actor.place.site, actor.closed == Some(true)) {
             (Site::Process { .. }, true) => "a level rises above an edge",
             (Site::Process { .. }, false) => "a level falls below an edge",
             (Site::Joint { .. }, true) => "a contact closes",
@@ -122,7 +145,24 @@ impl<S: Opening> Driven<'_, S> {
         }
     }
 
-    fn update_hysteresis_of(&mut self, index: usize, t: f64, x: &[S]) {
+    /// Takes an effect to the other side of its edge.
+    fn cross(&mut self, index: usize) {
+        let closed = self.actors[index].closed.as_mut().expect("the effect has a gap");
+        *closed = !*closed;
+    }
+
+    /// Returns the value that an effect at an actuator or a sensor passes on; 0 for other effects.
+    fn onward_of(&self, index: usize, t: f64, x: &[S]) -> S {
+        let actor = &self.actors[index];
+        match actor.place.site {
+            Site::Actuator { .. } | Site::Sensor { .. } => {
+                actor.passed(&self.at(actor, t, x, &[], self.arriving(index, t, x)), self.states(actor, x))
+            }
+            Site::Joint { .. } | Site::Process { .. } => S::from(0.0),
+        }
+    }
+
+    pub(super) fn update_hysteresis_of(&mut self, index: usize, t: f64, x: &[S]) {
         let at = self.at_edge(index, t, x);
         self.actors[index].follow(&at);
     }
@@ -178,7 +218,12 @@ impl<S: Opening> Driven<'_, S> {
     pub(super) fn start_actuators(&mut self, x: &mut [S], parameters: &[S]) {
         let next = |of: &Self| of.commands.iter().map(Command::next_break).fold(0.0, f64::min);
         let mut t = next(self);
-        self.update_hysteresis(t, x, Actor::is_at_actuator);
+        for index in (0..self.actors.len()).filter(|&index| self.actors[index].is_at_actuator()).collect::<Vec<_>>() {
+            self.start_actuator(index, t, x);
+            if !self.actors[index].memory.is_empty() {
+                self.update_hysteresis_of(index, t, x);
+            }
+        }
         while t < 0.0 {
             self.commands.iter_mut().for_each(|command| command.pass_break(t));
             self.update_hysteresis(t, x, Actor::is_at_actuator);
@@ -187,16 +232,20 @@ impl<S: Opening> Driven<'_, S> {
             t = end;
         }
         for index in (0..self.actors.len()).filter(|&index| self.actors[index].is_at_actuator()).collect::<Vec<_>>() {
-            let at = self.at_edge(index, 0.0, x);
+            self.start_actuator(index, 0.0, x);
             let actor = &mut self.actors[index];
             let ahead = actor.place.starts.map_or(&[][..], |starts| &parameters[starts..]);
-            let z = &mut x[actor.z.0..actor.z.0 + actor.z.1];
-            actor.acting.start(&at, z);
-            z.iter_mut().zip(ahead).for_each(|(z, &ahead)| *z += ahead);
-            if let (Some(output), Some(&ahead)) = (actor.memory.first_mut(), ahead.first()) {
-                *output += ahead;
-                actor.follow(&at);
+            x[actor.z.0..actor.z.0 + actor.z.1].iter_mut().zip(ahead).for_each(|(z, &ahead)| *z += ahead);
+            if let Some(output) = actor.memory.first_mut() {
+                *output += ahead.first().copied().unwrap_or(S::from(0.0));
+                self.update_hysteresis_of(index, 0.0, x);
             }
         }
+    }
+
+    /// Initialises the states of an effect at an actuator, as if the value that reaches it had been constant for long.
+    fn start_actuator(&self, index: usize, t: f64, x: &mut [S]) {
+        let (at, actor) = (self.at_edge(index, t, x), &self.actors[index]);
+        actor.acting.start(&at, &mut x[actor.z.0..actor.z.0 + actor.z.1]);
     }
 }

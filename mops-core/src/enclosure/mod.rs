@@ -140,6 +140,12 @@ impl Enclosure {
         }
     }
 
+    /// Returns `self^2`.
+    #[must_use]
+    pub fn square(self) -> Self {
+        self.chain(self.value.square(), Interval::point(2.0) * self.value)
+    }
+
     /// Returns `self^exponent`.
     #[must_use]
     pub fn power(self, exponent: Self) -> Self {

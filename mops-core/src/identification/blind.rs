@@ -189,6 +189,7 @@ mod tests {
                 range: 1.0,
                 span: 1.0,
                 unit: "m".into(),
+                counts_from_any_zero: false,
             })
             .collect();
         let signals =

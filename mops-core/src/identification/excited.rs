@@ -138,16 +138,26 @@ fn tuners_in(study: &Study, case: usize) -> usize {
 
 /// Returns equally spaced samples of an input and their sample time, s; `None` if its duration is unknown.
 fn samples(case: &Case, input: &Input, wanted: Option<f64>, horizon: Option<f64>) -> Option<(Vec<f64>, f64)> {
+    let channels = case.experiment.iter().flat_map(|experiment| &experiment.channels);
+    let end = channels.filter_map(|channel| channel.times.last()).copied().reduce(f64::max);
+    // Samples of an input before and after the measurements, which a file may have, excite nothing that is measured.
+    let during = |times: &[f64]| {
+        let first = times.partition_point(|time| *time < 0.0);
+        first..times.partition_point(|time| end.is_none_or(|end| *time <= end)).max(first)
+    };
     let recorded = match input {
-        Input::Sampled { times, .. } if case.experiment.is_some() => Some(times.as_slice()),
+        Input::Sampled { times, .. } if case.experiment.is_some() => Some(&times[during(times)]),
         _ => case.experiment.as_ref().and_then(|e| e.channels.first()).map(|c| c.times.as_slice()),
     };
     if let (None, Input::Sampled { times, values, .. }) = (wanted, input)
-        && let Some(step) = spacing(times)
+        && let Some(step) = spacing(&times[during(times)])
     {
-        return Some((values.clone(), step));
+        return Some((values[during(times)].to_vec(), step));
     }
-    let first = if let (Some(times), Input::Sampled { .. }) = (recorded, input) { times[0] } else { 0.0 };
+    let first = match (recorded, input) {
+        (Some(times), Input::Sampled { .. }) => *times.first()?,
+        _ => 0.0,
+    };
     let end = recorded.and_then(|times| times.last().copied()).or(horizon)?;
     let step = wanted.or_else(|| recorded.map(median_step)).unwrap_or(end / 1000.0);
     if !(step > 0.0 && end > first) {

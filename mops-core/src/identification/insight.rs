@@ -82,7 +82,7 @@ fn tuner(local: &Local, k: usize) -> TunerSensitivity {
     let [alone, together] = [found.alone[k], found.together[k]];
     let std_error = local.spread(k).deviation;
     // An initial state may be near zero, so its error is related to its range.
-    let by_range = local.starts[k] || coordinate.value == 0.0;
+    let by_range = local.starts[k] || coordinate.is_by_range();
     let scale = if by_range { coordinate.range } else { coordinate.scale() };
     let relative_error = std_error / scale;
     TunerSensitivity {
@@ -121,7 +121,7 @@ fn remaining(
         let mut tuners = at.to_vec();
         for &(k, share) in changes {
             let (i, step) = (problem.active()[k], 0.1 * share);
-            let straight = straight || tuners[i] == 0.0;
+            let straight = straight || coordinates[k].is_by_range();
             tuners[i] = if straight { tuners[i] + step * coordinates[k].scale() } else { tuners[i] * math::exp(step) };
         }
         study.apply_ties(&mut tuners);

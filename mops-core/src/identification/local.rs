@@ -75,6 +75,7 @@ pub fn local(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>)
         range: tuner.bounds[1] - tuner.bounds[0],
         span: unit_slope(tuner, value).abs(),
         unit: tuner.unit.to_string(),
+        counts_from_any_zero: tuner.unit.zero() != 0.0,
     });
     let mut at = found.at.residuals.clone();
     let mut records = records(problem, tuners).filter(|_| residuals);

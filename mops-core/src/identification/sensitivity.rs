@@ -24,19 +24,26 @@ pub struct Coordinate {
     pub name: String,
     /// Value at which the derivatives are evaluated.
     pub value: f64,
-    /// Largest minus smallest value; replaces the value if that is 0.
+    /// Largest minus smallest value; replaces the value if that is 0, or counts from an arbitrary zero.
     pub range: f64,
     /// Change over the whole range at the derivative of the tuner's scale: the range, or `value ln(max/min)` for a
     /// logarithmic tuner.
     pub span: f64,
     /// Unit of value and range.
     pub unit: String,
+    /// True if the value counts from an arbitrary zero, such as that of degC, so that a share of it has no meaning.
+    pub counts_from_any_zero: bool,
 }
 
 impl Coordinate {
-    /// Returns the scale of a relative change: the value, or the range of a tuner that is 0.
+    /// Returns true if relative changes are related to the range instead of the value.
+    pub fn is_by_range(&self) -> bool {
+        self.value == 0.0 || self.counts_from_any_zero
+    }
+
+    /// Returns the scale of a relative change: the value, or the range.
     pub fn scale(&self) -> f64 {
-        if self.value == 0.0 { self.range } else { self.value.abs() }
+        if self.is_by_range() { self.range } else { self.value.abs() }
     }
 }
 
@@ -241,6 +248,7 @@ mod tests {
             range: value.abs().max(1.0),
             span: value.abs().max(1.0),
             unit: "1".into(),
+            counts_from_any_zero: false,
         };
         values.iter().map(of).collect()
     }

@@ -191,7 +191,10 @@ impl Unit {
 
     /// Formats a number with this unit for a sentence: `3 rad`; a pure number without unit.
     pub fn amount(&self, number: f64) -> String {
-        if self.text == "1" { number.to_string() } else { format!("{number} {self}") }
+        // Written out, very small and very large numbers have hundreds of digits.
+        let is_readable = number == 0.0 || (1e-5..1e15).contains(&number.abs());
+        let number = if is_readable { number.to_string() } else { format!("{number:e}") };
+        if self.text == "1" { number } else { format!("{number} {self}") }
     }
 
     /// Returns true if quantities in the two units are comparable.

@@ -8,6 +8,7 @@ use mops_core::math;
 use mops_core::{Diagnostic, Hold, Input, Unit, suggestion};
 
 use super::super::data;
+use crate::numbers::significant;
 use crate::terminal::CommandError;
 use crate::toml_text::{key, number, quoted};
 
@@ -368,8 +369,8 @@ fn experiments(
     let skipped = if skip > 0 { format!("skip     = {skip}\n") } else { String::new() };
     let finite: Vec<f64> = times[skip..].iter().copied().filter(|t| t.is_finite()).collect();
     #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, clippy::cast_sign_loss)]
-    let split = finite[((finite.len() - 1) as f64 * SHARE) as usize];
-    let split = quoted(&format!("{} s", number(split)));
+    let split = ((finite.len() - 1) as f64 * SHARE) as usize;
+    let split = quoted(&format!("{} s", between(finite[split], finite.get(split + 1).copied())));
     let common = format!(
         "file     = {}\n{time_key}channels = {{ {} }}\ninputs   = {{ {} }}\nfree     = [{}]\n{skipped}",
         quoted(copy),
@@ -390,9 +391,27 @@ role     = \"validation\"
     )
 }
 
+/// Returns a number of few digits between two instants, so that no sample is in both parts.
+fn between(last: f64, next: Option<f64>) -> String {
+    let Some(next) = next else { return number(last) };
+    let middle = |digits: usize| significant(0.5 * (last + next), digits);
+    let is_between = |text: &String| text.parse().is_ok_and(|value: f64| last < value && value < next);
+    (1..17).map(middle).find(is_between).unwrap_or_else(|| number(last))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_parts_of_a_record_share_no_sample() {
+        let cases =
+            [((1.0, 2.0), "1.5"), ((1999.0, 2001.0), "2000"), ((12.34, 12.35), "12.345"), ((-0.2, 0.1), "-0.05")];
+        for ((last, next), expected) in cases {
+            assert_eq!(between(last, Some(next)), expected);
+        }
+        assert_eq!(between(7.0, None), "7");
+    }
 
     #[test]
     fn inputs_are_known_by_name_or_unit() {

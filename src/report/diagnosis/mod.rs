@@ -51,10 +51,7 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> (Tone, String) {
 
 /// Returns the facts below the verdict: name and value.
 pub(super) fn facts(diagnosis: &Diagnosis) -> Vec<(String, String)> {
-    let p_value = match diagnosis.p_value {
-        p if p.is_finite() && p < 1e-6 => "below 1e-6".to_owned(),
-        p => significant(p, 2),
-    };
+    let p_value = words::chance(diagnosis.p_value);
     let probability = (format!("Probability {}", words::of_what(diagnosis)), words::probability(diagnosis.probability));
     let probability = (!diagnosis.probability.is_nan()).then_some(probability);
     probability.into_iter().chain([("p-value if nothing is missing".to_owned(), p_value)]).collect()

@@ -58,7 +58,12 @@ fn rounds(found: &RobustReport) -> Markup {
                             td class="number" { (round.evaluations) }
                             td {
                                 @for added in &round.added {
-                                    div { (added.name) ", scaled " (significant(added.scaled, 4)) ": "
+                                    div { (added.name) ", "
+                                        @match added.scaled {
+                                            Some(scaled) => { "scaled " (significant(scaled, 4)) }
+                                            None => { "beyond the edge of a jump" }
+                                        }
+                                        ": "
                                         @for (j, c) in added.at.iter().enumerate() { @if j > 0 { ", " } (c.name) " = " (number(c.value)) }
                                     }
                                 }

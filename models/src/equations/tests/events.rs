@@ -330,3 +330,19 @@ fn a_guard_with_a_bounded_function_of_a_delayed_quantity_is_found() {
     let found = times(&response, "pass");
     assert!(near(&found, &[PI + 0.5, 3.0 * PI + 0.5]), "{found:?}");
 }
+
+#[test]
+fn a_pulse_over_a_moving_state_is_recorded() {
+    // Widths of 1 ms to 1 s in a simulation of 10 s, whose steps are seconds long.
+    for width in [1e-3, 1e-2, 0.1, 1.0] {
+        for place in [0.5037, 3.71, 8.2] {
+            let text = format!(
+                "states = {{ x = '1' }}\nparameters = {{ v = '1/s' }}\nder = {{ x = 'v' }}\n\
+                 outputs = {{ y = {{ value = 'exp(-((x - {place})/{width})^2)' }} }}"
+            );
+            let response = respond(&read(&text).unwrap(), &[], &[("v", 1.0)], 10.0);
+            assert!((at(&response, "y", place) - 1.0).abs() < 1e-6, "{width} {place}");
+            assert!(at(&response, "y", place + 5.0 * width) < 1e-6, "{width} {place}");
+        }
+    }
+}
