@@ -8,7 +8,8 @@
 mod criteria;
 #[path = "slopes/differences.rs"]
 mod differences;
-#[path = "slopes/plants.rs"]
+#[path = "common/plants.rs"]
+#[allow(dead_code)] // The comparison of pairs with independent simulations reads more of it.
 mod plants;
 #[path = "slopes/systems.rs"]
 mod systems;
@@ -22,12 +23,6 @@ use criteria::{Asked, asked};
 use differences::{Verdict, judge};
 use plants::{Setup, setups};
 use systems::systems;
-
-/// Horizon of the simulations, s.
-const HORIZON: f64 = 3.0;
-
-/// Number of signals of each plant that criteria read: a state and its rate, or two states.
-const SIGNALS: usize = 2;
 
 /// Distance along the derivative, in units of the parameter, within which a slope is to describe the criterion.
 const REACH: f64 = 1e-6;

@@ -3,7 +3,7 @@
 use mops::criteria;
 use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, Variable};
 
-use super::SIGNALS;
+use super::plants::SIGNALS;
 
 /// Criterion with a name to print.
 pub struct Asked {

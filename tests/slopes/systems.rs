@@ -137,6 +137,8 @@ pub fn systems() -> Vec<Setup> {
         Setup {
             name: name.to_owned(),
             effects: name.to_owned(),
+            plant: name,
+            placements: Vec::new(),
             varied: (0..values.len()).collect(),
             model,
             parameters,

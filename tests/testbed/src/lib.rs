@@ -23,6 +23,7 @@ mod span;
 mod strength;
 mod study;
 mod trial;
+pub mod twins;
 
 pub use disturbed::{NOMINAL, Nominal, Setting, disturbed};
 pub use draw::Draw;

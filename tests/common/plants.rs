@@ -9,7 +9,11 @@ use mops_core::{
     Case, Effect, EffectParameter, Hold, InitialGrid, Input, Job, ModelOptions, Placement, Port, PortKind,
 };
 
-use super::{HORIZON, SIGNALS};
+/// Horizon of the simulations, s.
+pub const HORIZON: f64 = 3.0;
+
+/// Number of signals of each plant that criteria read: a state and its rate, or two states.
+pub const SIGNALS: usize = 2;
 
 /// Plants whose signals, speeds, forces and times are of the order of 1.
 const PLANTS: [(&str, &str); 3] = [
@@ -48,6 +52,10 @@ pub struct Setup {
     pub name: String,
     /// Names of the effects.
     pub effects: String,
+    /// Name of the plant.
+    pub plant: &'static str,
+    /// The effects at their places.
+    pub placements: Vec<Placement>,
     pub model: Arc<dyn Model>,
     pub parameters: Vec<f64>,
     /// Indices of the parameters of the effects.
@@ -58,6 +66,11 @@ pub struct Setup {
 impl Setup {
     pub fn case(&self) -> Case {
         Case { inputs: vec![("u".to_owned(), self.input.clone())], ..Case::default() }
+    }
+
+    /// Returns true if both effects act at one place.
+    pub fn is_at_one_place(&self) -> bool {
+        matches!(&self.placements[..], [a, b] if a.port == b.port)
     }
 
     pub fn job<'a>(&'a self, case: &'a Case, parameters: &'a [f64]) -> Job<'a> {
@@ -141,7 +154,7 @@ fn acting_at(model: &dyn Model, port: &Port) -> Vec<(Arc<dyn Effect>, Option<Por
 
 type Acting = (Port, Arc<dyn Effect>, Option<Port>);
 
-fn setup((plant, model): (&str, &Arc<dyn Model>), kind: &str, pair: [&Acting; 2], even: &mut Even) -> Setup {
+fn setup((plant, model): (&'static str, &Arc<dyn Model>), kind: &str, pair: [&Acting; 2], even: &mut Even) -> Setup {
     let placement = |(k, (port, effect, companion)): (usize, &&Acting)| Placement {
         name: ["a", "b"][k].to_owned(),
         effect: Arc::clone(effect),
@@ -166,7 +179,7 @@ fn setup((plant, model): (&str, &Arc<dyn Model>), kind: &str, pair: [&Acting; 2]
     let [a, b] = pair;
     let effects = format!("{} + {}", a.1.name(), b.1.name());
     let name = format!("{plant} {kind}: {} at {} + {} at {} {parameters:?}", a.1.name(), a.0, b.1.name(), b.0);
-    Setup { name, effects, model: Arc::new(with), parameters, varied, input: input(kind) }
+    Setup { name, effects, plant, placements, model: Arc::new(with), parameters, varied, input: input(kind) }
 }
 
 /// Number of pairs at two places of a plant.
