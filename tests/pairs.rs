@@ -33,6 +33,9 @@ const CONVERGED: f64 = 1e-6;
 /// Change of a signal around a time, relative to its largest magnitude, beyond which it jumps there.
 const JUMP: f64 = 1e-3;
 
+/// Size of the twin's signals from which on the plant diverges with its effects.
+const DIVERGED: f64 = 1e3;
+
 /// Half the width of the interval around a time in which a jump is looked for, s.
 const AROUND: f64 = 1e-6;
 
@@ -108,7 +111,11 @@ fn compare(setup: &Setup) -> Deviation {
     let times = times();
     let model = match simulate(setup, &times) {
         Ok(model) => model,
-        Err(failure) => return Deviation { size: f64::INFINITY, line: failure },
+        Err(line) => {
+            let diverges =
+                twin::simulate(setup, &times, STEPS[0]).iter().flatten().any(|y| y.0.is_nan() || y.0.abs() > DIVERGED);
+            return Deviation { size: if diverges { 0.0 } else { f64::INFINITY }, line };
+        }
     };
     let mut last: Option<Signals> = None;
     let mut found = (f64::INFINITY, 0, 0);

@@ -8,6 +8,9 @@ use crate::law::Dry;
 /// Distance in time within which a step passes a jump of a law, s.
 const ACROSS: f64 = 1e-10;
 
+/// Size of a guard up to which the state is at the edge.
+const ROUNDING: f64 = 1e-13;
+
 /// Maximum number of events within a step.
 const MOST: usize = 100;
 
@@ -116,7 +119,7 @@ impl Twin<'_> {
                 _ => (),
             }
         }
-        let crosses = guards.iter().zip(&now.guards).any(|(a, b)| a * b < 0.0);
+        let crosses = guards.iter().zip(&now.guards).any(|(a, b)| a.abs() > ROUNDING && a * b < 0.0);
         if crosses { Err(Event::Crosses) } else { Ok((x, now)) }
     }
 

@@ -53,7 +53,7 @@ pub(super) struct Law {
     pub lost: f64,
     /// Delay of the command or signal, s.
     pub delay: f64,
-    /// Functions with sign changes where the law jumps.
+    /// Functions with sign changes where the law jumps or bends.
     pub guards: Vec<Term>,
 }
 
@@ -73,7 +73,7 @@ pub(super) fn dynamic(
 }
 
 impl Law {
-    /// Adds a function with a sign change where the law jumps.
+    /// Adds a function with a sign change where the law jumps or bends.
     pub(super) fn with_guard(mut self, guard: impl Fn(&At<'_>) -> f64 + 'static) -> Self {
         self.guards.push(Box::new(guard));
         self
