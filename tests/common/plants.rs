@@ -6,7 +6,7 @@ use mops::Model;
 use mops::models::WithEffects;
 use mops::models::equations::EquationsOptions;
 use mops_core::{
-    Case, Effect, EffectParameter, Hold, InitialGrid, Input, Job, ModelOptions, Placement, Port, PortKind,
+    Between, Case, Effect, EffectParameter, Hold, InitialGrid, Input, Job, ModelOptions, Placement, Port, PortKind,
 };
 
 /// Horizon of the simulations, s.
@@ -132,19 +132,34 @@ fn bare(text: &str) -> Arc<dyn Model> {
     Arc::from(options.build().expect("it is a model"))
 }
 
+/// Effects of the setups.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Chosen {
+    /// Effects at their own place whose reported derivative is exact: not quantisation, of which that of its mean is reported.
+    Differentiable,
+    /// All effects, also those of one joint between two.
+    All,
+}
+
 /// Returns the effects that act at a place, with a second place if they need one.
-fn acting_at(model: &dyn Model, port: &Port) -> Vec<(Arc<dyn Effect>, Option<Port>)> {
+fn acting_at(model: &dyn Model, port: &Port, chosen: Chosen) -> Vec<(Arc<dyn Effect>, Option<Port>)> {
     let ports = &model.interface().ports;
     let companion =
         |wanted: PortKind| ports.iter().find(|other| *other != port && other.kind(ports) == Some(wanted)).cloned();
-    // The reported derivative of quantisation is that of its mean.
     let is_staircase =
         |effect: &Arc<dyn Effect>| effect.parameters().iter().any(|of| matches!(of.grid, InitialGrid::Steps));
     let acts = |effect: &Arc<dyn Effect>| {
-        !is_staircase(effect) && port.kind(ports).is_some_and(|kind| effect.ports().contains(&kind))
+        (chosen == Chosen::All || !is_staircase(effect))
+            && port.kind(ports).is_some_and(|kind| effect.ports().contains(&kind))
     };
-    let fitting = mops::effects::effects().into_iter().filter(acts);
-    fitting
+    let mut effects = mops::effects::effects();
+    if chosen == Chosen::All {
+        let between: Vec<_> = effects.iter().filter_map(Between::of).collect();
+        effects.extend(between);
+    }
+    effects
+        .into_iter()
+        .filter(acts)
         .filter_map(|effect| match effect.second_port() {
             None => Some((effect, None)),
             Some(wanted) => companion(wanted).map(|other| (effect, Some(other))),
@@ -177,7 +192,8 @@ fn setup((plant, model): (&'static str, &Arc<dyn Model>), kind: &str, pair: [&Ac
     }
     assert_eq!((with.interface().parameters.len(), own <= parameters.len()), (parameters.len(), true));
     let [a, b] = pair;
-    let effects = format!("{} + {}", a.1.name(), b.1.name());
+    let title = |of: &Acting| format!("{}{}", of.1.name(), if of.1.mutual() { " between" } else { "" });
+    let effects = format!("{} + {}", title(a), title(b));
     let name = format!("{plant} {kind}: {} at {} + {} at {} {parameters:?}", a.1.name(), a.0, b.1.name(), b.0);
     Setup { name, effects, plant, placements, model: Arc::new(with), parameters, varied, input: input(kind) }
 }
@@ -186,7 +202,7 @@ fn setup((plant, model): (&'static str, &Arc<dyn Model>), kind: &str, pair: [&Ac
 const ACROSS: usize = 500;
 
 /// Returns all pairs of effects at one place, and some at two places, of every plant and with every input.
-pub fn setups() -> Vec<Setup> {
+pub fn setups(chosen: Chosen) -> Vec<Setup> {
     let mut even = Even(0.1);
     let mut all = Vec::new();
     for (plant, text) in PLANTS {
@@ -194,7 +210,7 @@ pub fn setups() -> Vec<Setup> {
         let ports = model.interface().ports.clone();
         let at = |port: &Port| {
             let with = |(effect, companion)| (port.clone(), effect, companion);
-            acting_at(model.as_ref(), port).into_iter().map(with).collect::<Vec<Acting>>()
+            acting_at(model.as_ref(), port, chosen).into_iter().map(with).collect::<Vec<Acting>>()
         };
         let acting: Vec<Vec<Acting>> = ports.iter().map(at).collect();
         for (kind, acting) in ports.iter().map(|port| port.kind(&ports)).zip(&acting) {

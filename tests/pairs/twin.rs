@@ -83,7 +83,8 @@ pub fn simulate(setup: &Setup, times: &[f64], longest: f64) -> Signals {
     let body = BODIES.iter().find(|body| body.name == setup.plant).expect("the plant has a twin");
     let declared = |(placement, parameters): (&Placement, _)| {
         let companion = placement.companion.as_ref().map(|port| site(body, port));
-        Declared { name: placement.effect.name(), site: site(body, &placement.port), companion, parameters }
+        let (name, is_mutual) = (placement.effect.name(), placement.effect.mutual());
+        Declared { name, site: site(body, &placement.port), companion, is_mutual, parameters }
     };
     let declared: Vec<Declared<'_>> =
         setup.placements.iter().zip(values(setup)).map(|(placement, values)| declared((placement, values))).collect();

@@ -16,11 +16,11 @@ fn constant(value: f64) -> impl Fn(f64) -> f64 {
 }
 
 fn joint(name: &'static str, parameters: &'static [f64]) -> Declared<'static> {
-    Declared { name, site: Site::Joint(0), companion: None, parameters }
+    Declared { name, site: Site::Joint(0), companion: None, is_mutual: false, parameters }
 }
 
 fn actuator(name: &'static str, parameters: &'static [f64]) -> Declared<'static> {
-    Declared { name, site: Site::Actuator, companion: None, parameters }
+    Declared { name, site: Site::Actuator, companion: None, is_mutual: false, parameters }
 }
 
 #[test]
@@ -42,8 +42,20 @@ fn half_swings_with_dry_friction_are_harmonic_about_two_centres() {
     // x'' = -x - 5 (x - y) + u - c sgn(v) is not harmonic; with a clamped second mass and u = 1 it is.
     let (masses, one) = (body("masses"), constant(1.0));
     let command = Command { value: &one, before: 1.0, knots: &[] };
-    let clamped = Declared { name: "coulomb-friction", site: Site::Joint(1), companion: None, parameters: &[100.0] };
-    let drag = Declared { name: "viscous-friction", site: Site::Joint(0), companion: None, parameters: &[-0.2] };
+    let clamped = Declared {
+        name: "coulomb-friction",
+        site: Site::Joint(1),
+        companion: None,
+        is_mutual: false,
+        parameters: &[100.0],
+    };
+    let drag = Declared {
+        name: "viscous-friction",
+        site: Site::Joint(0),
+        companion: None,
+        is_mutual: false,
+        parameters: &[-0.2],
+    };
     let effects = [joint("coulomb-friction", &[0.3]), clamped, drag];
     let w = 6.0_f64.sqrt();
     for (t, row) in times(3.0).iter().zip(simulate(masses, &effects, &command, &times(3.0), 1e-3)) {
@@ -81,7 +93,8 @@ fn the_output_of_a_play_lags_behind_by_half_the_gap() {
     let heater = body("heater");
     let sine = |t: f64| math::sin(t);
     let command = Command { value: &sine, before: 0.0, knots: &[] };
-    let play = Declared { name: "backlash", site: Site::Sensor(2), companion: None, parameters: &[0.4] };
+    let play =
+        Declared { name: "backlash", site: Site::Sensor(2), companion: None, is_mutual: false, parameters: &[0.4] };
     for (t, row) in times(4.0).iter().zip(simulate(heater, &[play], &command, &times(4.0), 1e-4)) {
         let rising = (math::sin(*t) - 0.2).max(0.0);
         let y = if *t < std::f64::consts::FRAC_PI_2 { rising } else { (math::sin(*t) + 0.2).min(0.8) };

@@ -42,6 +42,8 @@ pub struct Declared<'a> {
     pub site: Site,
     /// Second place, for an effect that has one.
     pub companion: Option<Site>,
+    /// True for a force between two joints, with the reaction at the second.
+    pub is_mutual: bool,
     /// Values of the parameters, in the order of the catalogue.
     pub parameters: &'a [f64],
 }

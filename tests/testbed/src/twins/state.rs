@@ -28,6 +28,8 @@ pub(super) struct Installed {
     pub(super) law: Law,
     pub(super) site: Site,
     companion: Option<Site>,
+    /// True for a law of the relative position and speed.
+    is_relative: bool,
     /// Index of the first own state.
     own: usize,
 }
@@ -74,14 +76,18 @@ impl<'a> Twin<'a> {
         let mut n = body.states.len();
         let mut modes = [Mode::Free; FEW];
         let mut installed = Vec::new();
-        for Declared { name, site, companion, parameters } in effects {
-            let law = law(name, parameters).unwrap_or_else(|| panic!("{name} has no law"));
+        for Declared { name, site, companion, is_mutual, parameters } in effects {
+            let mut law = law(name, parameters).unwrap_or_else(|| panic!("{name} has no law"));
+            let is_relative = *is_mutual && law.onward == 0.0;
+            if is_relative {
+                law.onward = -1.0;
+            }
             if let (Some(_), Site::Joint(j)) = (&law.dry, *site) {
                 modes[j] = Mode::Rests;
             }
             let own = n;
             n += law.states;
-            installed.push(Installed { law, site: *site, companion: *companion, own });
+            installed.push(Installed { law, site: *site, companion: *companion, is_relative, own });
         }
         let guards: usize = installed.iter().map(|effect| effect.law.guards.len()).sum();
         assert!(n <= SIZE && effects.len() <= FEW && guards <= FEW, "the plant exceeds the fixed array sizes");
@@ -153,9 +159,12 @@ impl<'a> Twin<'a> {
 
     /// Returns the state at the place of an effect.
     pub(super) fn at<'s>(&'s self, i: usize, t: f64, elapsed: f64, x: &'s State, now: &Now) -> At<'s> {
-        let Installed { law, site, companion, own } = &self.effects[i];
-        let (q, v) = self.located(Some(*site), x, now.u);
+        let Installed { law, site, companion, is_relative, own } = &self.effects[i];
+        let (mut q, mut v) = self.located(Some(*site), x, now.u);
         let (other, other_speed) = self.located(*companion, x, now.u);
+        if *is_relative {
+            (q, v) = (q - other, v - other_speed);
+        }
         let z = &x[*own..own + law.states];
         At { t, value: now.received[i], q, v, other, other_speed, z, last: self.last[i], elapsed }
     }
