@@ -191,7 +191,8 @@ fn pairs_of_effects_whose_order_or_sum_matters_are_simulated_as_independently() 
 fn pairs_of_effects_at_one_place_are_simulated_as_independently() {
     let all = std::env::var("MOPS_SLOPES").is_ok_and(|which| which == "all");
     let only = std::env::var("MOPS_SLOPES_OF").unwrap_or_default();
-    let pairs: Vec<Setup> = pairs().into_iter().filter(|setup| setup.name.contains(&only)).collect();
+    let pairs: Vec<Setup> =
+        pairs().into_iter().filter(|setup| format!("{} {}", setup.name, setup.effects).contains(&only)).collect();
     let chosen = |(index, _): &(usize, &Setup)| all || index % TENTH == 0;
     check(&pairs.iter().enumerate().filter(chosen).map(|(_, setup)| setup).collect::<Vec<_>>());
 }

@@ -22,7 +22,7 @@ pub(super) fn law(name: &str, p: &[f64]) -> Option<Law> {
             shown.with_guard(move |at| (at.value - centre).abs() - width)
         }
         [limit, 0.0] if name == "sensor-saturation" => {
-            curve(move |y| y.clamp(-limit, limit)).with_guard(move |at| at.value.abs() - limit)
+            curve(move |y| y.clamp(-limit.abs(), limit.abs())).with_guard(move |at| at.value.abs() - limit.abs())
         }
         [limit, side] if name == "sensor-saturation" => {
             let shown = curve(move |y| if side > 0.0 { y.min(limit) } else { y.max(limit) });
