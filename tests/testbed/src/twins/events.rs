@@ -70,7 +70,7 @@ impl Twin<'_> {
             let guards = self.now().guards;
             match self.attempt(&guards, left) {
                 Ok(step) => self.accept(left, step),
-                Err(event) => self.pass_event(event, &guards, left),
+                Err(event) => self.pass_event(event, (&guards, left), record),
             }
             record.push(self);
         }
@@ -78,7 +78,7 @@ impl Twin<'_> {
     }
 
     /// Passes the first event within a step that has one.
-    fn pass_event(&mut self, event: Event, guards: &[f64; FEW], left: f64) {
+    fn pass_event(&mut self, event: Event, (guards, left): (&[f64; FEW], f64), record: &mut Record) {
         let (mut low, mut high, mut event) = (0.0, left, event);
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
@@ -91,6 +91,7 @@ impl Twin<'_> {
             Event::Crosses => {
                 if low > ACROSS {
                     self.step(low - ACROSS);
+                    record.push(self);
                 }
                 self.step((2.0 * ACROSS).min(left));
             }
