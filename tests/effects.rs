@@ -150,3 +150,59 @@ fn the_schema_lists_the_effects_and_their_required_keys() {
     assert_eq!(friction["required"], serde_json::json!(["place"]), "{friction:#}");
     assert!(friction["description"].as_str().unwrap().contains("sgn(v)"), "{friction:#}");
 }
+
+/// A tank whose level is `t - t^2/2`, with effects at its sensor.
+const TANK: &str = r#"[study]
+name = "tank"
+
+[models.tank.equations]
+states = { T = "1", s = "1" }
+parameters = { k = "1" }
+der = { T = "1 [s]*T' = k - s", s = "1 [s]*s' = 1" }
+horizon = "1.9 s"
+
+[models.tank]
+EFFECTS
+
+[tuners]
+k = { start = 1.0, min = 0.5, max = 2.0 }
+
+[criteria]
+peak = { peak = { signal = "T" }, demand = 1 }
+end = { final-value = { signal = "T" }, demand = 1 }
+"#;
+
+#[test]
+fn a_quantised_signal_shows_its_levels_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = TANK.replace(
+        "EFFECTS",
+        "parameters.\"a.step\" = 0.2\neffects.a = { sensor-quantisation = { place = \"sensor:T\" } }",
+    );
+    std::fs::write(folder.path().join("study.toml"), study).unwrap();
+    let path = folder.path().join("study.toml");
+    let output = cargo_bin_cmd!("mops")
+        .args(["run", path.to_str().unwrap(), "--json", "--max-evaluations", "1", "--out"])
+        .arg(folder.path().join("out"))
+        .output()
+        .unwrap();
+    let result: Value = serde_json::from_slice(&output.stdout).unwrap();
+    // The largest level is 0.5, which is shown as 0.4 or 0.6; before and after it the sensor shows 0.4.
+    let peak = result["criteria"][0]["value"].as_f64().unwrap();
+    assert!((peak / 0.2 - (peak / 0.2).round()).abs() < 1e-9 && peak < 0.61, "{peak}");
+}
+
+#[test]
+fn a_play_behind_a_quantisation_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = TANK.replace(
+        "EFFECTS",
+        "parameters.\"a.step\" = 0.2\nparameters.\"b.gap\" = 0.1\neffects.a = { sensor-quantisation = { place = \"sensor:T\" } }\n\
+         effects.b = { backlash = { place = \"sensor:T\" } }",
+    );
+    std::fs::write(folder.path().join("study.toml"), study).unwrap();
+    let path = folder.path().join("study.toml");
+    let output = cargo_bin_cmd!("mops").args(["check", path.to_str().unwrap()]).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && said.contains("cannot follow the staircase"), "{said}");
+}

@@ -43,7 +43,7 @@ const AROUND: f64 = 1e-6;
 const TENTH: usize = 10;
 
 /// Pairs that are always compared.
-const ALWAYS: [&str; 8] = [
+const ALWAYS: [&str; 16] = [
     "coulomb-friction + stribeck-friction",
     "stiction + asymmetric-friction",
     "input-delay + actuator-lag",
@@ -52,6 +52,14 @@ const ALWAYS: [&str; 8] = [
     "backlash + input-dead-zone",
     "sensor-delay + sensor-saturation",
     "sensor-saturation + sensor-delay",
+    "added-mass + added-mass",
+    "mass-loss + added-mass",
+    "actuator-lag + input-rate-limit",
+    "second-order-lag + backlash",
+    "backlash + sensor-lag",
+    "input-saturation + backlash",
+    "input-dead-zone + input-rate-limit",
+    "sensor-gap + backlash",
 ];
 
 /// Largest difference between the simulations of a setup.

@@ -245,7 +245,12 @@ impl Subject {
         measured.sort();
         measured.dedup();
         let calibration: Vec<usize> = (0..of.len()).filter(|&i| of[i].role == Role::Calibration).collect();
-        candidates(effects, self.model.interface(), &measured, &calibration)
+        let mut all = candidates(effects, self.model.interface(), &measured, &calibration);
+        let declared = self.model.augmented().map_or(&[][..], |(_, declared)| declared);
+        let is_stairs = |of: &Candidate| declared.iter().any(|d| d.port == of.port && d.effect.is_staircase());
+        // A play is not simulated behind a declared quantisation.
+        all.retain(|candidate| !(candidate.effect.is_path_dependent() && is_stairs(candidate)));
+        all
     }
 
     /// Whether the position of a joint, the state of a process, or a signal is measured.

@@ -146,10 +146,8 @@ fn acting_at(model: &dyn Model, port: &Port, chosen: Chosen) -> Vec<(Arc<dyn Eff
     let ports = &model.interface().ports;
     let companion =
         |wanted: PortKind| ports.iter().find(|other| *other != port && other.kind(ports) == Some(wanted)).cloned();
-    let is_staircase =
-        |effect: &Arc<dyn Effect>| effect.parameters().iter().any(|of| matches!(of.grid, InitialGrid::Steps));
     let acts = |effect: &Arc<dyn Effect>| {
-        (chosen == Chosen::All || !is_staircase(effect))
+        (chosen == Chosen::All || !effect.is_staircase())
             && port.kind(ports).is_some_and(|kind| effect.ports().contains(&kind))
     };
     let mut effects = mops::effects::effects();
@@ -218,6 +216,10 @@ pub fn setups(chosen: Chosen) -> Vec<Setup> {
             let is_chain = matches!(kind, Some(PortKind::Actuator | PortKind::Sensor));
             for (i, a) in acting.iter().enumerate() {
                 for b in acting.iter().skip(if is_chain { 0 } else { i }) {
+                    // Refused.
+                    if a.1.is_staircase() && b.1.is_path_dependent() {
+                        continue;
+                    }
                     for kind in INPUTS {
                         all.push(setup((plant, &model), kind, [a, b], &mut even));
                     }

@@ -112,6 +112,9 @@ const WIDE: f64 = 8.0;
 /// and what is sought is as high as the bounds of the first part that contains it.
 const NARROW: f64 = 1e-3;
 
+/// Change of a signal between two neighbouring states, relative to its changes over a part, from which it jumps there.
+const JUMPS: f64 = 0.25;
+
 /// Number of parts of a signal that are halved in vain in a simulation; each place found gives as many again. A pulse of 1 ms in a step of
 /// 10 s takes some 30.
 const LOOKS: usize = 64;
@@ -219,10 +222,15 @@ impl<S: Scalar> Recorder<'_, S> {
         let off = Trace::deviation(values.map(Scalar::value), checks);
         let allowed = self.allowed(index, checks.iter().fold(largest(values), |most, check| most.max(check.abs())));
         // The node at the middle is one of the values.
-        match off {
-            off if off.is_nan() || off <= allowed => Fit::Quartic,
-            off if off <= allowed + (signal(0.5, At::Perturbed) - values[2]).value().abs() => Fit::Rough,
-            _ => Fit::Off,
+        if off.is_nan() || off <= allowed {
+            return Fit::Quartic;
+        }
+        let rough = (signal(0.5, At::Perturbed) - values[2]).value().abs();
+        let [least, most] = extremes(values);
+        match off <= allowed + rough {
+            true if rough >= JUMPS * (most - least) => Fit::Jump,
+            true => Fit::Quartic,
+            false => Fit::Off,
         }
     }
 
@@ -261,13 +269,39 @@ impl<S: Scalar> Recorder<'_, S> {
         }
         let resolved = &mut self.resolved[index];
         resolved.reach = resolved.reach.max(width);
-        let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| {
-            (least.min(value.value()), most.max(value.value()))
-        });
+        let [least, most] = extremes(values);
         let expected = (WIDE * (most - least)).max(NARROW * resolved.reach);
         let hides = width > expected + self.allowed(index, over.high.abs().max(over.low.abs()));
         self.resolved[index].looks -= usize::from(hides);
         hides
+    }
+
+    /// Finds the size of what hides in the part `[from, to]` of a step: the accuracy of a signal is relative to its size.
+    fn measure<D: Dynamics<S> + ?Sized>(
+        &mut self,
+        (step, dynamics): (&Step<S>, &D),
+        index: usize,
+        [from, to]: [f64; 2],
+        halvings: u32,
+    ) {
+        let looks = self.resolved[index].looks;
+        let middle = 0.5 * (from + to);
+        for [from, to] in [[from, middle], [middle, to]] {
+            let at = |s: f64| {
+                let s = from + s * (to - from);
+                dynamics.signal(self.signals[index].0, step.start + s * step.taken, &step.state_at(s))
+            };
+            let values = Trace::NODES.map(at);
+            let resolved = &mut self.resolved[index];
+            resolved.size = resolved.size.max(largest(&values));
+            if halvings > 0 && self.hides((step, dynamics), index, [from, to], &values) {
+                self.measure((step, dynamics), index, [from, to], halvings - 1);
+            }
+        }
+        // What is found here is recorded afterwards.
+        if halvings == HALVINGS {
+            self.resolved[index].looks = looks;
+        }
     }
 
     /// Adds the part `[from, to]` of a step to the traces of a signal, halved until one quartic per part suffices.
@@ -306,13 +340,18 @@ impl<S: Scalar> Recorder<'_, S> {
     }
 }
 
+fn extremes<S: Scalar>(values: &[S; 5]) -> [f64; 2] {
+    let values = values.map(Scalar::value);
+    [values.into_iter().fold(f64::INFINITY, f64::min), values.into_iter().fold(f64::NEG_INFINITY, f64::max)]
+}
+
 /// How the quartic through the values of a signal agrees with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fit {
-    /// Within tolerance.
+    /// Within tolerance, or within the rounding of the signal.
     Quartic,
-    /// Within the rounding of the signal.
-    Rough,
+    /// The rounding of the signal is as large as its changes: it jumps between two neighbouring states.
+    Jump,
     /// Not at all.
     Off,
 }
@@ -372,9 +411,13 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
                     *longest = longest.max(step.taken);
                 }
             }
-            if is_resolved && !self.hides((step, dynamics), i, [0.0, 1.0], &values) {
+            let hides = self.hides((step, dynamics), i, [0.0, 1.0], &values);
+            if is_resolved && !hides {
                 self.push(i, end, &values);
                 continue;
+            }
+            if hides {
+                self.measure((step, dynamics), i, [0.0, 1.0], HALVINGS);
             }
             for half in [[0.0, 0.5], [0.5, 1.0]] {
                 self.refine((step, dynamics), i, half, HALVINGS);

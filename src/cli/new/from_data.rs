@@ -410,7 +410,7 @@ mod tests {
         for ((last, next), expected) in cases {
             assert_eq!(between(last, Some(next)), expected);
         }
-        assert_eq!(between(7.0, None), "7");
+        assert_eq!(between(7.0, None), "7.0");
     }
 
     #[test]

@@ -342,7 +342,7 @@ fn a_pulse_over_a_moving_state_is_recorded() {
             );
             let response = respond(&read(&text).unwrap(), &[], &[("v", 1.0)], 10.0);
             assert!((at(&response, "y", place) - 1.0).abs() < 1e-6, "{width} {place}");
-            assert!(at(&response, "y", place + 5.0 * width) < 1e-6, "{width} {place}");
+            assert!(place + 5.0 * width > 10.0 || at(&response, "y", place + 5.0 * width) < 1e-6, "{width} {place}");
         }
     }
 }
