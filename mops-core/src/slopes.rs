@@ -39,11 +39,15 @@ const BESIDE: f64 = 2e-4;
 /// Difference of the derivatives of both sides, relative to the larger one, from which they are reported apart.
 const APART: f64 = 0.1;
 
-/// Ratio of the two steps by which a kink is told from a strong curvature.
+/// Ratio of the two steps that distinguish a kink from a strong curvature.
 const CLOSER: f64 = 4.0;
 
-/// Part of the difference of the sides that remains at the shorter step at a kink or a jump; a quarter remains of a curvature.
-const REMAINS: f64 = 0.6;
+/// Part of the difference of the sides that remains at the shorter step where a smooth criterion is curved, ideally a quarter. At a kink or
+/// a jump more remains, and less at a kink beside the point.
+const CURVED: [f64; 2] = [0.15, 0.4];
+
+/// Ratio of the differences at both steps from which the criterion jumps, where it is ideally [`CLOSER`].
+const JUMPS: f64 = 2.0;
 
 /// Change over the whole range of a tuner, in scaled values, whose sides are not reported apart.
 const SMALL: f64 = 1e-3;
@@ -81,10 +85,13 @@ impl SlopesReport {
         for (row, criterion) in counts().zip(&mut self.criteria) {
             let mut sides = vec![None; at.point.len()];
             for near in &close {
-                let far = wide.iter().find(|far| far.tuner == near.tuner).and_then(|far| differs(far, row));
-                let (Some(far), Some(near_sides)) = (far, near.sides(at, row, BESIDE / CLOSER)) else { continue };
-                if distance(&near_sides) > REMAINS * distance(&far) {
-                    sides[near.tuner] = Some(near_sides);
+                let Some(far) = wide.iter().find(|far| far.tuner == near.tuner) else { continue };
+                let (Some(outer), Some(inner)) = (differs(far, row), near.sides(at, row, BESIDE / CLOSER)) else {
+                    continue;
+                };
+                let share = distance(&inner) / distance(&outer);
+                if !(CURVED[0]..CURVED[1]).contains(&share) {
+                    sides[near.tuner] = if share > JUMPS { Some(inner) } else { far.beyond(near, row) };
                 }
             }
             criterion.sides = sides.iter().any(Option::is_some).then_some(sides);
@@ -102,10 +109,20 @@ struct Pair {
 impl Pair {
     /// Returns the derivatives of a criterion to the left and to the right.
     fn sides(&self, at: &Evaluation, row: usize, step: f64) -> Option<[f64; 2]> {
-        let [below, here, above] =
-            [&self.below, at, &self.above].map(|of| of.scaled.as_ref().map(|scaled| scaled[row]));
-        Some([(here? - below?) / step, (above? - here?) / step])
+        let here = value(at, row)?;
+        Some([(here - value(&self.below, row)?) / step, (value(&self.above, row)? - here) / step])
     }
+
+    /// Returns the derivatives between these points and those of a closer pair: at a kink within the closer pair they are exact.
+    fn beyond(&self, closer: &Self, row: usize) -> Option<[f64; 2]> {
+        let step = BESIDE - BESIDE / CLOSER;
+        let between = |a: &Evaluation, b: &Evaluation| Some((value(b, row)? - value(a, row)?) / step);
+        Some([between(&self.below, &closer.below)?, between(&closer.above, &self.above)?])
+    }
+}
+
+fn value(of: &Evaluation, row: usize) -> Option<f64> {
+    of.scaled.as_ref().map(|scaled| scaled[row])
 }
 
 fn distance([left, right]: &[f64; 2]) -> f64 {
