@@ -85,13 +85,12 @@ pub(super) fn pick(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     let demands = in_units(&before, &arguments.demands);
     let setting = |(name, value): &(String, String)| format!("criteria.{}.demand={}", key(name), written(value));
     let mut file = open(demands.iter().map(setting).collect())?;
-    let limit = cancel_after(arguments.limit);
-    file.study.cancelled_by(&limit);
+    file.study.cancelled_by(&cancel_after(arguments.limit));
     let problem = Problem::new(Arc::new(file.study.clone()));
     let (index, at) = nearest(&problem, &front, &path)?;
     let (refined, stop) = if arguments.no_refine { (None, None) } else { refined(catalogue, &problem, &at) };
     print(&comparison(&file.study, (index, front.len()), &at, refined.as_ref()))?;
-    if let Some(why) = limit.requested().map(Stop::from).or(stop).and_then(cut_off) {
+    if let Some(why) = stop.and_then(cut_off) {
         print(&format!("\n{why}\n"))?;
     }
     let chosen = refined.as_ref().unwrap_or(&at);
@@ -208,6 +207,7 @@ fn cut_off(stop: Stop) -> Option<String> {
     let (cause, way) = match stop {
         Stop::Converged | Stop::Stalled => return None,
         Stop::Budget => (format!("after {REFINEMENT_BUDGET} evaluations"), "run the new study to go on"),
+        // Nothing but the time limit interrupts the search here.
         Stop::TimeLimit | Stop::Interrupted => {
             ("at the time limit".to_owned(), "increase --time-limit, or run the new study to go on")
         }
