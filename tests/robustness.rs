@@ -221,6 +221,37 @@ fn the_robust_design_of_a_symmetric_problem_is_the_centre_of_the_box() {
     assert!(worst <= round.found + 1e-9, "{worst} {}", round.found);
 }
 
+/// A criterion of some 1 that jumps to 3 at `x0 = 0.95 + 0.05 t`: every design moves the edge past the case found last, by a little, until it
+/// leaves the box at t = 1.
+#[test]
+fn an_edge_that_each_design_moves_by_a_little_is_followed_in_large_steps() {
+    let f = |p: &[f64]| {
+        let [t, x] = [p[0], p[1]];
+        Some(vec![1.0 + 0.01 * t + if x >= 0.95 + 0.05 * t { 3.0 - x - 0.1 * t } else { 0.0 }])
+    };
+    let mut draft = draft(Task::Design, BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
+    draft.tuners = vec![("t".into(), TunerBuilder::new(-1.5, -2.0, 2.0))];
+    draft.tasks.robust = Some(RobustTask::default());
+    let solved = mops::solve(draft.build().unwrap(), &Options::default(), &()).unwrap();
+    let found = solved.outcome.found.robust.as_ref().unwrap();
+    let beyond: Vec<_> = found.rounds.iter().flat_map(|round| &round.added).filter(|a| a.scaled.is_none()).collect();
+    assert!(!beyond.is_empty(), "{:?}", found.rounds);
+    assert!(solved.outcome.tuners[0].value > 1.0 && found.settled, "{:?}", found.words);
+}
+
+/// The only round trades the nominal case for one that it does not know.
+#[test]
+fn an_initial_guess_that_is_better_over_the_cases_found_is_said() {
+    let f = |p: &[f64]| Some(vec![1.0 - 0.1 * p[0] + 4.0 * (p[0] + 2.0) * (p[1] - 0.5)]);
+    let mut draft = draft(Task::Design, BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
+    draft.tuners = vec![("t".into(), TunerBuilder::new(-2.0, -2.0, 2.0))];
+    draft.tasks.robust = Some(RobustTask { rounds: 1, ..RobustTask::default() });
+    let outcome = solved(draft);
+    let robust = outcome.found.robust.as_ref().unwrap();
+    assert!(!robust.settled && outcome.tuners[0].value > 1.9, "{:?} {:?}", outcome.tuners, robust.words);
+    assert!(outcome.warnings.iter().any(|w| w.contains("the initial guess is better")), "{:?}", outcome.warnings);
+}
+
 /// For `x0 + 2 x1` with equal ranges, x1 has four fifths of the variance; elementary effects are slope times range.
 #[test]
 fn sensitivities_of_an_additive_criterion_follow_from_its_slopes() {

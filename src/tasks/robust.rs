@@ -245,8 +245,8 @@ impl Rounds {
         self.scenarios.iter().any(|known| known.case == scenario.case && same(known))
     }
 
-    /// Returns the values beyond a new worst case that lies beside the last one of its criterion, in the direction from the last one to the
-    /// new one and within the box; `None` if it lies elsewhere.
+    /// Returns the values beyond a new worst case in those uncertain parameters in which it lies beside the last one of its criterion, in the
+    /// direction from the last one to the new one and within the box; `None` if there are none. A parameter without effect has any value.
     ///
     /// Cases side by side lie at the edge of a jump, which each design moves by a little: one by one, they would not come to an end.
     fn beyond(&self, case: usize, new: &[f64], criterion: &str) -> Option<Vec<f64>> {
@@ -257,14 +257,13 @@ impl Rounds {
             (Some(_), Some(tolerance)) => [1.0 - tolerance, 1.0 + tolerance],
             _ => uncertain.bounds,
         };
-        let mut values = Vec::new();
-        for ((now, before), uncertain) in new.iter().zip(&before.values).zip(&self.study.tasks().uncertain) {
+        let farther = |((now, before), uncertain): ((&f64, &f64), &Uncertain)| {
             let ([low, high], step) = (ends(uncertain), now - before);
-            if !(high - low).is_finite() || step.abs() > BESIDE * (high - low) {
-                return None;
-            }
-            values.push((now + FARTHER * step).clamp(low, high));
-        }
+            let is_beside = (high - low).is_finite() && step.abs() <= BESIDE * (high - low);
+            if is_beside { (now + FARTHER * step).clamp(low, high) } else { *now }
+        };
+        let pairs = new.iter().zip(&before.values).zip(&self.study.tasks().uncertain);
+        let values: Vec<f64> = pairs.map(farther).collect();
         (values != new).then_some(values)
     }
 
