@@ -177,7 +177,7 @@ fn a_quantised_signal_shows_its_levels_only() {
     let folder = tempfile::tempdir().unwrap();
     let study = TANK.replace(
         "EFFECTS",
-        "parameters.\"a.step\" = 0.2\neffects.a = { sensor-quantisation = { place = \"sensor:T\" } }",
+        "parameters.\"a.step\" = 0.22\neffects.a = { sensor-quantisation = { place = \"sensor:T\" } }",
     );
     std::fs::write(folder.path().join("study.toml"), study).unwrap();
     let path = folder.path().join("study.toml");
@@ -187,9 +187,9 @@ fn a_quantised_signal_shows_its_levels_only() {
         .output()
         .unwrap();
     let result: Value = serde_json::from_slice(&output.stdout).unwrap();
-    // The largest level is 0.5, which is shown as 0.4 or 0.6; before and after it the sensor shows 0.4.
-    let peak = result["criteria"][0]["value"].as_f64().unwrap();
-    assert!((peak / 0.2 - (peak / 0.2).round()).abs() < 1e-9 && peak < 0.61, "{peak}");
+    // The largest level is 0.5, which the sensor shows as two steps, and the last one 0.095, which it shows as none.
+    let [peak, end] = [0, 1].map(|index| result["criteria"][index]["value"].as_f64().unwrap());
+    assert!((peak - 0.44).abs() < 1e-12 && end == 0.0, "{peak} {end}");
 }
 
 #[test]

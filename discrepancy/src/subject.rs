@@ -247,9 +247,11 @@ impl Subject {
         let calibration: Vec<usize> = (0..of.len()).filter(|&i| of[i].role == Role::Calibration).collect();
         let mut all = candidates(effects, self.model.interface(), &measured, &calibration);
         let declared = self.model.augmented().map_or(&[][..], |(_, declared)| declared);
-        let is_stairs = |of: &Candidate| declared.iter().any(|d| d.port == of.port && d.effect.is_staircase());
-        // A play is not simulated behind a declared quantisation.
-        all.retain(|candidate| !(candidate.effect.is_path_dependent() && is_stairs(candidate)));
+        // Candidates act after what is declared.
+        all.retain(|candidate| {
+            let mut before = declared.iter().filter(|before| before.port == candidate.port);
+            before.all(|before| candidate.effect.can_follow(before.effect.as_ref()))
+        });
         all
     }
 

@@ -1,6 +1,6 @@
 //! Mass that decreases with time.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
+use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, MOST_LOST, PortKind, PortState, Scalar};
 
 use super::Definition;
 
@@ -34,7 +34,11 @@ impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
         // The lost mass as a fraction of the moving mass, limited so that some mass remains.
         let gone = self.r * at.t;
         let left = -gone * at.mobility + 1.0;
-        if left.value() > 0.05 { gone * at.a / left } else { at.a / at.mobility * 19.0 }
+        if left.value() > 1.0 - MOST_LOST {
+            gone * at.a / left
+        } else {
+            at.a / at.mobility * (MOST_LOST / (1.0 - MOST_LOST))
+        }
     }
 
     fn inertia(&self, at: &PortState<'_, S>) -> S {

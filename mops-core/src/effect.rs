@@ -431,6 +431,9 @@ pub struct DryFriction<S> {
     pub limit: [S; 2],
 }
 
+/// Largest part of the moving mass of a joint that effects take away together, so that some mass remains.
+pub const MOST_LOST: f64 = 0.95;
+
 /// An effect at given parameters.
 pub trait BoundEffect<S: Scalar> {
     /// Writes the default initial values of the states of the effect.
@@ -444,7 +447,7 @@ pub trait BoundEffect<S: Scalar> {
     fn value(&self, at: &PortState<'_, S>, z: &[S]) -> S;
 
     /// Returns the mass or inertia that an effect with [`Effect::is_inertial`] adds to the joint; negative for a loss. Those of all
-    /// effects at a joint add up, and at most 95 % of the moving mass is lost.
+    /// effects at a joint add up, and at most [`MOST_LOST`] of the moving mass is lost.
     fn inertia(&self, _at: &PortState<'_, S>) -> S {
         S::from(0.0)
     }
@@ -575,6 +578,12 @@ pub trait Effect: Send + Sync {
     fn is_path_dependent(&self) -> bool {
         self.hysteresis_states() > 0
             && self.ports().iter().any(|port| matches!(port, PortKind::Actuator | PortKind::Sensor))
+    }
+
+    /// Returns true if the effect can act on the value that another one passes on: the stairs of a staircase end no step of a simulation, so
+    /// that the way from one to the next is not known.
+    fn can_follow(&self, before: &dyn Effect) -> bool {
+        !(before.is_staircase() && self.is_path_dependent())
     }
 
     /// Returns true if the effect needs the acceleration because its force is proportional to it.

@@ -80,7 +80,7 @@ pub use diagnostic::{Diagnostic, Source, nearest, suggestion};
 pub use differences::Differences;
 pub use effect::{
     BoundEffect, Characteristic, DeclaredTerm, Dimension, DryFriction, Effect, EffectClass, EffectParameter,
-    InitialGrid, ParameterKind, Placement, PortKind, PortState, Scope,
+    InitialGrid, MOST_LOST, ParameterKind, Placement, PortKind, PortState, Scope,
 };
 pub use end::{Basins, End, NEGLIGIBLE_DECREASE, Optimality, SMALL_OBJECTIVE};
 pub use evaluation::{Evaluation, FEASIBLE, Merit, Objective, Reading};

@@ -217,7 +217,7 @@ pub fn setups(chosen: Chosen) -> Vec<Setup> {
             for (i, a) in acting.iter().enumerate() {
                 for b in acting.iter().skip(if is_chain { 0 } else { i }) {
                     // Refused.
-                    if a.1.is_staircase() && b.1.is_path_dependent() {
+                    if !b.1.can_follow(a.1.as_ref()) {
                         continue;
                     }
                     for kind in INPUTS {

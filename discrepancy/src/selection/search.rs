@@ -615,9 +615,9 @@ fn pairs<'s>(screened: &'s [Screened], candidates: &[Candidate]) -> Vec<(f64, Ve
 /// Returns true if two candidates may act at once: a place has each characteristic once at most.
 fn can_be_together(a: &Candidate, b: &Candidate) -> bool {
     let excludes = || a.effect.characteristic().is_some_and(|of| b.effect.characteristic() == Some(of));
-    // Neither order of a staircase and a play is known, and one of them is not simulated.
-    let of_staircase = |a: &Candidate, b: &Candidate| a.effect.is_staircase() && b.effect.is_path_dependent();
-    !(a.is(b) || a.port == b.port && (excludes() || of_staircase(a, b) || of_staircase(b, a)))
+    // Their order is not known.
+    let can_follow = |a: &Candidate, b: &Candidate| a.effect.can_follow(b.effect.as_ref());
+    !a.is(b) && (a.port != b.port || !excludes() && can_follow(a, b) && can_follow(b, a))
 }
 
 /// Returns a set without one of its effects.

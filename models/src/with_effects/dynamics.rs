@@ -4,8 +4,8 @@ use std::cell::RefCell;
 
 use mops_core::enclosure::Enclosure;
 use mops_core::{
-    BoundEffect, Case, EventInstant, Failure, Instant, Interface, Job, Model, Opening, Plant, Port, PortState, Scalar,
-    Span,
+    BoundEffect, Case, EventInstant, Failure, Instant, Interface, Job, MOST_LOST, Model, Opening, Plant, Port,
+    PortState, Scalar, Span,
 };
 
 use super::command::Command;
@@ -14,9 +14,6 @@ use super::edges::BLINK;
 use super::{Place, Site, WithEffects};
 use crate::kernel::drive::Drive;
 use crate::kernel::{Dynamics, shift, shown};
-
-/// Largest part of the moving mass of a joint that effects take away, so that some mass remains.
-const MOST_LOST: f64 = 0.95;
 
 /// Effect in a simulation.
 pub(super) struct Actor<S> {
@@ -140,7 +137,7 @@ impl<'a, S: Opening> Driven<'a, S> {
             late.filter_map(|actor| actor.acting.delay()).reduce(|a, b| a + b)
         };
         // The output of a sensor effect may be rough, so steps end at all samples.
-        let every_sample = actors.iter().any(|a| matches!(a.place.site, Site::Sensor { .. }));
+        let every_sample = actors.iter().any(Actor::is_at_sensor);
         let command = |(i, v): (usize, &mops_core::Variable)| {
             Command::new(job.case.input(&v.name), delay(i), job.case.begins, every_sample)
         };
@@ -149,7 +146,7 @@ impl<'a, S: Opening> Driven<'a, S> {
         let disturbances = disturbances(of, job.case);
         let states = model.equation_states();
         let shows = shown(of, &states);
-        let touched = |k: usize| actors.iter().any(|a| matches!(a.place.site, Site::Sensor { signal } if signal == k));
+        let touched = |k: usize| actors.iter().any(|a| a.is_at_sensor_of(k));
         let untouched = (0..shows.len()).map(|k| shows[k].filter(|_| !touched(k))).collect();
         let begins = job.case.begins;
         let breaks = actors.iter().flat_map(|a| a.acting.breaks()).filter(|t| t.value().is_finite());
@@ -207,9 +204,8 @@ impl<'a, S: Opening> Driven<'a, S> {
         }
         let force_per_rate = |k: usize| S::from(1.0) / self.mobility(&x, &u, k, self.balances[k]);
         self.force_per_rate = (0..self.disturbances.len()).map(force_per_rate).collect();
-        let is_at_sensor = |of: &Self, index: usize| matches!(of.actors[index].place.site, Site::Sensor { .. });
         let (last, first): (Vec<usize>, Vec<usize>) =
-            (0..self.actors.len()).partition(|&index| is_at_sensor(self, index));
+            (0..self.actors.len()).partition(|&index| self.actors[index].is_at_sensor());
         // What sensors measure depends on all other effects, and on the sensor effects before.
         for index in first.into_iter().chain(last) {
             let actor = &self.actors[index];
@@ -235,7 +231,6 @@ impl<'a, S: Opening> Driven<'a, S> {
                 self.update_hysteresis_of(index, 0.0, &x);
             }
         }
-        self.update_hysteresis(0.0, &x, |_| true);
         self.settle_gaps(0.0, &x);
         let before = self.commands.clone();
         self.commands.iter_mut().for_each(|command| command.pass_break(0.0));
@@ -254,7 +249,7 @@ impl<'a, S: Opening> Driven<'a, S> {
 
     /// Returns a value of a signal after the effects at its sensor whose index is below `end`, in their order.
     fn through(&self, signal: usize, end: usize, value: S, t: f64, x: &[S], u: &[S]) -> S {
-        let here = |actor: &&Actor<S>| matches!(actor.place.site, Site::Sensor { signal: s } if s == signal);
+        let here = |actor: &&Actor<S>| actor.is_at_sensor_of(signal);
         let see = |value: S, actor: &Actor<S>| actor.passed(&self.at(actor, t, x, u, value), self.states(actor, x));
         self.actors[..end].iter().filter(here).fold(value, see)
     }
@@ -487,7 +482,7 @@ impl<'a, S: Opening> Driven<'a, S> {
 
     /// Returns the value of a signal after the effects at its sensor whose index is below `end`.
     pub(super) fn seen(&self, signal: usize, end: usize, t: f64, x: &[S]) -> S {
-        let here = |actor: &&Actor<S>| matches!(actor.place.site, Site::Sensor { signal: s } if s == signal);
+        let here = |actor: &&Actor<S>| actor.is_at_sensor_of(signal);
         let simple = |actor: &Actor<S>| actor.place.companion.is_none();
         if let Some(state) = self.shows[signal]
             && self.actors[..end].iter().filter(here).all(simple)

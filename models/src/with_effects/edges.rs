@@ -32,6 +32,16 @@ impl<S: Opening> Actor<S> {
     pub(super) fn is_at_actuator(&self) -> bool {
         matches!(self.place.site, Site::Actuator { .. })
     }
+
+    /// Returns true if the effect acts at a sensor.
+    pub(super) fn is_at_sensor(&self) -> bool {
+        matches!(self.place.site, Site::Sensor { .. })
+    }
+
+    /// Returns true if the effect acts at the sensor of this signal.
+    pub(super) fn is_at_sensor_of(&self, signal: usize) -> bool {
+        matches!(self.place.site, Site::Sensor { signal: of } if of == signal)
+    }
 }
 
 impl<S: Opening> Driven<'_, S> {
@@ -109,8 +119,7 @@ impl<S: Opening> Driven<'_, S> {
     pub(super) fn follow(&mut self, t: f64, x: &[S], first: usize, settles: impl Fn(&Actor<S>) -> bool) {
         for index in first..self.actors.len() {
             let actor = &self.actors[index];
-            let passes = matches!(actor.place.site, Site::Actuator { .. } | Site::Sensor { .. });
-            if passes && actor.closed.is_some() && settles(actor) {
+            if (actor.is_at_actuator() || actor.is_at_sensor()) && actor.closed.is_some() && settles(actor) {
                 self.settle_gap(index, t, x);
             }
             if !self.actors[index].memory.is_empty() {

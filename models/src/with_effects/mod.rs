@@ -73,10 +73,8 @@ impl WithEffects {
         for (index, placement) in placements.iter().enumerate() {
             let Placement { name, effect, .. } = placement;
             let sites = Site::of_both(placement, of, &states).map_err(|mistake| mistake.within(name))?;
-            // The steps of a staircase end no step of the simulation, so that the way to a value is not known.
-            let stairs =
-                placements[..index].iter().find(|before| before.port == placement.port && before.effect.is_staircase());
-            if let Some(stairs) = stairs.filter(|_| effect.is_path_dependent()) {
+            let mut before = placements[..index].iter().filter(|before| before.port == placement.port);
+            if let Some(stairs) = before.find(|before| !effect.can_follow(before.effect.as_ref())) {
                 let fact = format!("`{}` cannot follow the staircase of `{}`", effect.name(), stairs.effect.name());
                 return Err(StudyError::new("place", fact).with_help("declare the quantisation after it").within(name));
             }
