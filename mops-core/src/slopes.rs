@@ -47,7 +47,7 @@ const CLOSER: f64 = 4.0;
 const CURVED: [f64; 2] = [0.15, 0.4];
 
 /// Ratio of the differences at both steps from which the criterion jumps, where it is ideally [`CLOSER`].
-const JUMPS: f64 = 2.0;
+const STEEPER: f64 = 2.0;
 
 /// Change over the whole range of a tuner, in scaled values, whose sides are not reported apart.
 const SMALL: f64 = 1e-3;
@@ -91,7 +91,7 @@ impl SlopesReport {
                 };
                 let share = distance(&inner) / distance(&outer);
                 if !(CURVED[0]..CURVED[1]).contains(&share) {
-                    sides[near.tuner] = if share > JUMPS { Some(inner) } else { far.beyond(near, row) };
+                    sides[near.tuner] = if share > STEEPER { Some(inner) } else { far.beyond(near, row) };
                 }
             }
             criterion.sides = sides.iter().any(Option::is_some).then_some(sides);

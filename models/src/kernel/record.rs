@@ -113,7 +113,7 @@ const WIDE: f64 = 8.0;
 const NARROW: f64 = 1e-3;
 
 /// Change of a signal between two neighbouring states, relative to its changes over a part, from which it jumps there.
-const JUMPS: f64 = 0.25;
+const ROUGH: f64 = 0.25;
 
 /// Number of parts of a signal that are halved in vain in a simulation; each place found gives as many again. A pulse of 1 ms in a step of
 /// 10 s takes some 30.
@@ -228,7 +228,7 @@ impl<S: Scalar> Recorder<'_, S> {
         let rough = (signal(0.5, At::Perturbed) - values[2]).value().abs();
         let [least, most] = extremes(values);
         match off <= allowed + rough {
-            true if rough >= JUMPS * (most - least) => Fit::Jump,
+            true if rough >= ROUGH * (most - least) => Fit::Jump,
             true => Fit::Quartic,
             false => Fit::Off,
         }
@@ -284,23 +284,17 @@ impl<S: Scalar> Recorder<'_, S> {
         [from, to]: [f64; 2],
         halvings: u32,
     ) {
-        let looks = self.resolved[index].looks;
+        let which = self.signals[index].0;
+        let signal = |t: f64, x: &[S]| dynamics.signal(which, t, x);
         let middle = 0.5 * (from + to);
-        for [from, to] in [[from, middle], [middle, to]] {
-            let at = |s: f64| {
-                let s = from + s * (to - from);
-                dynamics.signal(self.signals[index].0, step.start + s * step.taken, &step.state_at(s))
-            };
-            let values = Trace::NODES.map(at);
+        for part in [[from, middle], [middle, to]] {
+            let mut state = self.states[0].clone();
+            let values = Trace::NODES.map(|s| At::State.within(part, s, step, &mut state, &signal));
             let resolved = &mut self.resolved[index];
             resolved.size = resolved.size.max(largest(&values));
-            if halvings > 0 && self.hides((step, dynamics), index, [from, to], &values) {
-                self.measure((step, dynamics), index, [from, to], halvings - 1);
+            if halvings > 0 && self.hides((step, dynamics), index, part, &values) {
+                self.measure((step, dynamics), index, part, halvings - 1);
             }
-        }
-        // What is found here is recorded afterwards.
-        if halvings == HALVINGS {
-            self.resolved[index].looks = looks;
         }
     }
 
@@ -315,11 +309,7 @@ impl<S: Scalar> Recorder<'_, S> {
         let which = self.signals[index].0;
         let signal = |t: f64, x: &[S]| dynamics.signal(which, t, x);
         let mut state = self.states[0].clone();
-        let mut at = |s: f64, at: At| {
-            let s = from + s * (to - from);
-            step.state(s, &mut state);
-            at.signal(step.start + s * step.taken, &state, &signal)
-        };
+        let mut at = |s: f64, at: At| at.within([from, to], s, step, &mut state, &signal);
         let values = Trace::NODES.map(|s| at(s, At::State));
         let ends = halvings == 0 || self.taken > self.room || self.cancellation.requested().is_some();
         let fit = self.fit(index, &values, &mut at);
@@ -366,6 +356,20 @@ enum At {
 }
 
 impl At {
+    /// Evaluates a signal at a part `s` of the part `[from, to]` of a step.
+    fn within<S: Scalar>(
+        self,
+        [from, to]: [f64; 2],
+        s: f64,
+        step: &Step<S>,
+        state: &mut [S],
+        signal: &impl Fn(f64, &[S]) -> S,
+    ) -> S {
+        let s = from + s * (to - from);
+        step.state(s, state);
+        self.signal(step.start + s * step.taken, state, signal)
+    }
+
     fn signal<S: Scalar>(self, t: f64, x: &[S], signal: &impl Fn(f64, &[S]) -> S) -> S {
         match self {
             Self::State => signal(t, x),
@@ -401,10 +405,7 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
             let mut is_resolved = true;
             if self.must_compare(i, step.taken, &values) {
                 let mut state = self.states[0].clone();
-                let inside = |s: f64, at: At| {
-                    step.state(s, &mut state);
-                    at.signal(time(s), &state, &computed)
-                };
+                let inside = |s: f64, at: At| at.within([0.0, 1.0], s, step, &mut state, &computed);
                 is_resolved = self.agrees(i, &values, inside);
                 if is_resolved {
                     let longest = &mut self.resolved[i].longest;
@@ -417,7 +418,10 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
                 continue;
             }
             if hides {
+                // What is found here is recorded afterwards.
+                let looks = self.resolved[i].looks;
                 self.measure((step, dynamics), i, [0.0, 1.0], HALVINGS);
+                self.resolved[i].looks = looks;
             }
             for half in [[0.0, 0.5], [0.5, 1.0]] {
                 self.refine((step, dynamics), i, half, HALVINGS);

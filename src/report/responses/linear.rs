@@ -18,7 +18,7 @@ const MOST_TUNERS: usize = 6;
 /// Number of values of a tuner in a plot of the poles.
 const VALUES: u32 = 120;
 
-/// Number of values without poles after which a sweep ends: a search for an equilibrium that does not exist takes long.
+/// Number of values without poles after which the sweeps of a model end: a search for an equilibrium that does not exist takes long.
 const MOST_FAILURES: u32 = 3;
 /// Gain, relative to the largest one, below which a corner frequency is not shown: -60 dB.
 const SMALL: f64 = 1e-3;
@@ -51,7 +51,8 @@ pub(super) fn figures(cases: &Cases<'_>, outputs: &[&Variable]) -> Vec<Figure> {
         }
     }
     let tuners = cases.report.problem.study().tuners().len();
-    let moving = (0..tuners).filter_map(|tuner| poles(cases, tuner)).take(MOST_TUNERS);
+    let mut failures = 0;
+    let moving = (0..tuners).filter_map(|tuner| poles(cases, tuner, &mut failures)).take(MOST_TUNERS);
     figures.extend(
         moving.map(|(name, plot)| Figure { plots: vec![(format!("{place}poles-{name}"), plot)], ..Figure::default() }),
     );
@@ -231,7 +232,7 @@ fn nyquist_curve(cases: &Cases<'_>, (input, output): (usize, usize), name: &str)
 
 /// Returns the poles of the first case while a tuner moves from its lower to its upper bound, with the name of the tuner. For
 /// a loop transfer function, the poles are those of the closed loop. `None` if the tuner is fixed or moves no pole.
-fn poles(cases: &Cases<'_>, tuner: usize) -> Option<(String, Plot)> {
+fn poles(cases: &Cases<'_>, tuner: usize, failures: &mut u32) -> Option<(String, Plot)> {
     let (problem, one) = (&cases.report.problem, cases.ones[0]);
     let moved = &problem.study().tuners()[tuner];
     if !moved.active || moved.tie.is_some() || moved.bounds.iter().any(|bound| !bound.is_finite()) {
@@ -245,29 +246,25 @@ fn poles(cases: &Cases<'_>, tuner: usize) -> Option<(String, Plot)> {
         // A loop with a delay has infinitely many poles.
         if system.delay > 0.0 { None } else { system.complementary_sensitivity().ok()?.poles().ok() }
     };
-    let at = |position: f64| -> Option<Vec<Complex>> {
+    let at = |position: f64, failures: &mut u32| -> Option<Vec<Complex>> {
+        if *failures == MOST_FAILURES || problem.is_cancelled() {
+            return None;
+        }
         let mut tuners = cases.report.best.tuners.clone();
         tuners[tuner] = moved.value_at(position);
         problem.study().apply_ties(&mut tuners);
-        let analysis = problem.analyse_all(one.job, &tuners, None).ok()?;
-        poles_of(analysis.linear()?)
+        let analysis = problem.analyse_all(one.job, &tuners, None);
+        let poles = analysis.ok().and_then(|analysis| poles_of(analysis.linear()?));
+        *failures += u32::from(poles.is_none());
+        poles
     };
     let here = poles_of(of(&one.both.best)?)?;
-    let [first, last] = [at(0.0)?, at(1.0)?];
+    let [first, last] = [at(0.0, failures)?, at(1.0, failures)?];
     if first == last {
         return None;
     }
-    let mut failures = 0;
-    let mut cloud = Vec::new();
-    for i in 0..=VALUES {
-        if failures == MOST_FAILURES || problem.is_cancelled() {
-            break;
-        }
-        match at(f64::from(i) / f64::from(VALUES)) {
-            Some(poles) => cloud.extend(poles),
-            None => failures += 1,
-        }
-    }
+    let cloud: Vec<Complex> =
+        (0..=VALUES).filter_map(|i| at(f64::from(i) / f64::from(VALUES), failures)).flatten().collect();
     // Far poles would compress the others.
     let size = 3.0 * here.iter().map(|z| complex::norm(*z)).fold(0.0, f64::max);
     let points = |all: &mut dyn Iterator<Item = Complex>| -> Vec<(f64, f64)> {
