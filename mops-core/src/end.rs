@@ -162,6 +162,13 @@ impl End {
         self
     }
 
+    /// Returns the end of a search for less than the study states, as a sentence says: the first reason to doubt the point.
+    #[must_use]
+    pub fn with_first_doubt(mut self, sentence: &str) -> Self {
+        self.doubt = Some(self.doubt.map_or_else(|| sentence.to_owned(), |doubt| format!("{sentence} {doubt}")));
+        self
+    }
+
     /// Returns the end with a jump near the point, as a sentence states: a reason to doubt the point.
     #[must_use]
     pub fn with_jump(mut self, sentence: String) -> Self {

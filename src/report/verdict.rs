@@ -23,7 +23,7 @@ pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
         return excitation(outcome);
     }
     if let Some(verdict) = super::robustness::verdict(outcome) {
-        return verdict;
+        return if outcome.found.robust.is_some() { verdict } else { doubted(outcome, verdict) };
     }
     if !outcome.objective.is_finite() {
         let text = "Failed: no point could be evaluated, as a simulation or a criterion failed at each of them.";
@@ -40,10 +40,24 @@ pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
             if others > 0 { format!(" {} also violated.", counted(others, "other constraint")) } else { String::new() };
         return (Tone::Bad, format!("No feasible point found: {what}.{more}"));
     }
-    let (tone, text) = solved(report);
-    match outcome.end.as_ref().and_then(|end| end.doubt.as_ref()) {
-        Some(doubt) => (if tone == Tone::Good { Tone::Mixed } else { tone }, format!("{doubt} {text}")),
-        None => (tone, text),
+    doubted(outcome, solved(report))
+}
+
+/// Returns a verdict after the reason to doubt the design that it rests on, and after what cut off the work that follows the design.
+fn doubted(outcome: &Outcome, (tone, text): (Tone, String)) -> (Tone, String) {
+    let follows =
+        matches!(outcome.task, Task::Sweep | Task::Sensitivity | Task::WorstCase | Task::MonteCarlo) && tone != Tone::Bad;
+    let cut_off = match outcome.stop {
+        Stop::TimeLimit if follows => Some("The time limit ended the run before all was computed."),
+        Stop::Interrupted if follows => Some("The run was interrupted before all was computed."),
+        _ => None,
+    };
+    let doubt = outcome.end.as_ref().and_then(|end| end.doubt.as_deref());
+    let before: Vec<&str> = doubt.into_iter().chain(cut_off).collect();
+    match (before.is_empty(), tone) {
+        (true, _) => (tone, text),
+        (false, Tone::Good) => (Tone::Mixed, format!("{} {text}", before.join(" "))),
+        (false, _) => (tone, format!("{} {text}", before.join(" "))),
     }
 }
 

@@ -137,18 +137,30 @@ fn words(report: &GlobalSensitivityReport, random: bool, asked: usize) -> Vec<St
         };
         let unit = if found.of.unit == "1" { String::new() } else { format!(" {}", found.of.unit) };
         words.push(match strongest.total {
-            Some(Estimated { value: total, .. }) => {
-                let first: f64 = found.effects.iter().filter_map(|e| e.first).map(|f| f.value).sum();
-                let together = 1.0 - first;
-                let rest = if together > 0.05 {
-                    format!("; interactions between parameters account for {}", percent(together))
+            Some(_) if found.effects.len() == 1 => {
+                format!("`{}` is the only uncertain parameter, and {place} depends on it.", strongest.parameter)
+            }
+            Some(total) => {
+                let first = || found.effects.iter().filter_map(|e| e.first);
+                let [together, least] =
+                    [1.0 - first().map(|f| f.value).sum::<f64>(), 1.0 - first().map(|f| f.interval[1]).sum::<f64>()];
+                // What the intervals of the shares leave open is no interaction.
+                let rest = if least > 0.0 {
+                    format!(
+                        "; interactions between parameters account for {}, at least {}",
+                        percent(together),
+                        percent(least)
+                    )
                 } else {
                     String::new()
                 };
                 format!(
-                    "`{}` accounts for {} of the variance of {place}, interactions included{rest}.",
+                    "`{}` accounts for {} of the variance of {place} ({} confidence interval {} to {}), interactions included{rest}.",
                     strongest.parameter,
-                    percent(total)
+                    percent(total.value.min(1.0)),
+                    percent(report.level),
+                    percent(total.interval[0].max(0.0)),
+                    percent(total.interval[1].min(1.0))
                 )
             }
             None => format!(

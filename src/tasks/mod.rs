@@ -20,6 +20,10 @@ use mops_core::{Halt, Place, Stop, Study, Task, Watch};
 
 use crate::search::{Options, SolveError, Solved, evaluate_start, search};
 
+/// Doubt about a design for the given cases of a study with [robust].
+const WORST_CASES_LEFT_OUT: &str = "This task leaves [robust] out: it rests on a design for the given cases. Run the study first (`mops run`), make \
+     its design the initial guess, and set `at = \"start\"`, or remove [robust].";
+
 /// Performs the task of the study.
 ///
 /// # Errors
@@ -46,6 +50,9 @@ pub(crate) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         Task::WorstCase => worst_case::perform(study, options, watch)?,
         Task::MonteCarlo => monte_carlo::perform(study, options, watch)?,
     };
+    if solved.problem.study().leaves_worst_cases_out() {
+        solved.outcome.end = solved.outcome.end.map(|end| end.with_first_doubt(WORST_CASES_LEFT_OUT));
+    }
     // The search may have finished before the interruption, but not the work that follows it.
     if watch.wants_stop() && watch.halt() == Halt::Interrupted {
         solved.outcome.stop = Stop::Interrupted;

@@ -52,13 +52,14 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         .iter()
         .any(demanded)
         .then(|| share(answers.iter().filter(all_met).count(), answers.len(), task.level));
+    let is_monitored = over.rows().iter().any(|row| row.usage == Usage::Monitor && row.demand != Demand::None);
     let value = |e: &Evaluation, i: usize| e.readings[i].map_or(f64::NAN, |r| r.value);
     let table = samples
         .iter()
         .zip(&answers)
         .map(|(sample, e)| (sample.clone(), (0..over.rows().len()).map(|i| value(e, i)).collect()));
     let report = MonteCarloReport {
-        words: words(&criteria, all, &task, answers.len()),
+        words: words(&criteria, all, &task, (answers.len(), is_monitored)),
         parameters: uncertain_reports(&over),
         samples: answers.len(),
         method: task.method,
@@ -116,7 +117,7 @@ fn words(
     criteria: &[DistributionReport],
     all: Option<ShareReport>,
     task: &MonteCarloTask,
-    samples: usize,
+    (samples, is_monitored): (usize, bool),
 ) -> Vec<String> {
     let percent = |share: f64| format!("{} %", significant(100.0 * share, 4));
     let estimate = |share: &ShareReport| {
@@ -130,7 +131,9 @@ fn words(
             percent(high)
         )
     };
-    let mut words: Vec<String> = all.iter().map(|all| format!("All demands are met in {}.", estimate(all))).collect();
+    let aside = if is_monitored { " but those of monitored criteria" } else { "" };
+    let mut words: Vec<String> =
+        all.iter().map(|all| format!("All demands{aside} are met in {}.", estimate(all))).collect();
     for found in criteria {
         let DistributionReport { of, mean, deviation, met, failed, .. } = found;
         let unit = if of.unit == "1" { String::new() } else { format!(" {}", of.unit) };

@@ -76,7 +76,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         centre: [of(axes.first()), of(axes.get(1)), solved.best.merit.objective],
     };
     drop(axes_report);
-    report.words = words(&report);
+    report.words = words(&report, points.len());
     solved.archive.extend(points.iter().cloned());
     solved.outcome.evaluations += points.len();
     solved.outcome.simulations += simulations;
@@ -94,7 +94,7 @@ fn spread(problem: &Problem, axis: &Axis) -> Vec<f64> {
 }
 
 /// Formats the sweep as sentences.
-fn words(sweep: &SweepReport) -> Vec<String> {
+fn words(sweep: &SweepReport, evaluated: usize) -> Vec<String> {
     let number = |value: f64| significant(value, 4);
     let place = |[x, y, _]: [f64; 3]| {
         let along = |axis: &SweepAxis, value: f64| {
@@ -136,9 +136,13 @@ fn words(sweep: &SweepReport) -> Vec<String> {
         number(level),
         range(&sweep.x, &columns)
     ));
-    let failed = sweep.objective.iter().flatten().filter(|v| !v.is_finite()).count();
+    let asked = sweep.objective.iter().map(Vec::len).sum::<usize>();
+    let failed = evaluated.saturating_sub(all.len());
     if failed > 0 {
-        words.push(format!("{failed} of {} points have no value: a simulation failed.", failed + all.len()));
+        words.push(format!("{failed} of {evaluated} points have no value: a simulation failed."));
+    }
+    if evaluated < asked {
+        words.push(format!("{} of {asked} points were not evaluated: the sweep was cut off.", asked - evaluated));
     }
     words
 }

@@ -136,6 +136,20 @@ impl Study {
         &self.tasks
     }
 
+    /// Returns true if the task rests on a design for the given cases, although the study has the table of a design against worst cases.
+    pub fn leaves_worst_cases_out(&self) -> bool {
+        let tasks = &self.tasks;
+        let at = match self.task {
+            Task::Pareto => Place::Optimum,
+            Task::Sweep => tasks.sweep.as_ref().map_or(Place::Start, |sweep| sweep.at),
+            Task::Sensitivity => tasks.sensitivity.at,
+            Task::WorstCase => tasks.worst_case.at,
+            Task::MonteCarlo => tasks.monte_carlo.at,
+            Task::Design | Task::Calibration | Task::Excitation | Task::Diagnosis => Place::Start,
+        };
+        tasks.robust.is_some() && at == Place::Optimum
+    }
+
     /// Returns the warnings shown before a run, such as a suspicious first sample.
     pub fn warnings(&self) -> &[String] {
         &self.warnings

@@ -12,7 +12,7 @@ use super::Report;
 use super::figures::Group;
 use super::page::scrolling;
 use super::verdict::Tone;
-use crate::numbers::{number, significant};
+use crate::numbers::{counted, number, significant};
 
 /// Section of the page: title, content and plots.
 pub(super) struct Section {
@@ -45,6 +45,9 @@ pub(super) fn verdict(outcome: &Outcome) -> Option<(Tone, String)> {
         return Some((tone, found.words.iter().take(2).cloned().collect::<Vec<_>>().join(" ")));
     }
     if let Some(found) = &found.worst_case {
+        if found.criteria.is_empty() {
+            return Some((Tone::Bad, found.words.join(" ")));
+        }
         let demanded = found.criteria.iter().filter(|c| c.of.demand.is_some());
         let tone = if demanded.clone().all(|c| c.met) && found.criteria.iter().all(|c| c.failed == 0) {
             Tone::Good
@@ -59,14 +62,19 @@ pub(super) fn verdict(outcome: &Outcome) -> Option<(Tone, String)> {
                 worst.of.criterion, worst.of.case
             )
         });
-        let met = "All demands are met at every evaluated point of the box.";
-        return Some((tone, words.unwrap_or_else(|| met.to_owned())));
+        let failed: usize = found.criteria.iter().map(|c| c.failed).sum();
+        let met = match failed {
+            0 => "All demands are met at every evaluated point of the box.".to_owned(),
+            _ => format!("{} in the box failed; all demands are met at the other evaluated points.", counted(failed, "simulation")),
+        };
+        return Some((tone, words.unwrap_or(met)));
     }
     if let Some(found) = &found.monte_carlo {
-        let tone = match &found.all {
-            Some(all) if all.count < all.of => Tone::Mixed,
-            _ => Tone::Good,
+        let missed = match &found.all {
+            Some(all) => all.count < all.of,
+            None => found.criteria.iter().flat_map(|of| &of.met).any(|met| met.count < met.of),
         };
+        let tone = if missed { Tone::Mixed } else { Tone::Good };
         return Some((tone, found.words.first().cloned()?));
     }
     let found = found.global_sensitivity.as_ref()?;

@@ -4,7 +4,7 @@ mod climb;
 mod search;
 
 use mops_core::{
-    CoordinateReport, Problem, Row, Slice, Study, Usage, Watch, WorstCaseReport, WorstReport, uncertain_reports,
+    CoordinateReport, Problem, Row, Slice, Stop, Study, Usage, Watch, WorstCaseReport, WorstReport, uncertain_reports,
 };
 
 pub(super) use search::{Effort, Region, Worst};
@@ -41,7 +41,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     if criteria.is_empty() {
         solved.outcome.stop = watch.halt().into();
     }
-    let words = words(&criteria);
+    let words = words(&criteria, solved.outcome.stop);
     let parameters = uncertain_reports(region.study());
     solved.outcome.simulations += simulations;
     solved.outcome.found.worst_case =
@@ -97,9 +97,10 @@ pub(super) fn place(at: &[CoordinateReport]) -> String {
 }
 
 /// Formats the worst cases as sentences.
-fn words(criteria: &[WorstReport]) -> Vec<String> {
+fn words(criteria: &[WorstReport], stop: Stop) -> Vec<String> {
     if criteria.is_empty() {
-        return vec!["The search was interrupted without a result.".to_owned()];
+        let cause = if stop == Stop::TimeLimit { "ended by the time limit" } else { "interrupted" };
+        return vec![format!("The search of the box was {cause}, without a result.")];
     }
     let mut words: Vec<String> = criteria.iter().map(sentence).collect();
     words.push(NO_GUARANTEE.to_owned());
