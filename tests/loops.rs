@@ -143,6 +143,28 @@ fn a_limited_controller_of_equations_is_cut_within_its_limits() {
 }
 
 #[test]
+fn a_loop_of_a_shipped_plant_has_no_margins_beyond_a_limit() {
+    // The setpoint 1 needs the input 1.
+    let text = |limit: f64| {
+        format!(
+            "[study]\nname = 'limit'
+            [models.p.pid-loop]\nplant = {{ poles = [-1], gain = 1 }}\nhorizon = 30\nlimit = [-{limit}, {limit}]
+            [models.loop]\nlike = 'p'\nopen = 'u'
+            [tuners]\nk = {{ start = 2, min = 0.1, max = 100 }}\nTi = {{ start = 1, min = 0.1, max = 100 }}
+            [cases.c]\nTd = 0\ninputs.r.step.after = 1.0
+            [criteria]\nmargin = {{ model = 'loop', phase-margin = {{}}, usage = 'monitor' }}
+            y = {{ model = 'p', final-value = {{ signal = 'y' }}, demand = 1 }}\n"
+        )
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let within = run(folder.path(), &text(1.5));
+    assert!((value(&within, "c", "margin") - 90.0).abs() < 1e-6, "{within}");
+    let beyond = run(folder.path(), &text(0.5));
+    let margin = &beyond["criteria"].as_array().unwrap()[0];
+    assert!(margin["value"].is_null(), "{margin}");
+}
+
+#[test]
 fn the_margins_of_a_sampled_controller_are_those_of_its_difference_equation() {
     // A limited PI controller with computing time at a tank, A h' = q - kv h, by hand: from the change of q to the next sample of h,
     // and u = k e + s, s(k+1) = s + k T/Ti e.

@@ -87,7 +87,8 @@ fn compare(index: usize, setup: &Setup) -> Vec<Compared> {
             let Ok(value) = asked.criterion.value_with(&case, &analysis, &setup.parameters) else { continue };
             let (parameters, reach) = (&setup.parameters[..], REACH);
             let tangent = Tangent { analysis: &analysis, value: &value, along, parameters, seed, reach };
-            let told = asked.criterion.slope(&case, &tangent).map_or(f64::NAN, |slope| slope.number);
+            // Refused, as instants coincide.
+            let Ok(Value { number: told, .. }) = asked.criterion.slope(&case, &tangent) else { continue };
             let values = around.each_ref().map(|[low, high]| [low[k], high[k]]);
             found.push(Compared {
                 setup: index,

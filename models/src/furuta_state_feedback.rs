@@ -195,4 +195,9 @@ impl<S: Scalar> mops_core::Plant<S> for Loop<S> {
     fn linearised_at(&mut self, _: &Instant<'_, S>, _: bool) -> Result<Vec<usize>, Failure> {
         Ok(Vec::new())
     }
+
+    fn exceeded(&self, at: &Instant<'_, S>) -> Option<&'static str> {
+        let is_within = self.actuator.holds(self.demand(at.x));
+        (!is_within).then_some("the torque exceeds its `limit`")
+    }
 }

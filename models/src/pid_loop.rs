@@ -538,4 +538,10 @@ impl<S: Scalar> Plant<S> for Loop<S> {
     fn linearised_at(&mut self, _: &Instant<'_, S>, _: bool) -> Result<Vec<usize>, Failure> {
         Ok(Vec::new())
     }
+
+    fn exceeded(&self, at: &Instant<'_, S>) -> Option<&'static str> {
+        let wanted = self.wanted(at.u[0], self.output(at.x), at.x).value();
+        let is_within = wanted >= self.limit[0] && wanted <= self.limit[1];
+        (!is_within).then_some("the output of the controller exceeds its `limit`")
+    }
 }

@@ -193,7 +193,7 @@ fn bound_warnings(study: &Study, problem: &Problem, best: &Evaluation) -> Vec<St
         let tuner = &study.tuners[i];
         let side = tuner.at_bound(best.tuners[i])?;
         Some(format!(
-            "`{}` is at its {side} bound {}: the optimum depends on this bound",
+            "`{}` is at its {side} bound {}: the optimum may depend on this bound",
             tuner.name,
             tuner.unit.amount(rounded(tuner.bounds[usize::from(side == "upper")]))
         ))

@@ -24,7 +24,7 @@ const DEVIATION: f64 = 0.02;
 const AGREEMENT: f64 = 0.1;
 
 /// Change of a scaled value over the whole range of a tuner, relative to the value, that is negligible.
-const NEGLIGIBLE: f64 = 1e-3;
+pub(crate) const NEGLIGIBLE: f64 = 1e-3;
 
 /// Change at the smaller distance, relative to that at the larger one, from which a criterion jumps.
 const JUMP: f64 = 0.5;
@@ -44,6 +44,8 @@ pub struct DerivativesReport {
     pub beyond: Vec<Beyond>,
     /// Keys, `case/criterion`, of criteria that jump within a thousandth of the ranges of the tuners.
     pub jumps: Vec<String>,
+    /// True if one of them jumps to a better value.
+    pub jumps_to_better: bool,
 }
 
 /// Tuner whose derivatives are all 0, but that changes a criterion when it moves by a tenth of its range.
@@ -77,8 +79,8 @@ enum Comparison {
     Consistent,
     /// The derivative lies outside of differences that agree with each other.
     Contradiction([Option<f64>; 2]),
-    /// The value jumps.
-    Jump,
+    /// The value jumps, to this one.
+    Jump(f64),
 }
 
 /// Compares a derivative with the values at [`STEPS`] on each side of a point with the value `here`.
@@ -90,7 +92,7 @@ fn compare(derivative: f64, here: f64, sides: [Option<[f64; 2]>; 2]) -> Comparis
         let [near, far] = values.map(|value| value - here);
         let negligible = NEGLIGIBLE * (here.abs() + SMALL_OBJECTIVE);
         if near.abs() > negligible && near.abs() > JUMP * far.abs() {
-            return Comparison::Jump;
+            return Comparison::Jump(values[0]);
         }
         let sign = if side == 0 { -1.0 } else { 1.0 };
         let [near, far] = [sign * near / STEPS[0], sign * far / STEPS[1]];
@@ -172,7 +174,12 @@ impl DerivativesReport {
             };
             report.directions += 1;
             report.evaluations += points.len();
-            if let Some(j) = direction.axis {
+            let changes = |at: &Evaluation| {
+                let change = |i: usize| at.scaled.as_ref().map_or(f64::INFINITY, |scaled| (scaled[i] - here[i]).abs());
+                rows.iter().any(|&i| change(i) > STEPS[1] * NEGLIGIBLE * (here[i].abs() + SMALL_OBJECTIVE))
+            };
+            // At a kink or a smooth extremum, the tuner has an effect near the point.
+            if let Some(j) = direction.axis.filter(|_| !evaluations.iter().any(changes)) {
                 report.move_far(problem, oracle, &found.at, &rows, j);
             }
             let mut values =
@@ -187,8 +194,16 @@ impl DerivativesReport {
                 let key = || study.key(&study.rows()[i]);
                 match compare(derivative, here[i], sides.each_ref().map(of_row)) {
                     Comparison::Consistent => {}
-                    Comparison::Jump if report.jumps.contains(&key()) => {}
-                    Comparison::Jump => report.jumps.push(key()),
+                    Comparison::Jump(there) => {
+                        let level = |scaled: f64| match problem.shape().rows[i].0 {
+                            Usage::Equality => (scaled - 1.0).abs(),
+                            _ => scaled,
+                        };
+                        report.jumps_to_better |= level(there) < level(here[i]);
+                        if !report.jumps.contains(&key()) {
+                            report.jumps.push(key());
+                        }
+                    }
                     Comparison::Contradiction(differences) => report.contradictions.push(Contradiction {
                         key: key(),
                         tuner: direction.axis.map(|j| study.tuners()[problem.active()[j]].name.clone()),
@@ -272,7 +287,7 @@ mod tests {
 
     #[test]
     fn a_change_that_does_not_shrink_with_the_distance_is_a_jump() {
-        assert_eq!(compare(0.1, 1.0, sides(|x| if x > 1e-4 { 1.4 } else { 1.0 })), Comparison::Jump);
+        assert_eq!(compare(0.1, 1.0, sides(|x| if x > 1e-4 { 1.4 } else { 1.0 })), Comparison::Jump(1.4));
         // A jump between the two distances is no derivative either.
         assert_eq!(compare(0.1, 1.0, sides(|x| if x > 1e-3 { 1.4 } else { 1.0 + 0.1 * x })), Comparison::Consistent);
     }

@@ -150,15 +150,19 @@ impl End {
         self
     }
 
-    /// Returns the end of a search whose point lies beside a jump: first-order conditions show nothing there.
+    /// Returns the end of a search whose point lies beside a jump: first-order conditions show nothing there. A jump to a better value is a
+    /// reason to doubt the point.
     #[must_use]
-    pub fn beside_jump(mut self) -> Self {
+    pub fn beside_jump(mut self, to_better: bool) -> Self {
         let of_point = self.words_of_point();
         self.words.retain(|words| Some(words) != of_point.as_ref());
         if self.point.is_stationary() {
             self.point = Optimality::Jump;
         }
         self.words.splice(0..0, self.words_of_point());
+        if to_better {
+            self.doubt.get_or_insert_with(|| AT_JUMP.to_owned());
+        }
         self
     }
 

@@ -48,6 +48,8 @@ pub struct JumpsReport {
     pub quantities: usize,
     /// Names of the quantities that the budget did not cover: not looked at, or with a jump that was not located.
     pub left_out: Vec<String>,
+    /// Names of the active tuners with discrete values, which are not moved.
+    pub discrete: Vec<String>,
     /// Jumps found within 1 %, the nearest first; those that miss a demand come before the others.
     pub found: Vec<JumpReport>,
     /// Best evaluated point at which the criterion of the first jump still meets its demand 1 % farther; null if none was found or
@@ -65,6 +67,9 @@ pub struct JumpReport {
     /// True for a constant that is fixed in the equations of a model: no parameter.
     #[serde(skip)]
     pub is_fixed: bool,
+    /// True for a tuner that is not active: moved as a constant.
+    #[serde(skip)]
+    pub is_tuner: bool,
     /// Name of the quantity.
     pub name: String,
     /// Unit of its values.
@@ -121,6 +126,8 @@ struct Moved {
     kind: MovedKind,
     /// True for a constant of [`Model::constants`].
     is_fixed: bool,
+    /// Index of a tuner that is not active.
+    tuner: Option<usize>,
     name: String,
     unit: String,
     /// Coordinate of a tuner.
@@ -161,6 +168,9 @@ impl JumpsReport {
         if at.scaled.is_none() {
             return report;
         }
+        let is_discrete = |&i: &usize| problem.study().tuners()[i].spacing() > 0.0;
+        let discrete = problem.active().iter().copied().filter(is_discrete);
+        report.discrete = discrete.map(|i| problem.study().tuners()[i].name.clone()).collect();
         let moved = moved(problem, at);
         let ends = look.ends(&moved, at);
         report.left_out =
@@ -179,8 +189,8 @@ impl JumpsReport {
         }
         report.found.sort_by(|a, b| b.misses.cmp(&a.misses).then(a.distance.total_cmp(&b.distance)));
         if let Some(nearest) = report.found.first().filter(|jump| jump.misses).cloned() {
-            let key = (nearest.kind, nearest.is_fixed, &nearest.name);
-            let quantity = moved.iter().find(|m| (m.kind, m.is_fixed, &m.name) == key);
+            let key = (nearest.kind, nearest.is_fixed, nearest.is_tuner, &nearest.name);
+            let quantity = moved.iter().find(|m| (m.kind, m.is_fixed, m.tuner.is_some(), &m.name) == key);
             report.away = quantity.and_then(|quantity| look.away(quantity, &nearest, at, archive));
         }
         report.evaluations = look.evaluations;
@@ -198,8 +208,8 @@ impl JumpsReport {
     }
 }
 
-/// Returns the quantities whose changes are looked at: continuous active tuners, then constants and initial values of the models. What a
-/// robust design holds uncertain is left out: it is designed against.
+/// Returns the quantities whose changes are looked at: continuous active tuners, the other tuners, then constants and initial values of the
+/// models. What a robust design holds uncertain is left out: it is designed against.
 fn moved(problem: &Problem, at: &Evaluation) -> Vec<Moved> {
     let study = problem.study();
     let is_uncertain = |name: &str| {
@@ -210,6 +220,7 @@ fn moved(problem: &Problem, at: &Evaluation) -> Vec<Moved> {
         let moved = Moved {
             kind: MovedKind::Tuner,
             is_fixed: false,
+            tuner: None,
             name: tuner.name.clone(),
             unit: tuner.unit.to_string(),
             coordinate,
@@ -219,6 +230,17 @@ fn moved(problem: &Problem, at: &Evaluation) -> Vec<Moved> {
         (tuner.spacing() == 0.0 && !is_uncertain(&tuner.name)).then_some(moved)
     };
     let mut all: Vec<Moved> = problem.active().iter().enumerate().filter_map(tuner).collect();
+    let still = study.tuners().iter().enumerate().filter(|(_, tuner)| !tuner.active && tuner.tie.is_none());
+    all.extend(still.filter(|(i, tuner)| at.tuners[*i] != 0.0 && !is_uncertain(&tuner.name)).map(|(i, tuner)| Moved {
+        kind: MovedKind::Constant,
+        is_fixed: false,
+        tuner: Some(i),
+        name: tuner.name.clone(),
+        unit: tuner.unit.to_string(),
+        coordinate: 0,
+        value: at.tuners[i],
+        size: at.tuners[i].abs(),
+    }));
     for job in study.jobs() {
         let model = &study.models()[job.model].1;
         let parameters = study.parameters(job, &at.tuners);
@@ -237,7 +259,7 @@ fn moved(problem: &Problem, at: &Evaluation) -> Vec<Moved> {
             let Some(size) = size else { continue };
             let kind = if state.is_some() { MovedKind::Initial } else { MovedKind::Constant };
             let (name, unit) = (variable.name.clone(), variable.unit.to_string());
-            all.push(Moved { kind, is_fixed: false, name, unit, coordinate: 0, value, size });
+            all.push(Moved { kind, is_fixed: false, tuner: None, name, unit, coordinate: 0, value, size });
         }
     }
     for (variable, value) in study.models().iter().flat_map(|(_, model)| model.constants()) {
@@ -245,7 +267,7 @@ fn moved(problem: &Problem, at: &Evaluation) -> Vec<Moved> {
         if !is_known && value != 0.0 {
             let (name, unit) = (variable.name, variable.unit.to_string());
             let kind = MovedKind::Constant;
-            all.push(Moved { kind, is_fixed: true, name, unit, coordinate: 0, value, size: value.abs() });
+            all.push(Moved { kind, is_fixed: true, tuner: None, name, unit, coordinate: 0, value, size: value.abs() });
         }
     }
     all
@@ -260,6 +282,10 @@ fn scale_of(model: &dyn Model, state: &str, parameters: &[f64]) -> Option<f64> {
 /// Returns the study with a constant moved by a distance in all of its jobs.
 fn with_constant(study: &Study, quantity: &Moved, distance: f64) -> Option<Study> {
     let mut moved = study.clone();
+    if let Some(tuner) = quantity.tuner {
+        moved.set_start(tuner, quantity.value + distance * quantity.size);
+        return Some(moved);
+    }
     if quantity.is_fixed {
         for (_, model) in &mut moved.models {
             if let Some((_, value)) = model.constants().iter().find(|(constant, _)| constant.name == quantity.name) {
@@ -417,6 +443,7 @@ impl Look<'_> {
             key: study.key(of),
             kind: quantity.kind,
             is_fixed: quantity.is_fixed,
+            is_tuner: quantity.tuner.is_some(),
             name: quantity.name.clone(),
             unit: quantity.unit.clone(),
             value: quantity.value,

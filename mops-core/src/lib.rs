@@ -108,7 +108,7 @@ pub use outcome::{
     result_schema,
 };
 pub use placement::EffectBuilder;
-pub use plant::{EventInstant, Instant, Open, Opening, Past, Plant, Span};
+pub use plant::{EventInstant, Instant, Open, Opening, Past, Plant, Selected, Span};
 pub use port::Port;
 pub use prediction::SignalSlopes;
 pub use problem::{Problem, Slopes};

@@ -11,6 +11,7 @@ use crate::diagnostic::suggestion;
 use crate::failure::Failure;
 use crate::linear::{Balance, Clock, NoEquilibrium, Point, StateSpace, equilibrium};
 use crate::model::{Analysis, AnalysisKind, Cut, Interface, Job, Local, Model, OperatingPoint, Variable};
+use crate::plant::Selected;
 use crate::study_error::StudyError;
 use crate::unit::Quantity;
 
@@ -329,10 +330,21 @@ impl Linearised {
         let here = self.local(parameters, &mut point, &ties)?;
         let clocks = self.model.clocks(parameters)?;
         let rough = self.rough(&point, &here, &clocks, |point| self.evaluate(parameters, point).ok());
-        let Local { mut rates, slopes, frictionless, limited, .. } = here;
-        // A limit of what follows the cut variable at once opens the loop there, whatever else acts beside it, such as anti-windup.
-        let follows = |slopes: &[f64]| self.cut.iter().any(|[input, _]| slopes[n + input] != 0.0);
-        if let Some((place, _)) = limited.iter().find(|(_, slopes)| follows(slopes)) {
+        let Local { mut rates, slopes, frictionless, selected, exceeded, .. } = here;
+        if let Some(place) = exceeded {
+            return Err(Failure::Undefined(format!(
+                "{place} at the operating point, which no linear model within it describes; choose an operating point within the limits"
+            )));
+        }
+        // A selected value that does not follow the cut variable, where the other one would, opens the loop to the rates that nothing else
+        // connects with it, whatever other rates follow, such as that of anti-windup.
+        let opens = |of: &Selected<Vec<f64>>| {
+            self.cut.iter().map(|[input, _]| n + input).any(|cut| {
+                let is_cut_off = |&row: &usize| slopes[(row, cut)] == 0.0;
+                of.taken[cut] == 0.0 && of.other[cut] != 0.0 && of.rates.iter().any(is_cut_off)
+            })
+        };
+        if let Some(Selected { place, .. }) = selected.iter().find(|of| opens(of)) {
             return Err(Failure::Undefined(format!(
                 "a limit is active at the operating point ({place}), so that the loop is open there and has no margins; choose an \
                  operating point within the limits"
@@ -518,7 +530,8 @@ mod tests {
                 slopes: DMatrix::from_fn(4, 3, |i, j| slopes[i][j]),
                 past: Vec::new(),
                 frictionless: Vec::new(),
-                limited: Vec::new(),
+                selected: Vec::new(),
+                exceeded: None,
             }))
         }
     }

@@ -10,7 +10,7 @@ use crate::diagnostic::suggestion;
 use crate::effect::Placement;
 use crate::failure::Failure;
 use crate::linear::{Clock, StateSpace};
-use crate::plant::Open;
+use crate::plant::{Open, Selected};
 use crate::port::Port;
 use crate::study_error::StudyError;
 use crate::trace::Trace;
@@ -299,8 +299,10 @@ pub struct Local {
     pub slopes: DMatrix<f64>,
     /// Joints whose dry friction is omitted, as names of their positions: dry friction at rest has no derivative.
     pub frictionless: Vec<String>,
-    /// Quantities beyond an active limit, by the place of the limit, with their derivatives with respect to the columns of `slopes`.
-    pub limited: Vec<(String, Vec<f64>)>,
+    /// Values that conditions select, as their derivatives with respect to the columns of `slopes`.
+    pub selected: Vec<Selected<Vec<f64>>>,
+    /// Limit beyond which the point lies although the equations are those within it.
+    pub exceeded: Option<&'static str>,
 }
 
 /// An analysis and its directional derivatives: one analysis of the same form per direction.
@@ -350,12 +352,14 @@ impl Analysis {
         }
     }
 
-    /// Returns the largest distance up to which [`Analysis::moved`] keeps the order of the instants at which signals jump or bend.
+    /// Returns the largest distance up to which [`Analysis::moved`] keeps the order of the instants at which signals jump or bend; NaN if
+    /// instants coincide whose order changes with the parameters.
     pub fn room(&self, tangent: &Self) -> f64 {
         match (self, tangent) {
             (Self::Time(response), Self::Time(tangent)) => {
                 let room = |((_, trace), (_, tangent)): (&(String, Trace), &(String, Trace))| trace.room(tangent);
-                response.traces.iter().zip(&tangent.traces).map(room).fold(f64::INFINITY, f64::min)
+                let least = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.min(b) };
+                response.traces.iter().zip(&tangent.traces).map(room).fold(f64::INFINITY, least)
             }
             _ => f64::INFINITY,
         }

@@ -60,6 +60,19 @@ pub struct Span<'a> {
     pub w: &'a [Enclosure],
 }
 
+/// Value that a condition selects: of a limit, of `min` and `max`, of a piece of a curve.
+#[derive(Debug, Clone)]
+pub struct Selected<S> {
+    /// Place, for a message.
+    pub place: String,
+    /// Value that acts.
+    pub taken: S,
+    /// Value that acts where the condition does not hold.
+    pub other: S,
+    /// Rates that the value acts on at once, by their states; then delayed quantities.
+    pub rates: Vec<usize>,
+}
+
 /// A plant: `x' = f(t, x, u, w)` at given parameters, as a hybrid system whose guards switch between modes.
 ///
 /// Implementations are generic over [`Scalar`]: they run with values and with exact tangents, including those of jumps at
@@ -202,9 +215,14 @@ pub trait Plant<S: Scalar> {
         Ok(Vec::new())
     }
 
-    /// Returns the quantities that are limited at a point, by the places of their limits. The mode for linearisation was entered.
-    fn limited(&self, _at: &Instant<'_, S>) -> Vec<(String, S)> {
+    /// Returns the values that conditions select at a point. The mode for linearisation was entered.
+    fn selected(&self, _at: &Instant<'_, S>) -> Vec<Selected<S>> {
         Vec::new()
+    }
+
+    /// Returns the limit beyond which a point lies, if the plant is linearised within its limits all the same.
+    fn exceeded(&self, _at: &Instant<'_, S>) -> Option<&'static str> {
+        None
     }
 
     /// Returns the typical magnitude of a state, in its unit; `None` if only the simulation can determine it.
@@ -317,8 +335,11 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Plant<S> for Box<P> {
     fn linearised_at(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<Vec<usize>, Failure> {
         (**self).linearised_at(at, at_rest)
     }
-    fn limited(&self, at: &Instant<'_, S>) -> Vec<(String, S)> {
-        (**self).limited(at)
+    fn selected(&self, at: &Instant<'_, S>) -> Vec<Selected<S>> {
+        (**self).selected(at)
+    }
+    fn exceeded(&self, at: &Instant<'_, S>) -> Option<&'static str> {
+        (**self).exceeded(at)
     }
     fn scale(&self, state: usize) -> Option<f64> {
         (**self).scale(state)

@@ -115,7 +115,7 @@ impl Trace {
     /// times increase. They vary linearly between these times, and vanish at both ends of the trace.
     ///
     /// At a jump or a corner whose time varies, the derivative at a fixed time is that of one side, and a criterion needs the other
-    /// part: the derivative of the time.
+    /// part: the derivative of the time. NaN means that several instants with different derivatives coincide.
     pub fn move_knots(&mut self, of_times: &[(f64, f64)]) {
         if of_times.iter().all(|&(_, moves)| moves == 0.0) {
             return;
@@ -465,8 +465,11 @@ impl Trace {
     }
 
     /// Returns the largest distance in either direction by which [`Trace::moved`] at most halves the length of each segment;
-    /// infinity if no segment becomes shorter.
+    /// infinity if no segment becomes shorter, NaN if the derivatives of the knots are not known.
     pub fn room(&self, tangent: &Self) -> f64 {
+        if tangent.moves.iter().any(|moves| moves.is_nan()) {
+            return f64::NAN;
+        }
         let lengths = self.knots.windows(2).map(|knots| knots[1] - knots[0]);
         let changes = tangent.moves.windows(2).map(|moves| (moves[1] - moves[0]).abs());
         lengths.zip(changes).map(|(length, change)| 0.5 * length / change).fold(f64::INFINITY, f64::min)

@@ -67,6 +67,10 @@ pub struct Tuner {
     pub guessed: [bool; 2],
 }
 
+/// Part of a tuner's range within which a value is at its bound: above the rounding of positions. In a range of seven decades, optima of
+/// ordinary size are not.
+const AT_BOUND: f64 = 1e-9;
+
 impl Tuner {
     /// Returns the value at `u` in [0, 1].
     pub fn value_at(&self, u: f64) -> f64 {
@@ -127,11 +131,11 @@ impl Tuner {
         (u * (count - 1) as f64).round() as usize
     }
 
-    /// Returns `lower` or `upper` if `value` is at that bound, to within 1e-6 of the range.
+    /// Returns `lower` or `upper` if `value` is at that bound, to within [`AT_BOUND`] of the range.
     pub fn at_bound(&self, value: f64) -> Option<&'static str> {
         match self.position_of(value) {
-            u if u <= 1e-6 => Some("lower"),
-            u if u >= 1.0 - 1e-6 => Some("upper"),
+            u if u <= AT_BOUND => Some("lower"),
+            u if u >= 1.0 - AT_BOUND => Some("upper"),
             _ => None,
         }
     }

@@ -27,11 +27,13 @@ pub(super) fn section(found: &JumpsReport) -> Markup {
     };
     html! {
         p {
-            "Each tuner was moved by 1 % of its range, each constant and initial value by 1 % of itself (an initial value of 0: of the "
-            "scale of its state, if it has one), and criteria that then rise by at least 2 % were followed back to where they jump. "
-            "Looked at: " (found.quantities) " of " (found.quantities + found.left_out.len()) ", with "
-            (counted(found.evaluations, "evaluation")) "."
-            @if found.found.is_empty() { " No jump was found." }
+            "Quantities looked at: " (found.quantities) " of " (found.quantities + found.left_out.len()) ", with "
+            (counted(found.evaluations, "evaluation")) ". Each continuous tuner was moved by 1 % of its range, each constant, inactive tuner "
+            "and initial value by 1 % of itself (an initial value of 0: of the scale of its state, if it has one), and criteria that then "
+            "rise by at least 2 % were followed back to where they jump."
+            @if found.found.is_empty() && found.quantities > 0 { " No jump was found along them." }
+            @if !found.left_out.is_empty() { " Not looked at, for the budget: " (found.left_out.join(", ")) "." }
+            @if !found.discrete.is_empty() { " Not moved, as their values are discrete: " (found.discrete.join(", ")) "." }
         }
         @if !found.found.is_empty() { (scrolling("Jumps near the design", table)) }
     }

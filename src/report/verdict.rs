@@ -45,8 +45,8 @@ pub(super) fn verdict(report: &Report<'_>) -> (Tone, String) {
 
 /// Returns a verdict after the reason to doubt the design that it rests on, and after what cut off the work that follows the design.
 fn doubted(outcome: &Outcome, (tone, text): (Tone, String)) -> (Tone, String) {
-    let follows =
-        matches!(outcome.task, Task::Sweep | Task::Sensitivity | Task::WorstCase | Task::MonteCarlo) && tone != Tone::Bad;
+    let follows = matches!(outcome.task, Task::Sweep | Task::Sensitivity | Task::WorstCase | Task::MonteCarlo)
+        && tone != Tone::Bad;
     let cut_off = match outcome.stop {
         Stop::TimeLimit if follows => Some("The time limit ended the run before all was computed."),
         Stop::Interrupted if follows => Some("The run was interrupted before all was computed."),

@@ -41,7 +41,7 @@ pub(super) fn add(solved: &mut Solved, study: Study, options: &Options, watch: &
     outcome.simulations += found.evaluations * problem.simulations();
     if let Some(end) = outcome.end.take() {
         let is_beside = found.is_beside(BESIDE);
-        let end = if is_beside { end.beside_jump() } else { end };
+        let end = if is_beside { end.beside_jump(false) } else { end };
         if is_beside && outcome.pareto == Pareto::CertifiedLocal {
             outcome.pareto = Pareto::NotShown;
         }
@@ -105,16 +105,20 @@ fn sentence(jump: &JumpReport, found: &JumpsReport, tuners: &[Tuner]) -> String 
     } else {
         String::new()
     };
-    text += &format!(" To design against it, {first}add `[robust]` and, under [uncertain], `{}`.", line(jump, tuners));
+    if let Some(line) = line(jump, tuners) {
+        text += &format!(" To design against it, {first}add `[robust]` and, under [uncertain], `{line}`.");
+    }
     text
 }
 
-/// Returns the line of a study that makes a quantity uncertain by 1 %.
-fn line(jump: &JumpReport, tuners: &[Tuner]) -> String {
-    if jump.kind == MovedKind::Tuner {
-        let tuner = tuners.iter().find(|tuner| tuner.name == jump.name);
-        let change = tuner.map_or(0.0, |tuner| JUMPS_WITHIN * tuner.slope_at(jump.value).abs());
-        return format!("{} = {{ tolerance = {} }}", jump.name, significant(change / jump.value.abs(), 2));
+/// Returns the line of a study that makes a quantity uncertain by 1 %; `None` where no tolerance is a part of the value: near 0, and for a
+/// tuner of one case.
+fn line(jump: &JumpReport, tuners: &[Tuner]) -> Option<String> {
+    if jump.kind == MovedKind::Tuner || jump.is_tuner {
+        let tuner = tuners.iter().find(|tuner| tuner.name == jump.name && tuner.case.is_none())?;
+        let size = if jump.is_tuner { jump.value.abs() } else { tuner.slope_at(jump.value).abs() };
+        let tolerance = JUMPS_WITHIN * size / jump.value.abs();
+        return (tolerance < 1.0).then(|| format!("{} = {{ tolerance = {} }}", jump.name, significant(tolerance, 2)));
     }
     let size = (jump.beyond - jump.value).abs() / jump.distance;
     let quantity = |value: f64| {
@@ -122,14 +126,20 @@ fn line(jump: &JumpReport, tuners: &[Tuner]) -> String {
         if jump.unit == "1" { number } else { format!("\"{number} {}\"", jump.unit) }
     };
     let [low, high] = [-JUMPS_WITHIN, JUMPS_WITHIN].map(|part| quantity(jump.value + part * size));
-    format!("{} = {{ min = {low}, max = {high} }}", jump.name)
+    Some(format!("{} = {{ min = {low}, max = {high} }}", jump.name))
 }
 
 /// Returns a line on what was not looked at; `None` if all was.
 fn not_looked_at(found: &JumpsReport) -> Option<String> {
-    let names: Vec<String> = found.left_out.iter().map(|name| format!("`{name}`")).collect();
-    let all = (!names.is_empty()).then(|| listed(&names))?;
-    Some(format!("Jumps along {all} were not looked for: the look has a twentieth of the evaluations."))
+    let listed = |names: &[String]| {
+        let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+        (!names.is_empty()).then(|| listed(&names))
+    };
+    let beyond_budget = listed(&found.left_out)
+        .map(|all| format!("Jumps along {all} were not looked for: the look has a twentieth of the evaluations."));
+    let discrete = listed(&found.discrete).map(|all| format!("{all}, of discrete values, moved to no other value."));
+    let both: Vec<String> = beyond_budget.into_iter().chain(discrete).collect();
+    (!both.is_empty()).then(|| both.join(" "))
 }
 
 /// Lists names, at most four of them.

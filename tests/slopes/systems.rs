@@ -12,7 +12,7 @@ use super::plants::Setup;
 type System = (&'static str, &'static str, &'static [f64]);
 
 /// Systems with two signals each.
-const SYSTEMS: [System; 12] = [
+const SYSTEMS: [System; 17] = [
     (
         "bouncing ball, rebound e, gravity g",
         "states     = { h = '1', v = '1' }
@@ -122,6 +122,49 @@ const SYSTEMS: [System; 12] = [
          outputs    = { y = 'm' }
          clocks.c   = { every = '100 ms', memory = { m = '1' }, next = { m = 'm + (u - x)/Ti' } }",
         &[0.9, 5.0],
+    ),
+    // Instants that coincide at the given values, and part with them.
+    (
+        "two thresholds at one value",
+        "states     = { x = '1' }
+         parameters = { p = '1', q = '1' }
+         der        = { x = \"1 [s]*x' = 2.1 - 0.7*x\" }
+         outputs    = { y = 'if(x > p, 1, 0)', z = 'if(x > q, 1, 0)' }",
+        &[0.8, 0.8],
+    ),
+    (
+        "two switches at one time",
+        "states     = { x = '1', z = '1' }
+         parameters = { p = 's', q = 's' }
+         der        = { x = \"1 [s]*x' = if(time > p, 1, 0) - x\", z = \"1 [s]*z' = if(time > q, 1, 0) - z\" }",
+        &[0.5, 0.5],
+    ),
+    (
+        "two bouncing balls",
+        "states     = { h = '1', v = '1', k = '1', w = '1' }
+         parameters = { d = '1', e = '1' }
+         der        = { h = \"1 [s]*h' = v\", v = \"1 [s]*v' = -4\", k = \"1 [s]*k' = w\", w = \"1 [s]*w' = -4\" }
+         start      = { h = 1, k = 1 }
+         when.one   = { guard = 'h', reset = { h = 0, v = '-d*v' } }
+         when.two   = { guard = 'k', reset = { k = 0, w = '-e*w' } }",
+        &[0.7, 0.7],
+    ),
+    (
+        "two equal delays",
+        "states     = { x = '1', z = '1' }
+         inputs     = { u = '1' }
+         parameters = { p = 's', q = 's' }
+         let        = { a = 'delay(u, p)', b = 'delay(2*u, q)' }
+         der        = { x = \"1 [s]*x' = a - x\", z = \"1 [s]*z' = b - z\" }",
+        &[0.5, 0.5],
+    ),
+    (
+        "a threshold reached at a step of the input",
+        "states     = { x = '1', z = '1' }
+         inputs     = { u = '1' }
+         parameters = { p = 's' }
+         der        = { x = \"1 [s]*x' = u - x\", z = \"1 [s]*z' = if(time > p, 1, 0) - z\" }",
+        &[0.413],
     ),
 ];
 

@@ -5,7 +5,7 @@ use mops_core::expression::{Comparison, Form, Function, Node};
 
 use super::definition::{Text, under};
 use super::graph::{Id, Level, Op};
-use super::lower::{Kinks, Limit, Lowering, Order, Switch};
+use super::lower::{Kinks, Lowering, Order, Selection, Switch};
 
 impl Lowering<'_> {
     pub(super) fn call(
@@ -59,26 +59,23 @@ impl Lowering<'_> {
                 for &other in &values[1..] {
                     let (a, b) = if function == Function::Max { (best, other) } else { (other, best) };
                     let first = self.at_least(a, b, kinks);
-                    best = self.graph.choose(first, best, other);
+                    best = self.select(text, function, first, [best, other]);
                 }
                 best
             }
             Function::Clip | Function::Deadzone => {
                 let (low, high) = (values[1], values[2]);
-                if function == Function::Clip {
-                    let what = format!("`clip` in {}", text.path.join("."));
-                    self.limits.push(Limit { of: x, low, high, what });
-                }
                 let (above, below) = (self.at_least(x, low, kinks), self.at_least(high, x, kinks));
-                let (inside, over, under) = if function == Function::Clip {
-                    (x, high, low)
-                } else {
-                    (zero, self.graph.sub(x, high), self.graph.sub(x, low))
-                };
-                let upper = self.graph.choose(below, inside, over);
+                if function == Function::Clip {
+                    let upper = self.select(text, function, below, [x, high]);
+                    return Ok(self.select(text, function, above, [upper, low]));
+                }
+                // A dead zone is no limit.
+                let (over, under) = (self.graph.sub(x, high), self.graph.sub(x, low));
+                let upper = self.graph.choose(below, zero, over);
                 self.graph.choose(above, upper, under)
             }
-            Function::Table => self.table(x, &values[1..], kinks),
+            Function::Table => self.table(text, x, &values[1..], kinks),
             smooth => self.graph.function(smooth, x),
         })
     }
@@ -114,7 +111,7 @@ impl Lowering<'_> {
     }
 
     /// Adds `table(x, x1, y1, ..)`: segments are selected from the left.
-    fn table(&mut self, x: Id, points: &[Id], kinks: Kinks) -> Id {
+    fn table(&mut self, text: &Text, x: Id, points: &[Id], kinks: Kinks) -> Id {
         let lines = points.len() / 2 - 1;
         let mut value = None;
         for k in (0..lines).rev() {
@@ -128,7 +125,7 @@ impl Lowering<'_> {
                 None => line,
                 Some(further) => {
                     let here = self.at_least(x2, x, kinks);
-                    self.graph.choose(here, line, further)
+                    self.select(text, Function::Table, here, [line, further])
                 }
             });
         }
@@ -160,13 +157,24 @@ impl Lowering<'_> {
                 };
                 let (left, right) = (side(left)?, side(right)?);
                 let condition = self.condition(*comparison, left, right, true, kinks);
-                Ok(self.graph.choose(condition, a, b))
+                Ok(self.select(text, Function::If, condition, [a, b]))
             }
             Form::All(conditions) => conditions.iter().rev().try_fold(a, |a, of| self.decide(text, of, [a, b], kinks)),
             Form::Any(conditions) => conditions.iter().rev().try_fold(b, |b, of| self.decide(text, of, [a, b], kinks)),
             Form::Not(inner) => self.decide(text, inner, [b, a], kinks),
             _ => unreachable!("the parser requires a condition"),
         }
+    }
+
+    /// Adds a selection of a function: `a` if `condition` is positive, else `b`. One that varies is noted, as it may open a loop.
+    fn select(&mut self, text: &Text, function: Function, condition: Id, [a, b]: [Id; 2]) -> Id {
+        let taken = self.graph.choose(condition, a, b);
+        if self.graph.level(condition) == Level::Variable && a != b {
+            let other = self.graph.choose(condition, b, a);
+            let what = format!("`{}` in {}", function.name(), text.path.join("."));
+            self.selections.push(Selection { taken, other, what });
+        }
+        taken
     }
 
     /// Adds the kink at which `a` and `b` meet: positive if `a >= b`.

@@ -104,8 +104,9 @@ pub struct Compiled {
     pub switches: Vec<Switch>,
     /// Arguments that must increase: description and whether strictly; computes pairs of low and high.
     pub orders: (Vec<(String, bool)>, Program),
-    /// Places of limits; computes what is limited with its lower and upper limit.
-    pub limits: (Vec<String>, Program),
+    /// Places of the values that conditions select, with the rates and delayed quantities that they act on; computes each value and the
+    /// other one.
+    pub selections: (Vec<(String, Vec<usize>)>, Program),
     /// Joints with dry friction.
     pub joints: Vec<Joint>,
     /// Events.
@@ -157,7 +158,8 @@ impl Compiled {
             wanted.push(vec![graph.sub(switch.left, switch.right), switch.right]);
         }
         wanted.push(system.orders.iter().flat_map(|order| [order.low, order.high]).collect());
-        wanted.push(system.limits.iter().flat_map(|limit| [limit.of, limit.low, limit.high]).collect());
+        let places = system.acting_selections();
+        wanted.push(places.iter().flat_map(|(selection, _)| [selection.taken, selection.other]).collect());
         for c in &system.contacts {
             wanted.push(vec![c.torque, c.limit, c.coulomb, system.derivatives[c.velocity]]);
         }
@@ -189,7 +191,8 @@ impl Compiled {
             system.switches.iter().map(|s| Switch { mode: s.mode, strict: s.strict, jumps: s.jumps, sides: next() });
         let switches = switches.collect();
         let orders = (system.orders.iter().map(|order| (order.what.clone(), order.strict)).collect(), next());
-        let limits = (system.limits.iter().map(|limit| limit.what.clone()).collect(), next());
+        let places = places.into_iter().map(|(selection, rates)| (selection.what.clone(), rates)).collect();
+        let selections = (places, next());
         let joint = |contact: &Contact, balance| Joint {
             contact: *contact,
             balance,
@@ -244,7 +247,7 @@ impl Compiled {
             signals,
             switches,
             orders,
-            limits,
+            selections,
             joints,
             happenings,
             clocks,

@@ -9,6 +9,13 @@ use mops_core::math;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Id(u32);
 
+impl Id {
+    /// Returns the index of the node.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
 /// Operation of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Op {
@@ -85,12 +92,12 @@ pub struct Graph {
 impl Graph {
     /// Returns the operation of a node.
     pub fn op(&self, id: Id) -> Op {
-        self.nodes[id.0 as usize].0
+        self.nodes[id.index()].0
     }
 
     /// Returns the dependence of a node.
     pub fn level(&self, id: Id) -> Level {
-        self.nodes[id.0 as usize].1
+        self.nodes[id.index()].1
     }
 
     /// Returns the operands of a node.
@@ -131,7 +138,7 @@ impl Graph {
         let id = Id(u32::try_from(self.nodes.len()).expect("a model has fewer nodes"));
         self.nodes.push((op, level));
         let below = self.operands(id).into_iter().map(|o| self.level(o)).max().unwrap_or(level);
-        self.nodes[id.0 as usize].1 = level.max(below);
+        self.nodes[id.index()].1 = level.max(below);
         self.known.insert(op, id);
         id
     }
@@ -338,19 +345,22 @@ impl Graph {
 
     /// Returns the states that a node depends on, in order.
     pub fn states_of(&self, id: Id) -> Vec<usize> {
-        let mut states = std::collections::BTreeSet::new();
+        let below = self.below(id);
+        let nodes = self.nodes.iter().zip(below).filter(|(_, below)| *below);
+        let states = nodes.filter_map(|((op, _), _)| if let Op::State(state) = op { Some(*state) } else { None });
+        states.collect::<std::collections::BTreeSet<_>>().into_iter().collect()
+    }
+
+    /// Returns true for each node that a node depends on, itself included.
+    pub fn below(&self, id: Id) -> Vec<bool> {
         let mut seen = vec![false; self.nodes.len()];
         let mut stack = vec![id];
         while let Some(id) = stack.pop() {
-            if std::mem::replace(&mut seen[id.0 as usize], true) {
-                continue;
+            if !std::mem::replace(&mut seen[id.index()], true) {
+                stack.extend(self.operands(id));
             }
-            if let Op::State(state) = self.op(id) {
-                states.insert(state);
-            }
-            stack.extend(self.operands(id));
         }
-        states.into_iter().collect()
+        seen
     }
 }
 

@@ -53,13 +53,13 @@ pub struct Order {
     pub what: String,
 }
 
-/// Limits of a `clip`.
+/// Value that a condition selects.
 #[derive(Debug, Clone)]
-pub struct Limit {
-    /// Quantity that is limited.
-    pub of: Id,
-    pub low: Id,
-    pub high: Id,
+pub struct Selection {
+    /// Value that acts.
+    pub taken: Id,
+    /// Value that acts where the condition does not hold.
+    pub other: Id,
     /// Place, for a message.
     pub what: String,
 }
@@ -131,8 +131,8 @@ pub struct Lowering<'d> {
     pub switches: Vec<Switch>,
     /// Arguments that must increase, so far.
     pub orders: Vec<Order>,
-    /// Limits of every `clip`.
-    pub limits: Vec<Limit>,
+    /// Values that conditions select.
+    pub selections: Vec<Selection>,
     /// Delayed quantities so far.
     pub delays: Vec<Delayed>,
     /// Number of external forces, which are inputs after the declared ones.
@@ -188,7 +188,7 @@ impl<'d> Lowering<'d> {
             graph: Graph::default(),
             switches: Vec::new(),
             orders: Vec::new(),
-            limits: Vec::new(),
+            selections: Vec::new(),
             delays: Vec::new(),
             forces,
             modes: 0,

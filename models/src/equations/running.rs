@@ -5,7 +5,7 @@ use std::cell::{RefCell, RefMut};
 use mops_core::enclosure::Enclosure;
 use mops_core::expression::Comparison;
 use mops_core::linear;
-use mops_core::{DIRECTIONS, Dual, Dual7, EventInstant, Failure, Instant, Past, Plant, Scalar, Span};
+use mops_core::{DIRECTIONS, Dual, Dual7, EventInstant, Failure, Instant, Past, Plant, Scalar, Selected, Span};
 
 use super::bank::{Bank, Large, Register};
 use super::bounds::{self, moved, signed};
@@ -480,17 +480,19 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         self.model.delayed.results.iter().map(|&register| bank.get(register)).collect()
     }
 
-    fn limited(&self, at: &Instant<'_, S>) -> Vec<(String, S)> {
-        let (places, program) = &self.model.limits;
+    fn selected(&self, at: &Instant<'_, S>) -> Vec<Selected<S>> {
+        let (places, program) = &self.model.selections;
         let mut bank = self.bank.borrow_mut();
         self.load(&mut bank, at);
         program.run(&mut *bank);
         let values: Vec<S> = program.results.iter().map(|&register| bank.get(register)).collect();
-        let limited = places.iter().zip(values.chunks(3)).filter(|(_, value)| {
-            let [of, low, high] = [0, 1, 2].map(|k| value[k].value());
-            of < low || of > high
-        });
-        limited.map(|(what, value)| (what.clone(), value[0])).collect()
+        let selected = |((place, rates), value): (&(String, Vec<usize>), &[S])| Selected {
+            place: place.clone(),
+            taken: value[0],
+            other: value[1],
+            rates: rates.clone(),
+        };
+        places.iter().zip(values.chunks(2)).map(selected).collect()
     }
 
     fn delays(&self) -> Vec<f64> {

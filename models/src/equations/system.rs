@@ -8,7 +8,7 @@ use mops_core::{StudyError, suggestion};
 
 use super::definition::{self, Definition, Text, under};
 use super::graph::{Block, Graph, Id, Op};
-use super::lower::{Affine, Limit, Lowering, Order, Switch};
+use super::lower::{Affine, Lowering, Order, Selection, Switch};
 
 /// Equation `sum of coefficients * derivatives = force`.
 #[derive(Debug, Clone)]
@@ -73,8 +73,8 @@ pub struct System {
     pub switches: Vec<Switch>,
     /// Arguments that must increase.
     pub orders: Vec<Order>,
-    /// Limits of every `clip`.
-    pub limits: Vec<Limit>,
+    /// Values that conditions select.
+    pub selections: Vec<Selection>,
     /// Number of modes.
     pub modes: usize,
     /// Typical sizes of the states, if declared.
@@ -193,21 +193,21 @@ impl System {
         let mut delays = Vec::new();
         lower_delays(&mut l, &derivatives, &mut delays)?;
         // Unused definitions are checked too, but their switches and delays are discarded.
-        let (switches, orders, limits, modes) = (l.switches.len(), l.orders.len(), l.limits.len(), l.modes);
+        let (switches, orders, selections, modes) = (l.switches.len(), l.orders.len(), l.selections.len(), l.modes);
         for (_, text) in &d.lets {
             l.text(text)?;
         }
         lower_delays(&mut l, &derivatives, &mut delays.clone())?;
         l.switches.truncate(switches);
         l.orders.truncate(orders);
-        l.limits.truncate(limits);
+        l.selections.truncate(selections);
         l.modes = modes;
-        let Lowering { graph, switches, orders, limits, modes, .. } = l;
+        let Lowering { graph, switches, orders, selections, modes, .. } = l;
         Ok(Self {
             graph,
             switches,
             orders,
-            limits,
+            selections,
             modes,
             scales: d.scales.clone(),
             derivatives,
@@ -220,6 +220,24 @@ impl System {
             joints,
             matrices,
         })
+    }
+}
+
+impl System {
+    /// Returns the selections that act on rates, on new values of memory or on delayed quantities, with the numbers of these: those of the
+    /// states, then the delayed quantities.
+    pub fn acting_selections(&self) -> Vec<(&Selection, Vec<usize>)> {
+        let of_memory = self.clocks.iter().flat_map(|clock| clock.memory.clone().zip(clock.next.iter().copied()));
+        let first = self.derivatives.len();
+        let delayed = self.delays.iter().enumerate().map(|(k, &(of, _))| (first + k, of));
+        let roots = self.derivatives.iter().copied().enumerate().chain(of_memory).chain(delayed);
+        let mut all: Vec<(&Selection, Vec<usize>)> = self.selections.iter().map(|of| (of, Vec::new())).collect();
+        for (rate, id) in roots.filter(|_| !self.selections.is_empty()) {
+            let below = self.graph.below(id);
+            all.iter_mut().filter(|(of, _)| below[of.taken.index()]).for_each(|(_, rates)| rates.push(rate));
+        }
+        all.retain(|(_, rates)| !rates.is_empty());
+        all
     }
 }
 

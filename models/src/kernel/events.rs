@@ -112,22 +112,33 @@ impl<S: Scalar> Events<S> {
         !self.values.is_empty()
     }
 
-    /// Handles all events of an instant: the negative guard with the lowest index switches, until no guard is negative.
+    /// Handles all events of an instant: the negative guard with the lowest index switches, until no guard is negative. Each event occurs
+    /// at the time of its own crossing, the events that it causes at the same time: for the derivatives, the state is moved there before
+    /// an event, and back after the last one.
     pub(super) fn settle<D: Dynamics<S> + ?Sized>(
         &mut self,
         dynamics: &mut D,
-        t: f64,
-        x: &mut [S],
+        (t, crossings): (f64, &[Crossing<S>]),
+        (x, spare): (&mut [S], &mut [S]),
         sink: &mut impl Sink<S, D>,
     ) -> Result<(), Failure> {
         let mut index = 0;
-        self.values.resize(dynamics.guards(), 0.0);
+        let mut late = S::from(0.0);
+        let count = dynamics.guards();
+        self.values.resize(count, 0.0);
         while index < self.values.len() {
             let value = dynamics.guard(index, t, x).value();
             self.values[index] = value;
             if value >= 0.0 || value.is_nan() {
                 index += 1;
                 continue;
+            }
+            // A mode with other guards has other numbers.
+            let own = crossings.iter().find(|crossing| crossing.guard == index && dynamics.guards() == count);
+            if let Some(own) = own {
+                shift(dynamics, t, x, spare, own.late - late);
+                late = own.late;
+                dynamics.delay_events(late);
             }
             if self.accumulates(index, t) {
                 match dynamics.rest(index, t, CLOSE * self.span, x) {
@@ -140,6 +151,10 @@ impl<S: Scalar> Events<S> {
             }
             self.values.resize(dynamics.guards(), 0.0);
             index = 0;
+        }
+        if !crossings.is_empty() {
+            dynamics.delay_events(S::from(0.0));
+            shift(dynamics, t, x, spare, -late);
         }
         Ok(())
     }
@@ -412,13 +427,53 @@ fn zero_between([mut a, mut b]: Bracket, resolution: f64, value: &mut impl FnMut
     b.0
 }
 
+/// Guard that becomes negative at an instant by itself, not because of an event there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossing<S> {
+    guard: usize,
+    /// Derivatives of the time of the crossing, with value 0.
+    late: S,
+}
+
+/// Difference of the derivatives of two times, relative to the larger one, up to which they are the same.
+const SAME: f64 = 1e-6;
+
+impl<S: Scalar> Crossing<S> {
+    /// Returns the crossings at the end of the step, the first of them found in it; only that one without tangents.
+    pub(super) fn all<D: Dynamics<S> + ?Sized>(f: &D, first: usize, step: &Step<S>, x: &mut [S]) -> Vec<Self> {
+        let of = |guard: usize, x: &mut [S]| Self { guard, late: delay(f, guard, step, x) };
+        let mut all = vec![of(first, x)];
+        if S::DIRECTIONS > 0 {
+            for guard in (0..f.guards()).filter(|&guard| guard != first) {
+                step.at(step.share, x);
+                if f.guard(guard, step.time(step.share), x).value() < 0.0 {
+                    all.push(of(guard, x));
+                }
+            }
+        }
+        all
+    }
+
+    /// Returns the derivatives of the time of all crossings, of which there is at least one; NaN if they differ.
+    pub(super) fn common(all: &[Self]) -> S {
+        all.iter().skip(1).fold(all[0].late, |late, other| common(late, other.late))
+    }
+}
+
+/// Returns the derivatives of the time of two coincident instants; NaN if they differ.
+pub(crate) fn common<S: Scalar>(a: S, b: S) -> S {
+    let size = a.tangents().iter().chain(b.tangents()).fold(0.0, |most: f64, d| most.max(d.abs()));
+    let is_same = a.tangents().iter().zip(b.tangents()).all(|(a, b)| (a - b).abs() <= SAME * size);
+    if is_same { a } else { a * f64::NAN }
+}
+
 /// Returns the tangents of the event time, as a number with zero value: `dt = -dg / (dg/dt)` by the implicit function
 /// theorem. The rate of the guard along the solution is exact if the dynamics provide it, else taken from the dense
 /// output. If the guard only grazes zero, the event time has no derivative and 0 is returned.
 ///
 /// Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition (1993), section
 /// I.14; jumps of tangents at events: S. Galan, W. Feehery, P. Barton, Applied Numerical Mathematics 31 (1999) 17-47.
-pub(super) fn delay<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, index: usize, step: &Step<S>, x: &mut [S]) -> S {
+fn delay<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, index: usize, step: &Step<S>, x: &mut [S]) -> S {
     /// Distance of the two evaluations that give the rate from the event, as a fraction of the step.
     const APART: f64 = 1e-3;
     if S::DIRECTIONS == 0 {

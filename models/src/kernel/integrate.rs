@@ -4,7 +4,7 @@ use mops_core::{Failure, Scalar, Work};
 
 use super::dormand_prince::DormandPrince;
 use super::esdirk::Esdirk;
-use super::events::{Events, delay, shift};
+use super::events::{Crossing, Events, common};
 use super::step::Step;
 use super::step_size::{StepSizes, first_step};
 use super::weights::Weights;
@@ -117,7 +117,7 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
     let mut step = Step::new(&x);
 
     dynamics.pass_break(t, &mut x);
-    events.settle(dynamics, t, &mut x, sink)?;
+    events.settle(dynamics, (t, &[]), (&mut x, &mut spare), sink)?;
     method.restart(dynamics, t, &x, &mut work);
     let mut proposed = first_step(dynamics, (t, end), &x, method.slope(), M::ERROR_ORDER);
     work.derivatives += 1;
@@ -181,7 +181,7 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
         let factor = sizes.after_acceptance(error, rejected > 0);
         proposed = if reaches { proposed.max(h * factor) } else { h * factor };
         rejected = 0;
-        let Some(index) = event else {
+        let Some(first) = event else {
             std::mem::swap(&mut x, &mut next);
             t = arrival;
             weights.follow(&x);
@@ -191,15 +191,14 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
             }
             let moves = pass_break(dynamics, (t, end), &mut x, sink);
             sink.restart(t, moves);
-            events.settle(dynamics, t, &mut x, sink)?;
+            events.settle(dynamics, (t, &[]), (&mut x, &mut spare), sink)?;
             if t < end {
                 stop = dynamics.next_break(t).min(end);
                 method.restart(dynamics, t, &x, &mut work);
             }
             continue;
         };
-        // The tangents of the state at the event refer to the event time, which moves with the parameters.
-        let delay = delay(dynamics, index, &step, &mut spare);
+        let crossings = Crossing::all(dynamics, first, &step, &mut spare);
         let here = step.time(step.share);
         let at_stop = reaches && stop - here <= events.resolution(stop);
         if at_stop {
@@ -209,20 +208,42 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
             t = here;
             step.at(step.share, &mut x);
         }
-        sink.restart(t, delay);
-        shift(dynamics, t, &mut x, &mut spare, delay);
+        let mut moves = Crossing::common(&crossings);
         if at_stop {
-            pass_break(dynamics, (t, end), &mut x, sink);
+            let jumps = Jumps::new(dynamics, t, &x, &mut spare);
+            let of_break = pass_break(dynamics, (t, end), &mut x, sink);
+            if jumps.are_seen(dynamics, t, &x, &mut spare) {
+                moves = common(moves, of_break);
+            }
         }
-        dynamics.delay_events(delay);
-        events.settle(dynamics, t, &mut x, sink)?;
-        dynamics.delay_events(S::from(0.0));
-        shift(dynamics, t, &mut x, &mut spare, -delay);
+        sink.restart(t, moves);
+        events.settle(dynamics, (t, &crossings), (&mut x, &mut spare), sink)?;
         weights.follow(&x);
         stop = dynamics.next_break(t).min(end);
         method.restart(dynamics, t, &x, &mut work);
     }
     if all_finite(&x) { Ok((x, work)) } else { Err(Failure::Diverged(t)) }
+}
+
+/// State and rates before a break, where derivatives are computed.
+struct Jumps {
+    before: Option<[Vec<f64>; 2]>,
+}
+
+impl Jumps {
+    fn new<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, t: f64, x: &[S], dx: &mut [S]) -> Self {
+        Self { before: (S::DIRECTIONS > 0).then(|| Self::values(f, t, x, dx)) }
+    }
+
+    fn values<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, t: f64, x: &[S], dx: &mut [S]) -> [Vec<f64>; 2] {
+        f.derivative(t, x, dx);
+        [x, &*dx].map(|of| of.iter().map(|value| value.value()).collect())
+    }
+
+    /// Returns true if the break changed the state or its rates.
+    fn are_seen<S: Scalar, D: Dynamics<S> + ?Sized>(self, f: &D, t: f64, x: &[S], dx: &mut [S]) -> bool {
+        self.before.is_some_and(|before| before != Self::values(f, t, x, dx))
+    }
 }
 
 /// Sets the inputs to their values at the break. At the end of the simulation, reports them to the sink. Returns the derivatives of

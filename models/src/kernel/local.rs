@@ -1,6 +1,6 @@
 //! Model equations at one point with exact derivatives, for linearisation there.
 
-use mops_core::{DIRECTIONS, Dual, Dual7, Failure, Instant, Local, OperatingPoint, Plant, Scalar};
+use mops_core::{DIRECTIONS, Dual, Dual7, Failure, Instant, Local, OperatingPoint, Plant, Scalar, Selected};
 use nalgebra::DMatrix;
 
 use super::PlantModel;
@@ -20,8 +20,10 @@ struct Here<S> {
     values: Vec<S>,
     /// Positions, as states, of the joints whose dry friction is left out.
     left_out: Vec<usize>,
-    /// Quantities beyond an active limit.
-    limited: Vec<(String, S)>,
+    /// Values that conditions select.
+    selected: Vec<Selected<S>>,
+    /// Limit beyond which the point lies.
+    exceeded: Option<&'static str>,
 }
 
 fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Result<Here<S>, Failure> {
@@ -35,8 +37,8 @@ fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Resul
     plant.changes(&here, &mut values);
     values.extend((0..model.interface().signals.len()).map(|signal| plant.signal(signal, &here)));
     values.extend(plant.past(&here));
-    let limited = plant.limited(&here);
-    Ok(Here { values, left_out, limited })
+    let (selected, exceeded) = (plant.selected(&here), plant.exceeded(&here));
+    Ok(Here { values, left_out, selected, exceeded })
 }
 
 /// Linearises a model given by its plant; implements [`mops_core::Model::local`].
@@ -45,12 +47,20 @@ fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Resul
 /// The parameters are outside the domain of the model, or derivatives at the operating point are not finite.
 pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, Failure> {
     let OperatingPoint { parameters, states, inputs, past, at_rest } = *at;
-    let Here { values, left_out, limited } = look(model, at)?;
+    let Here { values, left_out, selected, exceeded } = look(model, at)?;
     let constants: Vec<Dual7> = parameters.iter().map(|&p| p.into()).collect();
     let columns = states.len() + inputs.len() + past.len();
     let mut slopes = DMatrix::zeros(values.len(), columns);
-    let mut limited: Vec<(String, Vec<f64>)> =
-        limited.into_iter().map(|(place, _)| (place, vec![0.0; columns])).collect();
+    let still = || vec![0.0; columns];
+    // Delayed quantities come after the signals.
+    let row = |rate: usize| if rate < states.len() { rate } else { rate + model.interface().signals.len() };
+    let without = |of: Selected<f64>| Selected {
+        taken: still(),
+        other: still(),
+        rates: of.rates.into_iter().map(row).collect(),
+        place: of.place,
+    };
+    let mut selected: Vec<Selected<Vec<f64>>> = selected.into_iter().map(without).collect();
     for first in (0..columns).step_by(DIRECTIONS) {
         let variable = |(j, &value): (usize, &f64)| {
             let direction = j.wrapping_sub(first);
@@ -60,12 +70,13 @@ pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, 
         let (states, others) = all.split_at(states.len());
         let (inputs, past) = others.split_at(inputs.len());
         let along = look(model, &OperatingPoint { parameters: &constants, states, inputs, past, at_rest })?;
-        for ((_, slopes), (_, value)) in limited.iter_mut().zip(&along.limited) {
-            let last = columns.min(first + DIRECTIONS);
-            slopes[first..last].copy_from_slice(&value.tangent[..last - first]);
+        let last = columns.min(first + DIRECTIONS);
+        for (of, along) in selected.iter_mut().zip(&along.selected) {
+            of.taken[first..last].copy_from_slice(&along.taken.tangent[..last - first]);
+            of.other[first..last].copy_from_slice(&along.other.tangent[..last - first]);
         }
         for (i, row) in along.values.iter().enumerate() {
-            for j in first..columns.min(first + DIRECTIONS) {
+            for j in first..last {
                 slopes[(i, j)] = row.tangent[j - first];
             }
         }
@@ -79,5 +90,6 @@ pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, 
     }
     let names = model.states();
     let frictionless = left_out.into_iter().map(|position| names[position].name.clone()).collect();
-    Ok(Local { rates: rates.to_vec(), signals: signals.to_vec(), past: past.to_vec(), slopes, frictionless, limited })
+    let [rates, signals, past] = [rates, signals, past].map(<[f64]>::to_vec);
+    Ok(Local { rates, signals, past, slopes, frictionless, selected, exceeded })
 }

@@ -63,7 +63,7 @@ pub use mops_core::{IntegrationMethod, Tolerance};
 use dormand_prince::DormandPrince;
 pub use driven::Driven;
 pub(crate) use esdirk::groups;
-pub(crate) use events::shift;
+pub(crate) use events::{common, shift};
 use integrate::Attempt;
 pub use integrate::integrate;
 pub(crate) use local::rests;

@@ -125,10 +125,13 @@ const SHORT: f64 = 2e-3;
 /// Permitted deviation of the quartic in units of the tolerance: the dense output of the states is no more accurate.
 const OFF: f64 = 10.0;
 
+/// Size below which numbers are rounded to fewer digits than others, so that no part of a step is accurate enough.
+const SMALLEST: f64 = f64::MIN_POSITIVE / f64::EPSILON;
+
 /// Returns the permitted deviation of a quartic from a signal with values of this size, and of size `largest` so far.
 pub(crate) fn allowed(tolerance: &Tolerance, largest: f64, size: f64) -> f64 {
     let Tolerance { relative, absolute, .. } = tolerance;
-    OFF * (absolute.unwrap_or(SHARE * relative * largest) + relative * size)
+    OFF * (absolute.unwrap_or(SHARE * relative * largest) + relative * size) + SMALLEST
 }
 
 /// Stores the past of a plant over a part of a step, halved until one quartic per part suffices. `past` evaluates the quantities at

@@ -13,7 +13,7 @@ use super::contacts::{Contacts, solve};
 use super::edges::BLINK;
 use super::{Place, Site, WithEffects};
 use crate::kernel::drive::Drive;
-use crate::kernel::{Dynamics, shift, shown};
+use crate::kernel::{Dynamics, common, shift, shown};
 
 /// Effect in a simulation.
 pub(super) struct Actor<S> {
@@ -661,13 +661,13 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
 
     fn pass_break(&mut self, t: f64, x: &mut [S]) -> S {
         let moving = self.breaks.iter().find(|at| at.value() == t).copied();
-        let mut moves = moving.map_or(S::from(0.0), |at| at - at.value());
+        let mut moves = moving.map(|at| at - at.value());
         for k in 0..self.commands.len() {
             if self.commands[k].is_due(t) {
                 let late = self.commands[k].late();
                 self.pass(t, x, late, |of| of.commands[k].pass_break(t));
                 if self.commands[k].is_delayed() {
-                    moves = late;
+                    moves = Some(moves.map_or(late, |moves| common(moves, late)));
                 }
             }
         }
@@ -680,6 +680,6 @@ impl<S: Opening> Dynamics<S> for Driven<'_, S> {
             self.balance(t, x, &mut u, &mut w, &mut dx);
             self.plant.settle(&Instant { t, x: &x[..self.own], u: &u, w: &w });
         }
-        moves
+        moves.unwrap_or(S::from(0.0))
     }
 }

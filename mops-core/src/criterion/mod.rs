@@ -135,7 +135,11 @@ pub trait Criterion: Send + Sync {
     /// Returns one sentence if the criterion has no derivative for the response.
     fn slope(&self, case: &Case, tangent: &Tangent<'_>) -> Result<Value, String> {
         let Tangent { analysis, along, parameters, seed, reach, .. } = *tangent;
-        let reach = analysis.room(along).max(LEAST_REACH).min(reach);
+        let room = analysis.room(along);
+        if room.is_nan() {
+            return Err("two instants coincide whose derivatives differ".into());
+        }
+        let reach = room.max(LEAST_REACH).min(reach);
         let [high, low] = [reach, -reach].map(|distance| {
             let there: Vec<f64> = parameters.iter().zip(seed).map(|(value, slope)| value + distance * slope).collect();
             self.value_with(case, &analysis.moved(along, distance), &there)

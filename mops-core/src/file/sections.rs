@@ -239,7 +239,8 @@ pub(super) struct ExperimentSection {
     pub from: Option<Quantity>,
     /// End of the used part of the file, as time in the file; a number is in s.
     pub to: Option<Quantity>,
-    /// Number of samples dropped at the start of the file; the first sample of a sensor is often wrong.
+    /// Number of samples dropped at the start of the file, those of inputs included; the first sample of a sensor is often wrong. `from` keeps the
+    /// inputs before it, which delays need.
     #[serde(default)]
     pub skip: usize,
     /// `false` keeps the times of the file. The simulation then starts at 0 s, with inputs from the file from that time on,

@@ -7,6 +7,9 @@ use super::local::{Local, Point, counting, local};
 use super::report::{DirectionReport, RelativeReport, SensitivityReport, TunerSensitivity};
 use super::sensitivity::{Coordinate, Eigen};
 use super::sentences::sentences;
+use super::words::listed;
+use crate::derivatives::NEGLIGIBLE;
+use crate::end::SMALL_OBJECTIVE;
 use crate::evaluation::Evaluation;
 use crate::math;
 use crate::problem::Problem;
@@ -30,14 +33,21 @@ pub(crate) fn report(problem: &Problem, at: &[f64], local: &Local) -> Sensitivit
         .iter()
         .map(|blind| {
             let along = |straight: bool| remaining(problem, at, (blind, straight), &found.coordinates);
-            let remaining = along(blind.straight);
+            let step = along(blind.straight);
             // A sum and a product of two tuners may have the same direction at a point: a step decides.
-            let sum = blind.sum.as_ref().map(|words| (words, along(true))).filter(|(_, change)| *change < remaining);
-            let (words, remaining) = sum.unwrap_or((&blind.words, remaining));
+            let sum =
+                blind.sum.as_ref().map(|words| (words, along(true))).filter(|(_, of)| of.remaining < step.remaining);
+            let (words, step) = sum.unwrap_or((&blind.words, step));
+            let has_effect = !local.residuals && step.has_effect;
             DirectionReport {
-                words: format!("{words}{}", suffix(blind.limit)),
+                words: if has_effect {
+                    at_point(blind, &found.coordinates)
+                } else {
+                    format!("{words}{}", suffix(blind.limit))
+                },
                 changes: blind.changes.iter().map(|&(k, c)| (found.coordinates[k].name.clone(), c)).collect(),
-                remaining,
+                remaining: step.remaining,
+                has_effect,
             }
         })
         .collect();
@@ -103,6 +113,23 @@ fn tuner(local: &Local, k: usize) -> TunerSensitivity {
     }
 }
 
+/// Returns a clause on a direction that has no effect to first order only.
+fn at_point(blind: &BlindDirection, coordinates: &[Coordinate]) -> String {
+    let names: Vec<String> = blind.changes.iter().map(|&(k, _)| format!("`{}`", coordinates[k].name)).collect();
+    let along = if names.len() == 1 { names.concat() } else { format!("a direction of {}", listed(&names)) };
+    format!(
+        "along {along} the derivatives are 0 at this point, but a step of 10 % has an effect: the point is stationary or at a kink"
+    )
+}
+
+/// Change for a 10 % step along a blind direction.
+struct Step {
+    /// Change relative to steps of the single tuners.
+    remaining: f64,
+    /// True if a criterion changes by more than is negligible.
+    has_effect: bool,
+}
+
 /// Returns the remaining change of the residuals for a 10 % step along a blind direction, relative to steps of its
 /// single tuners. The step is straight in the tuners, or in their logarithms.
 fn remaining(
@@ -110,7 +137,7 @@ fn remaining(
     at: &[f64],
     (blind, straight): (&BlindDirection, bool),
     coordinates: &[Coordinate],
-) -> f64 {
+) -> Step {
     let study = problem.study();
     let vector = |evaluation: Evaluation| -> Option<Vec<f64>> {
         let scaled = evaluation.scaled?;
@@ -127,12 +154,17 @@ fn remaining(
         study.apply_ties(&mut tuners);
         vector(problem.evaluate_at(&tuners))
     };
-    let Some(here) = vector(problem.evaluate_at(at)) else { return f64::NAN };
+    let unknown = Step { remaining: f64::NAN, has_effect: false };
+    let Some(here) = vector(problem.evaluate_at(at)) else { return unknown };
     let change = |changes: &[(usize, f64)]| -> f64 {
         let Some(there) = moved(changes) else { return f64::NAN };
         there.iter().zip(&here).map(|(a, b)| math::powi(a - b, 2)).sum::<f64>().sqrt()
     };
     let one_by_one = blind.changes.iter().map(|&one| change(&[one])).fold(0.0, f64::max);
     let together = change(&blind.changes);
-    if together == 0.0 { 0.0 } else { together / one_by_one }
+    let size = here.iter().map(|value| value.abs()).fold(0.0, f64::max);
+    Step {
+        remaining: if together == 0.0 { 0.0 } else { together / one_by_one },
+        has_effect: together > NEGLIGIBLE * (size + SMALL_OBJECTIVE),
+    }
 }

@@ -8,6 +8,8 @@ use super::noise::{Noise, Spread};
 use super::records::{Record, records};
 use super::sensitivity::{Coordinate, DIFFERENCES, Sensitivity, TANGENTS};
 use crate::criterion::Usage;
+use crate::derivatives::NEGLIGIBLE;
+use crate::end::SMALL_OBJECTIVE;
 use crate::problem::Problem;
 use crate::run::{Budget, Run};
 use crate::solver::Oracle;
@@ -63,12 +65,21 @@ pub fn local(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>)
     if n == 0 || rows == 0 || (residuals && found.residuals.iter().any(|column| column.len() != rows)) {
         return None;
     }
+    let scaled = found.at.scaled.as_ref()?;
+    // What is negligible over the whole range is rounding, as at a stationary point.
+    let slope_of = |row: usize, k: usize| {
+        let slope = found.rows[row][k];
+        if slope.abs() > NEGLIGIBLE * (scaled[row].abs() + SMALL_OBJECTIVE) { slope } else { 0.0 }
+    };
     let active: Vec<&Tuner> = problem.active().iter().map(|&i| &study.tuners[i]).collect();
     let values: Vec<f64> = problem.active().iter().map(|&i| tuners[i]).collect();
     let mut jacobian = DMatrix::from_fn(rows, n, |i, k| {
-        let slope = if residuals { found.residuals[k][i] } else { found.rows[counting[i]][k] };
+        let slope = if residuals { found.residuals[k][i] } else { slope_of(counting[i], k) };
         slope / unit_slope(active[k], values[k])
     });
+    if jacobian.iter().all(|&slope| slope == 0.0) {
+        return None;
+    }
     let coordinates = active.iter().zip(&values).map(|(tuner, &value)| Coordinate {
         name: tuner.name.clone(),
         value,

@@ -80,6 +80,8 @@ pub struct DirectionReport {
     pub changes: Vec<(String, f64)>,
     /// Change of the residuals for a 10 % step along the direction, relative to steps of its single tuners.
     pub remaining: f64,
+    /// True if a criterion changes for that step, although its derivatives along the direction are 0.
+    pub has_effect: bool,
 }
 
 /// Persistent excitation of an input.

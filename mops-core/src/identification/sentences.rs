@@ -68,7 +68,7 @@ fn determined(local: &Local, all_practically: bool) -> String {
             (count > 0).then(|| format!("{what} along {}", counted(count, "direction")))
         };
         let open = [
-            (Limit::Nothing, "no effect"),
+            (Limit::Nothing, if local.residuals { "no effect" } else { "no first-order effect" }),
             (Limit::Noise, "a change below the noise"),
             (Limit::Slopes, "derivatives of insufficient accuracy"),
         ];
@@ -77,6 +77,7 @@ fn determined(local: &Local, all_practically: bool) -> String {
         return format!("{what} {} of the {}; {}.", found.rank, counted(n, "direction"), listed(&open));
     }
     match (local.residuals, n) {
+        (false, 1) => "The criteria depend on the tuner.".to_owned(),
         (false, _) => format!("The criteria depend on all {} (condition number {condition}).", counted(n, "direction")),
         (true, 1) => "The tuner is locally identifiable.".to_owned(),
         (true, _) if all_practically => {
@@ -89,7 +90,7 @@ fn determined(local: &Local, all_practically: bool) -> String {
 /// Returns the finding on a direction that is not determined, and the remedy.
 fn undetermined(local: &Local, direction: &DirectionReport) -> String {
     let mut sentence = format!("{}.", capital(&direction.words));
-    if direction.changes.len() > 1 {
+    if direction.changes.len() > 1 && !direction.has_effect {
         sentence += match local.residuals {
             true => " Fix one of them, or measure a signal that distinguishes them.",
             false => " The criteria do not constrain this direction.",

@@ -65,7 +65,10 @@ pub(super) fn verdict(outcome: &Outcome) -> Option<(Tone, String)> {
         let failed: usize = found.criteria.iter().map(|c| c.failed).sum();
         let met = match failed {
             0 => "All demands are met at every evaluated point of the box.".to_owned(),
-            _ => format!("{} in the box failed; all demands are met at the other evaluated points.", counted(failed, "simulation")),
+            _ => format!(
+                "{} in the box failed; all demands are met at the other evaluated points.",
+                counted(failed, "simulation")
+            ),
         };
         return Some((tone, words.unwrap_or(met)));
     }

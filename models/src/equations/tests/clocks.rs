@@ -462,8 +462,24 @@ fn a_limit_opens_the_loop_whatever_acts_beside_it() {
                 next = { v = 'g*x + sum', sum = 'sum + 0.2*(clip(v, -1, 1) - v)' } }";
     let refused = linearised(text, Some("v"), &[("g", 1.0)]).unwrap_err();
     assert!(refused.contains("a limit is active at the operating point (`clip` in"), "{refused}");
-    let within = text.replace("v = 3 }", "v = 0 }");
-    assert!(linearised(&within, Some("v"), &[("g", 1.0)]).is_ok());
+    let limits = [
+        ("min", "min(max(v, -1), 1)"),
+        ("if", "if(v > 1, 1, v < -1, -1, v)"),
+        ("table", "table(v, -9, -1, -2, -1, -1, -1, 1, 1, 2, 1, 9, 1)"),
+        ("min", "sign(v)*min(abs(v), 1)"),
+    ];
+    let within = |text: &str| text.replace("v = 3 }", "v = 0.5 }");
+    for (function, limit) in limits {
+        let text = text.replace("clip(v, -1, 1)", limit);
+        let open = linearised(&within(&text), Some("v"), &[("g", 1.0)]);
+        assert!(open.is_ok(), "{limit}: {}", open.unwrap_err());
+        let refused = linearised(&text, Some("v"), &[("g", 1.0)]).unwrap_err();
+        let place = format!("a limit is active at the operating point (`{function}` in");
+        assert!(refused.contains(&place), "{limit}: {refused}");
+    }
+    // What the cut variable reaches beside the selected value is no open loop.
+    let root = text.replace("-clip(v, -1, 1)'", "-v/max(abs(v), 5)*1 [m/s]'").replace("v = 3 }", "v = 0 }");
+    assert!(linearised(&root, Some("v"), &[("g", 1.0)]).is_ok());
     // A limit of the plant that does not follow the cut variable at once, such as dry friction at a speed.
     let moving = "states = { w = '1/s' }\nparameters = { g = '1' }\nstart = { w = 5 }\n\
                   der = { w = '(u - clip(w/0.1, -1, 1))/1 [s]' }\n\

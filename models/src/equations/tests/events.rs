@@ -199,6 +199,35 @@ fn a_rest_that_is_elsewhere_is_a_failure() {
     assert!(matches!(failure, Failure::EventsAccumulate(..)), "{failure:?}");
 }
 
+/// Two first-order systems that switch on at p and at q, which are equal: x(3) = 1 - exp(p - 3).
+#[test]
+fn events_at_one_instant_keep_their_own_derivatives() {
+    let text = "states = { x = '1', z = '1' }
+         parameters = { p = 's', q = 's' }
+         der = { x = '(if(time > p, 1, 0) - x)/1 [s]', z = '(if(time > q, 1, 0) - z)/1 [s]' }";
+    let model = model(text);
+    let interface = model.interface();
+    let signals: Vec<usize> = (0..interface.signals.len()).collect();
+    let parameters: Vec<f64> = interface
+        .parameters
+        .iter()
+        .map(|p| if ["p", "q"].contains(&p.variable.name.as_str()) { 0.5 } else { 0.0 })
+        .collect();
+    let case = Case::default();
+    let job = Job { case: &case, parameters: &parameters, signals: &signals, horizon: 3.0 };
+    let seed = |name: &str| -> Vec<f64> {
+        interface.parameters.iter().map(|p| f64::from(u8::from(p.variable.name == name))).collect()
+    };
+    let (analysis, tangents) = model.tangents(&job, &[seed("p"), seed("q")]).unwrap().unwrap();
+    let exact = -math::exp(0.5 - 3.0);
+    for (tangent, own, other) in [(&tangents[0], "x", "z"), (&tangents[1], "z", "x")] {
+        let last = |signal: &str| tangent.trace(signal).last();
+        assert!((last(own) - exact).abs() < 1e-7 && last(other).abs() < 1e-7, "{} {}", last(own), last(other));
+        // Which signal jumps or bends when is not known for the traces.
+        assert!(analysis.room(tangent).is_nan());
+    }
+}
+
 #[test]
 fn tangents_jump_at_guards_on_time_as_the_closed_form_does() {
     // n counts the falling crossings of sin(w t) through c, and x grows by the time of each: dx/dw is that of the event

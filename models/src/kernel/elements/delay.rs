@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use mops_core::{Instant, Past, Plant, Scalar, Tolerance, Trace};
 
-use crate::kernel::{allowed, is_due};
+use crate::kernel::{allowed, common, is_due};
 
 /// Delay `y(t) = u(t - time)`, with `u(t) = before` for t < 0.
 ///
@@ -215,8 +215,12 @@ impl<S: Scalar> Delay<S> {
     }
 }
 
+/// Highest derivative whose jump bends a signal.
+const BENDING: u8 = 1;
+
 /// Lets the jumps of delayed quantities that are due take effect; `settle` determines the mode of the plant. A jump that moves with
-/// the parameters moves the state by the jump of its rates. Returns the derivatives of the time of the jump of lowest derivative.
+/// the parameters moves the state by the jump of its rates. Returns the derivatives of the time of the jump of lowest derivative, NaN if several signals jump or bend with
+/// different ones.
 pub(crate) fn pass_delays<S: Scalar, P: Plant<S>>(
     plant: &mut P,
     delays: impl Fn(&mut P) -> &mut [Delay<S>],
@@ -225,6 +229,7 @@ pub(crate) fn pass_delays<S: Scalar, P: Plant<S>>(
     x: &mut [S],
 ) -> S {
     let mut first: Option<Arrival<S>> = None;
+    let mut all: Option<S> = None;
     let mut jumps = vec![false; delays(plant).len()];
     for k in 0..delays(plant).len() {
         let moves = S::DIRECTIONS > 0 && delays(plant)[k].jumps_at(at.t);
@@ -235,6 +240,9 @@ pub(crate) fn pass_delays<S: Scalar, P: Plant<S>>(
         };
         let before = moves.then(|| look(plant, x));
         let Some(arrival) = delays(plant)[k].pass_break(at.t) else { continue };
+        if arrival.derivative <= BENDING {
+            all = Some(all.map_or(arrival.moves, |all| common(all, arrival.moves)));
+        }
         if first.is_none_or(|first| arrival.derivative < first.derivative) {
             first = Some(arrival);
         }
@@ -253,7 +261,7 @@ pub(crate) fn pass_delays<S: Scalar, P: Plant<S>>(
     let derivative = first.map(|arrival| arrival.derivative + 1);
     let restart = |jumps: bool| Restart { derivative, moves, jumps };
     delays(plant).iter_mut().zip(jumps).for_each(|(delay, jumps)| delay.restart(restart(jumps)));
-    moves
+    all.unwrap_or(moves)
 }
 
 /// Stores delayed quantities over a part of a step, or returns false if a quartic through the values is not accurate enough.

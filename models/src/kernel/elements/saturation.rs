@@ -38,6 +38,11 @@ impl<S: Scalar> Saturation<S> {
         self.band.region != Region::Within
     }
 
+    /// Returns true if the input `u` is within the limits.
+    pub fn holds(&self, u: S) -> bool {
+        (self.band.low.value()..=self.band.high.value()).contains(&u.value())
+    }
+
     /// Finds the mode for the input `u`.
     pub fn settle(&mut self, u: S) {
         self.band.settle(u);

@@ -275,7 +275,8 @@ fn build_channel(draft: &ChannelBuilder, to: &Unit) -> Result<Channel, StudyErro
 /// deviations.
 const OUTLYING: f64 = 12.0;
 
-/// Returns a warning about outliers: far from both neighbours, which agree with theirs.
+/// Returns a warning about outliers: far from both neighbours, which agree with theirs, and from the lines through the neighbours on either
+/// side. A corner lies on one of these lines.
 pub(super) fn outliers(experiment: &str, channel: &Channel) -> Option<String> {
     let v = &channel.values;
     let off = |k: usize| (v[k] - 0.5 * (v[k - 1] + v[k + 1])).abs();
@@ -289,7 +290,13 @@ pub(super) fn outliers(experiment: &str, channel: &Channel) -> Option<String> {
     // The neighbours of such a sample are off by half as much, because of it; those of a jump or a fast motion by as much.
     let is_outlier = |&k: &usize| {
         let around = [k - 1, k + 1].into_iter().filter(|&n| n > 0 && n + 1 < v.len()).map(off).fold(0.0, f64::max);
-        spread > 0.0 && off(k) > OUTLYING * spread && around < 0.6 * off(k)
+        let continues = |a: Option<usize>, b: Option<usize>| match (a.and_then(|k| v.get(k)), b.and_then(|k| v.get(k)))
+        {
+            (Some(near), Some(far)) => (v[k] - (2.0 * near - far)).abs() < 0.6 * off(k),
+            _ => false,
+        };
+        let is_corner = continues(Some(k - 1), k.checked_sub(2)) || continues(Some(k + 1), Some(k + 2));
+        spread > 0.0 && off(k) > OUTLYING * spread && around < 0.6 * off(k) && !is_corner
     };
     let alone: Vec<usize> = (1..v.len() - 1).filter(is_outlier).collect();
     // Times are sums of rounded numbers; a nanosecond is below the spacing of any samples.
