@@ -393,9 +393,10 @@ fn shown(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> (Optimality, 
     (point, pareto(run, point, probe, watch))
 }
 
-/// Classifies the best point to first order.
+/// Classifies the best point to first order. Where nothing is minimised, a feasible point is as good as any other.
 fn optimality(run: &Run<'_>, probe: &mut Run<'_>, watch: &dyn Watch) -> Optimality {
-    let best = run.best().filter(|best| best.scaled.is_some() && !watch.wants_stop());
+    let is_asked = |best: &&Evaluation| run.problem().shape().objective_count() > 0 || !best.merit.is_feasible();
+    let best = run.best().filter(|best| best.scaled.is_some() && !watch.wants_stop()).filter(is_asked);
     best.map_or(Optimality::NotShown, |best| mops_solvers::optimality(probe, &best.point))
 }
 
