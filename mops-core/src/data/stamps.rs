@@ -265,7 +265,9 @@ pub(super) fn is_stamp(text: &str) -> bool {
 /// Returns true for a text that is meant as a date, whether it can be read or not, such as `31.02.24`, `13/05` or `Mon 13. Mai`.
 pub(super) fn is_like_date(text: &str) -> bool {
     let text = text.trim().trim_matches('"').trim();
-    let parts: Vec<&str> = text.split([' ', '-', '/', '.', ',']).filter(|part| !part.is_empty()).collect();
+    // A colon belongs to a time of day; the words for year, month and day in Chinese and Japanese are marks.
+    let is_mark = |c: char| c != ':' && (!c.is_alphanumeric() || "\u{5e74}\u{6708}\u{65e5}".contains(c));
+    let parts: Vec<&str> = text.split(is_mark).filter(|part| !part.is_empty()).collect();
     let is_number = |part: &&str| part.bytes().all(|byte| byte.is_ascii_digit());
     let (numbers, names): (Vec<&str>, Vec<&str>) = parts.into_iter().partition(is_number);
     let has_year = [numbers.first(), numbers.last()].into_iter().flatten().any(|part| matches!(part.len(), 2 | 4));
@@ -273,7 +275,7 @@ pub(super) fn is_like_date(text: &str) -> bool {
     names.iter().all(|name| month(name).is_some() || is_weekday(name))
         && match numbers.len() {
             1 => !names.is_empty(),
-            2 => !names.is_empty() || numbers.iter().all(is_day),
+            2 => !names.is_empty() || (numbers.iter().all(is_day) && !text.contains(',')),
             3 => has_year && numbers.iter().all(|number| number.len() <= 4),
             _ => false,
         }
