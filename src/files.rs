@@ -11,6 +11,8 @@ use std::path::{Path, PathBuf};
 pub(crate) use inputs::Inputs;
 use mops_core::data::as_text;
 
+use crate::plain::plain;
+
 /// Prefix of a file name during writing. The name is fixed, so that the next process replaces the remains of a killed one;
 /// only one process at a time writes in the folder of a run.
 const TEMPORARY_PREFIX: &str = ".new-";
@@ -158,7 +160,7 @@ impl Drop for AtomicFile {
     }
 }
 
-/// Writes the names of the columns of a CSV file; a spreadsheet takes none for a formula.
+/// Writes the names of the columns of a CSV file; a spreadsheet takes none for a formula, and control characters are escaped.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -166,7 +168,7 @@ pub(crate) fn write_header<W: Write>(
     writer: &mut csv::Writer<W>,
     names: impl IntoIterator<Item = String>,
 ) -> Result<(), csv::Error> {
-    writer.write_record(names.into_iter().map(|name| as_text(&name).into_owned()))
+    writer.write_record(names.into_iter().map(|name| plain(&as_text(&name)).into_owned()))
 }
 
 /// Returns the temporary path of a file during writing.

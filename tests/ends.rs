@@ -304,6 +304,26 @@ fn two_points_that_fit_equally_well_are_not_one_optimum() {
 }
 
 #[test]
+fn a_bench_that_the_time_limit_cuts_off_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let bench = |limit: &str| {
+        let mut command = cargo_bin_cmd!("mops");
+        command.args(["bench", "pid-design", "--solver", "nelder-mead,sqp", "--seeds", "1000", "--jobs", "1"]);
+        command.args(["--max-evaluations", "200", "--time-limit", limit, "--out", "out"]);
+        let output = command.current_dir(folder.path()).output().unwrap();
+        let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+        (output.status.code().unwrap(), text)
+    };
+    let (code, text) = bench("0.001");
+    assert!(code == 3 && text.contains("the time limit ended the bench after 0 of 2000 runs"), "{text}");
+    assert!(text.contains("--time-limit") && !text.contains("constraint"), "{text}");
+    let (code, text) = bench("3");
+    assert!(code == 0 && text.contains("cut off by the time limit: ") && text.contains("of 2000 runs"), "{text}");
+    let page = std::fs::read_to_string(folder.path().join("out/bench.html")).unwrap();
+    assert!(page.contains("cut off by the time limit"), "the page says it too");
+}
+
+#[test]
 fn solvers_are_compared_on_a_study_by_their_success() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("bench");

@@ -176,6 +176,21 @@ fn reports_comparisons_and_plots_of_data_overwrite_no_input() {
         place.mops(&["compare", ".", ".", "--out", out]).refused_for("would overwrite");
         assert!(fs::read(place.at(out)).unwrap() == before, "{out}");
     }
+    place.mops(&[&["run", "study.toml", "--out", "r"], &FEW[..]].concat()).ends_with(0);
+    let plot = fs::read_dir(place.at("r/plots"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name())
+        .find(|name| Path::new(name).extension().is_some_and(|end| end == "svg"));
+    let plot = format!("r/plots/{}", plot.unwrap().to_string_lossy());
+    for out in ["r/report.html", "r/evaluations.csv", "./r/../r/report.html", &plot] {
+        let before = fs::read(place.at(out)).unwrap();
+        place.mops(&["compare", "r", "r", "--out", out]).refused_for("would overwrite an output of the run in r");
+        assert!(fs::read(place.at(out)).unwrap() == before, "{out}");
+    }
+    // A page of its own may be written again.
+    for _ in 0..2 {
+        place.mops(&["compare", "r", "r", "--out", "r/comparison.html"]).ends_with(0);
+    }
     place.mops(&["data", "plots/a.svg", "--plot", "plots/a.svg"]).ends_with(0);
     place.write("columns-x.svg", RECORDING);
     place.mops(&["data", "columns-x.svg", "--plot", "columns.svg"]).refused_for("would overwrite the data file");
@@ -459,6 +474,35 @@ fn pipes_are_neither_databases_nor_locks() {
 
 #[cfg(unix)]
 #[test]
+fn a_database_beside_a_pipe_of_sqlite_is_not_opened() {
+    let place = Place::new();
+    place.calibration("data.csv");
+    let run = [&["run", "study.toml", "--out", "r"], &FEW[..]].concat();
+    for end in ["journal", "wal", "shm"] {
+        place.mops(&run).ends_with(0);
+        let companion = format!("r/evaluations.sqlite-{end}");
+        assert!(Command::new("mkfifo").arg(place.at(&companion)).status().unwrap().success());
+        place.mops(&[&run[..], &["--resume"]].concat()).refused_for(&format!("{companion} is not a file"));
+        place.mops(&["report", "r"]).ends_with(2);
+        place.mops(&["history", "r"]).ends_with(0);
+        place.mops(&["compare", "r", "r"]).ends_with(0);
+        place.mops(&["run", "study.toml", "--out", "other", "--reuse", "r", "--quiet"]).ends_with(2);
+        place.mops(&run).ends_with(0);
+        assert!(place.at("r/evaluations.previous.sqlite").is_file());
+        assert!(!place.at(&companion).exists());
+        // Without a database, too.
+        std::fs::remove_file(place.at("r/evaluations.sqlite")).unwrap();
+        assert!(Command::new("mkfifo").arg(place.at(&companion)).status().unwrap().success());
+        place.mops(&[&run[..], &["--resume"]].concat()).ends_with(0);
+    }
+    let front = place.at("front");
+    fs::create_dir(&front).unwrap();
+    assert!(Command::new("mkfifo").arg(front.join("result.json")).status().unwrap().success());
+    place.mops(&["pick", "front", "--demand", "a=1"]).refused_for("there is no result");
+}
+
+#[cfg(unix)]
+#[test]
 fn a_run_writes_through_no_link_to_a_database() {
     let place = Place::new();
     place.calibration("data.csv");
@@ -491,6 +535,88 @@ fn a_constant_that_is_no_finite_number_is_a_mistake_of_the_study() {
         let run = place.mops(&["check", "study.toml"]);
         let is_of_parameter = expression == "l/0";
         assert!(is_of_parameter || run.status == 2 && run.said.contains(word), "{expression}: {}", run.said);
+    }
+}
+
+#[test]
+fn control_characters_of_names_are_escaped_in_every_output() {
+    let place = Place::new();
+    let study = DESIGN.replace("NAME", "n\\u001b[31m").replace("\na = {", "\n\"a\\u202e\\u0007\" = {");
+    place.write("study.toml", &study);
+    place.mops(&[&["run", "study.toml", "--out", "r"], &FEW[..]].concat()).ends_with(0);
+    place.mops(&["compare", "r", "r", "--out", "c.html"]).ends_with(0);
+    for file in ["r/report.html", "r/evaluations.csv", "c.html"] {
+        let text = place.text(file);
+        let raw = text.chars().find(|c| "\u{1b}\u{7}\u{202e}".contains(*c));
+        assert!(raw.is_none() && text.contains("a\\u{202e}\\u{7}"), "{file}: {raw:?}");
+    }
+    // The data of plots in the page are JSON, still.
+    let page = place.text("r/report.html");
+    let blocks: Vec<&str> = page.split("<script type=\"application/json\">").skip(1).collect();
+    assert!(!blocks.is_empty());
+    for block in blocks {
+        let json = block.split("</script>").next().unwrap();
+        assert!(serde_json::from_str::<serde_json::Value>(json).is_ok(), "{json}");
+    }
+}
+
+#[test]
+fn a_study_that_is_made_from_names_of_any_kind_is_valid() {
+    let place = Place::new();
+    let rows: String = (0..12).map(|k| format!("{k},{}\n", k * k)).collect();
+    for (file, header) in [
+        ("plain.csv", "\"a\n[experiments.evil]\nb\""),
+        ("plain.csv", "\"a\n[experiments.evil]\nfile=\"\"x.csv\"\"\n\""),
+        ("plain.csv", "\"a\r[x]b\""),
+        ("plain.csv", "a\u{1b}[31mred\u{7}"),
+        ("plain.csv", "\u{202e}a\u{7f}\u{85}"),
+        ("a\nb = 1\n.csv", "y"),
+        ("a\"\\'\u{1b}.csv", "y"),
+    ] {
+        for folder in ["study", "st\nudy = 1", "st\u{1b}\"\\udy"] {
+            let _ = fs::remove_dir_all(place.at(folder));
+            place.write(file, &format!("t [s],{header}\n{rows}"));
+            place.mops(&["new", folder, "--from-data", file]).ends_with(0);
+            let text = place.text(&format!("{folder}/study.toml"));
+            let table: toml::Table = text.parse().unwrap_or_else(|why| panic!("{file:?} {header:?}: {why}\n{text}"));
+            let experiments: Vec<&String> = table["experiments"].as_table().unwrap().keys().collect();
+            assert_eq!(experiments, ["calibration", "validation"]);
+            assert!(!text.contains('\u{202e}') || header.contains('\u{202e}'), "{text}");
+            place.mops(&["check", &format!("{folder}/study.toml")]).ends_with(0);
+            let _ = fs::remove_dir_all(place.at(folder));
+            place.mops(&["new", folder, "--template", "equations"]).ends_with(0);
+            place.mops(&["check", &format!("{folder}/study.toml")]).ends_with(0);
+        }
+    }
+}
+
+#[test]
+fn a_calibration_needs_an_experiment_that_is_not_for_validation() {
+    let place = Place::new();
+    place.write("data.csv", RECORDING);
+    let study = CALIBRATION.replace("FILE", "data.csv");
+    let validating = study.replace("[experiments.step]", "[experiments.step]\nrole = \"validation\"");
+    for text in [
+        validating.clone(),
+        validating.replace("demand = 1 }", "demand = 1, usage = \"inequality\" }"),
+        format!("{validating}y = {{ fit = {{ signal = \"x\" }}, usage = \"monitor\" }}\n"),
+    ] {
+        place.write("study.toml", &text);
+        for command in ["check", "run"] {
+            place.mops(&[command, "study.toml"]).refused_for("belong to experiments for validation only");
+        }
+    }
+    let both = validating.replace(
+        "[criteria]",
+        "[experiments.other]\nfile = \"data.csv\"\nchannels = { x = \"x\" }\n\
+                                   inputs = { u = \"u\" }\n[criteria]",
+    );
+    place.write("study.toml", &both);
+    place.mops(&["check", "study.toml"]).ends_with(0);
+    for scale in ["0", "0.0", "inf", "nan"] {
+        let scaled = format!("channels = {{ x = {{ column = \"x\", scale = {scale} }} }}");
+        place.write("study.toml", &study.replace("channels = { x = \"x\" }", &scaled));
+        place.mops(&["check", "study.toml"]).refused_for("`scale` must be finite and not 0");
     }
 }
 

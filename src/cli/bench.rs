@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use maud::{PreEscaped, html};
-use mops_core::{Catalogue, Diagnostic, Halt, SMALL_OBJECTIVE, Stop, Task};
+use mops_core::{Catalogue, Diagnostic, Halt, SMALL_OBJECTIVE, Stop, Study, Task, Usage};
 use serde::Serialize;
 
 use super::default_folder;
@@ -16,7 +16,7 @@ use crate::numbers::{number, significant};
 use crate::report::{Color, Curve, Plot, page};
 use crate::search::{DEFAULT_EVALUATIONS, Options, Solved, suits};
 use crate::solve::solve;
-use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, print, print_json, table};
+use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, eprint_line, print, print_json, table};
 
 /// Arguments of `mops bench`.
 #[derive(Args)]
@@ -90,6 +90,12 @@ struct Bench {
     /// Relative distance from it within which a run succeeds.
     within: f64,
     max_evaluations: usize,
+    /// Number of runs asked for.
+    planned: usize,
+    /// Cause for which fewer runs finished: the time limit or an interruption.
+    cut_off: Option<&'static str>,
+    /// Solvers without a finished run.
+    unfinished: Vec<&'static str>,
     runs: Vec<BenchRun>,
 }
 
@@ -143,11 +149,16 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
             }
         }
     }
+    let planned = solvers.len() * usize::from(arguments.seeds);
+    let cut_off = match cancellation.requested() {
+        _ if runs.len() == planned => None,
+        Some(Halt::TimeLimit) => Some("time limit"),
+        _ => Some(INTERRUPTION),
+    };
     let found = runs.iter().filter_map(|run| run.objective).reduce(f64::min);
-    let Some(known) = arguments.known.or(found) else {
-        return Err(Diagnostic::new("no run found a point that satisfies the constraints")
-            .with_help("raise --max-evaluations, or try other solvers")
-            .into());
+    let known = match arguments.known.or(found) {
+        Some(known) if !(runs.is_empty() && cut_off.is_some()) => known,
+        _ => return without_value(&file.study, cut_off.map(|cause| (cause, runs.len(), planned))),
     };
     let limit = known + arguments.within * known.abs().max(SMALL_OBJECTIVE);
     for run in &mut runs {
@@ -155,7 +166,10 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         let first = run.history.iter().find(|(_, objective)| *objective <= limit);
         run.arrived = first.map(|(evaluations, _)| *evaluations).filter(|_| run.success);
     }
-    let bench = Bench { study: file.study.name().to_owned(), known, within: arguments.within, max_evaluations, runs };
+    let (study, within) = (file.study.name().to_owned(), arguments.within);
+    let kinds = solvers.iter().map(|solver| solver.kind);
+    let unfinished = kinds.filter(|kind| runs.iter().all(|run| run.solver != *kind)).collect();
+    let bench = Bench { study, known, within, max_evaluations, planned, cut_off, unfinished, runs };
     bench.write(&folder, &outputs)?;
     if arguments.json {
         print_json(&bench)?;
@@ -164,6 +178,23 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     }
     let interrupted = cancellation.requested() == Some(Halt::Interrupted);
     Ok(if interrupted { ExitCode::from(4) } else { ExitCode::SUCCESS })
+}
+
+/// Returns the end of a bench whose runs give no best known value.
+fn without_value(study: &Study, cut_off: Option<(&str, usize, usize)>) -> Result<ExitCode, CommandError> {
+    if let Some((cause, finished, planned)) = cut_off {
+        let fact = format!("the {cause} ended the bench after {finished} of {planned} runs, without an objective");
+        eprint_line(&format!("error: {fact}; raise --time-limit, or lower --seeds"));
+        return Ok(ExitCode::from(if cause == INTERRUPTION { 4 } else { 3 }));
+    }
+    let is_constrained = study.rows().iter().any(|row| matches!(row.usage, Usage::Inequality | Usage::Equality));
+    let (fact, way_out) = match is_constrained {
+        true => {
+            ("no run found a point that satisfies the constraints", "raise --max-evaluations, or try other solvers")
+        }
+        false => ("no run found a point whose simulations succeed", "`mops simulate` shows why they fail"),
+    };
+    Err(Diagnostic::new(fact).with_help(way_out).into())
 }
 
 fn of_run(solver: &'static str, seed: u64, solved: &Solved) -> BenchRun {
@@ -227,8 +258,16 @@ impl Bench {
     }
 
     fn introduction(&self) -> String {
+        let finished = self.runs.len();
+        let cut_off = self.cut_off.map_or_else(String::new, |cause| {
+            let none = match self.unfinished.join(", ") {
+                none if none.is_empty() => none,
+                none => format!(", none of {none}"),
+            };
+            format!("cut off by the {cause}: {finished} of {} runs finished{none}; ", self.planned)
+        });
         format!(
-            "{}: best known objective {}; a run succeeds within {} of it; budget {} evaluations",
+            "{}: {cut_off}best known objective {}; a run succeeds within {} of it; budget {} evaluations",
             self.study,
             significant(self.known, 6),
             significant(100.0 * self.within, 3) + " %",
@@ -295,6 +334,9 @@ impl Bench {
         write("bench.html", page(&format!("{}: solvers", self.study), &body.into_string()))
     }
 }
+
+/// Cause of an end by a signal.
+const INTERRUPTION: &str = "interruption";
 
 /// Output files.
 const FILES: [&str; 4] = ["runs.csv", "profile.svg", "profile.png", "bench.html"];

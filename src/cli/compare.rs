@@ -9,6 +9,7 @@ use mops_core::{Catalogue, Diagnostic, Problem};
 use serde_json::{Value, json};
 
 use super::past_run::PastRun;
+use super::run_files::of_any_run;
 use crate::files::{Inputs, Outputs};
 use crate::numbers::significant;
 use crate::report::{Responses, Rows, comparison_page};
@@ -62,7 +63,11 @@ pub(super) fn compare(catalogue: &Catalogue, arguments: &Arguments) -> Result<Ex
     }
     if let Some(path) = &arguments.out {
         let mut inputs = Inputs::default();
-        runs.iter().for_each(|run| run.add_to(&mut inputs));
+        for run in &runs {
+            run.add_to(&mut inputs);
+            let what = format!("an output of the run in {}", run.folder.display());
+            of_any_run(&run.folder).iter().for_each(|path| inputs.add(path, &what));
+        }
         let (responses, missing_responses) = responses(catalogue, &runs, &results, &mut inputs);
         let names: Vec<(String, String)> = names.into_iter().enumerate().map(|(i, name)| (letter(i), name)).collect();
         let page = comparison_page(&names, &tables, &responses, &missing_responses);

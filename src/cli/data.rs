@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use mops_core::Diagnostic;
-use mops_core::data::{DataFile, is_since_1970};
+use mops_core::data::{DataFile, unit_since_1970};
 use mops_core::identification::{excitation_report, spacing};
 use mops_discrepancy::noise_of;
 
@@ -72,10 +72,8 @@ pub(super) fn data(arguments: &Arguments) -> Result<ExitCode, CommandError> {
         let is_time = time.as_ref() == Some(name);
         if is_time {
             sampling = sample_time(name, column.unit.unwrap_or("s"), &finite().collect::<Vec<f64>>());
-            if column.unit.is_none() && finite().next().is_some_and(is_since_1970) {
-                advice.push(format!(
-                    "`{name}`: counts as s, but is probably in ms, us or ns since 1970; see `time-unit`\n"
-                ));
+            if let (None, Some(unit)) = (column.unit, finite().next().and_then(unit_since_1970)) {
+                advice.push(format!("`{name}`: counts as s, but is probably in {unit} since 1970; see `time-unit`\n"));
             }
         }
         let noise = if is_time || is_switched(column.values) { None } else { noise(column.values, times) };

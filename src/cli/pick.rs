@@ -16,7 +16,7 @@ use super::reading;
 use super::run_files::relative_path;
 use super::study::{Home, StudyArguments, inputs, open_as};
 use super::tables::met_text;
-use crate::files::Outputs;
+use crate::files::{self, Outputs};
 use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 use crate::toml_text::{self, TomlText, key, quoted};
 
@@ -133,9 +133,9 @@ fn output_path(arguments: &Arguments) -> Result<PathBuf, Diagnostic> {
 fn front(folder: &Path) -> Result<Vec<Value>, Diagnostic> {
     let path = folder.join("result.json");
     let help = "name the output folder of `mops pareto`, such as results/pid-pareto";
-    let text = fs::read_to_string(&path)
+    let text = files::read(&path)
         .map_err(|_| Diagnostic::new(format!("there is no result in `{}`", folder.display())).with_help(help))?;
-    let result: Value = serde_json::from_str(&text)
+    let result: Value = serde_json::from_slice(&text)
         .map_err(|error| Diagnostic::new(format!("cannot parse `{}`: {error}", path.display())).with_help(help))?;
     match result["front"].as_array() {
         Some(points) if !points.is_empty() && result.get("trade_offs").is_some() => Ok(points.clone()),

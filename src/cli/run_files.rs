@@ -48,24 +48,23 @@ pub(super) struct Names {
     folders: &'static [(&'static str, &'static [&'static str])],
 }
 
-/// Returns the further outputs of a task.
-fn names_of(task: Task) -> Names {
-    match task {
-        Task::MonteCarlo => Names { files: &["samples.csv"], folders: &[] },
-        Task::Pareto => Names { files: &["study.toml"], folders: &[] },
-        Task::Diagnosis => {
-            Names { files: &[DIAGNOSIS, "repaired.toml", "repaired.rs"], folders: &[("predictions", &["csv"])] }
-        }
-        _ => Names { files: &[], folders: &[] },
-    }
-}
+/// Further outputs of tasks.
+const OF_TASKS: [(Task, Names); 3] = [
+    (Task::MonteCarlo, Names { files: &["samples.csv"], folders: &[] }),
+    (Task::Pareto, Names { files: &["study.toml"], folders: &[] }),
+    (
+        Task::Diagnosis,
+        Names { files: &[DIAGNOSIS, "repaired.toml", "repaired.rs"], folders: &[("predictions", &["csv"])] },
+    ),
+];
 
 /// Checks before a run that none of its outputs would replace an input.
 ///
 /// # Errors
 /// If one would; the error names the input.
 pub(super) fn check_run(outputs: &Outputs, folder: &Path, task: Task) -> Result<(), CommandError> {
-    [RUN, REPORT, names_of(task)].into_iter().try_for_each(|names| check_outputs(outputs, folder, names))
+    let of_task = OF_TASKS.into_iter().filter(|(other, _)| *other == task).map(|(_, names)| names);
+    [RUN, REPORT].into_iter().chain(of_task).try_for_each(|names| check_outputs(outputs, folder, names))
 }
 
 /// Checks that no output of these names would replace an input.
@@ -73,6 +72,11 @@ pub(super) fn check_run(outputs: &Outputs, folder: &Path, task: Task) -> Result<
 /// # Errors
 /// If one would; the error names the input.
 pub(super) fn check_outputs(outputs: &Outputs, folder: &Path, names: Names) -> Result<(), CommandError> {
+    paths(folder, names).try_for_each(|path| outputs.check(&path).map_err(CommandError::cannot_write(&path)))
+}
+
+/// Returns the paths of the outputs of these names: files, folders, and the files in them.
+fn paths(folder: &Path, names: Names) -> impl Iterator<Item = PathBuf> {
     let files = names.files.iter().map(|name| folder.join(name));
     let folders = names.folders.iter().map(|(name, ends)| (folder.join(name), ends));
     let below = folders.flat_map(|(folder, ends)| {
@@ -81,10 +85,13 @@ pub(super) fn check_outputs(outputs: &Outputs, folder: &Path, names: Names) -> R
         let written: Vec<PathBuf> = written.collect();
         std::iter::once(folder).chain(written)
     });
-    for path in files.chain(below) {
-        outputs.check(&path).map_err(CommandError::cannot_write(&path))?;
-    }
-    Ok(())
+    files.chain(below)
+}
+
+/// Returns the paths of all files that a run of any task may have written into a folder.
+pub(super) fn of_any_run(folder: &Path) -> Vec<PathBuf> {
+    let of_tasks = OF_TASKS.into_iter().map(|(_, names)| names);
+    [RUN, REPORT].into_iter().chain(of_tasks).flat_map(|names| paths(folder, names)).collect()
 }
 
 /// Output files of a run.

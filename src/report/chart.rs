@@ -9,6 +9,7 @@ use super::plot::{Bound, Color, Curve, CurveStyle, Level, Plot};
 use super::range::{drawable, x_range, y_range};
 use super::sampling::thinned;
 use super::svg::class;
+use crate::plain::escaped;
 
 /// Style sheet and scripts of pages with interactive plots. uPlot 1.6.32: <https://github.com/leeoniya/uPlot>, MIT licence.
 pub(crate) const STYLE: &str = include_str!("../../assets/uPlot.min.css");
@@ -25,12 +26,17 @@ pub(super) fn markup(plot: &Plot) -> Markup {
         @if is_chart(plot) {
             div class="chart" {
                 (PreEscaped(plot.svg()))
-                script type="application/json" { (PreEscaped(data(plot).to_string().replace('<', "\\u003c"))) }
+                script type="application/json" { (PreEscaped(text(plot).replace('<', "\\u003c"))) }
             }
         } @else {
             div class="wide" { (PreEscaped(plot.svg())) }
         }
     }
+}
+
+/// Returns the data of an interactive plot as text, in which escaped characters are shown as in the other text of the page.
+fn text(plot: &Plot) -> String {
+    escaped(&data(plot).to_string(), |c| format!("\\\\{}", &c.escape_unicode().to_string()[1..])).into_owned()
 }
 
 /// Returns true if the plot has curves over x that no other part of the page refers to.

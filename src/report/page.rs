@@ -12,6 +12,7 @@ use super::{
     uncertainty,
 };
 use crate::numbers::significant;
+use crate::plain::plain;
 
 /// Plots of the page, by section.
 pub(super) struct Plots {
@@ -39,7 +40,7 @@ pub fn page(title: &str, body: &str) -> String {
 /// Returns a page with the common head: one file, light and dark scheme, sortable tables.
 pub(super) fn document(title: &str, body: Markup) -> Markup {
     let charts = body.0.contains("class=\"chart\"");
-    html! {
+    let whole = html! {
         (DOCTYPE)
         html lang="en" {
             head {
@@ -57,7 +58,9 @@ pub(super) fn document(title: &str, body: Markup) -> Markup {
                 @if charts { @for text in chart::SCRIPTS { script { (PreEscaped(text)) } } }
             }
         }
-    }
+    };
+    // Names from a study are untrusted text, wherever the page shows them.
+    PreEscaped(plain(&whole.0).into_owned())
 }
 
 /// Returns the page of a report.

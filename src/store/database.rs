@@ -10,6 +10,7 @@ use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, Row, params}
 
 use super::bytes;
 use super::columns::{columns, known};
+use super::relocate::obstacle;
 use super::runs::{RunRow, RunState, insert_run, now, run_row};
 
 /// `PRAGMA application_id`: "mops" in ASCII.
@@ -100,8 +101,7 @@ impl Database {
     }
 
     fn read(path: &Path, writes: bool) -> rusqlite::Result<Option<Self>> {
-        // A pipe would be waited for, and a device may have no end.
-        if fs::metadata(path).is_ok_and(|file| !file.is_file()) {
+        if obstacle(path).is_some() {
             return Ok(None);
         }
         let mode = if writes { OpenFlags::SQLITE_OPEN_READ_WRITE } else { OpenFlags::SQLITE_OPEN_READ_ONLY };

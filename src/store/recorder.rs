@@ -18,6 +18,7 @@ use super::ending::Ending;
 use super::identity::Identity;
 use super::lock::FolderLock;
 use super::memory::{Memory, Message, ROOM};
+use super::relocate::obstacle;
 use super::replace::make_room;
 use super::runs::{RunRow, RunState};
 use super::writer::{DelayedWatch, Unwritten, write};
@@ -391,6 +392,11 @@ fn open_database(folder: &Path, writes: bool) -> Result<Database, OpenError> {
     if writes && path.is_symlink() {
         return Err(Diagnostic::new(format!("{} is a symbolic link, which a run does not follow", path.display()))
             .with_help("copy the database to its place, or choose its folder with --out")
+            .into());
+    }
+    if let Some(other) = obstacle(&path).filter(|other| *other != path) {
+        return Err(Diagnostic::new(format!("{} is not a file, and SQLite would wait for it", other.display()))
+            .with_help("remove it, or choose another folder with --out")
             .into());
     }
     Database::open(&path, writes).map_err(|error| database_error(folder, &error))?.ok_or_else(|| {

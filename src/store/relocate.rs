@@ -28,6 +28,12 @@ pub(super) fn with_companions(path: &Path) -> [PathBuf; 4] {
     })
 }
 
+/// Returns the first of a database and its companion files that is not a regular file: SQLite would wait for the writer of a pipe, and
+/// a device may have no end.
+pub(super) fn obstacle(path: &Path) -> Option<PathBuf> {
+    with_companions(path).into_iter().find(|name| fs::metadata(name).is_ok_and(|file| !file.is_file()))
+}
+
 impl Database {
     /// Removes the leftover of a run that was killed while it created its database.
     pub(super) fn clear_draft(path: &Path) {
@@ -55,7 +61,7 @@ impl Database {
     /// Returns true if the database contains no run. Earlier versions created the database in several steps and left such a
     /// file when killed at the start.
     pub(super) fn is_blank(path: &Path) -> bool {
-        if fs::symlink_metadata(path).is_ok_and(|entry| !entry.is_file()) {
+        if obstacle(path).is_some() {
             return false;
         }
         let count = |connection: &Connection, sql: &str| connection.query_row(sql, [], |row| row.get::<_, i64>(0));
@@ -83,7 +89,7 @@ impl Database {
         }
         let path = path.clone();
         let temporary = temporary_path(&path);
-        let _ = fs::remove_file(&temporary);
+        Self::clear_draft(&path);
         let copied = temporary.to_str().ok_or_else(|| io::Error::other("its path is not valid UTF-8"));
         self.connection.execute("VACUUM INTO ?", [copied?]).map_err(io::Error::other)?;
         fs::rename(&temporary, &path)?;

@@ -11,7 +11,7 @@ use rusqlite::{Connection, OpenFlags};
 use super::database::{Database, is_of_machine, is_temporary};
 use super::file;
 use super::recorder::OpenError;
-use super::relocate::with_companions;
+use super::relocate::{obstacle, with_companions};
 use super::runs::RunState;
 
 /// Makes room for the database of a new run; returns a note for the user if an old database was renamed.
@@ -32,6 +32,9 @@ pub(super) fn make_room(folder: &Path) -> Result<Option<String>, OpenError> {
     };
     if !entry.is_file() {
         return renamed("is not a database of this version of mops");
+    }
+    if let Some(other) = obstacle(&path) {
+        return renamed(&format!("cannot be read beside {}, which is not a file", other.display()));
     }
     let in_use = |what: &str| {
         OpenError::Mistake(

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use csv::{ByteRecord, ReaderBuilder};
 
 use super::Variable;
-use super::header::{Header, later_headers};
-use super::stamps::{self, Origin, Reference, is_stamp};
+use super::header::{Header, is_date, is_time, later_headers};
+use super::stamps::{self, Origin, Reference, is_basic, is_like_date, is_stamp};
 use crate::diagnostic::{Diagnostic, Source};
 
 /// Positions of the cells in the text.
@@ -78,24 +78,8 @@ fn read_from(source: &Arc<Source>, start: usize) -> Result<Content, Diagnostic> 
             .with_help("write thousands without a mark, or decimal numbers with a fixed number of digits")
             .at(source, span));
     }
-    let texts: Vec<usize> = (0..columns.len()).filter(|&k| columns[k].bad.is_some()).collect();
-    let mut stamps: Vec<(usize, stamps::Column)> = Vec::new();
-    let mut skipped = Vec::new();
-    for &cell in &texts {
-        let name = &header.names[cell].0;
-        match columns[cell].stamps(|row| layout.cell(&source.text, cell, row), &source.text) {
-            Some(Ok(column)) => stamps.push((cell, column)),
-            Some(Err(reason)) => skipped.push((cell, format!("{name}: {reason}"))),
-            None => {
-                let row = columns[cell].bad.expect("it is a text");
-                let span = layout.cell(&source.text, cell, row).expect("the row is in the layout");
-                skipped.push((cell, format!("{name}: text (`{}`)", shortened(&source.text[span]))));
-            }
-        }
-    }
-    if let Some((date, time)) = joined(&mut stamps) {
-        skipped.push((date, format!("{}: joined with `{}`", header.names[date].0, header.names[time].0)));
-    }
+    let cell_at = |cell: usize, row: usize| layout.cell(&source.text, cell, row).map_or("", |span| &source.text[span]);
+    let (stamps, mut skipped) = read_stamps(&columns, &header.names, cell_at);
     skipped.sort();
     let mut variables = Vec::new();
     for (cell, (column, (name, unit))) in columns.into_iter().zip(&header.names).enumerate() {
@@ -104,7 +88,7 @@ fn read_from(source: &Arc<Source>, start: usize) -> Result<Content, Diagnostic> 
             let (values, origin) = since_first(column);
             let unit = Some("s".to_owned());
             layout.cells.push(cell);
-            variables.push(Variable { name, unit, rows, columns: 1, values, origin: Some(origin) });
+            variables.push(Variable { name, unit, rows, columns: 1, values, origin });
         } else if skipped.iter().any(|(known, _)| *known == cell) {
         } else if cell + 1 == header.names.len() && header.ends_unnamed(source) && !column.has_numbers {
             // A separator at the end of the header starts no column.
@@ -120,7 +104,7 @@ fn read_from(source: &Arc<Source>, start: usize) -> Result<Content, Diagnostic> 
             });
         }
     }
-    let skipped = skipped.into_iter().map(|(_, reason)| reason).collect();
+    let skipped = skipped.into_iter().map(|(cell, reason)| format!("{}: {reason}", header.names[cell].0)).collect();
     if variables.is_empty() {
         return Err(Diagnostic::new("no column of the file contains numbers")
             .with_help("separate the cells by commas, semicolons, tabs or blanks")
@@ -129,30 +113,103 @@ fn read_from(source: &Arc<Source>, start: usize) -> Result<Content, Diagnostic> 
     Ok(Content { variables, skipped, layout, before: start..start })
 }
 
-/// Adds the dates of one column to the times of day of another, if there is exactly one of each and no other column of time stamps.
-/// Returns both columns.
-fn joined(stamps: &mut Vec<(usize, stamps::Column)>) -> Option<(usize, usize)> {
-    let [(_, a), (_, b)] = &stamps[..] else { return None };
-    let date = match (a.is_dates, a.reference, b.is_dates, b.reference) {
-        (true, Reference::Local, _, Reference::Midnight) => 0,
-        (_, Reference::Midnight, true, Reference::Local) => 1,
-        _ => return None,
-    };
-    let (date, dates) = stamps.remove(date);
-    let (time, times) = &mut stamps[0];
-    for (time, date) in times.nanoseconds.iter_mut().zip(dates.nanoseconds) {
-        *time = time.zip(date).and_then(|(time, date)| time.checked_add(date));
+/// Reads the columns of time stamps. Returns them, and the columns of text with the reason why they are skipped.
+fn read_stamps<'t>(
+    columns: &[Reading],
+    names: &[(String, Option<String>)],
+    cell_at: impl Fn(usize, usize) -> &'t str,
+) -> (Vec<(usize, stamps::Column)>, Vec<(usize, String)>) {
+    let (mut stamps, mut skipped) = (Vec::new(), Vec::new());
+    for (cell, column) in columns.iter().enumerate() {
+        let (name, unit) = &names[cell];
+        match column.stamps(|row| cell_at(cell, row), name, unit.as_deref()) {
+            Some(Ok(column)) => stamps.push((cell, column)),
+            Some(Err(reason)) => skipped.push((cell, reason)),
+            None => {
+                let unread = |row: &usize| !is_gap(cell_at(cell, *row)) && !is_stamp(cell_at(cell, *row));
+                if let Some(first) = column.bad {
+                    let row = (first..column.values.len()).find(unread).unwrap_or(first);
+                    skipped.push((cell, format!("text (`{}`)", shortened(cell_at(cell, row)))));
+                }
+            }
+        }
     }
-    times.reference = Reference::Local;
-    Some((date, *time))
+    // Columns of dates that are not read, or read as numbers.
+    let is_unread_date = |(cell, column): &(usize, &Reading)| {
+        let is_read = stamps.iter().any(|(known, _)| known == cell);
+        let given = || (0..column.values.len()).map(|row| cell_at(*cell, row)).filter(|text| !is_gap(text));
+        let differs = || given().next().is_some_and(|first| given().any(|text| text != first));
+        !is_read && ((column.bad.is_some() && given().any(is_like_date)) || (is_date(&names[*cell].0) && differs()))
+    };
+    let unread: Vec<usize> = columns.iter().enumerate().filter(is_unread_date).map(|(cell, _)| cell).collect();
+    join(&mut stamps, &mut skipped, names, &unread);
+    (stamps, skipped)
 }
 
-/// Returns the times of a column since its first one, s, and the first one.
-fn since_first(column: &stamps::Column) -> (Vec<f64>, Origin) {
-    let first = column.nanoseconds.iter().flatten().next().copied().unwrap_or(0);
+/// Adds the dates of one column to the times of day of all others. Times of day are skipped if their dates are not read or may be in
+/// several columns, and so are dates without a time beside times that are not read: either would merge different instants.
+fn join(
+    stamps: &mut Vec<(usize, stamps::Column)>,
+    skipped: &mut Vec<(usize, String)>,
+    names: &[(String, Option<String>)],
+    unread: &[usize],
+) {
+    let name = |cell: usize| names[cell].0.as_str();
+    let is_midnight = |column: &stamps::Column| column.reference == Some(Reference::Midnight);
+    let is_dates = |column: &stamps::Column| column.is_dates && column.reference == Some(Reference::Local);
+    let refuse = |stamps: &mut Vec<(usize, stamps::Column)>, skipped: &mut Vec<(usize, String)>, reason: &str| {
+        let refused = stamps.extract_if(.., |(_, column)| is_midnight(column) || is_dates(column));
+        skipped.extend(refused.map(|(cell, _)| (cell, reason.to_owned())));
+    };
+    let times: Vec<usize> = stamps.iter().filter(|(_, column)| is_midnight(column)).map(|(cell, _)| *cell).collect();
+    let read = stamps.iter().filter(|(_, column)| is_dates(column)).map(|(cell, _)| *cell);
+    let mut dates: Vec<usize> = read.chain(unread.iter().copied()).collect();
+    if dates.iter().any(|cell| is_date(name(*cell))) {
+        dates.retain(|cell| is_date(name(*cell)));
+    }
+    if times.is_empty() {
+        let unread_time = skipped.iter().find(|(cell, _)| is_time(name(*cell)));
+        if let Some((cell, reason)) = unread_time.cloned() {
+            refuse(stamps, skipped, &format!("the times of its days, in `{}`, are not read: {reason}", name(cell)));
+        }
+        return;
+    }
+    match dates[..] {
+        [] => {}
+        [date] if unread.contains(&date) => {
+            let known = skipped.iter().find(|(cell, _)| *cell == date);
+            let why = known.map_or("numbers", |(_, reason)| reason);
+            let way_out = "write them as year-month-day, or delete the column if it has no dates";
+            let way_out = if why.contains(';') { String::new() } else { format!("; {way_out}") };
+            refuse(stamps, skipped, &format!("its dates, in `{}`, are not read: {why}{way_out}", name(date)));
+        }
+        [date] => {
+            let at = stamps.iter().position(|(cell, _)| *cell == date).expect("the dates are read");
+            let (_, dates) = stamps.remove(at);
+            for (_, column) in stamps.iter_mut().filter(|(_, column)| is_midnight(column)) {
+                for (time, date) in column.nanoseconds.iter_mut().zip(&dates.nanoseconds) {
+                    *time = time.zip(*date).and_then(|(time, date)| time.checked_add(date));
+                }
+                column.reference = Some(Reference::Local);
+            }
+            let of_times: Vec<String> = times.iter().map(|cell| format!("`{}`", name(*cell))).collect();
+            skipped.push((date, format!("joined with {}", of_times.join(", "))));
+        }
+        _ => {
+            let several: Vec<String> = dates.iter().map(|cell| format!("`{}`", name(*cell))).collect();
+            let several = several.join(", ");
+            refuse(stamps, skipped, &format!("its dates may be in several columns ({several}); delete all but one"));
+        }
+    }
+}
+
+/// Returns the times of a column since its first one, s, and the first one; elapsed times are returned as they are.
+fn since_first(column: &stamps::Column) -> (Vec<f64>, Option<Origin>) {
+    let nanoseconds = column.nanoseconds.iter().flatten().next().copied().unwrap_or(0);
+    let origin = column.reference.map(|reference| Origin { nanoseconds, reference });
+    let zero = origin.map_or(0, |origin| origin.nanoseconds);
     #[allow(clippy::cast_precision_loss)]
-    let value = |ns: &Option<i64>| ns.map_or(f64::NAN, |ns| (ns - first) as f64 * 1e-9);
-    let origin = Origin { nanoseconds: first, reference: column.reference };
+    let value = |ns: &Option<i64>| ns.map_or(f64::NAN, |ns| (ns - zero) as f64 * 1e-9);
     (column.nanoseconds.iter().map(value).collect(), origin)
 }
 
@@ -222,19 +279,24 @@ impl Reading {
         }
     }
 
-    /// Returns the time stamps of a column that has only these and gaps, as [`stamps::column`].
-    fn stamps(
+    /// Returns the time stamps of a column that has only these and gaps, as [`stamps::column`]. Stamps in digits only are numbers, too:
+    /// the name of the column decides.
+    fn stamps<'t>(
         &self,
-        cell: impl Fn(usize) -> Option<Range<usize>>,
-        text: &str,
+        cell: impl Fn(usize) -> &'t str,
+        name: &str,
+        unit: Option<&str>,
     ) -> Option<Result<stamps::Column, String>> {
-        let first = self.bad.filter(|_| !self.has_numbers)?;
-        let shown = |row: usize| cell(row).map_or("", |span| &text[span]);
-        if !is_stamp(shown(first)) {
-            return None;
-        }
-        let given = |row: usize| Some(shown(row)).filter(|cell| number(cell.as_bytes(), b';').is_none());
-        stamps::column((0..self.values.len()).map(given))
+        let given = |row: usize| Some(cell(row)).filter(|text| !is_gap(text));
+        let all = || (0..self.values.len()).map(given);
+        let is_basic = |text: &str| {
+            (is_date(name) && is_basic(text, false)) || ((is_date(name) || is_time(name)) && is_basic(text, true))
+        };
+        let is_stamped = match self.bad {
+            Some(_) => !self.has_numbers,
+            None => self.has_numbers && unit.is_none() && all().flatten().all(is_basic),
+        };
+        if is_stamped { stamps::column(all(), unit) } else { None }
     }
 
     /// Returns the first bad row of a column that contains numbers; a column of text only has none.
@@ -420,6 +482,11 @@ pub(super) fn number(cell: &[u8], separator: u8) -> Option<f64> {
         _ if separator != b',' && cell.contains(',') => cell.replace(',', ".").parse().ok(),
         _ => cell.parse().ok(),
     }
+}
+
+/// Returns true for a gap.
+fn is_gap(cell: &str) -> bool {
+    number(cell.as_bytes(), b',').is_some_and(f64::is_nan)
 }
 
 /// Returns true for a number, a time stamp or a gap.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::csv::{cells, first_line, is_value, number, refuse_long_quotes, separator};
 use super::formulas::from_text;
+use super::stamps::Form;
 use crate::diagnostic::{Diagnostic, Source};
 use crate::unit::Unit;
 
@@ -70,10 +71,15 @@ pub(super) fn label(text: &str) -> Option<(&str, &str)> {
     };
     // `trial (2)` and `motor (left)` have no unit.
     let is_unit =
-        |text: &str| text.contains(|c: char| c.is_alphabetic() || "%\u{b0}".contains(c)) && Unit::parse(text).is_ok();
+        |text: &str| text.contains(|c: char| c.is_alphabetic() || "%\u{b0}".contains(c)) && is_unit_or_form(text);
     let named = |(name, unit): &(&str, &str)| !name.is_empty() && is_unit(unit);
     let marked = || [" / ", " in ", ", "].into_iter().find_map(|mark| after(mark).filter(named));
     within('[', ']').or_else(marked).or_else(|| within('(', ')').filter(named))
+}
+
+/// Returns true for a unit, or the form of time stamps.
+fn is_unit_or_form(text: &str) -> bool {
+    Unit::parse(text).is_ok() || Form::parse(text).is_some()
 }
 
 /// Formats a label that [`label`] can read.
@@ -111,7 +117,7 @@ fn units_below(text: &str, body: usize, separator: u8, count: usize) -> Option<(
             .trim();
         match bare {
             "" | "-" | "1" => Some(None),
-            unit => Unit::parse(unit).is_ok().then(|| Some(unit.to_owned())),
+            unit => is_unit_or_form(unit).then(|| Some(unit.to_owned())),
         }
     };
     let units: Vec<Option<String>> = spans.iter().map(unit).collect::<Option<_>>()?;
@@ -170,6 +176,34 @@ pub(super) fn is_time(name: &str) -> bool {
 
 fn is_named_time(name: &str) -> bool {
     name == "t" || TIMES.contains(&name.to_lowercase().as_str())
+}
+
+/// Words for a date or a day in the name of a column, in lower case.
+const DATES: [&str; 17] = [
+    "date",
+    "dates",
+    "datum",
+    "fecha",
+    "dato",
+    "day",
+    "days",
+    "weekday",
+    "tag",
+    "tage",
+    "wochentag",
+    "jour",
+    "dag",
+    "d\u{ed}a",
+    "dia",
+    "giorno",
+    "ymd",
+];
+
+/// Returns true for the name of a column of dates, such as `Date (UTC)` or `Messdatum`.
+pub(super) fn is_date(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let mut words = name.split(|c: char| !c.is_alphabetic());
+    words.any(|word| DATES.contains(&word) || word.ends_with("datum"))
 }
 
 /// Returns the part before the unit of a name such as `time_s`.

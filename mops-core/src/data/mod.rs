@@ -1,5 +1,6 @@
 //! Measured data: readers that convert a file to named columns of numbers.
 
+mod calendar;
 mod csv;
 mod encoding;
 mod files;
@@ -196,13 +197,13 @@ impl DataFile {
 
     /// Returns the error for a file without a time column; the caller adds a location, and what else to do.
     pub fn without_time(&self, otherwise: &str) -> Diagnostic {
-        let reason =
-            self.skipped.iter().find(|entry| entry.split_once(": ").is_some_and(|(name, _)| header::is_time(name)));
-        match reason.and_then(|entry| entry.split_once(": ")) {
+        let skipped = || self.skipped.iter().filter_map(|entry| entry.split_once(": "));
+        let reason = skipped().find(|(name, _)| header::is_time(name));
+        match reason.or_else(|| skipped().find(|(name, _)| header::is_date(name))) {
             Some((column, reason)) => Diagnostic::new(format!(
                 "`{column}` of the file is neither a column of numbers nor one of time stamps: {reason}"
             ))
-            .with_help(format!("correct the column `{column}`, or {otherwise}")),
+            .with_help(format!("correct the file, or {otherwise}")),
             None => Diagnostic::new("no column of the file is called `t` or `time`").with_help(otherwise),
         }
     }
@@ -337,10 +338,19 @@ impl DataFile {
     }
 }
 
-/// Returns true for a time that is far beyond any date as seconds since 1970, but a usual one in ms, us or ns.
-pub fn is_since_1970(time: f64) -> bool {
-    // 1e11 s are 3000 years, and as ms the year 1973.
-    (1e11..1e20).contains(&time)
+/// First and last time since 1970 that is taken for one, s: the years 1973 and 2201. In s, these times in ms are 3000 years and more.
+const SINCE_1970: [f64; 2] = [1e8, 7.3e9];
+
+/// Returns the unit in which a time without a unit is a usual date since 1970, if that is `ms`, `us` or `ns`.
+pub fn unit_since_1970(time: f64) -> Option<&'static str> {
+    let [first, last] = SINCE_1970;
+    let units = [("ms", 1e3), ("us", 1e6), ("ns", 1e9)];
+    units.into_iter().find(|(_, factor)| (first * factor..last * factor).contains(&time)).map(|(unit, _)| unit)
+}
+
+/// Returns true for a time that no record reaches in s, neither from its start nor from 1970.
+pub fn is_beyond_seconds(time: f64) -> bool {
+    time >= 1e3 * SINCE_1970[0]
 }
 
 /// Returns the bytes of a regular file.

@@ -1,4 +1,8 @@
-//! Time stamps: `2024-05-17T10:30:00.5+02:00`, `17.05.2024 10:30`, `5/17/2024 10:30:00 AM`, `2024-05-17` and `10:30:00.5`.
+//! Time stamps: `2024-05-17T10:30:00.5+02:00`, `17.05.2024 10:30`, `17-May-24`, `5/17/2024 10:30:00 AM`, `20240517T103000`,
+//! `2024-05-17` and `10:30:00.5`.
+
+use super::calendar::{days, is_weekday, month};
+use crate::unit::Unit;
 
 /// Nanoseconds in a second.
 const SECOND: i64 = 1_000_000_000;
@@ -28,28 +32,123 @@ pub struct Origin {
 
 /// Parts of a time stamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Stamp {
+struct Stamp {
     date: Option<Date>,
-    /// Time of day, ns.
-    time: Option<i64>,
+    time: Option<Time>,
     /// Zone: time east of universal time, ns.
     zone: Option<i64>,
 }
 
-/// Date as written.
+/// Time of day, or elapsed time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Date {
-    /// Year, month and day.
-    Ordered([i64; 3]),
-    /// Year, and day and month in an order that depends on the country.
-    Unordered(i64, [i64; 2]),
+struct Time {
+    nanoseconds: i64,
+    clock: Clock,
 }
 
-/// Order of day and month in the dates of a column.
+/// Date as written: its three numbers, with the number of digits of each; a month given by its name has 0 digits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Date {
+    parts: [(i64, usize); 3],
+    /// Orders that the form of the date admits.
+    orders: &'static [Order],
+}
+
+/// Order of the numbers of a date.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Order {
     DayFirst,
     MonthFirst,
+    YearFirst,
+}
+
+impl Order {
+    const ALL: [Self; 3] = [Self::DayFirst, Self::MonthFirst, Self::YearFirst];
+
+    /// Returns the positions of year, month and day.
+    fn positions(self) -> [usize; 3] {
+        match self {
+            Self::DayFirst => [2, 1, 0],
+            Self::MonthFirst => [2, 0, 1],
+            Self::YearFirst => [0, 1, 2],
+        }
+    }
+
+    fn shown(self) -> &'static str {
+        match self {
+            Self::DayFirst => "day/month",
+            Self::MonthFirst => "month/day",
+            Self::YearFirst => "year/month/day",
+        }
+    }
+}
+
+/// Units of the numbers between colons.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Clock {
+    HoursMinutes,
+    HoursMinutesSeconds,
+    MinutesSeconds,
+}
+
+/// Form of the cells of a column, as its header gives it in place of a unit: `hh:mm:ss`, `min:sec`, `dd/mm/yyyy hh:mm`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Form {
+    order: Option<Order>,
+    clock: Option<Clock>,
+}
+
+impl Form {
+    /// Reads a form.
+    pub fn parse(text: &str) -> Option<Self> {
+        let mut form = Self { order: None, clock: None };
+        for part in text.split_whitespace() {
+            match part.contains(':') {
+                true if form.clock.is_none() => form.clock = Some(clock(part)?),
+                false if form.order.is_none() => form.order = Some(date_order(part)?),
+                _ => return None,
+            }
+        }
+        (form.order.is_some() || form.clock.is_some()).then_some(form)
+    }
+
+    /// Returns true if a stamp has this form; a form of the time alone leaves the date open.
+    fn admits(self, stamp: &Stamp) -> bool {
+        let time = |clock: Clock| match stamp.time {
+            Some(time) => time.clock == clock,
+            None => stamp.date.is_some() && clock != Clock::MinutesSeconds,
+        };
+        self.clock.is_none_or(time) && self.order.is_none_or(|order| stamp.date.is_some_and(|date| date.is_in(order)))
+    }
+}
+
+/// Reads the form of a time, such as `hh:mm:ss.000` or `Min:Sek`.
+fn clock(text: &str) -> Option<Clock> {
+    let text = text.split(['.', ',']).next()?.to_lowercase();
+    let unit = |part: &str| match part.chars().next().filter(|_| part.chars().all(char::is_alphabetic))? {
+        _ if part == "std" => Some('h'),
+        letter => Some(letter),
+    };
+    match text.split(':').map(unit).collect::<Option<Vec<char>>>()?[..] {
+        ['h', 'm'] => Some(Clock::HoursMinutes),
+        ['h', 'm', 's'] => Some(Clock::HoursMinutesSeconds),
+        ['m', 's'] => Some(Clock::MinutesSeconds),
+        _ => None,
+    }
+}
+
+/// Reads the form of a date, such as `dd/mm/yyyy` or `TT.MM.JJ`.
+fn date_order(text: &str) -> Option<Order> {
+    let parts: Vec<String> = text.split(['-', '/', '.']).map(str::to_lowercase).collect();
+    let part = |text: &String| {
+        let letter = text.chars().next().filter(|first| text.len() <= 4 && text.chars().all(|c| c == *first))?;
+        ["yja", "m", "dt"].iter().position(|letters| letters.contains(letter))
+    };
+    let found: Vec<usize> = parts.iter().map(part).collect::<Option<_>>()?;
+    Order::ALL.into_iter().find(|order| {
+        let positions = order.positions();
+        found.len() == 3 && (0..3).all(|part| found[positions[part]] == part) && parts[positions[0]].len() > 1
+    })
 }
 
 /// Time stamps of a column.
@@ -57,23 +156,36 @@ enum Order {
 pub(super) struct Column {
     /// Time of each row since the reference, ns; `None` for a gap.
     pub nanoseconds: Vec<Option<i64>>,
-    pub reference: Reference,
-    /// True for dates without a time of day.
+    /// Reference; `None` for elapsed times.
+    pub reference: Option<Reference>,
+    /// True for dates without a time of day, or with midnight throughout, as spreadsheets write them.
     pub is_dates: bool,
 }
 
-/// Reads the cells of a column; an empty cell is `None`. Returns `None` if a cell is no time stamp, and the reason if the stamps have
-/// no common clock.
-pub(super) fn column<'t>(cells: impl Iterator<Item = Option<&'t str>>) -> Option<Result<Column, String>> {
+/// Reads the cells of a column; an empty cell is `None`. `unit` is that of the header. Returns `None` if a cell is no time stamp, and
+/// the reason if the stamps have no common clock or contradict the header.
+pub(super) fn column<'t>(
+    cells: impl Iterator<Item = Option<&'t str>>,
+    unit: Option<&str>,
+) -> Option<Result<Column, String>> {
+    let form = unit.and_then(Form::parse);
+    let is_elapsed = form.is_some_and(|form| form.clock == Some(Clock::MinutesSeconds));
     let mut stamps: Vec<Option<(Stamp, &str)>> = Vec::new();
     for cell in cells {
         stamps.push(match cell {
-            Some(text) => Some((stamp(text)?, text.trim())),
+            Some(text) => Some((if is_elapsed { elapsed(text) } else { None }.or_else(|| stamp(text))?, text.trim())),
             None => None,
         });
     }
     let given = || stamps.iter().flatten();
     let (first, text) = *given().next()?;
+    if let Some(unit) = unit
+        && let Some((_, other)) = given().find(|(stamp, _)| contradicts(stamp, unit, form))
+    {
+        return Some(Err(format!(
+            "`{other}` contradicts `{unit}` in the header; write the form of the cells there, such as [hh:mm:ss] or [mm:ss]"
+        )));
+    }
     if let Some((_, other)) = given().find(|(stamp, _)| stamp.kind() != first.kind()) {
         let what = match given().any(|(stamp, _)| stamp.date.is_none()) {
             true => "time stamps with and without a date are mixed",
@@ -81,42 +193,68 @@ pub(super) fn column<'t>(cells: impl Iterator<Item = Option<&'t str>>) -> Option
         };
         return Some(Err(format!("{what} (`{text}` and `{other}`)")));
     }
-    let order = match order(given().filter_map(|(stamp, _)| stamp.date))? {
-        Ok(order) => order,
-        Err(()) => {
+    let dates: Vec<Date> = given().filter_map(|(stamp, _)| stamp.date).collect();
+    let days = match readings(&dates, form.and_then(|form| form.order)).as_slice() {
+        [] => return None,
+        [(_, days)] => days.clone(),
+        several => {
+            let orders: Vec<&str> = several.iter().map(|(order, _)| order.shown()).collect();
             return Some(Err(format!(
-                "`{text}` and all other dates may be day/month or month/day; write them as year-month-day"
+                "`{text}` and all other dates may be {}; write them as year-month-day",
+                orders.join(" or ")
             )));
         }
     };
-    let nanoseconds: Option<Vec<Option<i64>>> = stamps
-        .iter()
-        .map(|stamp| match stamp {
-            Some((stamp, _)) => stamp.nanoseconds(order).map(Some),
-            None => Some(None),
-        })
-        .collect();
-    let reference = match (first.date, first.zone) {
-        (None, _) => Reference::Midnight,
-        (_, None) => Reference::Local,
-        _ => Reference::Universal,
+    let mut days = days.into_iter();
+    let mut nanoseconds = |stamp: &Stamp| {
+        let days = if stamp.date.is_some() { days.next()? } else { 0 };
+        let time = stamp.time.map_or(0, |time| time.nanoseconds);
+        days.checked_mul(DAY)?.checked_add(time - stamp.zone.unwrap_or(0))
     };
-    let is_dates = given().all(|(stamp, _)| stamp.time.is_none());
+    let nanoseconds: Option<Vec<Option<i64>>> =
+        stamps.iter().map(|cell| cell.as_ref().map_or(Some(None), |(stamp, _)| nanoseconds(stamp).map(Some))).collect();
+    let reference = match (first.date, first.zone) {
+        _ if is_elapsed => None,
+        (None, _) => Some(Reference::Midnight),
+        (_, None) => Some(Reference::Local),
+        _ => Some(Reference::Universal),
+    };
+    let is_dates =
+        given().all(|(stamp, _)| stamp.date.is_some() && stamp.time.is_none_or(|time| time.nanoseconds == 0));
     Some(Ok(Column { nanoseconds: nanoseconds?, reference, is_dates }))
 }
 
-/// Returns the order of day and month that suits all dates; an error if both do, and `None` if neither does.
-fn order(dates: impl Iterator<Item = Date>) -> Option<Result<Order, ()>> {
-    let pairs: Vec<[i64; 2]> =
-        dates.filter_map(|date| if let Date::Unordered(_, pair) = date { Some(pair) } else { None }).collect();
-    let day_first = pairs.iter().all(|[_, month]| *month <= 12);
-    let month_first = pairs.iter().all(|[month, _]| *month <= 12);
-    match (day_first, month_first) {
-        (true, true) if pairs.iter().any(|[a, b]| a != b) => Some(Err(())),
-        (true, _) => Some(Ok(Order::DayFirst)),
-        (_, true) => Some(Ok(Order::MonthFirst)),
-        _ => None,
+/// Returns true if a stamp has not the form in the header, or is a time of day under a unit.
+fn contradicts(stamp: &Stamp, unit: &str, form: Option<Form>) -> bool {
+    match form {
+        Some(form) => !form.admits(stamp),
+        None => stamp.date.is_none() && (unit.contains(':') || Unit::parse(unit).is_ok()),
     }
+}
+
+/// Returns the days since 1970-01-01 of all dates, in each order that suits them, or in that of the header; equal days count once.
+fn readings(dates: &[Date], stated: Option<Order>) -> Vec<(Order, Vec<i64>)> {
+    let mut found: Vec<(Order, Vec<i64>)> = Vec::new();
+    for order in Order::ALL.into_iter().filter(|order| stated.is_none_or(|stated| stated == *order)) {
+        let read = |date: &Date| match (stated, date.orders) {
+            (None, [own]) => date.in_order(*own),
+            (None, orders) if !orders.contains(&order) => None,
+            _ => date.in_order(order),
+        };
+        let Some(read) = dates.iter().map(read).collect::<Option<Vec<[i64; 3]>>>() else { continue };
+        let days: Vec<i64> = read.iter().filter_map(|date| days(*date)).collect();
+        if stated.is_some() || !(is_yearly(&read) && dates.iter().any(Date::is_short)) {
+            if !found.iter().any(|(_, known)| *known == days) {
+                found.push((order, days));
+            }
+        }
+    }
+    found
+}
+
+/// Returns true if dates differ in the year alone: a number of two digits that counts up is a day rather than a year.
+fn is_yearly(dates: &[[i64; 3]]) -> bool {
+    dates.windows(2).all(|pair| pair[0][1..] == pair[1][1..]) && dates.windows(2).any(|pair| pair[0][0] != pair[1][0])
 }
 
 /// Returns true if a text is a time stamp.
@@ -124,30 +262,72 @@ pub(super) fn is_stamp(text: &str) -> bool {
     stamp(text).is_some()
 }
 
+/// Returns true for a text that is meant as a date, whether it can be read or not, such as `31.02.24`, `13/05` or `Mon 13. Mai`.
+pub(super) fn is_like_date(text: &str) -> bool {
+    let text = text.trim().trim_matches('"').trim();
+    // A colon belongs to a time of day; the words for year, month and day in Chinese and Japanese are marks.
+    let is_mark = |c: char| c != ':' && (!c.is_alphanumeric() || "\u{5e74}\u{6708}\u{65e5}".contains(c));
+    let parts: Vec<&str> = text.split(is_mark).filter(|part| !part.is_empty()).collect();
+    let is_number = |part: &&str| part.bytes().all(|byte| byte.is_ascii_digit());
+    let (numbers, names): (Vec<&str>, Vec<&str>) = parts.into_iter().partition(is_number);
+    let has_year = [numbers.first(), numbers.last()].into_iter().flatten().any(|part| matches!(part.len(), 2 | 4));
+    let is_day = |part: &&str| part.parse::<i64>().is_ok_and(|day| (1..=31).contains(&day));
+    names.iter().all(|name| month(name).is_some() || is_weekday(name))
+        && match numbers.len() {
+            1 => !names.is_empty(),
+            2 => !names.is_empty() || (numbers.iter().all(is_day) && !text.contains(',')),
+            3 => has_year && numbers.iter().all(|number| number.len() <= 4),
+            _ => false,
+        }
+}
+
+/// Returns true for a date, and a time of day if there is one, in digits only: `20240517` and `20240517103000` (ISO 8601, basic format).
+pub(super) fn is_basic(text: &str, with_time: bool) -> bool {
+    let digits = text.trim().split('.').next().unwrap_or_default();
+    let fits = if with_time { matches!(digits.len(), 12 | 14) } else { digits.len() == 8 };
+    fits && digits.bytes().all(|byte| byte.is_ascii_digit()) && is_stamp(text)
+}
+
 impl Stamp {
     /// Returns which parts are given that determine the clock; a date alone is its midnight.
     fn kind(&self) -> [bool; 2] {
         [self.date.is_some(), self.zone.is_some()]
     }
+}
 
-    /// Returns the time since the reference; `None` if there is no such day.
-    fn nanoseconds(&self, order: Order) -> Option<i64> {
-        let days = match self.date {
-            None => 0,
-            Some(Date::Ordered(date)) => days(date)?,
-            Some(Date::Unordered(year, [a, b])) => days(match order {
-                Order::DayFirst => [year, b, a],
-                Order::MonthFirst => [year, a, b],
-            })?,
+impl Date {
+    /// Returns true if the number of digits of each part fits to an order.
+    fn is_in(&self, order: Order) -> bool {
+        let [year, month, day] = order.positions().map(|position| self.parts[position].1);
+        let is_named = self.parts.iter().any(|(_, digits)| *digits == 0);
+        matches!(year, 2 | 4) && (1..=2).contains(&day) && if is_named { month == 0 } else { month <= 2 }
+    }
+
+    /// Returns year, month and day in an order; `None` if there is no such day.
+    fn in_order(&self, order: Order) -> Option<[i64; 3]> {
+        let [(year, digits), (month, _), (day, _)] = order.positions().map(|position| self.parts[position]);
+        let year = match digits {
+            2 if year < PIVOT => 2000 + year,
+            2 => 1900 + year,
+            _ => year,
         };
-        days.checked_mul(DAY)?.checked_add(self.time.unwrap_or(0) - self.zone.unwrap_or(0))
+        let date = [year, month, day];
+        (self.is_in(order) && days(date).is_some()).then_some(date)
+    }
+
+    /// Returns true if the year has two digits.
+    fn is_short(&self) -> bool {
+        self.parts.iter().all(|(_, digits)| *digits <= 2)
     }
 }
 
-/// Reads a time stamp. Sources: ISO 8601 as restricted by RFC 3339; dates with dots are day.month.year (DIN 1355-1).
+/// First year of two digits in the 20th century: 69 is 1969 and 68 is 2068. Source: POSIX.1-2017, `strptime`, `%y`.
+const PIVOT: i64 = 69;
+
+/// Reads a time stamp. Source: ISO 8601 as restricted by RFC 3339, and its basic format.
 fn stamp(text: &str) -> Option<Stamp> {
     let text = text.trim().trim_matches('"').trim();
-    let Some((date, rest)) = date(text) else {
+    let Some((date, rest, is_basic)) = basic_date(text).or_else(|| date(text)) else {
         let (time, rest) = time_of_day(text)?;
         return rest.is_empty().then_some(Stamp { date: None, time: Some(time), zone: None });
     };
@@ -155,8 +335,12 @@ fn stamp(text: &str) -> Option<Stamp> {
         return Some(Stamp { date: Some(date), time: None, zone: None });
     }
     let rest = rest.strip_prefix(',').unwrap_or(rest);
-    let rest = rest.strip_prefix(['T', 't', ' ', '_'])?.trim_start();
-    let (time, rest) = time_of_day(rest)?;
+    let (time, rest) = match rest.strip_prefix(['T', 't', ' ', '_']) {
+        Some(rest) if is_basic => basic_time(rest.trim_start()).or_else(|| time_of_day(rest.trim_start()))?,
+        Some(rest) => time_of_day(rest.trim_start())?,
+        None if is_basic => basic_time(rest)?,
+        None => return None,
+    };
     let zone = if rest.is_empty() { None } else { Some(zone(rest)?) };
     Some(Stamp { date: Some(date), time: Some(time), zone })
 }
@@ -168,35 +352,108 @@ fn digits(text: &str, most: usize) -> Option<(i64, usize, &str)> {
     Some((number, count, &text[count..]))
 }
 
-fn date(text: &str) -> Option<(Date, &str)> {
-    let (first, width, rest) = digits(text, 4)?;
-    let mark = rest.chars().next().filter(|mark| "-/.".contains(*mark))?;
-    let (second, second_width, rest) = digits(&rest[1..], 2)?;
-    let (third, third_width, rest) = digits(rest.strip_prefix(mark)?, 4)?;
-    let is_day_or_month = |value: i64, width: usize| width <= 2 && (1..=31).contains(&value);
-    if !is_day_or_month(second, second_width) {
+/// Reads a date of 8 digits, which digits of a time of day may follow.
+fn basic_date(text: &str) -> Option<(Date, &str, bool)> {
+    let (_, count, _) = digits(text, 14)?;
+    let number = |range: std::ops::Range<usize>| Some((text[range.clone()].parse().ok()?, range.len()));
+    if !matches!(count, 8 | 12 | 14) {
         return None;
     }
-    let date = match (width, third_width) {
-        (4, 1 | 2) if is_day_or_month(third, third_width) => Date::Ordered([first, second, third]),
-        (1 | 2, 4) if is_day_or_month(first, width) => match mark {
-            '.' => Date::Ordered([third, second, first]),
-            _ => Date::Unordered(third, [first, second]),
-        },
-        _ => return None,
-    };
-    // An ordered date is checked at once, so that a number such as 1.99.2000 is none.
-    if let Date::Ordered(date) = date {
-        days(date)?;
-    }
-    Some((date, rest))
+    let date = Date { parts: [number(0..4)?, number(4..6)?, number(6..8)?], orders: &[Order::YearFirst] };
+    date.in_order(Order::YearFirst)?;
+    Some((date, &text[8..], true))
 }
 
-/// Reads a time of day with minutes, and returns it in ns.
-fn time_of_day(text: &str) -> Option<(i64, &str)> {
+/// Reads a time of day of 4 or 6 digits.
+fn basic_time(text: &str) -> Option<(Time, &str)> {
+    let (_, count, rest) = digits(text, 6)?;
+    let spread = match count {
+        4 => format!("{}:{}", &text[..2], &text[2..4]),
+        6 => format!("{}:{}:{}", &text[..2], &text[2..4], &text[4..6]),
+        _ => return None,
+    };
+    let (whole, _) = time_of_day(&spread)?;
+    let (fraction, rest) = if count == 6 { fraction(rest)? } else { (0, rest) };
+    Some((Time { nanoseconds: whole.nanoseconds + fraction, ..whole }, rest.trim_start()))
+}
+
+/// Reads a date with marks, or with the name of the month. Returns false, as it is not in the basic format.
+fn date(text: &str) -> Option<(Date, &str, bool)> {
+    let (first, rest) = part(text)?;
+    let mark = rest.chars().next()?;
+    let (second, rest) = part(after_marks(rest))?;
+    let is_named = first.1 == 0 || second.1 == 0;
+    let (third, rest) = match is_named {
+        true => part(after_marks(rest))?,
+        false => part(rest.strip_prefix(mark)?)?,
+    };
+    let parts = [first, second, third];
+    let is_short = parts.iter().all(|(_, digits)| *digits <= 2);
+    // Dates with dots are day.month.year (DIN 1355-1), and years of two digits come first between hyphens only (ISO 8601:1988).
+    let orders: &'static [Order] = match (mark, is_named) {
+        (_, true) => &Order::ALL,
+        ('.', _) => &[Order::DayFirst, Order::YearFirst],
+        ('/' | '-', _) => &Order::ALL,
+        _ => return None,
+    };
+    let is_open = |order: &Order| *order != Order::YearFirst || !is_short || (mark == '-' && !is_named);
+    let fits = |order: &Order| Date { parts, orders }.is_in(*order) && is_open(order);
+    let orders: &'static [Order] = match Order::ALL.map(|order| orders.contains(&order) && fits(&order)) {
+        [true, true, true] => &Order::ALL,
+        [true, true, false] => &[Order::DayFirst, Order::MonthFirst],
+        [true, false, _] => &[Order::DayFirst],
+        [false, true, _] => &[Order::MonthFirst],
+        [false, false, true] => &[Order::YearFirst],
+        _ => return None,
+    };
+    let date = Date { parts, orders };
+    // A number such as 1.99.2000 is no date.
+    orders.iter().find_map(|order| date.in_order(*order))?;
+    Some((date, rest, false))
+}
+
+/// Returns the text after the marks beside the name of a month.
+fn after_marks(text: &str) -> &str {
+    text.trim_start_matches(['-', '/', '.', ' ', ','])
+}
+
+/// Reads a number or the name of a month, with the number of digits.
+fn part(text: &str) -> Option<((i64, usize), &str)> {
+    if let Some((number, count, rest)) = digits(text, 4) {
+        return Some(((number, count), rest));
+    }
+    let end = text.find(|c: char| !c.is_alphabetic()).unwrap_or(text.len());
+    Some(((month(&text[..end])?, 0), &text[end..]))
+}
+
+/// Reads an elapsed time in minutes and seconds, such as `75:30.5`.
+fn elapsed(text: &str) -> Option<Stamp> {
+    /// Digits of the minutes: a year has six.
+    const MOST: usize = 7;
+    let text = text.trim().trim_matches('"').trim();
+    let (minutes, _, rest) = digits(text, MOST)?;
+    let (seconds, width, rest) = digits(rest.strip_prefix(':')?, 2)?;
+    let (fraction, rest) = fraction(rest)?;
+    let time = Time { nanoseconds: (minutes * 60 + seconds) * SECOND + fraction, clock: Clock::MinutesSeconds };
+    let is_time = width == 2 && seconds < 60 && rest.is_empty();
+    is_time.then_some(Stamp { date: None, time: Some(time), zone: None })
+}
+
+/// Reads decimals of a second, ns; there may be none.
+fn fraction(text: &str) -> Option<(i64, &str)> {
+    let Some(after) = text.strip_prefix(['.', ',']) else { return Some((0, text)) };
+    let count = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
+    // Digits beyond ns are dropped.
+    let shown = &after[..count.min(9)];
+    let scale = 10_i64.pow(9 - u32::try_from(shown.len()).expect("at most 9"));
+    Some((shown.parse::<i64>().ok()? * scale, &after[count..]))
+}
+
+/// Reads a time of day with minutes.
+fn time_of_day(text: &str) -> Option<(Time, &str)> {
     let (hour, _, rest) = digits(text, 2)?;
     let (minute, width, mut rest) = digits(rest.strip_prefix(':')?, 2)?;
-    let (mut second, mut fraction) = (0, 0);
+    let (mut second, mut part, mut clock) = (0, 0, Clock::HoursMinutes);
     if width != 2 || minute > 59 {
         return None;
     }
@@ -206,15 +463,8 @@ fn time_of_day(text: &str) -> Option<(i64, &str)> {
         if width != 2 || value > 60 {
             return None;
         }
-        (second, rest) = (value, after);
-        if let Some(after) = rest.strip_prefix(['.', ',']) {
-            let count = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
-            // Digits beyond ns are dropped.
-            let shown = &after[..count.min(9)];
-            let scale = 10_i64.pow(9 - u32::try_from(shown.len()).expect("at most 9"));
-            fraction = shown.parse::<i64>().ok()? * scale;
-            rest = &after[count..];
-        }
+        (second, clock) = (value, Clock::HoursMinutesSeconds);
+        (part, rest) = fraction(after)?;
     }
     let rest = rest.trim_start();
     let half = [("am", 0), ("pm", 12), ("a.m.", 0), ("p.m.", 12)];
@@ -227,7 +477,8 @@ fn time_of_day(text: &str) -> Option<(i64, &str)> {
         Some(_) => return None,
         None => (hour, rest),
     };
-    (hour < 24).then_some((((hour * 60 + minute) * 60 + second) * SECOND + fraction, rest))
+    let nanoseconds = ((hour * 60 + minute) * 60 + second) * SECOND + part;
+    (hour < 24).then_some((Time { nanoseconds, clock }, rest))
 }
 
 /// Reads a zone, and returns the time east of universal time, ns.
@@ -253,33 +504,13 @@ fn zone(text: &str) -> Option<i64> {
     (hours < 24 && minutes < 60).then_some(sign * (hours * 60 + minutes) * 60 * SECOND)
 }
 
-/// Returns the days since 1970-01-01 in the Gregorian calendar; `None` if there is no such day.
-///
-/// Source: E. G. Richards, Calendars, in: Explanatory Supplement to the Astronomical Almanac, 3rd edition (2013), section 15.11.3.
-fn days([year, month, day]: [i64; 3]) -> Option<i64> {
-    let is_leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
-    let length = match month {
-        2 => 28 + i64::from(is_leap),
-        4 | 6 | 9 | 11 => 30,
-        1..=12 => 31,
-        _ => return None,
-    };
-    if !(1..=length).contains(&day) {
-        return None;
-    }
-    // Years that begin in March, so that a leap day is the last day of one.
-    let (year, month) = if month <= 2 { (year - 1, month + 9) } else { (year, month - 3) };
-    let leaps = year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400);
-    Some(365 * year + leaps + (153 * month + 2) / 5 + day - 719_469)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[allow(clippy::cast_precision_loss)]
     fn seconds(text: &str) -> Option<f64> {
-        let column = column([Some(text)].into_iter())?.ok()?;
+        let column = column([Some(text)].into_iter(), None)?.ok()?;
         Some(column.nanoseconds[0]? as f64 * 1e-9)
     }
 
@@ -302,6 +533,21 @@ mod tests {
             ("10:30:00.5", 37_800.5),
             ("12:00:00 AM", 0.0),
             ("12:05 PM", 43_500.0),
+            ("17.05.24", 1_715_904_000.0),
+            ("17.05.68", 3_104_438_400.0),
+            ("1.1.69 00:00", -31_536_000e9 * 1e-9),
+            ("5/17/24 12:00 AM", 1_715_904_000.0),
+            ("17-May-2024", 1_715_904_000.0),
+            ("17-MAY-24 00:00:01", 1_715_904_001.0),
+            ("17. Mai 2024 00:00", 1_715_904_000.0),
+            ("May 17, 2024 00:00:01", 1_715_904_001.0),
+            ("17 d\u{e9}c. 2024", 1_734_393_600.0),
+            ("2024-M\u{e4}r-01", 1_709_251_200.0),
+            ("17MAY2024", 1_715_904_000.0),
+            ("20240517T000001.5", 1_715_904_001.5),
+            ("20240517 0001", 1_715_904_060.0),
+            ("20240517000001", 1_715_904_001.0),
+            ("20240517T020000+0200", 1_715_904_000.0),
         ] {
             assert_eq!(seconds(text), Some(expected), "{text}");
         }
@@ -322,16 +568,21 @@ mod tests {
             "13:00 PM",
             "0:30 AM",
             "2024-05-17T10:30:00 CEST",
-            "17.05.24",
             "10:30.5",
             "10:30:00Z",
+            "17-Mxe-2024",
+            "17-Jui-2024",
+            "31-Apr-2024",
+            "20240230T103000",
+            "2024051710300",
+            "24.05",
         ] {
             assert_eq!(seconds(text), None, "{text}");
         }
     }
 
     fn read(cells: &[&str]) -> Result<Column, String> {
-        column(cells.iter().map(|cell| (!cell.is_empty()).then_some(*cell))).expect("they are stamps")
+        column(cells.iter().map(|cell| (!cell.is_empty()).then_some(*cell)), None).expect("they are stamps")
     }
 
     #[test]
@@ -341,7 +592,100 @@ mod tests {
         assert_eq!(day(&["01/02/2024", "01/13/2024"]), day(&["2024-01-02"]));
         assert_eq!(day(&["05/05/2024"]), day(&["2024-05-05"]));
         assert!(read(&["05/01/2024 11:50:00 AM", "05/02/2024 11:50:00 AM"]).unwrap_err().contains("day/month"));
-        assert!(column([Some("13/02/2024"), Some("02/13/2024")].into_iter()).is_none());
+        assert!(column([Some("13/02/2024"), Some("02/13/2024")].into_iter(), None).is_none());
+    }
+
+    #[test]
+    fn years_of_two_digits_are_read_if_the_column_shows_their_place() {
+        let days = |cells: &[&str]| {
+            let column = read(cells).unwrap_or_else(|why| panic!("{why}"));
+            column.nanoseconds.iter().map(|ns| ns.unwrap() / DAY).collect::<Vec<_>>()
+        };
+        for cells in
+            [["24-05-13", "24-05-14"], ["13-05-24", "14-05-24"], ["13/05/24", "14/05/24"], ["13.05.24", "14.05.24"]]
+        {
+            assert_eq!(days(&cells), days(&["2024-05-13", "2024-05-14"]), "{cells:?}");
+        }
+        assert!(read(&["13-05-24", "13-05-24"]).unwrap_err().contains("may be day/month or year/month/day"));
+        assert!(read(&["05/06/24", "05/07/24"]).unwrap_err().contains("may be day/month or month/day"));
+        // A number that counts up beside a constant day and month is no year.
+        for cells in [["24.05.13", "24.05.14"], ["24/05/13", "24/05/14"]] {
+            assert!(column(cells.map(Some).into_iter(), None).is_none(), "{cells:?}");
+        }
+    }
+
+    #[test]
+    fn the_header_gives_the_form_of_the_cells() {
+        let seconds = |cell: &str, unit: &str| {
+            let column = column([Some(cell)].into_iter(), Some(unit)).expect("the cells are stamps")?;
+            #[allow(clippy::cast_precision_loss)]
+            Ok::<_, String>((column.nanoseconds[0].unwrap() as f64 * 1e-9, column.reference))
+        };
+        for unit in ["mm:ss", "min:sec", "MM:SS", "m:s", "min:s", "Min:Sek", "mm:ss.000", "mm:ss,fff"] {
+            assert_eq!(seconds("75:30.5", unit), Ok((4530.5, None)), "{unit}");
+        }
+        for unit in ["hh:mm", "h:min", "HH:MM", "Std:Min"] {
+            assert_eq!(seconds("01:30", unit), Ok((5400.0, Some(Reference::Midnight))), "{unit}");
+        }
+        for unit in ["hh:mm:ss", "H:M:S"] {
+            assert_eq!(seconds("01:30:01 AM", unit), Ok((5401.0, Some(Reference::Midnight))), "{unit}");
+        }
+        for (cell, unit, day) in [
+            ("05/06/2024", "dd/mm/yyyy", "2024-06-05"),
+            ("05/06/2024", "MM/DD/YYYY", "2024-05-06"),
+            ("05.06.24", "TT.MM.JJ", "2024-06-05"),
+            ("05.06.24", "yy.mm.dd", "2005-06-24"),
+            ("05.06.24 00:00", "yy.mm.dd hh:mm", "2005-06-24"),
+            ("05-06-24 00:00", "dd-mm-yy", "2024-06-05"),
+        ] {
+            let expected = read(&[day]).unwrap().nanoseconds[0].unwrap();
+            #[allow(clippy::cast_precision_loss)]
+            let expected = expected as f64 * 1e-9;
+            assert_eq!(seconds(cell, unit), Ok((expected, Some(Reference::Local))), "{cell} {unit}");
+        }
+        for (cell, unit) in [
+            ("12:30", "ms"),
+            ("12:30", "s"),
+            ("12:30:00", "s"),
+            ("12:30", "V"),
+            ("12:30", "hh:mm:ss"),
+            ("12:30:00", "hh:mm"),
+            ("1:12:30", "mm:ss"),
+            ("12:30 PM", "mm:ss"),
+            ("12:30", "ss:ms"),
+            ("2024-05-06", "dd.mm.yyyy"),
+            ("2024-05-06", "mm:ss"),
+            ("12:30", "dd.mm.yyyy"),
+        ] {
+            let why = seconds(cell, unit).unwrap_err();
+            assert!(why.contains(&format!("`{cell}` contradicts `{unit}`")), "{why}");
+        }
+        // A zone or a word is no unit.
+        assert!(seconds("12:30", "UTC").is_ok() && seconds("12:30", "local").is_ok());
+    }
+
+    #[test]
+    fn texts_that_are_meant_as_dates_are_known() {
+        for text in [
+            "31.02.24",
+            "2024-13-05",
+            "13/05",
+            "13.05.",
+            "Mon 13.05.24",
+            "13. Mai",
+            "Fr 13 May 2024",
+            "13.05.'24",
+            "2024\u{5e74}5\u{6708}13\u{65e5}",
+            "\"13.05.2024\"",
+            "May 3",
+        ] {
+            assert!(is_like_date(text), "{text}");
+        }
+        for text in
+            ["", "start", "1.2.3", "12:30", "25:10:00", "5,3", "10.0.0.1", "rig 2", "ABC-2024-1", "-", "40/99", "May"]
+        {
+            assert!(!is_like_date(text), "{text}");
+        }
     }
 
     #[test]

@@ -340,6 +340,95 @@ mod csv {
     }
 
     #[test]
+    fn times_of_day_without_their_dates_are_no_column() {
+        let refused = |header: &str, rows: [&str; 3], fact: &str| {
+            let file = read(format!("{header}\n{}\n", rows.join("\n")).as_str());
+            assert_eq!(file.time_column(), None, "{header} {rows:?}: {:?}", file.skipped);
+            let why = file.without_time("").message;
+            assert!(why.contains(fact), "{why}");
+            let time = header.split([',', ';']).nth(1).unwrap();
+            assert!(file.column(time).is_err(), "{time}");
+        };
+        for (name, cells, fact) in [
+            ("Datum", ["13.13.24", "14.13.24", "15.13.24"], "in `Datum`, are not read: text (`13.13.24`)"),
+            ("when", ["30.02.2024", "01.03.2024", "02.03.2024"], "in `when`, are not read: text (`30.02.2024`)"),
+            ("Date", ["05/01/2024", "05/02/2024", "05/03/2024"], "may be day/month or month/day"),
+            ("Date", ["05-06-24", "05-06-24", "05-06-24"], "write them as year-month-day"),
+            ("day", ["Mon", "Tue", "Wed"], "write them as year-month-day, or delete the column"),
+            ("x", ["Mon 13.5.", "Tue 14.5.", "Wed 15.5."], "in `x`"),
+            ("x", ["13.5.", "14.5.", "15.5."], "in `x`"),
+            ("Tag", ["1", "2", "3"], "in `Tag`, are not read: numbers"),
+            ("Messdatum", ["45000", "45001", "45002"], "numbers"),
+            ("Date", ["240513", "240514", "240515"], "numbers"),
+            ("Date", ["2024-05-13", "2024-05-14", "??"], "text (`??`)"),
+        ] {
+            let rows = [0, 1, 2].map(|k| format!("{};0{k}:00;{k}", cells[k]));
+            refused(&format!("{name};Uhrzeit;T"), [&rows[0], &rows[1], &rows[2]], fact);
+        }
+        // Dates without times that are not read.
+        refused("Uhrzeit;Datum;T", ["8h00;13.05.2024;1", "9h00;14.05.2024;2", "10h00;15.05.2024;3"], "text (`8h00`)");
+        let two = "Start,Uhrzeit,End,T\n2024-05-13,08:00,2024-06-13,1\n2024-05-14,09:00,2024-06-14,2\n";
+        assert!(read(two).without_time("").message.contains("several columns (`Start`, `End`)"));
+    }
+
+    #[test]
+    fn dates_in_any_readable_form_are_joined_with_all_times_of_day() {
+        for dates in [
+            ["13.05.24", "14.05.24"],
+            ["13-May-2024", "14-May-2024"],
+            ["13. Mai 2024", "14. Mai 2024"],
+            ["13-05-24", "14-05-24"],
+            ["5/13/24", "5/14/24"],
+            ["20240513", "20240514"],
+            ["2024-05-13", "2024-05-14"],
+            ["2024-05-13 00:00:00", "2024-05-14 00:00:00"],
+        ] {
+            let [a, b] = dates;
+            let file = read(format!("Datum;Uhrzeit;Ende;T\n{a};00:00;00:30;1\n{b};01:00;01:30;2\n").as_str());
+            assert_same(values(&file, "Uhrzeit"), &[0.0, 90_000.0]);
+            assert_same(values(&file, "Ende"), &[0.0, 90_000.0]);
+            assert_eq!(file.skipped, ["Datum: joined with `Uhrzeit`, `Ende`"]);
+            assert_eq!(file.column("Ende").unwrap().origin.unwrap().nanoseconds, 1_715_560_200_000_000_000);
+        }
+        // Another column of dates, and texts that are no dates.
+        let file =
+            read("Kalibriert,Date,Time,rig,T\n2023-01-01,2024-05-13,23:00,1.2.3,1\n2023-01-01,2024-05-14,00:00,x,2\n");
+        assert_same(values(&file, "Time"), &[0.0, 3600.0]);
+        let file = read("rig,day,Time,T\nr-2024-1,7,23:00,1\nfast,7,23:30,2\n");
+        assert_same(values(&file, "Time"), &[0.0, 1800.0]);
+    }
+
+    #[test]
+    fn a_header_gives_the_form_of_times() {
+        for header in ["Zeit [mm:ss]", "Zeit (min:sec)", "Zeit / mm:ss", "Zeit in m:s", "Zeit;T\nmm:ss"] {
+            let header = if header.contains(';') { format!("{header};K") } else { format!("{header};T") };
+            let file = read(format!("{header}\n59:50;1\n75:00,5;2\n").as_str());
+            let column = file.column("Zeit").unwrap();
+            assert_eq!((column.unit, column.origin), (Some("s"), None), "{header}");
+            assert_same(column.values, &[3590.0, 4500.5]);
+            assert_eq!(file.time_column().as_deref(), Some("Zeit"));
+        }
+        for header in ["time [ms]", "time_s", "time (s)", "time [hh:mm:ss]", "time [mm:ss:ff]"] {
+            let file = read(format!("{header},T\n0:00,1\n0:10,2\n").as_str());
+            let why = file.without_time("").message;
+            assert!(file.time_column().is_none() && why.contains("`0:00` contradicts"), "{header}: {why}");
+        }
+    }
+
+    #[test]
+    fn stamps_in_digits_are_stamps_under_the_name_of_a_time() {
+        let file = read("time,T\n20240513235959,1\n20240514000001,2\n");
+        assert_same(values(&file, "time"), &[0.0, 2.0]);
+        assert_eq!(file.column("time").unwrap().origin.unwrap().reference, Reference::Local);
+        assert_same(values(&read("timestamp,T\n202405132359,1\n202405140001,2\n"), "timestamp"), &[0.0, 120e9 * 1e-9]);
+        assert_same(values(&read("Date,T\n20240513,1\n20240514,2\n"), "Date"), &[0.0, 86_400.0]);
+        for text in ["count,T\n20240513235959,1\n", "time [us],T\n20240513235959,1\n", "time,T\n20241313235959,1\n"] {
+            let name = text.split([',', ' ']).next().unwrap();
+            assert!(values(&read(text), name)[0] > 2e13, "{text}");
+        }
+    }
+
+    #[test]
     fn time_stamps_that_have_no_common_clock_are_no_column() {
         let file = read("time,y\n05/01/2024 11:50:00 AM,1\n05/01/2024 11:55:00 AM,2\n");
         assert_eq!((file.column_names(), file.time_column()), (vec!["y".to_owned()], None));

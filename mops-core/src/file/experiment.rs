@@ -10,7 +10,9 @@ use super::entries::Short;
 use super::sections::{ChannelTable, ExperimentSection, InputTable, RecordedInput};
 use super::tree::Node;
 use super::{Files, UNIT_HELP, at_key, frequency, read_seconds, read_unit};
-use crate::data::{Column, DataFile, Origin, OutsideFolder, Reference, SOURCES, is_since_1970, source_of};
+use crate::data::{
+    Column, DataFile, Origin, OutsideFolder, Reference, SOURCES, is_beyond_seconds, source_of, unit_since_1970,
+};
 use crate::diagnostic::Diagnostic;
 use crate::input::{Hold, Input};
 use crate::study::{CaseBuilder, ChannelBuilder, Free, Measured};
@@ -379,11 +381,18 @@ impl Clock {
         let unit = match (time_unit, column.unit) {
             (Some(unit), _) => read_unit(node, "time-unit", unit)?,
             (None, Some(unit)) => unit_of_header(&place, file, &time, unit, "time-unit")?,
-            (None, None) if column.values.iter().find(|t| !t.is_nan()).is_some_and(|t| is_since_1970(*t)) => {
-                let fact = format!("the time column `{time}` has no unit, and its values are no dates as s since 1970");
-                return Err(place.diagnostic(fact).with_help("set time-unit = \"ms\", \"us\" or \"ns\""));
+            (None, None) => {
+                if let Some(first) = column.values.iter().find(|t| is_beyond_seconds(**t)) {
+                    let fact =
+                        format!("the time column `{time}` has no unit, and its values are no dates as s since 1970");
+                    let way_out = match unit_since_1970(*first) {
+                        Some(unit) => format!("set time-unit = \"{unit}\", for times in {unit} since 1970"),
+                        None => "set `time-unit`, or write time stamps such as 2024-05-17T10:30:00".to_owned(),
+                    };
+                    return Err(place.diagnostic(fact).with_help(way_out));
+                }
+                Unit::known("s")
             }
-            (None, None) => Unit::known("s"),
         };
         if let (Some(_), Some(given)) = (time_unit, column.unit)
             && Unit::parse(given).is_ok_and(|given| given.factor_to(&unit).is_some_and(|factor| factor != 1.0))
@@ -814,6 +823,10 @@ impl Table {
             (None, None) => None,
         };
         let scale = scale.unwrap_or(1.0);
+        if scale == 0.0 || !scale.is_finite() {
+            let fact = format!("`scale` must be finite and not 0, and is {scale}");
+            return Err(at_key(place, "scale", fact).with_help("give the factor from the column to the signal"));
+        }
         let offset = match (offset, &unit) {
             (None, _) => 0.0,
             (Some(q), Some(unit)) => q.to(&unit.difference()).map_err(|why| {

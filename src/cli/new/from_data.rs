@@ -3,12 +3,13 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use mops_core::data::{DataFile, read_regular};
+use mops_core::data::{DataFile, read_regular, unit_since_1970};
 use mops_core::math;
 use mops_core::{Diagnostic, Hold, Input, Unit, suggestion};
 
 use super::super::data;
 use crate::numbers::significant;
+use crate::plain::line;
 use crate::terminal::CommandError;
 use crate::toml_text::{key, number, quoted};
 
@@ -98,7 +99,8 @@ fn times(file: &DataFile, chosen: Option<&str>) -> Result<(String, Vec<f64>), Di
         })?,
     };
     let column = file.column(&time)?;
-    let to_seconds = column.unit.map_or(Some(1.0), |unit| Unit::parse(unit).ok()?.factor_to(&Unit::known("s")));
+    let unit = column.unit.or_else(|| assumed_unit(column.values));
+    let to_seconds = unit.map_or(Some(1.0), |unit| Unit::parse(unit).ok()?.factor_to(&Unit::known("s")));
     let to_seconds = to_seconds.ok_or_else(|| {
         let unit = column.unit.unwrap_or_default();
         Diagnostic::new(format!("the time column `{time}` is in `{unit}`, which is not a unit of time"))
@@ -107,6 +109,11 @@ fn times(file: &DataFile, chosen: Option<&str>) -> Result<(String, Vec<f64>), Di
     let times: Vec<f64> = column.values.iter().map(|t| t * to_seconds).collect();
     file.increases(&time, &times, 0)?;
     Ok((time, times))
+}
+
+/// Returns the unit of times without one that are dates since 1970, if that is not the second.
+fn assumed_unit(times: &[f64]) -> Option<&'static str> {
+    times.iter().find(|t| t.is_finite()).and_then(|t| unit_since_1970(*t))
 }
 
 /// Returns the inputs and the outputs among the columns that change.
@@ -211,7 +218,7 @@ fn identifier(column: &str, taken: &[String]) -> String {
 }
 
 fn list(signals: &[Signal]) -> String {
-    signals.iter().map(|signal| format!("`{}`", signal.column)).collect::<Vec<_>>().join(", ")
+    signals.iter().map(|signal| format!("`{}`", line(&signal.column))).collect::<Vec<_>>().join(", ")
 }
 
 fn head(name: &str, copy: &str, inputs: &[Signal], outputs: &[Signal]) -> String {
@@ -219,6 +226,8 @@ fn head(name: &str, copy: &str, inputs: &[Signal], outputs: &[Signal]) -> String
         [] => "No input was found: each output decays freely from its initial state.".to_owned(),
         inputs => format!("Inputs: {}; `mops new --inputs` chooses others.", list(inputs)),
     };
+    // Names from the file stay on one line: a line break would end the comment.
+    let copy = line(copy);
     format!(
         "#:schema study.schema.json
 # A calibration to start from, for {copy}: `mops run study.toml` estimates the tuners, and its report shows measured against
@@ -365,7 +374,12 @@ fn experiments(
     let free: Vec<String> =
         outputs.iter().flat_map(|y| [quoted(&y.name), quoted(&format!("{}_rate", y.name))]).collect();
     let names = file.time_column();
-    let time_key = if names.as_deref() == Some(time) { String::new() } else { format!("time = {}\n", quoted(time)) };
+    let mut time_key =
+        if names.as_deref() == Some(time) { String::new() } else { format!("time = {}\n", quoted(time)) };
+    let column = file.column(time).ok().filter(|column| column.unit.is_none());
+    if let Some(unit) = column.and_then(|column| assumed_unit(column.values)) {
+        let _ = writeln!(time_key, "time-unit = {}", quoted(unit));
+    }
     let skipped = if skip > 0 { format!("skip     = {skip}\n") } else { String::new() };
     let finite: Vec<f64> = times[skip..].iter().copied().filter(|t| t.is_finite()).collect();
     #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, clippy::cast_sign_loss)]

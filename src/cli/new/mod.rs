@@ -10,6 +10,7 @@ use mops_core::{Catalogue, CatalogueStudy, Diagnostic, suggestion};
 
 use super::schema;
 use crate::files::Outputs;
+use crate::plain::acts;
 use crate::terminal::{CommandError, print};
 
 /// Arguments of `mops new`.
@@ -67,7 +68,8 @@ pub(super) fn new(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCo
             .into());
     }
     let called = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_else(|| "study".into());
-    let called = called.replace(['"', '\\'], "-");
+    // The name is written between quotation marks, where these characters would end it or not be valid.
+    let called: String = called.chars().map(|c| if acts(c) || "\"\\\n\t".contains(c) { '-' } else { c }).collect();
     let files: Vec<(&Path, Vec<u8>)> = match (from, from_data) {
         (_, Some(data)) => {
             let copy = data.file_name().map_or(data.as_path(), Path::new);

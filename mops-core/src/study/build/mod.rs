@@ -13,6 +13,7 @@ use std::sync::Arc;
 use crate::case::Case;
 use crate::criterion::Usage;
 use crate::evaluation::Objective;
+use crate::experiment::Role;
 use crate::loss::Loss;
 use crate::model::{AnalysisKind, Interface, Model};
 use crate::study::draft::{CaseBuilder, CriterionBuilder, StudyBuilder};
@@ -143,6 +144,9 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
             "nothing to minimise: every criterion has usage monitor, so that the tuners keep their initial guess";
         study.warnings.push(fact.to_owned());
     }
+    if solved || study.task == Task::Pareto {
+        refuse_validation_alone(&study)?;
+    }
     study.rows.sort_by_key(|row| study.jobs[row.job].case);
     study.tasks = tasks::build(draft.tasks, &study)?;
     let is_sure = match study.task {
@@ -175,6 +179,20 @@ fn in_order(mut left: Vec<(String, CriterionBuilder)>) -> Result<Vec<(String, Cr
         ordered.push(left.remove(next));
     }
     Ok(ordered)
+}
+
+/// Refuses a study whose criteria all belong to experiments for validation, or are monitored: no tuner would have an effect.
+fn refuse_validation_alone(study: &Study) -> Result<(), StudyError> {
+    let mut used = study.rows.iter().filter(|row| row.usage != Usage::Monitor);
+    let Some(case) = used.clone().next().map(|row| study.case_of(row)) else { return Ok(()) };
+    if used.any(|row| study.case_of(row).role() == Role::Calibration) {
+        return Ok(());
+    }
+    let fact = "no criterion counts, as those that are not monitored belong to experiments for validation only";
+    Err(StudyError::new("role", fact)
+        .within(&case.name)
+        .within("experiments")
+        .with_help("remove `role` from the experiments that the tuners are fitted to"))
 }
 
 /// Refuses an experiment that does not give an input of a model, although its data files have columns that it does not use.
