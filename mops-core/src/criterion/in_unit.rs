@@ -19,7 +19,7 @@ impl InUnit {
     /// Creates the criterion.
     ///
     /// # Errors
-    /// If the unit has another dimension, or another zero.
+    /// If the unit has another dimension, or another zero, or is ambiguous.
     pub(crate) fn new(inner: Box<dyn Criterion>, unit: &Unit) -> Result<Self, String> {
         let own = inner.unit();
         let factor = own.factor_to(unit).filter(|_| own.is_angle() == unit.is_angle() || !own.dimension().is_none());
@@ -27,7 +27,10 @@ impl InUnit {
         if own.zero() != unit.zero() {
             return Err(format!("the values of the criterion are in `{own}`, whose zero is not that of `{unit}`"));
         }
-        Ok(Self { inner, unit: unit.clone(), factor })
+        match unit.ambiguity_in(&own) {
+            Some(why) => Err(why),
+            None => Ok(Self { inner, unit: unit.clone().of_quantity_in(&own), factor }),
+        }
     }
 
     /// Returns the factor of the number of a value: 1 for a missed criterion that is not a time, whose number is a ratio.
