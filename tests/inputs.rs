@@ -479,7 +479,7 @@ fn a_sum_of_temperatures_has_one_temperature_wherever_it_stands() {
             vec![&fahrenheit, step],
             vec!["'20 degC'", "{ table = { time = [0, 10], value = ['0 K', '5 K'] } }"],
             vec!["{ sine = { amplitude = '5 K', frequency = '0.00625 Hz', offset = '68 degF' } }"],
-            vec!["['20 degC']", "[['2 K'], '3 K']"],
+            vec!["'20 degC'", "'2 K'", "'3 K'"],
         ] {
             for first in 0..terms.len() {
                 let mut turned = terms.clone();

@@ -306,16 +306,14 @@ impl Reader<'_> {
     /// Returns the input that an entry describes, in the unit of the input.
     pub fn read(&self, entry: &InputEntry, node: &Node<'_>) -> Result<Input, Diagnostic> {
         match entry {
-            InputEntry::Sum(_) => self.sum(entry, node),
+            InputEntry::Sum(parts) => self.sum(parts, node),
             entry => self.converted(Term::open(entry, node, self.files)?),
         }
     }
 
     /// Returns a sum. Of temperatures, one term at most is a temperature, wherever it stands, and all others are differences.
-    fn sum(&self, entry: &InputEntry, node: &Node<'_>) -> Result<Input, Diagnostic> {
-        let mut parts = Vec::new();
-        flatten(entry, node, &mut parts);
-        let terms = parts.iter().map(|(entry, node)| Term::open(entry, node, self.files));
+    fn sum(&self, parts: &[InputEntry], node: &Node<'_>) -> Result<Input, Diagnostic> {
+        let terms = parts.iter().zip(node.elements()).map(|(entry, node)| Term::open(entry, &node, self.files));
         let terms = terms.collect::<Result<Vec<_>, _>>()?;
         let absolute = self.absolute(&terms)?;
         let difference = self.unit.difference();
@@ -371,7 +369,7 @@ impl Reader<'_> {
                 })
             }
             InputEntry::Function(section) => self.function(section).map_err(|mistake| node.locate(&mistake)),
-            InputEntry::Sum(_) => unreachable!("sums are flattened"),
+            InputEntry::Sum(_) => unreachable!("the schema has no sums within sums"),
         }
     }
 
@@ -552,18 +550,8 @@ impl<'e, 't> Term<'e, 't> {
             (None, InputEntry::Function(section)) => {
                 section.values().into_iter().map(|value| value.unit.as_ref()).collect()
             }
-            (None, InputEntry::Sum(_)) => unreachable!("sums are flattened"),
+            (None, InputEntry::Sum(_)) => unreachable!("the schema has no sums within sums"),
         }
-    }
-}
-
-/// Collects the terms of a sum; a sum within a sum adds its own.
-fn flatten<'e, 't>(entry: &'e InputEntry, node: &Node<'t>, terms: &mut Vec<(&'e InputEntry, Node<'t>)>) {
-    match entry {
-        InputEntry::Sum(parts) => {
-            parts.iter().zip(node.elements()).for_each(|(part, node)| flatten(part, &node, terms));
-        }
-        entry => terms.push((entry, node.clone())),
     }
 }
 

@@ -147,7 +147,9 @@ fn in_unit(criterion: Box<dyn Criterion>, draft: &CriterionBuilder) -> Result<Bo
             // Angles and other pure numbers are refused with the demand, too.
             && !(own.dimension().is_none() && own.is_angle() != unit.is_angle())
     };
-    match asked.filter(|unit| **unit != own).filter(is_certain) {
+    // Hz beside rad/s is only known to contradict 1/s if the answer is in rad/s.
+    let is_other = |unit: &&Unit| **unit != own || (unit.is_angle() && !own.is_angle());
+    match asked.filter(is_other).filter(is_certain) {
         Some(unit) => Ok(Box::new(InUnit::new(criterion, unit).map_err(StudyError::here)?)),
         None => Ok(criterion),
     }
