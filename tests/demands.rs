@@ -198,7 +198,7 @@ fn a_condition_that_is_never_reached_meets_no_demand_in_any_unit() {
         // The samples of Monte Carlo are counted by the same rule.
         let uncertain = "[uncertain]\nk = { min = 0.1, max = 0.9 }\n[monte-carlo]\nat = 'start'\nsamples = 4\n";
         let task = text.replace("name = \"never\"", "name = \"never\"\ntask = \"monte-carlo\"");
-        let found = &run(&format!("{task}{other}\n{uncertain}"))["monte_carlo"]["criteria"][2];
+        let found = &run(&format!("{task}{other}\n{uncertain}"))["monte-carlo"]["criteria"][2];
         assert!(found["met"]["count"] == 0 && found["failed"] == 4, "{criterion} {demand}: {found}");
     }
 }
