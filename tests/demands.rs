@@ -149,6 +149,60 @@ fn a_level_that_is_never_reached_meets_no_demand_for_any_horizon() {
     }
 }
 
+/// `L = k/(s + 1)` with a gain below 1, and a lag that is at 0.17 at most when the simulation ends.
+const NEVER: &str = r#"
+    [study]
+    name = "never"
+    [models.L.transfer-function]
+    numerator = ["k"]
+    denominator = [1, 1]
+    [models.s.equations]
+    states = { y = "1" }
+    parameters = { k = "1" }
+    der = { y = "(1 - y)*k/100 [s]" }
+    horizon = "20 s"
+    [tuners]
+    k = { start = 0.5, min = 0.1, max = 0.9 }
+    [criteria]
+    wc = { model = "L", crossover-frequency = {}, usage = "monitor" }
+    rise = { model = "s", rise-time = { signal = "y", target = 1 }, usage = "monitor" }
+    c = { DEMANDED }
+"#;
+
+#[test]
+fn a_condition_that_is_never_reached_meets_no_demand_in_any_unit() {
+    let crossover = "model = 'L', crossover-frequency = {}";
+    let of_rise = "model = 's', expression = { value = '2*rise' }";
+    let of_crossover = "model = 'L', expression = { value = '3*wc', unit = 'rad/s' }";
+    let energy = "model = 's', expression = { value = '2*rise*3 [kW]' }";
+    for (criterion, demand) in [
+        (crossover, "good = '2 rad/s', bad = '20 rad/s'"),
+        (crossover, "good = '2 Hz', bad = '20 Hz'"),
+        (crossover, "good = '5 Hz', bad = '1 Hz', usage = 'inequality'"),
+        (crossover, "demand = '30 rpm', usage = 'equality'"),
+        (of_rise, "demand = '10 min'"),
+        (of_rise, "demand = '600 s'"),
+        (of_rise, "good = 0, bad = 1, unit = 'h'"),
+        (of_crossover, "demand = '1 Hz'"),
+        (energy, "demand = '1 kJ'"),
+        (energy, "demand = '1 mJ', usage = 'inequality'"),
+    ] {
+        let other =
+            if demand.contains("usage") { "d = { model = 's', peak = { signal = 'y' }, demand = 1 }" } else { "" };
+        let text = NEVER.replace("DEMANDED", &format!("{criterion}, {demand}"));
+        let result = run(&format!("{text}{other}"));
+        let c = &result["criteria"][2];
+        assert!(c["value"].is_null() && c["met"] == false, "{criterion} {demand}: {c}");
+        assert!((1.0..=2.0).contains(&number(&c["scaled"])), "{criterion} {demand}: {c}");
+        assert!(!demand.contains("usage") || result["feasible"] == false, "{result}");
+        // The samples of Monte Carlo are counted by the same rule.
+        let uncertain = "[uncertain]\nk = { min = 0.1, max = 0.9 }\n[monte-carlo]\nat = 'start'\nsamples = 4\n";
+        let task = text.replace("name = \"never\"", "name = \"never\"\ntask = \"monte-carlo\"");
+        let found = &run(&format!("{task}{other}\n{uncertain}"))["monte-carlo"]["criteria"][2];
+        assert!(found["met"]["count"] == 0 && found["failed"] == 4, "{criterion} {demand}: {found}");
+    }
+}
+
 #[test]
 fn a_solver_finds_a_design_that_settles_from_one_that_does_not() {
     // A lag that must be within 2 % after 5 s; the initial guess is far from that.

@@ -448,14 +448,79 @@ fn data_are_summarised_at_rest_and_plotted() {
     assert!(mops(&["data", "log.csv", "--plot", "x.gif"]).contains("neither .svg nor .png"));
 }
 
+/// Returns a study whose input in `unit` is a sum of these terms.
+fn summed(unit: &str, terms: &[&str]) -> String {
+    format!(
+        "[study]\nname = 'room'\n[models.room.equations]\nstates = {{ T = '{unit}' }}\ninputs = {{ To = '{unit}' }}\n\
+         der = {{ T = '(To - T)/1 [s]' }}\nstart = {{ T = '20 degC' }}\nhorizon = '40 s'\n\
+         [cases]\nc = {{ inputs.To = [{}] }}\n\
+         [criteria]\nend = {{ final-value = {{ signal = 'To' }}, usage = 'monitor' }}\n",
+        terms.join(", ")
+    )
+}
+
 #[test]
-fn the_second_part_of_a_sum_is_a_difference_on_every_scale() {
-    let text = "[study]\nname = 'room'\n[models.room.equations]\nstates = { T = 'degC' }\ninputs = { To = 'degC' }\n\
-                der = { T = '(To - T)/1 [s]' }\nstart = { T = '20 degC' }\nhorizon = '40 s'\n\
-                [cases]\nc = { inputs.To = ['20 degC', { step = { time = '1 s', after = '5 K' } }] }\n\
-                [criteria]\nend = { final-value = { signal = 'T' }, usage = 'monitor' }\n";
+fn a_sum_of_temperatures_has_one_temperature_wherever_it_stands() {
     let folder = tempfile::tempdir().unwrap();
-    assert!((value(&run(folder.path(), text), "c", "end") - 25.0).abs() < 1e-6);
+    std::fs::write(folder.path().join("log.csv"), "time [s],A [K],F [degF],n\n0,293.15,68,20\n40,293.15,68,20\n")
+        .unwrap();
+    // At 40 s, the sine of 1/160 Hz is at its amplitude.
+    let sine = "{ sine = { amplitude = '9 degF', frequency = '0.00625 Hz' } }";
+    let step = "{ step = { time = '1 s', after = '5 K' } }";
+    let file = |column: &str| format!("{{ file = {{ path = 'log.csv', column = '{column}' }} }}");
+    let (kelvin, fahrenheit, plain) = (file("A"), file("F"), file("n"));
+    for unit in ["K", "degC", "degF"] {
+        for terms in [
+            vec!["'20 degC'", step],
+            vec!["{ constant = '68 degF' }", sine],
+            vec!["{ step = { before = '0 degC', after = '20 degC' } }", "'10 K'", "{ constant = '-5 K' }"],
+            vec!["'293.15 K'", sine],
+            vec![&kelvin, sine],
+            vec![&fahrenheit, step],
+            vec!["'20 degC'", "{ table = { time = [0, 10], value = ['0 K', '5 K'] } }"],
+            vec!["{ sine = { amplitude = '5 K', frequency = '0.00625 Hz', offset = '68 degF' } }"],
+            vec!["'20 degC'", "'2 K'", "'3 K'"],
+        ] {
+            for first in 0..terms.len() {
+                let mut turned = terms.clone();
+                turned.rotate_left(first);
+                let found = value(&run(folder.path(), &summed(unit, &turned)), "c", "end");
+                let expected = match unit {
+                    "K" => 298.15,
+                    "degC" => 25.0,
+                    _ => 77.0,
+                };
+                assert!((found - expected).abs() < 1e-6, "{unit} {turned:?}: {found}");
+            }
+        }
+    }
+    // Numbers without a unit, and columns without one, are in that of the input.
+    for terms in [["20", step], [step, "20"], [&plain, step], [step, &plain], ["20", "{ step = { after = 5 } }"]] {
+        assert!((value(&run(folder.path(), &summed("degC", &terms)), "c", "end") - 25.0).abs() < 1e-6, "{terms:?}");
+    }
+}
+
+#[test]
+fn a_sum_of_two_temperatures_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (unit, terms, help) in [
+        ("K", ["'20 degC'", "{ step = { after = '5 degC' } }"], "one term in degC, and the differences in K"),
+        ("degC", ["'20 degC'", "{ step = { after = '86 degF' } }"], "one term in degC, and the differences in K"),
+        ("degC", ["'293.15 K'", "{ step = { after = '5 K' } }"], "one term in degC, and the differences in K"),
+        ("degF", ["20", "'5 degC'"], "one term in degF, and the differences in degR"),
+    ] {
+        for terms in [terms, [terms[1], terms[0]]] {
+            std::fs::write(folder.path().join("study.toml"), summed(unit, &terms)).unwrap();
+            let output =
+                cargo_bin_cmd!("mops").current_dir(folder.path()).args(["check", "study.toml"]).output().unwrap();
+            let message = String::from_utf8(output.stderr).unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(
+                output.status.code() == Some(2) && message.contains("may be the temperature"),
+                "{terms:?}: {message}"
+            );
+            assert!(message.contains(help) && message.contains("study.toml:10:"), "{terms:?}: {message}");
+        }
+    }
 }
 
 #[test]

@@ -304,6 +304,122 @@ fn unity_feedback_requires_equal_dimensions_and_converts_units() {
     }
 }
 
+/// Returns a loop `k/s` and an axis with the angular speed `w`, its frequency `f` and a rate `r`; all are 5 1/s for `k` = 5.
+fn speeds(criterion: &str) -> String {
+    format!(
+        "[study]\nname = 'speeds'\n[models.L.transfer-function]\nnumerator = ['k']\ndenominator = [1, 0]\n\
+         [models.axis.equations]\nstates = {{ x = '1' }}\nparameters = {{ k = '1' }}\nder = {{ x = '0 [1/s]' }}\nhorizon = 1\n\
+         outputs = {{ w = {{ value = 'k*1 [rad/s]', unit = 'rad/s' }}, f = {{ value = 'k*1 [Hz]', unit = 'Hz' }}, \
+         r = {{ value = 'k*1 [1/s]', unit = '1/s' }} }}\n\
+         [tuners]\nk = {{ start = 5, min = 4.999, max = 5.001 }}\n[criteria]\n\
+         bw = {{ model = 'L', bandwidth = {{ of = 'closed-loop' }}, demand = '1 Hz' }}\nc = {{ {criterion} }}\n"
+    )
+}
+
+#[test]
+fn cycles_and_angles_of_a_demand_are_those_of_the_quantity_whatever_the_unit() {
+    let bandwidth = "model = 'L', bandwidth = { of = 'closed-loop' }";
+    let peak = |signal: &str| format!("model = 'axis', peak = {{ signal = '{signal}' }}");
+    let [speed, frequency, rate] = ["w", "f", "r"].map(peak);
+    // Value and scaled value in the unit of the answer.
+    for (criterion, demand, expected, limit) in [
+        (bandwidth, "demand = '1 Hz', unit = '1/s'", 5.0, std::f64::consts::TAU),
+        (bandwidth, "demand = '1 Hz', unit = '1/min'", 300.0, 60.0 * std::f64::consts::TAU),
+        (bandwidth, "demand = '1 1/s', unit = 'Hz'", 5.0 / std::f64::consts::TAU, 1.0 / std::f64::consts::TAU),
+        (bandwidth, "good = '10 1/s', bad = '1 Hz'", 5.0 / std::f64::consts::TAU, 1.0),
+        (bandwidth, "good = '10 Hz', bad = '1 1/s'", 5.0, 1.0),
+        (bandwidth, "demand = '60 rpm', unit = '1/s'", 5.0, std::f64::consts::TAU),
+        (&speed, "demand = '1 Hz', unit = '1/min'", 300.0, 60.0 * std::f64::consts::TAU),
+        (&speed, "good = '1 1/s', bad = '10 Hz'", 5.0 / std::f64::consts::TAU, 10.0),
+        (&frequency, "demand = '1 rad/s', unit = '1/s'", 5.0, 1.0 / std::f64::consts::TAU),
+        (&frequency, "demand = '60 rpm', unit = '1/min'", 300.0, 60.0),
+        (&rate, "demand = '1 Hz', unit = '1/min'", 300.0, 60.0),
+        (&rate, "demand = '1 rad/s'", 5.0, 1.0),
+    ] {
+        let text = speeds(&format!("{criterion}, {demand}"));
+        let folder = study(&text, "");
+        let (code, output) = mops(folder.path(), &["run", "study.toml", "--max-evaluations", "1", "--out", "out"]);
+        assert!(code <= 1, "{output}");
+        let c = &result(folder.path())["criteria"][1];
+        let number = |key: &str| c[key].as_f64().unwrap_or(f64::NAN);
+        assert!((number("value") / expected - 1.0).abs() < 1e-9, "{criterion} {demand}: {c}");
+        let found = [number("demand"), number("bad")].into_iter().find(|number| !number.is_nan()).unwrap_or(f64::NAN);
+        assert!((found / limit - 1.0).abs() < 1e-9, "{criterion} {demand}: {c}");
+    }
+    // A formula reads the bandwidth in rad/s, although it is shown in Hz.
+    let formula = values(&speeds("model = 'L', expression = { value = '2*bw', unit = 'rad/s' }, demand = 1"), "");
+    assert!((formula[1].1 - 10.0).abs() < 1e-9, "{formula:?}");
+}
+
+#[test]
+fn cycles_beside_angles_are_refused_for_a_quantity_that_may_count_either() {
+    for (criterion, message) in [
+        ("model = 'axis', peak = { signal = 'r' }, good = '1 Hz', bad = '1 rad/s'", "the quantity counts neither"),
+        ("model = 'axis', peak = { signal = 'r' }, demand = '60 rpm', unit = 'Hz'", "the quantity counts neither"),
+        ("model = 'axis', expression = { value = 'maximum(w)' }, demand = '1 Hz'", "the value may count angles"),
+        (
+            "model = 'axis', expression = { value = 'maximum(w)' }, good = 0, bad = '60 rpm'",
+            "the value may count cycles",
+        ),
+        (
+            "model = 'axis', expression = { value = 'maximum(f)' }, demand = 1, unit = 'Hz'",
+            "the value may count angles",
+        ),
+    ] {
+        let folder = study(&speeds(criterion), "");
+        let (code, output) = mops(folder.path(), &["check", "study.toml"]);
+        let output = output.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(code == 2 && output.contains(message), "{criterion}: {output}");
+    }
+    let stated = "model = 'axis', expression = { value = 'maximum(w)', unit = 'rad/s' }, demand = '1 Hz'";
+    assert!((values(&speeds(stated), "")[1].1 - 5.0 / std::f64::consts::TAU).abs() < 1e-9);
+}
+
+#[test]
+fn a_tuner_in_another_unit_has_the_angles_of_its_parameter() {
+    let text = |tuner: &str| {
+        format!(
+            "[study]\nname = 'm'\n[models.m.equations]\nstates = {{ x = 'rad' }}\nparameters = {{ w = 'rad/s' }}\n\
+             der = {{ x = 'w' }}\nhorizon = '1 s'\n[tuners]\nw = {{ {tuner} }}\n\
+             [criteria]\nend = {{ final-value = {{ signal = 'x' }}, demand = '1 rad' }}\n"
+        )
+    };
+    for tuner in ["unit = '1/s'", "unit = '1/min'", "unit = 'rad/s'", "unit = 'Hz'"] {
+        let found = values(&text(&format!("start = '1 Hz', min = '0.5 Hz', max = '2 Hz', {tuner}")), "");
+        assert!((found[0].1 / std::f64::consts::TAU - 1.0).abs() < 1e-9, "{tuner}: {found:?}");
+    }
+}
+
+#[test]
+fn ratios_of_a_temperature_on_a_scale_are_refused() {
+    let text = |unit: &str, rest: &str| {
+        format!(
+            "[study]\nname = 'm'\ntask = 'monte-carlo'\n[models.m.equations]\nstates = {{ T = '{unit}' }}\n\
+             parameters = {{ Ta = '{unit}', Tb = '{unit}' }}\nder = {{ T = '(Ta - T)/1 [s] + (Tb - T)/1 [s]' }}\n\
+             start = {{ T = '20 degC' }}\nhorizon = '1 s'\n[cases]\nc = {{ Tb = '20 degC' }}\n\
+             [criteria]\nend = {{ final-value = {{ signal = 'T' }}, demand = '300 K' }}\n{rest}"
+        )
+    };
+    let tuner =
+        |scale: &str| format!("[tuners]\nTa = {{ start = '20 degC', min = '10 degC', max = '30 degC'{scale} }}\n");
+    let uncertain = |of: &str| format!("{}[uncertain]\nTb = {{ {of} }}\n[monte-carlo]\nat = 'start'\n", tuner(""));
+    let median = uncertain("log-normal = { median = '20 degC', deviation = 0.1 }");
+    let interval = uncertain("log-normal = { interval = ['10 degC', '30 degC'] }");
+    let logarithmic =
+        tuner(", scale = 'log'") + "[uncertain]\nTb = { normal = { mean = '20 degC', deviation = '1 K' } }\n";
+    for (rest, key) in [(&median, "log-normal"), (&interval, "log-normal"), (&logarithmic, "scale")] {
+        for unit in ["degC", "degF", "K"] {
+            let folder = study(&text(unit, rest), "");
+            let (code, output) = mops(folder.path(), &["check", "study.toml"]);
+            let output = output.split_whitespace().collect::<Vec<_>>().join(" ");
+            match unit {
+                "K" => assert_eq!(code, 0, "{key}: {output}"),
+                _ => assert!(code == 2 && output.contains("depends on the zero of the scale"), "{key}: {output}"),
+            }
+        }
+    }
+}
+
 #[test]
 fn common_notations_of_units_are_read() {
     let text = "[study]\nname = 'm'\n[models.m.equations]\nstates = { x = 'J' }\nparameters = { E = 'J' }\nder = { x = 'E/1[s]' }\nhorizon = '1 s'\n\

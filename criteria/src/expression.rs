@@ -20,7 +20,8 @@ use crate::common::trace;
 /// `initial(x)` and `final(x)` are the values at the start and at the end of the simulation, `maximum(x)` and `minimum(x)` the
 /// extrema, `integral(x)` the integral over time, `mean(x)` and `rms(x)` the mean and the root mean square. `x` is a signal, or a
 /// formula over signals and parameters. Operators and functions are those of equations. All quantities count in coherent SI units,
-/// and dimensions are checked; a number may have a unit, `5 [N m]`.
+/// and dimensions are checked; a number may have a unit, `5 [N m]`. A demand in Hz, rpm or deg/s needs a `unit` of the formula, as 1/s
+/// may count cycles or angles.
 ///
 /// Range: any number. Whether less or more is better depends on the study: a demand is an upper limit, `good` and `bad` set either
 /// direction. If another criterion in the formula has no value, because its condition was not reached, the formula has none.
@@ -346,7 +347,9 @@ impl Criterion for Bound {
                         let share = value.number / horizon.unwrap_or(1.0);
                         missed = Some(missed.map_or(share, |known| known.max(share)));
                     }
-                    in_coherent(value.number, &of.unit())
+                    // A criterion in rad/s is one in whatever unit the study shows it.
+                    let unit = of.unit();
+                    unit.convert(value.number, &coherent(&unit)).expect("the coherent unit has the same dimension")
                 }
             });
         }

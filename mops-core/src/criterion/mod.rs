@@ -226,11 +226,12 @@ pub struct Value {
 /// A condition of a criterion, such as settling, that was not reached in a simulation or at any frequency.
 ///
 /// The criterion then has no value, and no demand is met. To guide solvers, the number is `h (1 + e/(e + b))`. `h` is the
-/// time available to reach the condition (1 if the criterion is not a time). `e` is the distance of the response from its
-/// target and `b` the tolerance. [`crate::Demand::scaled`] defines the scaled value.
+/// time available to reach the condition, in the criterion's unit. For a criterion that is not a time, `h` is 1 and the number a
+/// ratio, whatever the unit. `e` is the distance of the response from its target and `b` the tolerance. [`crate::Demand::scaled`]
+/// defines the scaled value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Missed {
-    /// Time available to reach the condition, s; `None` if the criterion is not a time.
+    /// Time available to reach the condition, in the criterion's unit; `None` if the criterion is not a time.
     pub horizon: Option<f64>,
 }
 

@@ -205,14 +205,13 @@ fn constant(place: &Node<'_>, table: &InputTable) -> Result<Option<Quantity>, Di
     Ok(Some(value.clone()))
 }
 
-/// Reads an input of a case from a data file, in `unit`.
+/// Reads an input of a case from a data file, and the unit of its column.
 pub(super) fn recorded(
     place: &Node<'_>,
     path: &str,
     column: &InputTable,
-    unit: &Unit,
     files: &dyn Files,
-) -> Result<Input, Diagnostic> {
+) -> Result<(Input, Option<Unit>), Diagnostic> {
     let file = Opened { files, known: RefCell::default() }.open(place, "path", path)?;
     let keys = Elsewhere::of(&None, &column.time, &column.time_unit, &column.sample_time);
     let clock = Clock::new(place, &file, keys.time, keys.unit, keys.sample_time, &column.column)?;
@@ -226,13 +225,8 @@ pub(super) fn recorded(
         let fact = format!("`{}` ends {} s before the simulation starts at 0 s", column.column, -last);
         return Err(place.diagnostic(fact).with_help("correct `shift`, or the time column"));
     }
-    let (input, own, _) = table.sampled(place, column, shift, table.rows.clone())?;
-    let Some(own) = own.filter(|own| own != unit) else { return Ok(input) };
-    let Some(factor) = own.factor_to(unit) else {
-        let fact = format!("the column `{}` is in `{own}`, but the input is in `{unit}`", column.column);
-        return Err(place.diagnostic(fact).with_help("choose another column, or set `unit`"));
-    };
-    Ok(input.mapped(&|value| own.convert(value, unit).expect("the units are compatible"), factor))
+    let (input, unit, _) = table.sampled(place, column, shift, table.rows.clone())?;
+    Ok((input, unit))
 }
 
 pub(super) fn entry<'t>(node: &Node<'t>, table: &str, key: &str) -> Node<'t> {

@@ -306,6 +306,61 @@ impl Reader<'_> {
     /// Returns the input that an entry describes, in the unit of the input.
     pub fn read(&self, entry: &InputEntry, node: &Node<'_>) -> Result<Input, Diagnostic> {
         match entry {
+            InputEntry::Sum(parts) => self.sum(parts, node),
+            entry => self.converted(Term::open(entry, node, self.files)?),
+        }
+    }
+
+    /// Returns a sum. Of temperatures, one term at most is a temperature, wherever it stands, and all others are differences.
+    fn sum(&self, parts: &[InputEntry], node: &Node<'_>) -> Result<Input, Diagnostic> {
+        let terms = parts.iter().zip(node.elements()).map(|(entry, node)| Term::open(entry, &node, self.files));
+        let terms = terms.collect::<Result<Vec<_>, _>>()?;
+        let absolute = self.absolute(&terms)?;
+        let difference = self.unit.difference();
+        let rest = Reader { unit: &difference, ..*self };
+        let convert = |(k, term)| if Some(k) == absolute { self.converted(term) } else { rest.converted(term) };
+        terms.into_iter().enumerate().map(convert).collect::<Result<_, _>>().map(Input::Sum)
+    }
+
+    /// Returns the term of a sum that is a temperature: the one on a temperature scale. Without one, in an input on a scale, the only
+    /// one in K, unless numbers without a unit are on that scale.
+    fn absolute(&self, terms: &[Term<'_, '_>]) -> Result<Option<usize>, Diagnostic> {
+        let having = |is_meant: &dyn Fn(Option<&Unit>) -> bool| -> Vec<usize> {
+            (0..terms.len()).filter(|&k| terms[k].units().into_iter().any(is_meant)).collect()
+        };
+        let zero = self.unit.zero();
+        let on_scale = having(&|unit| unit.is_some_and(|unit| unit.zero() != 0.0));
+        let on_other = having(&|unit| unit.is_some_and(|unit| unit.zero() != 0.0 && unit.zero() != zero));
+        let in_kelvin = having(&|unit| unit.is_some_and(|unit| unit.zero() == 0.0));
+        // Of an input in degC, numbers without a unit are in degC.
+        let numbers = if zero == 0.0 { Vec::new() } else { having(&|unit| unit.is_none()) };
+        let in_doubt = |k: usize| {
+            let scale = if zero == 0.0 { Unit::known("degC") } else { self.unit.clone() };
+            let fact = "another term of the sum may be the temperature, of which this one would be a difference";
+            let help = format!("write one term in {scale}, and the differences in {}", scale.difference());
+            Err(terms[k].node.diagnostic(fact.to_owned()).with_help(help))
+        };
+        match (&on_scale[..], &in_kelvin[..]) {
+            ([_, second, ..], _) => in_doubt(*second),
+            ([one], _) if on_other.contains(one) && numbers.iter().any(|k| k != one) => in_doubt(*one),
+            ([one], _) => Ok(Some(*one)),
+            ([], _) if zero == 0.0 || !numbers.is_empty() => Ok(None),
+            ([], [_, second, ..]) => in_doubt(*second),
+            ([], only) => Ok(only.first().copied()),
+        }
+    }
+
+    /// Returns a term in the unit of the input.
+    fn converted(&self, Term { entry, recorded, node }: Term<'_, '_>) -> Result<Input, Diagnostic> {
+        if let Some(Recorded { input, unit, column }) = recorded {
+            let Some(own) = unit.filter(|own| own != self.unit) else { return Ok(input) };
+            let Some(factor) = own.factor_to(self.unit) else {
+                let fact = format!("the column `{column}` is in `{own}`, but the input is in `{}`", self.unit);
+                return Err(node.diagnostic(fact).with_help("choose another column, or set `unit`"));
+            };
+            return Ok(input.mapped(&|value| own.convert(value, self.unit).expect("they are compatible"), factor));
+        }
+        match entry {
             InputEntry::Constant(value) => {
                 let constant = self.number("", value, self.unit);
                 constant.map(Input::Constant).map_err(|mut mistake| {
@@ -313,22 +368,8 @@ impl Reader<'_> {
                     node.locate(&mistake)
                 })
             }
-            InputEntry::Sum(parts) => {
-                // The first part has the zero of the unit, the others are differences.
-                let difference = self.unit.difference();
-                let rest = Reader { unit: &difference, ..*self };
-                let parts = parts.iter().zip(node.elements()).enumerate();
-                let read =
-                    parts.map(|(k, (part, node))| if k == 0 { self.read(part, &node) } else { rest.read(part, &node) });
-                read.collect::<Result<_, _>>().map(Input::Sum)
-            }
-            InputEntry::Function(section) => match &**section {
-                InputSection::File(file) => {
-                    let place = node.child("file").unwrap_or_else(|| node.clone());
-                    recorded(&place, &file.path, &file.column(), self.unit, self.files)
-                }
-                section => self.function(section).map_err(|mistake| node.locate(&mistake)),
-            },
+            InputEntry::Function(section) => self.function(section).map_err(|mistake| node.locate(&mistake)),
+            InputEntry::Sum(_) => unreachable!("the schema has no sums within sums"),
         }
     }
 
@@ -475,7 +516,66 @@ impl Reader<'_> {
     }
 }
 
+/// A term of an input, before its values are converted to the unit of the input.
+struct Term<'e, 't> {
+    entry: &'e InputEntry,
+    /// Values of a data file.
+    recorded: Option<Recorded<'e>>,
+    node: Node<'t>,
+}
+
+/// Column of a data file, in its unit.
+struct Recorded<'e> {
+    input: Input,
+    unit: Option<Unit>,
+    column: &'e str,
+}
+
+impl<'e, 't> Term<'e, 't> {
+    /// Creates the term; a data file is read.
+    fn open(entry: &'e InputEntry, node: &Node<'t>, files: &dyn Files) -> Result<Self, Diagnostic> {
+        let node = node.clone();
+        let InputEntry::Function(section) = entry else { return Ok(Self { entry, recorded: None, node }) };
+        let InputSection::File(file) = &**section else { return Ok(Self { entry, recorded: None, node }) };
+        let node = node.child("file").unwrap_or(node);
+        let (input, unit) = recorded(&node, &file.path, &file.column(), files)?;
+        Ok(Self { entry, recorded: Some(Recorded { input, unit, column: &file.column }), node })
+    }
+
+    /// Returns the units in which values are given, not amplitudes or times; `None` for a number without a unit.
+    fn units(&self) -> Vec<Option<&Unit>> {
+        match (&self.recorded, self.entry) {
+            (Some(recorded), _) => vec![recorded.unit.as_ref()],
+            (None, InputEntry::Constant(value)) => vec![value.unit.as_ref()],
+            (None, InputEntry::Function(section)) => {
+                section.values().into_iter().map(|value| value.unit.as_ref()).collect()
+            }
+            (None, InputEntry::Sum(_)) => unreachable!("the schema has no sums within sums"),
+        }
+    }
+}
+
 impl InputSection {
+    /// Returns the values that the study gives to the input, without amplitudes, which are differences.
+    fn values(&self) -> Vec<&Quantity> {
+        fn given(quantities: [Option<&Quantity>; 2]) -> Vec<&Quantity> {
+            quantities.into_iter().flatten().collect()
+        }
+        match self {
+            Self::Constant(value) => vec![value],
+            Self::Step(step) => given([step.before.as_ref(), Some(&step.after)]),
+            Self::Ramp(ramp) => given([ramp.before.as_ref(), Some(&ramp.after)]),
+            Self::Pulse(pulse) => given([pulse.before.as_ref(), Some(&pulse.value)]),
+            Self::Doublet(doublet) => given([doublet.offset.as_ref(), None]),
+            Self::Sine(sine) => given([sine.offset.as_ref(), None]),
+            Self::Multisine(sines) => given([sines.offset.as_ref(), None]),
+            Self::Chirp(chirp) => given([chirp.offset.as_ref(), None]),
+            Self::Prbs(prbs) => given([prbs.offset.as_ref(), None]),
+            Self::Table(table) => table.value.iter().collect(),
+            Self::File(_) => Vec::new(),
+        }
+    }
+
     /// Returns the key of the function in the study file.
     fn name(&self) -> &'static str {
         match self {

@@ -172,8 +172,8 @@ pub(super) struct CaseOptions {
     /// Inputs of the model; all others are 0. Each is a quantity, which is constant, or one of `constant`, `step`, `ramp`, `pulse`,
     /// `doublet`, `sine`, `multisine`, `chirp`, `prbs`, `table` and `file`:
     /// `inputs.u.step = { time = "1 s", before = 0, after = "60 deg" }`. A list is their sum:
-    /// `inputs.u = [{ constant = 2 }, { sine = { amplitude = 1, frequency = "3 Hz" } }]`. Numbers without a unit are in the unit of
-    /// the input.
+    /// `inputs.u = [{ constant = 2 }, { sine = { amplitude = 1, frequency = "3 Hz" } }]`, in which one term at most is in degC or degF
+    /// and the others are differences. Numbers without a unit are in the unit of the input.
     #[serde(default)]
     pub inputs: Entries<InputEntry>,
     /// End of the simulation.

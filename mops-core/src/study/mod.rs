@@ -435,3 +435,8 @@ impl Study {
 fn same<T>(a: &[T], b: &[T], alike: impl Fn(&T, &T) -> bool) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| alike(a, b))
 }
+
+/// Returns the fact that a share, a ratio or a logarithm of a parameter on a temperature scale has no meaning.
+fn ratio_of_temperatures(name: &str, unit: &Unit) -> String {
+    format!("`{name}` is a temperature in {unit}, of which a share or a ratio depends on the zero of the scale")
+}

@@ -1,7 +1,7 @@
 //! Uncertain parameters as written in a study, and their checks.
 
-use super::Study;
 use super::distribution::{Distribution, Uncertain};
+use super::{Study, ratio_of_temperatures};
 use crate::diagnostic::suggestion;
 use crate::math;
 use crate::study_error::StudyError;
@@ -81,9 +81,13 @@ fn build(name: &str, draft: UncertainBuilder, study: &Study) -> Result<Uncertain
     let bound = |key: &str, quantity: &Option<Quantity>| quantity.as_ref().map(|q| number(key, q)).transpose();
     let (min, max) = (bound("min", &draft.min)?, bound("max", &draft.max)?);
     let tolerance = tolerance(&draft, tuner.is_some(), name)?;
-    if tolerance.is_some() && unit.zero() != 0.0 {
-        let fact = format!("`{name}` is a temperature in {unit}, of which a share depends on the zero of the scale");
-        return Err(StudyError::new("tolerance", fact)
+    let of_ratios = match &draft.distribution {
+        _ if tolerance.is_some() => Some("tolerance"),
+        Some(DistributionBuilder::LogNormal { .. } | DistributionBuilder::LogNormalWithin(_)) => Some("log-normal"),
+        _ => None,
+    };
+    if let Some(key) = of_ratios.filter(|_| unit.zero() != 0.0) {
+        return Err(StudyError::new(key, ratio_of_temperatures(name, &unit))
             .with_help("declare it in K, or as a difference from a fixed temperature"));
     }
     let mut bounds = [min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)];

@@ -38,6 +38,8 @@ pub struct Unit {
     turning: [f64; 2],
     /// Value of the angle units in the coherent unit: 180/pi for V/deg, 1 for rad.
     angles: f64,
+    /// Exponents of the unit in which a quantity is declared, as in `turning`, if this unit is another one for its values.
+    declared: Option<[f64; 2]>,
 }
 
 /// Meaning of quantities in a unit, which matters for temperatures.
@@ -62,6 +64,7 @@ impl Unit {
             kind: Kind::Value,
             turning: [0.0; 2],
             angles: 1.0,
+            declared: None,
         }
     }
 
@@ -145,12 +148,39 @@ impl Unit {
         self.turning[0] != 0.0
     }
 
-    /// Returns true if a number in this unit leaves the angle unit ambiguous when converted to `other`, which counts
-    /// angles in deg, rev or similar.
+    /// Returns why a number in this unit has no certain value in `other`, and in which unit it has; `None` if it has one.
     ///
-    /// V is ambiguous for V/deg, and 1/s for rpm. V is not ambiguous for V/rad, because the radian is 1.
-    pub fn leaves_angles_open(&self, other: &Self) -> bool {
-        self.turning == [0.0; 2] && other.is_angle() && other.angles != 1.0
+    /// V is ambiguous for V/deg, and 1/s for rpm. V is not ambiguous for V/rad, because the radian is 1. Of a quantity in 1/s, Hz and
+    /// rad/s are ambiguous beside each other; and of one of unknown kind, such as the value of a formula, degC, Hz and rpm.
+    pub fn ambiguity_in(&self, other: &Self) -> Option<String> {
+        if !self.is_compatible(other) {
+            return None;
+        }
+        let [plain, of_other] = [self, other].map(|unit| unit.turning == [0.0; 2]);
+        let is_unknown = other.kind == Kind::Unknown;
+        let counts = if self.counts_cycles() { ["cycles", "angles"] } else { ["angles", "cycles"] };
+        if is_unknown && self.zero != other.zero {
+            let difference = self.difference();
+            return Some(format!(
+                "`{self}` has a zero of its own, but the value may be a difference; write it in `{difference}`"
+            ));
+        }
+        if is_unknown && of_other && !self.dimension.is_none() && (self.counts_cycles() || self.angles != 1.0) {
+            let [own, others] = counts;
+            return Some(format!("`{self}` counts {own}, but the value may count {others}; write it in `{other}`"));
+        }
+        if plain && other.is_angle() && other.angles != 1.0 {
+            return Some(format!(
+                "expected a quantity in `{other}`, found `{self}` without an angle unit; write it in `{other}`"
+            ));
+        }
+        if other.declared == Some([0.0; 2]) && self.turns_to(other) != 1.0 {
+            let [own, others] = counts;
+            return Some(format!(
+                "`{self}` counts {own} and `{other}` {others}, but the quantity counts neither; write it in `{other}`"
+            ));
+        }
+        None
     }
 
     /// Returns true if the unit counts cycles, as Hz does; conversion to an angle unit multiplies by 2 pi.
@@ -184,9 +214,11 @@ impl Unit {
         Self { kind: Kind::Unknown, ..self }
     }
 
-    /// Returns true if a quantity in this unit can have two meanings in `other`: a temperature or a difference.
-    pub fn is_ambiguous_in(&self, other: &Self) -> bool {
-        other.kind == Kind::Unknown && self.zero != other.zero && self.is_compatible(other)
+    /// Returns the unit as one for values of a quantity that is declared in `own`. Units that count neither angles nor cycles then
+    /// count what `own` counts: of a quantity in rad/s, 1 1/s is 1 rad/s, and 2 pi 1/s are 1 Hz.
+    #[must_use]
+    pub fn of_quantity_in(self, own: &Self) -> Self {
+        Self { kind: own.kind, declared: own.declared.or(Some(own.turning)), ..self }
     }
 
     /// Formats a number with this unit for a sentence: `3 rad`; a pure number without unit.
@@ -210,11 +242,18 @@ impl Unit {
         if !self.is_compatible(other) {
             return None;
         }
-        let [[angles, cycles], [others, of_other]] = [self.turning, other.turning];
-        let counted = cycles - of_other;
-        let turns = if counted != 0.0 && counted == others - angles { raised(2.0 * PI, counted) } else { 1.0 };
+        let turns = self.turns_to(other);
         // Equal units must convert without rounding, so that no bit of a study's numbers changes.
         Some(if self.factor == other.factor { turns } else { self.factor / other.factor * turns })
+    }
+
+    /// Returns the factor from cycles to angles that converts this unit to `other`.
+    fn turns_to(&self, other: &Self) -> f64 {
+        let declared = self.declared.or(other.declared).unwrap_or_default();
+        let [[angles, cycles], [others, of_other]] =
+            [self, other].map(|unit| if unit.turning == [0.0; 2] { declared } else { unit.turning });
+        let counted = cycles - of_other;
+        if counted != 0.0 && counted == others - angles { raised(2.0 * PI, counted) } else { 1.0 }
     }
 
     /// Converts a number from this unit to `other`, including the zeros of temperature scales: 20 degC is 293.15 K.
@@ -373,6 +412,7 @@ fn symbol(text: &str) -> Option<Unit> {
         kind: Kind::Value,
         turning,
         angles: if turning[0] == 0.0 { 1.0 } else { factor },
+        declared: None,
     })
 }
 
@@ -430,6 +470,41 @@ mod tests {
         assert_eq!(factor("N m/Hz", "N m s/rad"), 1.0 / (2.0 * PI));
         assert_eq!([factor("1/s", "rad/s"), factor("N m s", "N m s/rad")], [1.0; 2]);
         assert_eq!(factor("rev/s", "rad/s"), 2.0 * PI);
+    }
+
+    #[test]
+    fn the_unit_in_which_a_quantity_is_declared_tells_what_its_other_units_count() {
+        let shown = |unit: &str, own: &str| Unit::known(unit).of_quantity_in(&Unit::known(own));
+        let read = |text: &str, unit: &str, own: &str| Quantity::parse(text).unwrap().to(&shown(unit, own));
+        for (text, unit, own, value) in [
+            ("1 Hz", "1/s", "rad/s", 2.0 * PI),
+            ("1 Hz", "1/min", "rad/s", 120.0 * PI),
+            ("1 1/s", "Hz", "rad/s", 0.5 / PI),
+            ("1 1/s", "Hz", "Hz", 1.0),
+            ("1 rad/s", "1/s", "Hz", 0.5 / PI),
+            ("60 rpm", "1/s", "Hz", 1.0),
+            ("1 Hz", "1/min", "1/s", 60.0),
+            ("1 rad/s", "1/s", "1/s", 1.0),
+            ("2 N m s", "N m/Hz", "N m s/rad", 4.0 * PI),
+        ] {
+            let found = read(text, unit, own).unwrap();
+            assert!((found - value).abs() <= 1e-12 * value, "{text} in {unit} of {own}: {found}");
+            let there = Unit::known(own).factor_to(&shown(unit, own)).unwrap();
+            let back = shown(unit, own).factor_to(&Unit::known(own)).unwrap();
+            assert!((there * back - 1.0).abs() < 1e-12, "{unit} of {own}");
+            let direct = Quantity::parse(text).unwrap().to(&Unit::known(own)).unwrap();
+            assert!((found - direct * there).abs() <= 1e-12 * value, "{text} in {unit} of {own}");
+        }
+        for (text, unit) in [("1 Hz", "rad/s"), ("1 rad/s", "Hz"), ("60 rpm", "kHz"), ("1 Hz", "rpm")] {
+            let mistake = read(text, unit, "1/s").unwrap_err();
+            assert!(mistake.contains("the quantity counts neither"), "{text} in {unit}: {mistake}");
+        }
+        let formula = Unit::known("1/s").of_unknown_kind();
+        for text in ["1 Hz", "60 rpm", "5 deg/s"] {
+            let mistake = Quantity::parse(text).unwrap().to(&formula).unwrap_err();
+            assert!(mistake.ends_with("write it in `1/s`"), "{text}: {mistake}");
+        }
+        assert_eq!(Quantity::parse("1 rad/s").unwrap().to(&formula), Ok(1.0));
     }
 
     #[test]

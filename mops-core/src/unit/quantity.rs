@@ -44,19 +44,12 @@ impl Quantity {
     /// [`Unit::difference`].
     ///
     /// # Errors
-    /// If the unit has another dimension, if it leaves the angle unit ambiguous, or if it is a temperature scale and the value may be a
-    /// difference.
+    /// If the unit has another dimension, or if the value is ambiguous there, see [`Unit::ambiguity_in`].
     pub fn to(&self, unit: &Unit) -> Result<f64, String> {
-        match &self.unit {
-            None => Ok(self.number),
-            Some(given) if given.is_ambiguous_in(unit) => Err(format!(
-                "`{given}` has a zero of its own, but the value may be a difference; write it in `{}`",
-                given.difference()
-            )),
-            Some(given) if given.leaves_angles_open(unit) => Err(format!(
-                "expected a quantity in `{unit}`, found `{given}` without an angle unit; write it in `{unit}`"
-            )),
-            Some(given) => given.convert(self.number, unit).ok_or_else(|| misplaced(given, unit)),
+        let Some(given) = &self.unit else { return Ok(self.number) };
+        match given.ambiguity_in(unit) {
+            Some(why) => Err(why),
+            None => given.convert(self.number, unit).ok_or_else(|| misplaced(given, unit)),
         }
     }
 }

@@ -140,19 +140,18 @@ fn in_unit(criterion: Box<dyn Criterion>, draft: &CriterionBuilder) -> Result<Bo
         return Ok(Box::new(InUnit::new(criterion, unit).map_err(fail)?));
     }
     let asked = [&draft.demand, &draft.bad, &draft.good].into_iter().flatten().find_map(|q| q.unit.as_ref());
-    match asked.filter(|unit| **unit != criterion.unit()) {
-        Some(unit) if criterion.unit().factor_to(unit).is_some() && criterion.unit().zero() == unit.zero() => {
-            let angles = [criterion.unit().is_angle(), unit.is_angle()];
-            if criterion.unit().dimension().is_none() && angles[0] != angles[1] {
-                // Refused with the demand.
-                return Ok(criterion);
-            }
-            InUnit::new(criterion, unit)
-                .map(|converted| Box::new(converted) as Box<dyn Criterion>)
-                .map_err(StudyError::here)
-        }
-        // Another dimension is refused with the demand; a temperature on another scale is converted with it.
-        _ => Ok(criterion),
+    let own = criterion.unit();
+    // Another dimension and an ambiguous unit are refused with the demand; a temperature on another scale is converted with it.
+    let is_certain = |unit: &&Unit| {
+        unit.is_compatible(&own) && unit.zero() == own.zero() && unit.ambiguity_in(&own).is_none()
+            // Angles and other pure numbers are refused with the demand, too.
+            && !(own.dimension().is_none() && own.is_angle() != unit.is_angle())
+    };
+    // Hz beside rad/s is only known to contradict 1/s if the answer is in rad/s.
+    let is_other = |unit: &&Unit| **unit != own || (unit.is_angle() && !own.is_angle());
+    match asked.filter(is_other).filter(is_certain) {
+        Some(unit) => Ok(Box::new(InUnit::new(criterion, unit).map_err(StudyError::here)?)),
+        None => Ok(criterion),
     }
 }
 

@@ -9,6 +9,7 @@ use crate::expression::Expression;
 use crate::math;
 use crate::model::Parameter;
 use crate::study::draft::{Free, TunerBuilder};
+use crate::study::ratio_of_temperatures;
 use crate::study_error::StudyError;
 use crate::tuner::{Grid, Scale, Tuner};
 use crate::unit::{Quantity, Unit};
@@ -39,7 +40,8 @@ pub(super) fn build_tuner(
         {
             p.variable.unit.clone()
         }
-        (Some(unit), _) => unit.clone(),
+        (Some(unit), Some(p)) => unit.clone().of_quantity_in(&p.variable.unit),
+        (Some(unit), None) => unit.clone(),
         (None, Some(p)) => p.variable.unit.clone(),
         (None, None) => Unit::one(),
     };
@@ -136,6 +138,10 @@ pub(super) fn build_tuner(
     if draft.scale == Scale::Log && min <= 0.0 && max >= 0.0 {
         return Err(StudyError::new("scale", format!("a logarithmic range must exclude zero, but `min` is {min}"))
             .with_help("raise `min`, or omit `scale`"));
+    }
+    if draft.scale == Scale::Log && unit.zero() != 0.0 {
+        return Err(StudyError::new("scale", ratio_of_temperatures(name, &unit))
+            .with_help("omit `scale`, or declare the parameter in K"));
     }
     let width = if draft.scale == Scale::Log { math::ln(max / min) } else { max - min };
     if !fixed && !width.is_finite() {
