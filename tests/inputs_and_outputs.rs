@@ -491,7 +491,7 @@ fn a_database_beside_a_pipe_of_sqlite_is_not_opened() {
         assert!(place.at("r/evaluations.previous.sqlite").is_file());
         assert!(!place.at(&companion).exists());
         // Without a database, too.
-        std::fs::remove_file(place.at("r/evaluations.sqlite")).unwrap();
+        fs::remove_file(place.at("r/evaluations.sqlite")).unwrap();
         assert!(Command::new("mkfifo").arg(place.at(&companion)).status().unwrap().success());
         place.mops(&[&run[..], &["--resume"]].concat()).ends_with(0);
     }

@@ -126,7 +126,7 @@ fn a_time_limit_ends_every_task_like_a_spent_budget() {
         assert_eq!(result["evaluations"].as_u64().unwrap() > 0, known, "{task:?}");
         let warnings = result["warnings"].to_string();
         assert!(warnings.contains("stopped at the time limit of 0.5 s"), "{task:?}: {warnings}");
-        let page = std::fs::read_to_string(root.path().join(&out).join("report.html")).unwrap();
+        let page = fs::read_to_string(root.path().join(out).join("report.html")).unwrap();
         assert!(!page.contains("verdict good"), "{task:?}");
     }
     for wrong in ["0", "-1 s", "3 m", "soon"] {

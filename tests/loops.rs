@@ -150,15 +150,15 @@ fn a_loop_of_a_shipped_plant_has_no_margins_beyond_a_limit() {
             "[study]\nname = 'limit'
             [models.p.pid-loop]\nplant = {{ poles = [-1], gain = 1 }}\nhorizon = 30\nlimit = [-{limit}, {limit}]
             [models.loop]\nlike = 'p'\nopen = 'u'
-            [tuners]\nk = {{ start = 2, min = 0.1, max = 100 }}\nTi = {{ start = 1, min = 0.1, max = 100 }}
-            [cases.c]\nTd = 0\ninputs.r.step.after = 1.0
+            [tuners]\nNd = {{ start = 10, min = 5, max = 20 }}
+            [cases.c]\nk = 2\nTi = 1\nTd = 0\ninputs.r.step.after = 1.0
             [criteria]\nmargin = {{ model = 'loop', phase-margin = {{}}, usage = 'monitor' }}
             y = {{ model = 'p', final-value = {{ signal = 'y' }}, demand = 1 }}\n"
         )
     };
     let folder = tempfile::tempdir().unwrap();
     let within = run(folder.path(), &text(1.5));
-    assert!((value(&within, "c", "margin") - 90.0).abs() < 1e-6, "{within}");
+    assert!((value(&within, "c", "margin") - std::f64::consts::FRAC_PI_2).abs() < 1e-6, "{within}");
     let beyond = run(folder.path(), &text(0.5));
     let margin = &beyond["criteria"].as_array().unwrap()[0];
     assert!(margin["value"].is_null(), "{margin}");

@@ -21,8 +21,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
     if found.is_none() && watch.wants_stop() {
         solved.outcome.stop = watch.halt().into();
     } else if found.is_none() {
-        let why = "the sensitivities could not be computed: a simulation failed, or no criterion changes with a tuner to first order, as at \
-                   the optimum of a single criterion; `--set sensitivity.at=start` and `mops sweep` show how they change";
+        let why = "the sensitivities could not be computed: a simulation failed, or no criterion depends on a tuner";
         solved.outcome.warnings.push(why.to_owned());
     }
     solved.outcome.found.sensitivity = found;

@@ -136,10 +136,10 @@ pub trait Criterion: Send + Sync {
     fn slope(&self, case: &Case, tangent: &Tangent<'_>) -> Result<Value, String> {
         let Tangent { analysis, along, parameters, seed, reach, .. } = *tangent;
         let room = analysis.room(along);
-        if room.is_nan() {
+        if room.is_nan() || room < LEAST_REACH {
             return Err("two instants coincide whose derivatives differ".into());
         }
-        let reach = room.max(LEAST_REACH).min(reach);
+        let reach = room.min(reach);
         let [high, low] = [reach, -reach].map(|distance| {
             let there: Vec<f64> = parameters.iter().zip(seed).map(|(value, slope)| value + distance * slope).collect();
             self.value_with(case, &analysis.moved(along, distance), &there)
@@ -170,8 +170,8 @@ pub trait Criterion: Send + Sync {
     }
 }
 
-/// Smallest distance that [`Criterion::slope`] moves an analysis by, as jumps and corners come to one instant, in the unit box:
-/// rounding of the values then changes a difference by some 1e-9 of the value.
+/// Smallest distance that [`Criterion::slope`] moves an analysis by, in the unit box: rounding of the values then changes a difference by
+/// some 1e-9 of the value. Jumps and corners that change their order within it coincide.
 const LEAST_REACH: f64 = 1e-7;
 
 /// Which values of a criterion are better.

@@ -77,9 +77,6 @@ pub fn local(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>)
         let slope = if residuals { found.residuals[k][i] } else { slope_of(counting[i], k) };
         slope / unit_slope(active[k], values[k])
     });
-    if jacobian.iter().all(|&slope| slope == 0.0) {
-        return None;
-    }
     let coordinates = active.iter().zip(&values).map(|(tuner, &value)| Coordinate {
         name: tuner.name.clone(),
         value,
