@@ -113,12 +113,18 @@ fn read_from(source: &Arc<Source>, start: usize) -> Result<Content, Diagnostic> 
     Ok(Content { variables, skipped, layout, before: start..start })
 }
 
+/// Columns of time stamps, by index.
+type Stamped = Vec<(usize, stamps::Column)>;
+
+/// Skipped columns, by index, with the reason.
+type Skipped = Vec<(usize, String)>;
+
 /// Reads the columns of time stamps. Returns them, and the columns of text with the reason why they are skipped.
 fn read_stamps<'t>(
     columns: &[Reading],
     names: &[(String, Option<String>)],
     cell_at: impl Fn(usize, usize) -> &'t str,
-) -> (Vec<(usize, stamps::Column)>, Vec<(usize, String)>) {
+) -> (Stamped, Skipped) {
     let (mut stamps, mut skipped) = (Vec::new(), Vec::new());
     for (cell, column) in columns.iter().enumerate() {
         let (name, unit) = &names[cell];
@@ -148,16 +154,11 @@ fn read_stamps<'t>(
 
 /// Adds the dates of one column to the times of day of all others. Times of day are skipped if their dates are not read or may be in
 /// several columns, and so are dates without a time beside times that are not read: either would merge different instants.
-fn join(
-    stamps: &mut Vec<(usize, stamps::Column)>,
-    skipped: &mut Vec<(usize, String)>,
-    names: &[(String, Option<String>)],
-    unread: &[usize],
-) {
+fn join(stamps: &mut Stamped, skipped: &mut Skipped, names: &[(String, Option<String>)], unread: &[usize]) {
     let name = |cell: usize| names[cell].0.as_str();
     let is_midnight = |column: &stamps::Column| column.reference == Some(Reference::Midnight);
     let is_dates = |column: &stamps::Column| column.is_dates && column.reference == Some(Reference::Local);
-    let refuse = |stamps: &mut Vec<(usize, stamps::Column)>, skipped: &mut Vec<(usize, String)>, reason: &str| {
+    let refuse = |stamps: &mut Stamped, skipped: &mut Skipped, reason: &str| {
         let refused = stamps.extract_if(.., |(_, column)| is_midnight(column) || is_dates(column));
         skipped.extend(refused.map(|(cell, _)| (cell, reason.to_owned())));
     };

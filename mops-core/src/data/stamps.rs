@@ -54,31 +54,31 @@ struct Date {
     orders: &'static [Order],
 }
 
-/// Order of the numbers of a date.
+/// Order of the numbers of a date, by the first of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Order {
-    DayFirst,
-    MonthFirst,
-    YearFirst,
+    Day,
+    Month,
+    Year,
 }
 
 impl Order {
-    const ALL: [Self; 3] = [Self::DayFirst, Self::MonthFirst, Self::YearFirst];
+    const ALL: [Self; 3] = [Self::Day, Self::Month, Self::Year];
 
     /// Returns the positions of year, month and day.
     fn positions(self) -> [usize; 3] {
         match self {
-            Self::DayFirst => [2, 1, 0],
-            Self::MonthFirst => [2, 0, 1],
-            Self::YearFirst => [0, 1, 2],
+            Self::Day => [2, 1, 0],
+            Self::Month => [2, 0, 1],
+            Self::Year => [0, 1, 2],
         }
     }
 
     fn shown(self) -> &'static str {
         match self {
-            Self::DayFirst => "day/month",
-            Self::MonthFirst => "month/day",
-            Self::YearFirst => "year/month/day",
+            Self::Day => "day/month",
+            Self::Month => "month/day",
+            Self::Year => "year/month/day",
         }
     }
 }
@@ -243,10 +243,9 @@ fn readings(dates: &[Date], stated: Option<Order>) -> Vec<(Order, Vec<i64>)> {
         };
         let Some(read) = dates.iter().map(read).collect::<Option<Vec<[i64; 3]>>>() else { continue };
         let days: Vec<i64> = read.iter().filter_map(|date| days(*date)).collect();
-        if stated.is_some() || !(is_yearly(&read) && dates.iter().any(Date::is_short)) {
-            if !found.iter().any(|(_, known)| *known == days) {
-                found.push((order, days));
-            }
+        let is_likely = stated.is_some() || !(is_yearly(&read) && dates.iter().any(Date::is_short));
+        if is_likely && !found.iter().any(|(_, known)| *known == days) {
+            found.push((order, days));
         }
     }
     found
@@ -359,8 +358,8 @@ fn basic_date(text: &str) -> Option<(Date, &str, bool)> {
     if !matches!(count, 8 | 12 | 14) {
         return None;
     }
-    let date = Date { parts: [number(0..4)?, number(4..6)?, number(6..8)?], orders: &[Order::YearFirst] };
-    date.in_order(Order::YearFirst)?;
+    let date = Date { parts: [number(0..4)?, number(4..6)?, number(6..8)?], orders: &[Order::Year] };
+    date.in_order(Order::Year)?;
     Some((date, &text[8..], true))
 }
 
@@ -392,18 +391,18 @@ fn date(text: &str) -> Option<(Date, &str, bool)> {
     // Dates with dots are day.month.year (DIN 1355-1), and years of two digits come first between hyphens only (ISO 8601:1988).
     let orders: &'static [Order] = match (mark, is_named) {
         (_, true) => &Order::ALL,
-        ('.', _) => &[Order::DayFirst, Order::YearFirst],
+        ('.', _) => &[Order::Day, Order::Year],
         ('/' | '-', _) => &Order::ALL,
         _ => return None,
     };
-    let is_open = |order: &Order| *order != Order::YearFirst || !is_short || (mark == '-' && !is_named);
+    let is_open = |order: &Order| *order != Order::Year || !is_short || (mark == '-' && !is_named);
     let fits = |order: &Order| Date { parts, orders }.is_in(*order) && is_open(order);
     let orders: &'static [Order] = match Order::ALL.map(|order| orders.contains(&order) && fits(&order)) {
         [true, true, true] => &Order::ALL,
-        [true, true, false] => &[Order::DayFirst, Order::MonthFirst],
-        [true, false, _] => &[Order::DayFirst],
-        [false, true, _] => &[Order::MonthFirst],
-        [false, false, true] => &[Order::YearFirst],
+        [true, true, false] => &[Order::Day, Order::Month],
+        [true, false, _] => &[Order::Day],
+        [false, true, _] => &[Order::Month],
+        [false, false, true] => &[Order::Year],
         _ => return None,
     };
     let date = Date { parts, orders };
