@@ -53,7 +53,7 @@ pub struct TransferFunctionOptions {
 
 enum Form {
     Coefficients { numerator: Vec<Bound>, denominator: Vec<Bound> },
-    Roots { zeros: Vec<Bound>, poles: Vec<Bound>, gain: Option<Bound> },
+    Roots { zeros: Vec<Bound>, poles: Vec<Bound>, gain: Option<Box<Bound>> },
 }
 
 /// Model of the kind `transfer-function`.
@@ -78,7 +78,7 @@ impl ModelOptions for TransferFunctionOptions {
             (None, None, Some(poles)) => Form::Roots {
                 zeros: Bound::all(self.zeros.as_deref().unwrap_or_default(), &mut names),
                 poles: Bound::all(poles, &mut names),
-                gain: self.gain.as_ref().map(|gain| Bound::new(gain, &mut names)),
+                gain: self.gain.as_ref().map(|gain| Box::new(Bound::new(gain, &mut names))),
             },
             _ => {
                 return Err(StudyError::here(
@@ -109,7 +109,7 @@ impl ModelOptions for TransferFunctionOptions {
         let units = Units(&units);
         let entries: Vec<&Bound> = match &form {
             Form::Coefficients { numerator, denominator } => numerator.iter().chain(denominator).collect(),
-            Form::Roots { zeros, poles, gain } => zeros.iter().chain(poles).chain(gain).collect(),
+            Form::Roots { zeros, poles, gain } => zeros.iter().chain(poles).chain(gain.as_deref()).collect(),
         };
         units.check(&names, &[input.clone(), output.clone()], entries, delay.as_ref())?;
         let interface = Interface {
