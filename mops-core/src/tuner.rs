@@ -131,7 +131,7 @@ impl Tuner {
         (u * (count - 1) as f64).round() as usize
     }
 
-    /// Returns `lower` or `upper` if `value` is at that bound, to within [`AT_BOUND`] of the range.
+    /// Returns `lower` or `upper` if `value` is at that bound, to within 1e-9 of the range.
     pub fn at_bound(&self, value: f64) -> Option<&'static str> {
         match self.position_of(value) {
             u if u <= AT_BOUND => Some("lower"),
