@@ -222,8 +222,9 @@ pub(crate) fn search_within(
     if let (Some(slopes), Some(best), false) = (&mut slopes, run.best(), point == Optimality::Stationary) {
         slopes.add_sides(&problem, &mut probe, best);
     }
-    let jumps = derivatives.as_ref().is_some_and(|found| !found.jumps.is_empty());
-    let pareto = if contradiction.is_some() || jumps { Pareto::NotShown } else { pareto };
+    let jumping = derivatives.as_ref().filter(|found| !found.jumps.is_empty());
+    let is_hidden = contradiction.is_some() || jumping.is_some() && pareto == Pareto::CertifiedLocal;
+    let pareto = if is_hidden { Pareto::NotShown } else { pareto };
     let ending = Ending { stop, end: None, pareto, seconds: started.elapsed().as_secs_f64() };
     let (mut outcome, best) = conclude(&run, &options.solver, ending);
     // A replay ends where the run was interrupted, not at a budget.
@@ -234,7 +235,7 @@ pub(crate) fn search_within(
         let twin = if problem.study().task() == Task::Calibration { twin(&run, best) } else { None };
         let end = twin.into_iter().fold(end, End::with_twin);
         let mut end = contradiction.clone().into_iter().fold(end, End::with_contradiction);
-        if let Some(found) = derivatives.as_ref().filter(|found| !found.jumps.is_empty()) {
+        if let Some(found) = jumping {
             end = end.beside_jump(found.jumps_to_better);
         }
         end.words.extend(derivatives.iter().flat_map(|found| found.beyond.iter().map(beyond)));

@@ -103,7 +103,7 @@ pub struct JumpReport {
 pub enum MovedKind {
     /// Active tuner.
     Tuner,
-    /// Constant of a model.
+    /// Constant of a model, or tuner that is not active.
     Constant,
     /// Initial value of a state.
     Initial,

@@ -137,7 +137,7 @@ fn not_looked_at(found: &JumpsReport) -> Option<String> {
     };
     let beyond_budget = listed(&found.left_out)
         .map(|all| format!("Jumps along {all} were not looked for: the look has a twentieth of the evaluations."));
-    let discrete = listed(&found.discrete).map(|all| format!("{all}, of discrete values, moved to no other value."));
+    let discrete = listed(&found.discrete).map(|all| format!("Not moved, as their values are discrete: {all}."));
     let both: Vec<String> = beyond_budget.into_iter().chain(discrete).collect();
     (!both.is_empty()).then(|| both.join(" "))
 }

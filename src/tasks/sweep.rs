@@ -41,11 +41,13 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
             Ok(answers) => merits.push(answers.into_iter().map(|e| e.merit).collect()),
             Err(_) => {
                 solved.outcome.stop = watch.halt().into();
-                merits.resize(rows.len(), vec![Merit::FAILED; values[0].len()]);
                 break;
             }
         }
     }
+    // Points of a row that was cut off are not counted.
+    let complete = merits.iter().map(Vec::len).sum();
+    merits.resize(rows.len(), vec![Merit::FAILED; values[0].len()]);
     let points = run.archive().to_vec();
     let simulations = points.len() * problem.simulations();
     drop(run);
@@ -76,7 +78,7 @@ pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Res
         centre: [of(axes.first()), of(axes.get(1)), solved.best.merit.objective],
     };
     drop(axes_report);
-    report.words = words(&report, points.len());
+    report.words = words(&report, complete);
     solved.archive.extend(points.iter().cloned());
     solved.outcome.evaluations += points.len();
     solved.outcome.simulations += simulations;
@@ -94,7 +96,7 @@ fn spread(problem: &Problem, axis: &Axis) -> Vec<f64> {
 }
 
 /// Formats the sweep as sentences.
-fn words(sweep: &SweepReport, evaluated: usize) -> Vec<String> {
+fn words(sweep: &SweepReport, complete: usize) -> Vec<String> {
     let number = |value: f64| significant(value, 4);
     let place = |[x, y, _]: [f64; 3]| {
         let along = |axis: &SweepAxis, value: f64| {
@@ -105,8 +107,13 @@ fn words(sweep: &SweepReport, evaluated: usize) -> Vec<String> {
         along(&sweep.x, x) + &y
     };
     let all: Vec<f64> = sweep.objective.iter().flatten().copied().filter(|v| v.is_finite()).collect();
+    let asked = sweep.objective.iter().map(Vec::len).sum::<usize>();
     if all.is_empty() {
-        return vec!["No point of the sweep could be simulated.".to_owned()];
+        let why = match complete < asked {
+            true => "The sweep was cut off before a point had a value.",
+            false => "No point of the sweep could be simulated.",
+        };
+        return vec![why.to_owned()];
     }
     let highest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let lowest = all.iter().copied().fold(f64::INFINITY, f64::min);
@@ -136,13 +143,12 @@ fn words(sweep: &SweepReport, evaluated: usize) -> Vec<String> {
         number(level),
         range(&sweep.x, &columns)
     ));
-    let asked = sweep.objective.iter().map(Vec::len).sum::<usize>();
-    let failed = evaluated.saturating_sub(all.len());
+    let failed = complete - all.len();
     if failed > 0 {
-        words.push(format!("{failed} of {evaluated} points have no value: a simulation failed."));
+        words.push(format!("{failed} of {complete} points have no value: a simulation failed."));
     }
-    if evaluated < asked {
-        words.push(format!("{} of {asked} points were not evaluated: the sweep was cut off.", asked - evaluated));
+    if complete < asked {
+        words.push(format!("{} of {asked} points are missing: the sweep was cut off.", asked - complete));
     }
     words
 }

@@ -114,6 +114,7 @@ impl Lowering<'_> {
     fn table(&mut self, text: &Text, x: Id, points: &[Id], kinks: Kinks) -> Id {
         let lines = points.len() / 2 - 1;
         let mut value = None;
+        let mut was_flat = false;
         for k in (0..lines).rev() {
             let [x1, y1, x2, y2] = [points[2 * k], points[2 * k + 1], points[2 * k + 2], points[2 * k + 3]];
             let (rise, run) = (self.graph.sub(y2, y1), self.graph.sub(x2, x1));
@@ -125,9 +126,14 @@ impl Lowering<'_> {
                 None => line,
                 Some(further) => {
                     let here = self.at_least(x2, x, kinks);
-                    self.select(text, Function::Table, here, [line, further])
+                    // Only a segment without slope opens a loop.
+                    match was_flat || self.graph.is(slope, 0.0) {
+                        true => self.select(text, Function::Table, here, [line, further]),
+                        false => self.graph.choose(here, line, further),
+                    }
                 }
             });
+            was_flat = self.graph.is(slope, 0.0);
         }
         value.expect("the parser requires two points")
     }

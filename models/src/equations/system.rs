@@ -221,9 +221,7 @@ impl System {
             matrices,
         })
     }
-}
 
-impl System {
     /// Returns the selections that act on rates, on new values of memory or on delayed quantities, with the numbers of these: those of the
     /// states, then the delayed quantities.
     pub fn acting_selections(&self) -> Vec<(&Selection, Vec<usize>)> {

@@ -124,8 +124,7 @@ impl<S: Scalar> Events<S> {
     ) -> Result<(), Failure> {
         let mut index = 0;
         let mut late = S::from(0.0);
-        let count = dynamics.guards();
-        self.values.resize(count, 0.0);
+        self.values.resize(dynamics.guards(), 0.0);
         while index < self.values.len() {
             let value = dynamics.guard(index, t, x).value();
             self.values[index] = value;
@@ -133,9 +132,7 @@ impl<S: Scalar> Events<S> {
                 index += 1;
                 continue;
             }
-            // A mode with other guards has other numbers.
-            let own = crossings.iter().find(|crossing| crossing.guard == index && dynamics.guards() == count);
-            if let Some(own) = own {
+            if let Some(own) = crossings.iter().find(|crossing| crossing.guard == index) {
                 shift(dynamics, t, x, spare, own.late - late);
                 late = own.late;
                 dynamics.delay_events(late);

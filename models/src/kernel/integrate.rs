@@ -210,9 +210,11 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
         }
         let mut moves = Crossing::common(&crossings);
         if at_stop {
-            let jumps = Jumps::new(dynamics, t, &x, &mut spare);
+            let mut values = |dynamics: &D, x: &[S]| (S::DIRECTIONS > 0).then(|| values(dynamics, t, x, &mut spare));
+            let before = values(dynamics, &x);
             let of_break = pass_break(dynamics, (t, end), &mut x, sink);
-            if jumps.are_seen(dynamics, t, &x, &mut spare) {
+            // A break at which nothing jumps leaves the time of the event alone.
+            if before != values(dynamics, &x) {
                 moves = common(moves, of_break);
             }
         }
@@ -225,25 +227,10 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
     if all_finite(&x) { Ok((x, work)) } else { Err(Failure::Diverged(t)) }
 }
 
-/// State and rates before a break, where derivatives are computed.
-struct Jumps {
-    before: Option<[Vec<f64>; 2]>,
-}
-
-impl Jumps {
-    fn new<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, t: f64, x: &[S], dx: &mut [S]) -> Self {
-        Self { before: (S::DIRECTIONS > 0).then(|| Self::values(f, t, x, dx)) }
-    }
-
-    fn values<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, t: f64, x: &[S], dx: &mut [S]) -> [Vec<f64>; 2] {
-        f.derivative(t, x, dx);
-        [x, &*dx].map(|of| of.iter().map(|value| value.value()).collect())
-    }
-
-    /// Returns true if the break changed the state or its rates.
-    fn are_seen<S: Scalar, D: Dynamics<S> + ?Sized>(self, f: &D, t: f64, x: &[S], dx: &mut [S]) -> bool {
-        self.before.is_some_and(|before| before != Self::values(f, t, x, dx))
-    }
+/// Returns the values of the state and of its rates.
+fn values<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, t: f64, x: &[S], dx: &mut [S]) -> Vec<f64> {
+    f.derivative(t, x, dx);
+    x.iter().chain(&*dx).map(|value| value.value()).collect()
 }
 
 /// Sets the inputs to their values at the break. At the end of the simulation, reports them to the sink. Returns the derivatives of

@@ -219,8 +219,8 @@ impl<S: Scalar> Delay<S> {
 const BENDING: u8 = 1;
 
 /// Lets the jumps of delayed quantities that are due take effect; `settle` determines the mode of the plant. A jump that moves with
-/// the parameters moves the state by the jump of its rates. Returns the derivatives of the time of the jump of lowest derivative, NaN if several signals jump or bend with
-/// different ones.
+/// the parameters moves the state by the jump of its rates. Returns the derivatives of the time of the jump of lowest derivative,
+/// NaN if several signals jump or bend with different ones.
 pub(crate) fn pass_delays<S: Scalar, P: Plant<S>>(
     plant: &mut P,
     delays: impl Fn(&mut P) -> &mut [Delay<S>],
