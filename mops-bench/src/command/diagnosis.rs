@@ -41,7 +41,7 @@ pub(super) struct Arguments {
     /// Number of cases of each of these kinds.
     #[arg(long, default_value_t = 120, value_name = "NUMBER", requires = "kinds")]
     per_kind: usize,
-    /// Plants, separated by commas [default: all].
+    /// Plants, separated by commas [default: all; with `--kinds` those without a sampled controller].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     plants: Vec<String>,
     /// Effects, by their names in the test bed, separated by commas [default: all].
@@ -192,8 +192,12 @@ fn scaled(settings: Settings, change: &String) -> Result<Settings, Diagnostic> {
 
 /// Returns the plan of the benchmark, with names checked.
 fn plan(arguments: &Arguments) -> Result<Plan, Diagnostic> {
-    let plants = if arguments.kinds.is_empty() { mops_testbed::plants() } else { mops_testbed::disturbed_plants() };
-    let all_plants: Vec<&str> = plants.iter().map(|plant| plant.name).collect();
+    let (plants, further) = if arguments.kinds.is_empty() {
+        (mops_testbed::plants(), &[][..])
+    } else {
+        (mops_testbed::disturbed_plants(), mops_testbed::further_plants())
+    };
+    let names = |plants: &[&mops_testbed::Plant]| plants.iter().map(|plant| plant.name).collect::<Vec<&str>>();
     let all_effects: Vec<&str> = mops_testbed::effects().iter().map(|effect| effect.name).collect();
     let counts = if arguments.kinds.is_empty() {
         vec![
@@ -213,8 +217,8 @@ fn plan(arguments: &Arguments) -> Result<Plan, Diagnostic> {
         return Err(Diagnostic::new(fact).with_help("for example `--sizes 20,5,2,1.3`"));
     }
     Ok(Plan {
-        plants: chosen(&arguments.plants, &all_plants, "plant")?,
-        effects: chosen(&arguments.effects, &all_effects, "effect")?,
+        plants: chosen(&arguments.plants, (&names(plants), &names(further)), "plant")?,
+        effects: chosen(&arguments.effects, (&all_effects, &[]), "effect")?,
         sizes: arguments.sizes.clone(),
         counts,
         seed: arguments.seed,
@@ -222,11 +226,12 @@ fn plan(arguments: &Arguments) -> Result<Plan, Diagnostic> {
     })
 }
 
-/// Returns the requested names without duplicates; all names if none are requested.
-fn chosen(asked: &[String], all: &[&str], what: &str) -> Result<Vec<String>, Diagnostic> {
-    if let Some(unknown) = asked.iter().find(|name| !all.contains(&name.as_str())) {
+/// Returns the requested names without duplicates; all but the further names if none are requested.
+fn chosen(asked: &[String], (all, further): (&[&str], &[&str]), what: &str) -> Result<Vec<String>, Diagnostic> {
+    let known = || all.iter().chain(further).copied();
+    if let Some(unknown) = asked.iter().find(|name| known().all(|known| known != name.as_str())) {
         let fact = format!("the test bed has no {what} `{unknown}`");
-        return Err(Diagnostic::new(fact).with_help(suggestion(unknown, all.iter().copied())));
+        return Err(Diagnostic::new(fact).with_help(suggestion(unknown, known())));
     }
     let mut names: Vec<String> =
         if asked.is_empty() { all.iter().map(|&n| n.to_owned()).collect() } else { asked.to_vec() };

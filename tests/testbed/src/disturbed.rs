@@ -14,7 +14,7 @@ use crate::effects::{Effect, Family, Scene, effects};
 use crate::fit::Series;
 use crate::law::{Installed, Spot};
 use crate::places::{accepted, equivalents, place};
-use crate::plants::disturbed_plants;
+use crate::plants::{disturbed_plants, further_plants};
 use crate::simulate::{base_outputs, outputs};
 use crate::study::{self, Declared, TASK};
 use crate::trial::{Disturbance, Trial, TrueEffect, Truth};
@@ -125,6 +125,7 @@ pub const NOMINAL: &[Nominal] = &{
         of("cascade", "sensor-drift@sensor:h2", 0.0006, 1),
         of("cascade", "periodic-disturbance@process:h2", 3.0, 1),
         of("cascade", "wind-gust@process:h2", 7.0, 1),
+        of("sampled-drive", "coulomb-friction@joint:q", 1.0, 1),
     ]
 };
 
@@ -134,7 +135,8 @@ pub const NOMINAL: &[Nominal] = &{
 /// not reach its size with a plausible amplitude.
 pub fn disturbed(setting: Setting, plant: &str, effect: &str, seed: u64) -> Option<Trial> {
     let nominal = NOMINAL.iter().find(|nominal| nominal.plant == plant && nominal.effect == effect)?;
-    let plant = disturbed_plants().iter().copied().find(|p| p.name == plant)?;
+    let mut plants = disturbed_plants().iter().chain(further_plants()).copied();
+    let plant = plants.find(|p| p.name == plant)?;
     let named = if setting.lacks_effect() { nominal.effect } else { "none" };
     let label = format!("{}-{}-{}", setting.letter(), plant.name, named.replace(['@', ':'], "-"));
     let mut bench = Bench::draw(plant, seed, &label)?;

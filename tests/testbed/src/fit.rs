@@ -27,12 +27,15 @@ pub struct Fit {
 /// `noise` is the standard deviation of each output, `from` the initial guess. `None` if the model diverges at the
 /// initial guess.
 pub fn fit(plant: &Plant, setup: &Setup, measured: &Series, noise: &[f64], from: (&[f64], &[f64])) -> Option<Fit> {
-    let (np, nx) = (from.0.len(), from.1.len());
+    // The memory of a controller is known at the start.
+    let (free, memory) = from.1.split_at(plant.continuous());
+    let (np, nx) = (from.0.len(), free.len());
     let n = np + nx;
-    let mut at: Vec<f64> = from.0.iter().map(|p| math::ln(*p)).chain(from.1.iter().copied()).collect();
+    let mut at: Vec<f64> = from.0.iter().map(|p| math::ln(*p)).chain(free.iter().copied()).collect();
     let residual = |at: &[f64]| -> Option<Vec<f64>> {
         let p: Vec<f64> = at[..np].iter().map(|p| math::exp(*p)).collect();
-        let y = base_outputs(plant, &p, &at[np..], setup, STEPS)?;
+        let start = [&at[np..], memory].concat();
+        let y = base_outputs(plant, &p, &start, setup, STEPS)?;
         let weighted = y.iter().zip(measured).zip(noise);
         let r: Vec<f64> = weighted.flat_map(|((y, m), s)| y.iter().zip(m).map(move |(y, m)| (y - m) / s)).collect();
         r.iter().all(|v| v.is_finite()).then_some(r)
@@ -79,7 +82,7 @@ pub fn fit(plant: &Plant, setup: &Setup, measured: &Series, noise: &[f64], from:
         }
     }
     let parameters = at[..np].iter().map(|p| math::exp(*p)).collect();
-    Some(Fit { parameters, start: at[np..].to_vec(), error: (best / r.len() as f64).sqrt() })
+    Some(Fit { parameters, start: [&at[np..], memory].concat(), error: (best / r.len() as f64).sqrt() })
 }
 
 /// Solves `(A + damping diag(A)) x = b` by Cholesky in units of the diagonal; `None` if the matrix is not positive

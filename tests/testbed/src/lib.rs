@@ -33,6 +33,6 @@ pub use generate::{Missing, SIZES, generate};
 pub use law::{At, Dry, Installed, Law, Spot};
 pub use outside::outside;
 pub use plant::{Output, Parameter, Place, Plant, Setup};
-pub use plants::{disturbed_plants, plants};
+pub use plants::{disturbed_plants, further_plants, plants};
 pub use simulate::{base_outputs, base_states, outputs};
 pub use trial::{Disturbance, Trial, TrueEffect, Truth};

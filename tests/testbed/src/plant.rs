@@ -49,11 +49,34 @@ pub struct Traits {
     pub linear: bool,
     /// States that no measurement determines: index, guess of the initial value, lower and upper bound.
     pub unmeasured: &'static [(usize, [f64; 3])],
+    /// Sampled controller of the plant.
+    pub sampled: Option<&'static Sampled>,
+}
+
+/// Sampled controller, whose memory are the last states of the plant; it is 0 at the start.
+#[derive(Debug)]
+pub struct Sampled {
+    /// Number of states that are memory.
+    pub memory: usize,
+    /// Samples of the record from one instant to the next.
+    pub every: usize,
+    /// Time from an instant to the change of the memory, in sample times of the record: 0.5, so that it is a whole number of steps.
+    pub delay: f64,
+    /// Writes the next values of the memory; without terms at places.
+    pub next: Rates,
 }
 
 /// None of the properties.
-pub const PLAIN: Traits =
-    Traits { mass: None, spring: None, coupling: None, levels: false, thermal: false, linear: false, unmeasured: &[] };
+pub const PLAIN: Traits = Traits {
+    mass: None,
+    spring: None,
+    coupling: None,
+    levels: false,
+    thermal: false,
+    linear: false,
+    unmeasured: &[],
+    sampled: None,
+};
 
 /// Measured state.
 #[derive(Debug, Clone, Copy)]
@@ -141,6 +164,11 @@ impl Setup {
 }
 
 impl Plant {
+    /// Returns the number of states that are not the memory of a controller.
+    pub fn continuous(&self) -> usize {
+        self.states.len() - self.traits.sampled.map_or(0, |sampled| sampled.memory)
+    }
+
     /// Returns the output that measures a state.
     pub fn output_of(&self, state: usize) -> Option<usize> {
         self.outputs.iter().position(|output| output.state == state)

@@ -31,7 +31,7 @@ pub fn text(plant: &Plant, declared: &Declared<'_>) -> String {
     let mut line = |text: String| writeln!(s, "{text}").expect("writing to a string cannot fail");
     line(format!("[study]\nname = \"{}\"\ntask = \"{}\"\n", declared.name, declared.task));
     line("[models.plant.equations]".to_owned());
-    line(format!("states     = {}", table(plant.states)));
+    line(format!("states     = {}", table(&plant.states[..plant.continuous()])));
     if !plant.inputs.is_empty() {
         line(format!("inputs     = {}", table(plant.inputs)));
     }
@@ -92,6 +92,6 @@ fn free(plant: &Plant) -> String {
             None => format!("{name} = {{}}"),
         }
     };
-    let all: Vec<String> = plant.states.iter().enumerate().map(one).collect();
+    let all: Vec<String> = plant.states[..plant.continuous()].iter().enumerate().map(one).collect();
     if unmeasured.is_empty() { format!("[{}]", all.join(", ")) } else { format!("{{ {} }}", all.join(", ")) }
 }

@@ -11,6 +11,7 @@ mod furuta;
 mod jacket;
 mod pendulum;
 mod room;
+mod sampled_drive;
 mod servo;
 mod spring;
 mod tanks;
@@ -44,6 +45,11 @@ pub fn plants() -> &'static [&'static Plant] {
 /// Their records are short. The calibration record is as long as the two others together.
 pub fn disturbed_plants() -> &'static [&'static Plant] {
     &[&driven_pendulum::PLANT, &two_masses::PLANT, &cascade::PLANT]
+}
+
+/// Returns further plants of cases with a model error in the background: one whose controller samples.
+pub fn further_plants() -> &'static [&'static Plant] {
+    &[&sampled_drive::PLANT]
 }
 
 /// Creates an angle with viscous friction and without a spring in the baseline model.

@@ -54,7 +54,11 @@ pub fn base_states(
         for i in 0..inputs {
             u[i] = setup.inputs[i][k];
         }
-        for _ in 0..steps {
+        let mut pending = sample(plant, k, &x, &u, p);
+        for step in 0..steps {
+            if let Some((_, memory)) = pending.take_if(|(delay, _)| step as f64 + 0.5 > *delay * steps as f64) {
+                x[plant.continuous()..n].copy_from_slice(&memory);
+            }
             x = runge_kutta(&x, n, h, |_, x, dx| (plant.rates)(&x[..n], &u, p, &w, dx));
         }
         if !x[..n].iter().all(|v| v.abs() < 1e9) {
@@ -62,6 +66,15 @@ pub fn base_states(
         }
     }
     Some(out)
+}
+
+/// Returns the values that the controller of a plant computes at a sample, and the fraction of the sample after which they reach its
+/// memory; `None` if it does not sample there.
+fn sample(plant: &Plant, k: usize, x: &State, u: &[f64; FEW], p: &[f64]) -> Option<(f64, Vec<f64>)> {
+    let sampled = plant.traits.sampled.filter(|sampled| k.is_multiple_of(sampled.every))?;
+    let mut memory = vec![0.0; sampled.memory];
+    (sampled.next)(&x[..plant.states.len()], u, p, &[], &mut memory);
+    Some((sampled.delay, memory))
 }
 
 /// Does one step of the classical method of order 4 for `n` states; `rates(fraction, x, dx)`.

@@ -1,7 +1,7 @@
 //! Simulation of a plant with effects through an experiment.
 
 use super::friction::Mode;
-use super::{FEW, MANY, SIZE, STEPS, State};
+use super::{FEW, MANY, SIZE, STEPS, State, sample};
 use crate::law::{At, Installed, Spot};
 use crate::plant::{Place, Plant, Setup};
 
@@ -60,6 +60,7 @@ impl<'a> World<'a> {
         };
         // Offsets within a sample at which a delayed command changes.
         let mut cuts: Vec<f64> = late(true).map(|delay| delay % setup.dt).filter(|&r| r > 1e-9 * setup.dt).collect();
+        cuts.extend(plant.traits.sampled.map(|sampled| sampled.delay * setup.dt));
         cuts.extend([0.0, setup.dt]);
         cuts.sort_by(f64::total_cmp);
         let before = late(false).fold(0.0, f64::max);
@@ -94,9 +95,13 @@ impl<'a> World<'a> {
             if k + 1 == setup.samples {
                 break;
             }
+            let mut pending = sample(plant, k, &x, &self.u, self.p);
             for cut in cuts.windows(2) {
                 let length = cut[1] - cut[0];
                 self.commands(t + 0.5 * (cut[0] + cut[1]));
+                if let Some((_, memory)) = pending.take_if(|(delay, _)| cut[0] >= *delay * setup.dt) {
+                    x[plant.continuous()..plant.states.len()].copy_from_slice(&memory);
+                }
                 self.settle(t + cut[0], &mut x);
                 self.break_away(t + cut[0], &x);
                 let steps = (length / setup.dt * STEPS as f64).ceil();
