@@ -9,7 +9,7 @@ use mops::core::{DIRECTIONS, Dual, Dual7, Job, Work};
 use mops::models::furuta::{Furuta, FurutaPlant};
 use mops::models::kernel::drive::Drive;
 use mops::models::kernel::friction::Contact;
-use mops::models::kernel::{Driven, Dynamics, Sink, Step, Tolerance, integrate};
+use mops::models::kernel::{Driven, Inputs, Sink, Step, Tolerance, integrate};
 use mops::{Analysis, Case, Input, Model, Scalar};
 
 const END: f64 = 3.0;
@@ -125,15 +125,11 @@ fn median(mut numbers: Vec<f64>) -> f64 {
 }
 
 /// Simulates the plant of the model with the kernel.
-fn simulate<S: Scalar>(
-    parameters: [S; 8],
-    input: &Input,
-    sink: &mut impl for<'a> Sink<S, Driven<'a, S, FurutaPlant<S>>>,
-) -> (Vec<S>, Work) {
+fn simulate<S: Scalar>(parameters: [S; 8], input: &Input, sink: &mut impl Sink<S, FurutaPlant<S>>) -> (Vec<S>, Work) {
     let [a, b, c, d, ba, bp, ca, cp] = parameters;
     let start = START.map(S::from);
     let plant = FurutaPlant { a, b, c, d, viscous: [bp, ba], coulomb: [cp, ca], start, contact: [Contact::Forward; 2] };
-    let mut driven = Driven::new(plant, vec![Drive::new(Some(input))], 2, &[]);
+    let mut driven = Driven::new(plant, Inputs::new(vec![Drive::new(Some(input))], 2), &[]);
     integrate(&mut driven, 0.0, END, &start, &TOLERANCE, sink).expect("the simulation succeeds")
 }
 
@@ -151,8 +147,8 @@ fn analysis(physical: [f64; 8]) -> impl Fn() -> Analysis {
 /// Counts events.
 struct Events(usize);
 
-impl<D: Dynamics<f64>> Sink<f64, D> for Events {
-    fn step(&mut self, _: &Step<f64>, _: &D) {}
+impl<P> Sink<f64, P> for Events {
+    fn step(&mut self, _: &Step<f64>, _: &Driven<'_, f64, P>) {}
     fn event(&mut self, _: f64, _: &str) {
         self.0 += 1;
     }
@@ -168,8 +164,8 @@ fn sample_time(i: usize) -> f64 {
     END * i as f64 / (SAMPLES - 1) as f64
 }
 
-impl<D: Dynamics<f64>> Sink<f64, D> for Samples {
-    fn step(&mut self, step: &Step<f64>, _: &D) {
+impl<P> Sink<f64, P> for Samples {
+    fn step(&mut self, step: &Step<f64>, _: &Driven<'_, f64, P>) {
         while self.states.len() < SAMPLES && sample_time(self.states.len()) <= step.start + step.taken {
             let mut x = [0.0; 4];
             step.state((sample_time(self.states.len()) - step.start) / step.taken, &mut x);

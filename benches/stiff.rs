@@ -5,9 +5,10 @@ use std::hint::black_box;
 use criterion::Criterion;
 use mops::core::Job;
 use mops::models::equations::{Equations, EquationsOptions};
-use mops::models::kernel::{Dynamics, IntegrationMethod, Simulated, Tolerance, integrate};
+use mops::models::kernel::{Driven, IntegrationMethod, Simulated, Tolerance, integrate};
 use mops::{Case, Model, Scalar};
-use mops_core::math;
+use mops_core::plant::Jacobian;
+use mops_core::{Instant, Plant, math};
 
 const CELLS: usize = 100;
 /// Heat exchange between neighbouring cells, 1/s.
@@ -23,8 +24,13 @@ const END: f64 = 10.0;
 /// Heat equation `T[i]' = EXCHANGE (T[i - 1] - 2 T[i] + T[i + 1]) - RADIATION (T[i]^4 - COLD^4)`.
 struct Rod;
 
-impl<S: Scalar> Dynamics<S> for Rod {
-    fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
+impl<S: Scalar> Plant<S> for Rod {
+    fn start(&self) -> Vec<S> {
+        vec![S::from(COLD); CELLS]
+    }
+
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        let x = at.x;
         for i in 0..CELLS {
             let left = if i > 0 { x[i - 1] } else { S::from(HOT) };
             let right = if i + 1 < CELLS { x[i + 1] } else { x[i] };
@@ -33,9 +39,15 @@ impl<S: Scalar> Dynamics<S> for Rod {
         }
     }
 
-    fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {
+    fn jacobian(&self) -> Option<&dyn Jacobian<S>> {
+        Some(self)
+    }
+}
+
+impl<S: Scalar> Jacobian<S> for Rod {
+    fn pattern(&self) -> Vec<(usize, usize)> {
         let neighbours = |i: usize| (i.saturating_sub(1)..=(i + 1).min(CELLS - 1)).map(move |j| (i, j));
-        Some((0..CELLS).flat_map(neighbours).collect())
+        (0..CELLS).flat_map(neighbours).collect()
     }
 }
 
@@ -64,7 +76,8 @@ fn main() {
     let tolerance =
         Tolerance { relative: 1e-6, absolute: Some(1e-6), method: IntegrationMethod::Stiff, ..Tolerance::default() };
     let compiled = || {
-        integrate(&mut Rod, 0.0, END, black_box(&[COLD; CELLS]), &tolerance, &mut ()).expect("the simulation succeeds")
+        integrate(&mut Driven::alone(Rod), 0.0, END, black_box(&[COLD; CELLS]), &tolerance, &mut ())
+            .expect("the simulation succeeds")
     };
     let (end, work) = compiled();
     println!("compiled: {work:?}, end {:.9}, {:.9}, {:.9}", end[0], end[CELLS / 2], end[CELLS - 1]);

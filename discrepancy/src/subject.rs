@@ -108,13 +108,7 @@ impl Subject {
             .with_help("keep one model in the study"));
         }
         let (name, model) = &study.models()[index];
-        let parameters = study.parameters(&study.jobs()[first], &study.start());
-        let has_delays = || model.delays(&parameters).is_ok_and(|delays| !delays.is_empty());
-        let has_clocks = || model.clocks(&parameters).is_ok_and(|clocks| !clocks.is_empty());
-        let why = (model.not_linear())
-            .or_else(|| has_clocks().then_some("no effect can be added to a model with clocks"))
-            .or_else(|| has_delays().then_some("no effect can be added to a model with delays"));
-        if let Some(why) = why {
+        if let Some(why) = model.not_linear() {
             let fact = format!("the model `{name}` cannot be diagnosed: {why}");
             return Err(StudyError::new("models", fact).with_help("calibrate it with `mops run`"));
         }
@@ -222,6 +216,18 @@ impl Subject {
             notes.push(format!(
                 "the noise of `{signal}` was estimated from neighbouring samples{experiments}: {noise:.3e} {unit}"
             ));
+        }
+        let parameters = study.parameters(&study.jobs()[first], &study.start());
+        if model.clocks(&parameters).is_ok_and(|clocks| !clocks.is_empty()) {
+            notes.push(
+                "a window of a record begins with the phase of each clock, and with its memory fitted".to_owned(),
+            );
+        }
+        if model.delays(&parameters).is_ok_and(|delays| !delays.is_empty()) {
+            notes.push(
+                "before a window of a record, delayed inputs are as recorded, and delayed states as at its begin"
+                    .to_owned(),
+            );
         }
         if !measurements.iter().any(|m| m.role == Role::Calibration) {
             return Err(StudyError::new("experiments", "no experiment is for calibration")

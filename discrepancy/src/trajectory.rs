@@ -5,7 +5,7 @@
 //! J. Oteo, J. Ros, The Magnus expansion and some of its applications, Physics Reports 470 (2009) 151, section 5).
 
 use mops_core::{Failure, Job, Port};
-use mops_models::{Moment, WithEffects};
+use mops_models::{Along, Moment, WithEffects};
 use nalgebra::allocator::Allocator;
 use nalgebra::{Const, DMatrix, DefaultAllocator, Dim, Dyn, OMatrix};
 
@@ -36,7 +36,7 @@ pub struct Trajectory {
     noise: Vec<f64>,
     /// For each series, and each of its samples: slopes of the output by the states, then by the columns.
     outputs: Vec<Vec<f64>>,
-    /// Number of states.
+    /// Number of linearised states.
     states: usize,
     /// Number of columns: inputs, then forces.
     columns: usize,
@@ -64,18 +64,23 @@ impl Trajectory {
         let job = Job { case: &p.case, parameters: &parameters, signals: &signals, horizon: p.horizon };
         let mut sampled: Vec<f64> = p.series.iter().flat_map(|s| s.times.iter().copied()).chain([0.0]).collect();
         sampled.sort_by(f64::total_cmp);
-        sampled.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * (1.0 + a.abs()));
-        let first = Self::nodes(&sampled);
-        let coarse = model.along(&job, &first)?;
-        let fastest = coarse.iter().map(|m| m.a.amax()).fold(0.0, f64::max);
+        let is_same = |a: f64, b: f64| (a - b).abs() <= 1e-9 * (1.0 + a.abs());
+        // Clocks change their memory at knots.
+        let mut ends = [&sampled[..], &model.instants(&job)?].concat();
+        ends.sort_by(f64::total_cmp);
+        ends.dedup_by(|a, b| is_same(*b, *a));
+        let coarse = model.along(&job, &Self::nodes(&ends))?;
+        // Delay lines are fast, but do not vary.
+        let rates = |m: &Moment| m.a.rows(0, m.x.len()).amax();
+        let fastest = coarse.moments.iter().map(rates).fold(0.0, f64::max);
         // Rates in very different units exaggerate: at most eight parts.
-        let largest = sampled.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        let largest = ends.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let parts = ((fastest.sqrt().min(fastest) * largest / 0.5).ceil() as usize).clamp(1, 8);
-        let mut knots = vec![sampled[0]];
-        for pair in sampled.windows(2) {
+        let mut knots = vec![ends[0]];
+        for pair in ends.windows(2) {
             knots.extend((1..=parts).map(|k| pair[0] + (pair[1] - pair[0]) * k as f64 / parts as f64));
         }
-        let moments = if parts == 1 { coarse } else { model.along(&job, &Self::nodes(&knots))? };
+        let Along { moments, ticks } = if parts == 1 { coarse } else { model.along(&job, &Self::nodes(&knots))? };
         let mut intervals: Vec<Interval> =
             knots.windows(2).zip(moments.chunks(2)).map(|(ends, m)| interval(ends[1] - ends[0], m)).collect();
         for (k, interval) in intervals.iter_mut().enumerate() {
@@ -88,7 +93,15 @@ impl Trajectory {
                 interval.transition = &interval.transition * jump;
             }
         }
-        let place = |t: f64| sampled.partition_point(|&s| s < t - 1e-9 * (1.0 + t.abs())) * parts;
+        let place = |t: f64| knots.partition_point(|&knot| knot < t - 1e-9 * (1.0 + t.abs()));
+        for tick in &ticks {
+            // What clocks change at a sample has changed when it is taken.
+            let Some(before) = place(tick.t).checked_sub(1) else { continue };
+            let interval = &mut intervals[before];
+            interval.transition = &tick.states * &interval.transition;
+            interval.gains = interval.gains.each_ref().map(|gain| &tick.states * gain);
+            interval.gains[1] += &tick.inputs;
+        }
         let samples: Vec<Vec<usize>> = p.series.iter().map(|s| s.times.iter().map(|&t| place(t)).collect()).collect();
         let row = |s: &Series| signals.iter().position(|&k| k == s.signal).expect("it is asked for");
         let slopes = |(s, knots): (&Series, &Vec<usize>)| {
@@ -122,7 +135,7 @@ impl Trajectory {
             mobilities: model.mobilities(&job)?,
             noise: p.series.iter().map(|s| s.noise).collect(),
             outputs,
-            states: moments.first().map_or(0, |m| m.x.len()),
+            states: moments.first().map_or(0, |m| m.a.nrows()),
             columns: moments.first().map_or(0, |m| m.b.ncols()),
             moments,
             intervals,
@@ -288,14 +301,14 @@ where
 fn jump(before: &Moment, after: &Moment) -> Option<DMatrix<f64>> {
     let mut all: Option<DMatrix<f64>> = None;
     for (was, is) in before.sliding.iter().zip(&after.sliding) {
-        let (velocity, states) = (was.velocity, before.rates.len());
+        let (velocity, states) = (was.velocity, before.a.nrows());
         let deceleration = before.rates[velocity];
         let mut jump = DMatrix::<f64>::identity(states, states);
         if is.rests > was.rests {
             // What has come to rest does not remember its speed.
             jump[(velocity, velocity)] = 0.0;
         } else if was.direction * is.direction < 0.0 && deceleration != 0.0 {
-            for i in 0..states {
+            for i in 0..before.rates.len() {
                 jump[(i, velocity)] += (after.rates[i] - before.rates[i]) / deceleration;
             }
         } else {
@@ -344,6 +357,55 @@ mod tests {
     der        = { x = "v", v = "m*v' = u + bias - d*v - k*x - 3 [1/m2]*k*x^3" }
     outputs    = { a = { value = "(u - d*v - k*x - 3 [1/m2]*k*x^3)/m", unit = "m/s^2" } }
     "#;
+
+    /// Mass that a sampled controller with a computing delay moves to the input.
+    const SAMPLED: &str = r#"
+    states     = { x = "m", v = "m/s" }
+    inputs     = { u = "m" }
+    parameters = { m = "kg", bias = { unit = "N", default = 0 } }
+    constants  = { T = "70 ms", kp = "30 N/m", ki = "20 N/(m s)", kd = "8 N s/m" }
+    der        = { x = "v", v = "m*v' = f + bias - 3 [N s^3/m^3]*v^3" }
+    let        = { next = "s + T*(u - x)" }
+    clocks.c   = { every = "T", delay = "25 ms", memory = { f = "N", s = "m s" }, next = { s = "next", f = "kp*(u - x) + ki*next - kd*v" } }
+    "#;
+
+    /// Mass on a spring whose force arrives late.
+    const LATE: &str = r#"
+    states     = { x = "m", v = "m/s" }
+    inputs     = { u = "N" }
+    parameters = { m = "kg", bias = { unit = "N", default = 0 } }
+    let        = { late = "delay(x, 0.1 [s])" }
+    der        = { x = "v", v = "m*v' = u + bias - 5 [N/m]*late - 8 [N/m^3]*late^3 - 2 [N s/m]*v" }
+    "#;
+
+    #[test]
+    fn a_force_beside_clocks_and_delays_has_the_tangent_of_the_simulation() {
+        for (text, amplitude) in [(SAMPLED, 0.8), (LATE, 2.0)] {
+            let count = if text == SAMPLED { 4 } else { 2 };
+            let truth: Vec<f64> = [2.0, 0.5].into_iter().chain(std::iter::repeat_n(0.1, count)).collect();
+            let subject = subject(text, &truth, count, vec![record(&["x", "v"], amplitude, 0.02)]);
+            let simulations = Meter::new(&());
+            let (fit, variant, mut at, _) = fitted(&subject, &simulations);
+            at.globals = truth[..2].to_vec();
+            at.locals = vec![truth[2..].to_vec()];
+            let along = super::Trajectory::new(&fit, &variant.model, 0, &at).expect("it simulates");
+            let unit = vec![1.0; along.moments.len()];
+            let response = along.response(along.inputs(), &unit);
+            let piece = &fit.pieces[0];
+            let job = Job { case: &piece.case, parameters: &truth, signals: &[0, 1], horizon: piece.horizon };
+            let seed = (0..truth.len()).map(|i| f64::from(u8::from(i == 1))).collect();
+            let (_, tangents) = variant.model.tangents(&job, &[seed]).expect("exact").expect("it simulates");
+            for (s, response) in piece.series.iter().zip(response.chunks(200)) {
+                let expected = tangents[0].trace(&s.name).sample(&s.times);
+                let largest = expected.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
+                let allowed = if text == SAMPLED { 1e-4 } else { 5e-3 };
+                for ((r, e), t) in response.iter().zip(&expected).zip(&s.times) {
+                    let r = r * s.noise;
+                    assert!((r - e).abs() < allowed * largest, "{} {t}: {r} {e} of {largest}", s.name);
+                }
+            }
+        }
+    }
 
     fn record(names: &[&'static str], amplitude: f64, step: f64) -> Record {
         let times: Vec<f64> = (0..200).map(|k| f64::from(k) * step).collect();

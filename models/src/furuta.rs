@@ -1,7 +1,8 @@
 //! Furuta pendulum: an arm that turns about the vertical axis, and a pendulum that swings at its end.
 
+use mops_core::plant::{Events, InputRates};
 use mops_core::{
-    EventInstant, Failure, Instant, Interface, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, State,
+    EventInstant, Failure, Instant, Interface, LeftOut, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, State,
     StudyError, Unit, Variable,
 };
 use schemars::JsonSchema;
@@ -223,13 +224,42 @@ impl<S: Scalar> Plant<S> for FurutaPlant<S> {
         *dx.first_chunk_mut().expect("the pendulum has four rates") = [dphi, ddphi, dtheta, ddtheta];
     }
 
+    fn settle(&mut self, at: &Instant<'_, S>) {
+        self.find_contacts(at);
+    }
+
+    fn linearise(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<LeftOut<S>, Failure> {
+        let mut frictionless = Vec::new();
+        for (position, joint) in [(0, 1), (2, 0)] {
+            let speed = at.x[SPEED[joint]];
+            if rests(at_rest, speed) {
+                if self.coulomb[joint].value() != 0.0 {
+                    frictionless.push(position);
+                }
+                self.coulomb[joint] = S::from(0.0);
+            }
+            self.contact[joint] = Contact::of(speed.value());
+        }
+        Ok(LeftOut { frictionless, ..LeftOut::default() })
+    }
+
+    fn events(&self) -> Option<&dyn Events<S>> {
+        Some(self)
+    }
+
+    fn events_mut(&mut self) -> Option<&mut dyn Events<S>> {
+        Some(self)
+    }
+}
+
+impl<S: Scalar> Events<S> for FurutaPlant<S> {
     fn guards(&self) -> usize {
         if self.limits().iter().all(|&limit| limit == 0.0) { 0 } else { 2 }
     }
 
     /// Returns the speed in the direction of sliding, or the margin to the limit of a stuck joint.
     #[inline]
-    fn guard(&self, joint: usize, at: &Instant<'_, S>) -> S {
+    fn guard(&self, joint: usize, at: &Instant<'_, S>, _: InputRates<'_>) -> S {
         let limit = self.coulomb[joint];
         if limit.value() == 0.0 {
             S::from(1.0)
@@ -240,7 +270,7 @@ impl<S: Scalar> Plant<S> for FurutaPlant<S> {
         }
     }
 
-    fn guard_shows(&self, joint: usize) -> Option<(usize, f64)> {
+    fn guard_state(&self, joint: usize) -> Option<(usize, f64)> {
         let slides = self.coulomb[joint].value() != 0.0 && !self.is_stuck(joint);
         slides.then(|| (SPEED[joint], self.contact[joint].sign()))
     }
@@ -259,24 +289,5 @@ impl<S: Scalar> Plant<S> for FurutaPlant<S> {
             (_, true) => "arm sticks",
             (_, false) => "arm slides",
         }
-    }
-
-    fn settle(&mut self, at: &Instant<'_, S>) {
-        self.find_contacts(at);
-    }
-
-    fn linearised_at(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<Vec<usize>, Failure> {
-        let mut left_out = Vec::new();
-        for (position, joint) in [(0, 1), (2, 0)] {
-            let speed = at.x[SPEED[joint]];
-            if rests(at_rest, speed) {
-                if self.coulomb[joint].value() != 0.0 {
-                    left_out.push(position);
-                }
-                self.coulomb[joint] = S::from(0.0);
-            }
-            self.contact[joint] = Contact::of(speed.value());
-        }
-        Ok(left_out)
     }
 }

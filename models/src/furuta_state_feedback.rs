@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use mops_core::plant::{Events, InputRates};
 use mops_core::{
-    Cut, EventInstant, Failure, Instant, Interface, Model, ModelOptions, Parameter, Quantity, Scalar, StudyError,
-    Variable,
+    Cut, EventInstant, Failure, Instant, Interface, LeftOut, Model, ModelOptions, Parameter, Quantity, Scalar,
+    StudyError, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -174,30 +175,37 @@ impl<S: Scalar> mops_core::Plant<S> for Loop<S> {
         at.x.get(signal).copied().unwrap_or_else(torque)
     }
 
+    fn settle(&mut self, at: &Instant<'_, S>) {
+        self.actuator.settle(self.demand(at.x));
+    }
+
+    /// Linearises within the torque limit.
+    fn linearise(&mut self, at: &Instant<'_, S>, _: bool) -> Result<LeftOut<S>, Failure> {
+        let is_within = self.actuator.holds(self.demand(at.x));
+        let exceeded = (!is_within).then_some("the torque exceeds its `limit`");
+        Ok(LeftOut { exceeded, ..LeftOut::default() })
+    }
+
+    fn events(&self) -> Option<&dyn Events<S>> {
+        Some(self)
+    }
+
+    fn events_mut(&mut self) -> Option<&mut dyn Events<S>> {
+        Some(self)
+    }
+}
+
+impl<S: Scalar> Events<S> for Loop<S> {
     fn guards(&self) -> usize {
         1
     }
 
-    fn guard(&self, _: usize, at: &Instant<'_, S>) -> S {
+    fn guard(&self, _: usize, at: &Instant<'_, S>, _: InputRates<'_>) -> S {
         self.actuator.guard(self.demand(at.x))
     }
 
     fn switch(&mut self, _: usize, event: &EventInstant<'_, S>, _: &mut [S]) -> &str {
         let limited = self.actuator.switch(self.demand(event.at.x));
         if limited { "torque reaches its limit" } else { "torque leaves its limit" }
-    }
-
-    fn settle(&mut self, at: &Instant<'_, S>) {
-        self.actuator.settle(self.demand(at.x));
-    }
-
-    /// Linearises within the torque limit.
-    fn linearised_at(&mut self, _: &Instant<'_, S>, _: bool) -> Result<Vec<usize>, Failure> {
-        Ok(Vec::new())
-    }
-
-    fn exceeded(&self, at: &Instant<'_, S>) -> Option<&'static str> {
-        let is_within = self.actuator.holds(self.demand(at.x));
-        (!is_within).then_some("the torque exceeds its `limit`")
     }
 }

@@ -18,7 +18,7 @@ mod with_effects;
 
 pub use from_fn::{FnModel, from_fn};
 use mops_core::ModelKind;
-pub use with_effects::{Moment, Sliding, WithEffects};
+pub use with_effects::{Along, Moment, Sliding, Tick, WithEffects};
 
 /// Returns all kinds of models. To add a model, write its file and add a line here.
 pub fn kinds() -> Vec<ModelKind> {

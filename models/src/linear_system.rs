@@ -4,9 +4,10 @@
 use std::fmt;
 
 use mops_core::expression::units::{Conflict, Dimensions, Measure, Named};
+use mops_core::plant::{Breaks, Memory, Past};
 use mops_core::{
-    Analysis, AnalysisKind, DIRECTIONS, Dual, Dual7, Expression, Failure, Instant, Interface, Job, Parameter, Past,
-    Plant, Quantity, Scalar, StateSpace, StudyError, Unit, Variable, WithTangents,
+    Analysis, AnalysisKind, DIRECTIONS, Dual, Dual7, Expression, Failure, Instant, Interface, Job, Parameter, Plant,
+    Quantity, Scalar, StateSpace, StudyError, Unit, Variable, WithTangents,
 };
 use nalgebra::DMatrix;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -109,23 +110,39 @@ impl<S: Scalar> Plant<S> for Delayed<S> {
         self.sum([&self.matrices.c[signal], &self.matrices.d[signal]], at)
     }
 
-    fn remembers(&self) -> bool {
-        !self.inputs.is_empty()
+    fn longest_step(&self) -> f64 {
+        self.inputs.iter().map(Delay::longest_step).fold(f64::INFINITY, f64::min)
     }
 
-    fn past(&self, at: &Instant<'_, S>) -> Vec<S> {
-        at.u[..self.inputs.len()].to_vec()
+    fn breaks(&self) -> Option<&dyn Breaks<S>> {
+        (!self.inputs.is_empty()).then_some(self as _)
     }
 
-    fn delays(&self) -> Vec<f64> {
-        self.inputs.iter().map(|delay| delay.time().value()).collect()
+    fn breaks_mut(&mut self) -> Option<&mut dyn Breaks<S>> {
+        (!self.inputs.is_empty()).then_some(self as _)
     }
 
-    fn hold(&mut self, past: &[S]) {
-        self.inputs.iter_mut().zip(past).for_each(|(delay, &past)| delay.set_before(past));
+    fn memory(&self) -> Option<&dyn Memory<S>> {
+        (!self.inputs.is_empty()).then_some(self as _)
     }
 
-    fn begin(&mut self, at: &Instant<'_, S>) {
+    fn memory_mut(&mut self) -> Option<&mut dyn Memory<S>> {
+        (!self.inputs.is_empty()).then_some(self as _)
+    }
+}
+
+impl<S: Scalar> Breaks<S> for Delayed<S> {
+    fn next(&self, t: f64) -> f64 {
+        self.inputs.iter().map(|delay| delay.next_break(t)).fold(f64::INFINITY, f64::min)
+    }
+
+    fn pass(&mut self, at: &Instant<'_, S>, x: &mut [S]) -> S {
+        pass_delays(self, |system| &mut system.inputs, |_, _| {}, at, x)
+    }
+}
+
+impl<S: Scalar> Memory<S> for Delayed<S> {
+    fn begin(&mut self, at: &Instant<'_, S>, _: &mut [S]) {
         let past = self.past(at);
         self.hold(&past);
     }
@@ -134,20 +151,20 @@ impl<S: Scalar> Plant<S> for Delayed<S> {
         remember_delays(&mut self.inputs, &Tolerance::default(), over)
     }
 
-    fn samples(&self) -> bool {
-        self.remembers()
+    fn delays(&self) -> Vec<f64> {
+        self.inputs.iter().map(|delay| delay.time().value()).collect()
     }
 
-    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) -> S {
-        pass_delays(self, |system| &mut system.inputs, |_, _| {}, at, x)
+    fn past(&self, at: &Instant<'_, S>) -> Vec<S> {
+        at.u[..self.inputs.len()].to_vec()
     }
 
-    fn next_break(&self, t: f64) -> f64 {
-        self.inputs.iter().map(|delay| delay.next_break(t)).fold(f64::INFINITY, f64::min)
+    fn delayed(&self, t: f64) -> Vec<S> {
+        self.inputs.iter().map(|delay| delay.at(t)).collect()
     }
 
-    fn longest_step(&self) -> f64 {
-        self.inputs.iter().map(Delay::longest_step).fold(f64::INFINITY, f64::min)
+    fn hold(&mut self, past: &[S]) {
+        self.inputs.iter_mut().zip(past).for_each(|(delay, &past)| delay.hold(past));
     }
 }
 

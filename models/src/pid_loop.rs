@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use mops_core::plant::{Breaks, Events, InputRates};
 use mops_core::{
-    Cut, EventInstant, Failure, Input, Instant, Interface, Model, ModelOptions, Parameter, Plant, Quantity, Scalar,
-    StudyError, Unit, Variable,
+    Cut, EventInstant, Failure, Input, Instant, Interface, LeftOut, Model, ModelOptions, Parameter, Plant, Quantity,
+    Scalar, StudyError, Unit, Variable,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -477,13 +478,68 @@ impl<S: Scalar> Plant<S> for Loop<S> {
         }
     }
 
+    fn settle(&mut self, at: &Instant<'_, S>) {
+        if self.sampled.is_some() {
+            return;
+        }
+        let (r, y) = (at.u[0], self.output(at.x));
+        let wanted = self.wanted(r, y, at.x).value();
+        self.saturated = if wanted < self.limit[0] {
+            -1.0
+        } else if wanted > self.limit[1] {
+            1.0
+        } else {
+            0.0
+        };
+    }
+
+    /// Linearises within the limits of the actuator: the default would enter the saturated mode.
+    fn linearise(&mut self, at: &Instant<'_, S>, _: bool) -> Result<LeftOut<S>, Failure> {
+        let wanted = self.wanted(at.u[0], self.output(at.x), at.x).value();
+        let is_within = wanted >= self.limit[0] && wanted <= self.limit[1];
+        let exceeded = (!is_within).then_some("the output of the controller exceeds its `limit`");
+        Ok(LeftOut { exceeded, ..LeftOut::default() })
+    }
+
+    fn events(&self) -> Option<&dyn Events<S>> {
+        Some(self)
+    }
+
+    fn events_mut(&mut self) -> Option<&mut dyn Events<S>> {
+        Some(self)
+    }
+
+    fn breaks(&self) -> Option<&dyn Breaks<S>> {
+        self.sampled.is_some().then_some(self as _)
+    }
+
+    fn breaks_mut(&mut self) -> Option<&mut dyn Breaks<S>> {
+        self.sampled.is_some().then_some(self as _)
+    }
+}
+
+impl<S: Scalar> Breaks<S> for Loop<S> {
+    fn next(&self, _: f64) -> f64 {
+        self.sampled.as_ref().map_or(f64::INFINITY, Sampled::next_break)
+    }
+
+    fn pass(&mut self, at: &Instant<'_, S>, _: &mut [S]) -> S {
+        let (r, y) = (at.u[0], self.output(at.x));
+        if let Some(sampled) = &mut self.sampled {
+            sampled.pass(at.t, &self.controller, self.limit, r, y);
+        }
+        S::from(0.0)
+    }
+}
+
+impl<S: Scalar> Events<S> for Loop<S> {
     fn guards(&self) -> usize {
         let limited = self.limit[0] > f64::NEG_INFINITY || self.limit[1] < f64::INFINITY;
         if self.sampled.is_none() && limited { 2 } else { 0 }
     }
 
     /// Returns the guard of the lower limit (0) or of the upper limit (1).
-    fn guard(&self, index: usize, at: &Instant<'_, S>) -> S {
+    fn guard(&self, index: usize, at: &Instant<'_, S>, _: InputRates<'_>) -> S {
         let side = if index == 0 { -1.0 } else { 1.0 };
         let inside = (-self.wanted(at.u[0], self.output(at.x), at.x) + self.limit[index]) * side;
         match self.saturated {
@@ -501,47 +557,5 @@ impl<S: Scalar> Plant<S> for Loop<S> {
             (0, false) => "actuator at its lower limit",
             _ => "actuator at its upper limit",
         }
-    }
-
-    fn next_break(&self, _: f64) -> f64 {
-        self.sampled.as_ref().map_or(f64::INFINITY, Sampled::next_break)
-    }
-
-    fn samples(&self) -> bool {
-        self.sampled.is_some()
-    }
-
-    fn sample(&mut self, at: &Instant<'_, S>, _: &mut [S]) -> S {
-        let (r, y) = (at.u[0], self.output(at.x));
-        if let Some(sampled) = &mut self.sampled {
-            sampled.pass(at.t, &self.controller, self.limit, r, y);
-        }
-        S::from(0.0)
-    }
-
-    fn settle(&mut self, at: &Instant<'_, S>) {
-        if self.sampled.is_some() {
-            return;
-        }
-        let (r, y) = (at.u[0], self.output(at.x));
-        let wanted = self.wanted(r, y, at.x).value();
-        self.saturated = if wanted < self.limit[0] {
-            -1.0
-        } else if wanted > self.limit[1] {
-            1.0
-        } else {
-            0.0
-        };
-    }
-
-    /// Linearises within the limits of the actuator: the default would enter the saturated mode.
-    fn linearised_at(&mut self, _: &Instant<'_, S>, _: bool) -> Result<Vec<usize>, Failure> {
-        Ok(Vec::new())
-    }
-
-    fn exceeded(&self, at: &Instant<'_, S>) -> Option<&'static str> {
-        let wanted = self.wanted(at.u[0], self.output(at.x), at.x).value();
-        let is_within = wanted >= self.limit[0] && wanted <= self.limit[1];
-        (!is_within).then_some("the output of the controller exceeds its `limit`")
     }
 }

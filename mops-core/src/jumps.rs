@@ -276,7 +276,7 @@ fn moved(problem: &Problem, at: &Evaluation) -> Vec<Moved> {
 /// Returns the declared scale of a state.
 fn scale_of(model: &dyn Model, state: &str, parameters: &[f64]) -> Option<f64> {
     let index = model.equation_states().iter().position(|of| of.name == state)?;
-    model.ported()?.open(parameters).ok()?.scale(index)
+    model.ported()?.plant(parameters).ok()?.scale(index)
 }
 
 /// Returns the study with a constant moved by a distance in all of its jobs.

@@ -40,7 +40,7 @@ mod objectives;
 mod outcome;
 mod panics;
 mod placement;
-mod plant;
+pub mod plant;
 mod port;
 mod prediction;
 mod problem;
@@ -108,7 +108,7 @@ pub use outcome::{
     result_schema,
 };
 pub use placement::EffectBuilder;
-pub use plant::{EventInstant, Instant, Open, Opening, Past, Plant, Selected, Span};
+pub use plant::{EventInstant, Instant, LeftOut, Plant, PlantScalar, Ported, Selected};
 pub use port::Port;
 pub use prediction::SignalSlopes;
 pub use problem::{Problem, Slopes};

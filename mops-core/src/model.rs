@@ -10,7 +10,7 @@ use crate::diagnostic::suggestion;
 use crate::effect::Placement;
 use crate::failure::Failure;
 use crate::linear::{Clock, StateSpace};
-use crate::plant::{Open, Selected};
+use crate::plant::{Ported, Selected};
 use crate::port::Port;
 use crate::study_error::StudyError;
 use crate::trace::Trace;
@@ -244,7 +244,7 @@ pub trait Model: Send + Sync {
     }
 
     /// Returns the open model, for access at its ports; `None` if the model has no ports.
-    fn ported(&self) -> Option<&dyn Open> {
+    fn ported(&self) -> Option<&dyn Ported> {
         None
     }
 

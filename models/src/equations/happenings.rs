@@ -1,6 +1,7 @@
 //! Events of a user's model: arming, resets, and rest states.
 
 use mops_core::enclosure::Enclosure;
+use mops_core::plant::{Events, InputRates};
 use mops_core::{Dual, EventInstant, Instant, Plant, Scalar};
 
 use super::bank::{Bank, Large};
@@ -114,7 +115,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
     /// Returns true if the guard of an event depends on a state that the event resets.
     fn resets_guard(&self, k: usize, at: &Instant<'_, S>) -> bool {
         let happening = &self.model.happenings[k];
-        let still = vec![0.0; at.u.len()];
+        let still = |_: usize| 0.0;
         let mut bank = self.dual_bank();
         happening.resets.0.iter().any(|&reset| {
             self.load_dual(&mut bank, at, |i| f64::from(u8::from(i == reset)), (0.0, &still));
@@ -188,7 +189,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
     fn lift(&self, k: usize, at: &Instant<'_, S>) -> Vec<(usize, f64)> {
         let model = self.model;
         let (held, n) = (&model.happenings[k].at_rest.0, at.x.len());
-        let still = vec![0.0; at.u.len()];
+        let still = |_: usize| 0.0;
         let mut free = at.x.to_vec();
         self.free_rates(at, &mut free);
         let guard = &model.happenings[k].guard;
@@ -213,7 +214,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
     }
 
     /// Returns the first and second time derivatives of all states, with no state fixed.
-    fn rates_and_bends(&self, at: &Instant<'_, S>, du: &[f64]) -> [Vec<f64>; 2] {
+    fn rates_and_bends(&self, at: &Instant<'_, S>, du: InputRates<'_>) -> [Vec<f64>; 2] {
         let mut rates = at.x.to_vec();
         self.free_rates(at, &mut rates);
         let mut bank = self.dual_bank();
@@ -229,7 +230,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         tape: &super::program::Program,
         result: usize,
         at: &Instant<'_, S>,
-        du: &[f64],
+        du: InputRates<'_>,
     ) -> f64 {
         let mut slope = at.x.to_vec();
         self.rates(at, &mut slope);
@@ -257,14 +258,14 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
         bank: &mut Large<Dual<1>>,
         at: &Instant<'_, S>,
         tangent: impl Fn(usize) -> f64,
-        (time, du): (f64, &[f64]),
+        (time, du): (f64, InputRates<'_>),
     ) {
         let layout = &self.model.layout;
         for (i, x) in at.x.iter().enumerate() {
             bank.set(layout.state(i), Dual { value: x.value(), tangent: [tangent(i)] });
         }
-        for (i, (u, &rate)) in at.u.iter().zip(du).enumerate() {
-            bank.set(layout.input(i), Dual { value: u.value(), tangent: [rate] });
+        for (i, u) in at.u.iter().enumerate() {
+            bank.set(layout.input(i), Dual { value: u.value(), tangent: [du(i)] });
         }
         for (i, w) in self.forces(at.w).iter().enumerate() {
             bank.set(layout.input(at.u.len() + i), Dual::from(w.value()));

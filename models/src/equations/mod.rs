@@ -121,8 +121,7 @@ impl Equations {
             signals: signals.map(variable).collect(),
             states: starts.iter().enumerate().map(state).collect(),
             inputs: d.inputs.iter().map(variable).collect(),
-            // Windows of records, and effects on what is sampled or delayed, need a state that the plant does not show.
-            ports: if is_past_free(d, &system) { ports(d, &system, &measured.forces)? } else { Vec::new() },
+            ports: ports(d, &system, &measured.forces)?,
             parameters,
             horizon,
             ..Interface::default()
@@ -196,11 +195,6 @@ impl Equations {
     }
 }
 
-/// Returns true if the model has neither clocks nor delays.
-fn is_past_free(d: &Definition, system: &System) -> bool {
-    d.clocks.is_empty() && system.delays.is_empty()
-}
-
 impl PlantModel for Equations {
     fn interface(&self) -> &Interface {
         &self.interface
@@ -256,7 +250,7 @@ impl PlantModel for Equations {
         Ok(self.running(&self.compiled, parameters))
     }
 
-    fn open_plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
+    fn ported_plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
         Ok(self.running(self.opened(), parameters))
     }
 }

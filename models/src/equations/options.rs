@@ -70,7 +70,7 @@ use crate::kernel::Tolerance;
 ///
 /// The linearisation of a model with clocks is its discrete equivalent, for inputs that are constant between the instants of the slowest
 /// clock. A loop is cut with `open` at the memory of the slowest clock, or at an expression of `let` that depends on
-/// it only. A model with clocks or delays has no places for effects.
+/// it only.
 ///
 /// Source: F. Cellier, E. Kofman, Continuous System Simulation (2006), chapters 7 (sorting and solving equations) and 9
 /// (discontinuities); A. Bellen, M. Zennaro, Numerical Methods for Delay Differential Equations (2003), section 3.2.

@@ -5,7 +5,8 @@ use std::cell::{RefCell, RefMut};
 use mops_core::enclosure::Enclosure;
 use mops_core::expression::Comparison;
 use mops_core::linear;
-use mops_core::{DIRECTIONS, Dual, Dual7, EventInstant, Failure, Instant, Past, Plant, Scalar, Selected, Span};
+use mops_core::plant::{Bounds, Breaks, Events, InputRates, Jacobian, Memory, Past, Span};
+use mops_core::{DIRECTIONS, Dual, Dual7, EventInstant, Failure, Instant, LeftOut, Plant, Scalar, Selected};
 
 use super::bank::{Bank, Large, Register};
 use super::bounds::{self, moved, signed};
@@ -244,6 +245,26 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
         }
     }
 
+    fn has_breaks(&self) -> bool {
+        !self.ticking.is_empty() || !self.delays.is_empty()
+    }
+
+    /// Returns the values that conditions select at a point, in the mode for linearisation.
+    fn selected(&self, at: &Instant<'_, S>) -> Vec<Selected<S>> {
+        let (places, program) = &self.model.selections;
+        let mut bank = self.bank.borrow_mut();
+        self.load(&mut bank, at);
+        program.run(&mut *bank);
+        let values: Vec<S> = program.results.iter().map(|&register| bank.get(register)).collect();
+        let selected = |((place, rates), value): (&(String, Vec<usize>), &[S])| Selected {
+            place: place.clone(),
+            taken: value[0],
+            other: value[1],
+            rates: rates.clone(),
+        };
+        places.iter().zip(values.chunks(2)).map(selected).collect()
+    }
+
     fn note_sizes(&mut self, x: &[S]) {
         for (size, x) in self.sizes.iter_mut().zip(x) {
             *size = size.max(x.value().abs());
@@ -283,11 +304,76 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         }
     }
 
+    fn scale(&self, state: usize) -> Option<f64> {
+        self.model.scales[state]
+    }
+
+    fn longest_step(&self) -> f64 {
+        self.delays.iter().map(Delay::longest_step).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Replaces a step limit by its cause, a condition that switched back and forth.
+    fn explain(&self, failure: Failure) -> Failure {
+        let mut jumping = self.model.switches.iter().zip(&self.flips);
+        match failure {
+            Failure::StepLimit(t, _) if jumping.any(|(switch, &flips)| switch.jumps && flips >= FLIPS) => {
+                Failure::EventsAccumulate(t, TO_AND_FRO.to_owned())
+            }
+            failure => failure,
+        }
+    }
+
+    fn settle(&mut self, at: &Instant<'_, S>) {
+        self.settle_modes(at);
+        if !std::mem::replace(&mut self.started, true) {
+            self.note_sizes(at.x);
+        }
+    }
+
+    fn linearise(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<LeftOut<S>, Failure> {
+        let frictionless = self.look(at, at_rest);
+        Ok(LeftOut { frictionless, selected: self.selected(at), exceeded: None })
+    }
+
+    fn events(&self) -> Option<&dyn Events<S>> {
+        Some(self)
+    }
+
+    fn events_mut(&mut self) -> Option<&mut dyn Events<S>> {
+        Some(self)
+    }
+
+    fn breaks(&self) -> Option<&dyn Breaks<S>> {
+        self.has_breaks().then_some(self as _)
+    }
+
+    fn breaks_mut(&mut self) -> Option<&mut dyn Breaks<S>> {
+        self.has_breaks().then_some(self as _)
+    }
+
+    fn memory(&self) -> Option<&dyn Memory<S>> {
+        (!self.delays.is_empty()).then_some(self as _)
+    }
+
+    fn memory_mut(&mut self) -> Option<&mut dyn Memory<S>> {
+        (!self.delays.is_empty()).then_some(self as _)
+    }
+
+    fn jacobian(&self) -> Option<&dyn Jacobian<S>> {
+        Some(self)
+    }
+
+    fn bounds(&self) -> Option<&dyn Bounds> {
+        Some(self)
+    }
+}
+
+impl<S: Scalar, B: Bank<S>> Events<S> for Running<'_, S, B> {
     fn guards(&self) -> usize {
         self.model.joints.len() + self.model.switches.len() + self.model.happenings.len()
     }
 
-    fn guard(&self, index: usize, at: &Instant<'_, S>) -> S {
+    fn guard(&self, index: usize, at: &Instant<'_, S>, _: InputRates<'_>) -> S {
         match self.kind(index) {
             Guard::Joint(j) if self.frictionless[j] => S::from(1.0),
             Guard::Joint(j) => {
@@ -309,7 +395,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         }
     }
 
-    fn guard_rate(&self, index: usize, at: &Instant<'_, S>, du: &[f64]) -> Option<f64> {
+    fn guard_rate(&self, index: usize, at: &Instant<'_, S>, du: InputRates<'_>) -> Option<f64> {
         match self.kind(index) {
             Guard::Joint(_) => None,
             Guard::Switch(k) => {
@@ -327,39 +413,11 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         }
     }
 
-    fn has_bounds(&self) -> bool {
-        true
-    }
-
-    fn enclose_guard(&self, index: usize, over: &Span<'_>) -> Enclosure {
-        self.enclose(index, over)
-    }
-
-    fn enclose_signal(&self, signal: usize, over: &Span<'_>) -> Enclosure {
-        match &self.model.signals[signal] {
-            Signal::State(state) => over.x[*state],
-            Signal::Input(input) => over.u[*input],
-            Signal::Tape(tape) => {
-                let mut registers = self.load_bounds(over);
-                tape.enclose(&mut registers);
-                registers[usize::from(tape.results[0])]
-            }
+    fn arm(&mut self, at: &Instant<'_, S>) {
+        for k in 0..self.phases.len() {
+            let passed = self.happening_guard(k, at).value() < 0.0;
+            self.phases[k] = if passed { Phase::Passed } else { Phase::Armed(0.0) };
         }
-    }
-
-    fn rest(&mut self, index: usize, event: &EventInstant<'_, S>, close: f64, x: &mut [S]) -> Result<&str, String> {
-        match self.kind(index) {
-            Guard::Happening(k) => self.come_to_rest(k, event, close, x),
-            Guard::Joint(j) => Err(format!(
-                "a joint with dry friction does not come to rest: {} again and again",
-                self.model.joints[j].slides
-            )),
-            Guard::Switch(_) => Err(TO_AND_FRO.to_owned()),
-        }
-    }
-
-    fn scale(&self, state: usize) -> Option<f64> {
-        self.model.scales[state]
     }
 
     fn switch(&mut self, index: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
@@ -401,13 +459,98 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         }
     }
 
-    fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {
-        Some(self.model.pattern.clone())
+    fn rest(&mut self, index: usize, event: &EventInstant<'_, S>, close: f64, x: &mut [S]) -> Result<&str, String> {
+        match self.kind(index) {
+            Guard::Happening(k) => self.come_to_rest(k, event, close, x),
+            Guard::Joint(j) => Err(format!(
+                "a joint with dry friction does not come to rest: {} again and again",
+                self.model.joints[j].slides
+            )),
+            Guard::Switch(_) => Err(TO_AND_FRO.to_owned()),
+        }
+    }
+}
+
+impl<S: Scalar, B: Bank<S>> Breaks<S> for Running<'_, S, B> {
+    fn next(&self, t: f64) -> f64 {
+        let ticks = self.ticking.iter().zip(&self.model.clocks).map(|(ticking, clock)| ticking.next_break(clock));
+        next_of(ticks.chain(self.delays.iter().map(|delay| delay.next_break(t))))
+    }
+
+    fn pass(&mut self, at: &Instant<'_, S>, x: &mut [S]) -> S {
+        let moves = pass_delays(self, |running| &mut running.delays, Self::settle_modes, at, x);
+        self.tick(at, x);
+        moves
+    }
+
+    fn clocks(&self) -> Vec<linear::Clock> {
+        let clock = |clock: &Clock| linear::Clock {
+            memory: clock.memory.clone(),
+            period: clock.period,
+            offset: clock.offset,
+            delay: clock.delay,
+        };
+        self.model.clocks.iter().map(clock).collect()
+    }
+
+    fn changes(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        for clock in &self.model.clocks {
+            let mut bank = self.bank.borrow_mut();
+            self.load(&mut bank, at);
+            clock.next.run(&mut *bank);
+            for (state, &register) in clock.memory.clone().zip(&clock.next.results) {
+                dx[state] = bank.get(register) - at.x[state];
+            }
+        }
+    }
+}
+
+impl<S: Scalar, B: Bank<S>> Memory<S> for Running<'_, S, B> {
+    fn begin(&mut self, at: &Instant<'_, S>, _: &mut [S]) {
+        // Delays of delays, and a quantity that contains its own past, need several passes.
+        for _ in 0..MOST_PASSES {
+            self.settle_modes(at);
+            let past = self.past(at);
+            let is_known = self.delays.iter().zip(&past).all(|(delay, past)| delay.before().value() == past.value());
+            self.delays.iter_mut().zip(past).for_each(|(delay, past)| delay.set_before(past));
+            if is_known {
+                break;
+            }
+        }
+    }
+
+    fn remember(&mut self, over: &Past<'_, S>) -> bool {
+        remember_delays(&mut self.delays, &self.tolerance, over)
+    }
+
+    fn delays(&self) -> Vec<f64> {
+        self.delays.iter().map(|delay| delay.time().value()).collect()
+    }
+
+    fn past(&self, at: &Instant<'_, S>) -> Vec<S> {
+        let mut bank = self.bank.borrow_mut();
+        self.load(&mut bank, at);
+        self.model.delayed.run(&mut *bank);
+        self.model.delayed.results.iter().map(|&register| bank.get(register)).collect()
+    }
+
+    fn hold(&mut self, past: &[S]) {
+        self.delays.iter_mut().zip(past).for_each(|(delay, &past)| delay.hold(past));
+    }
+
+    fn delayed(&self, t: f64) -> Vec<S> {
+        self.delays.iter().map(|delay| delay.at(t)).collect()
+    }
+}
+
+impl<S: Scalar, B: Bank<S>> Jacobian<S> for Running<'_, S, B> {
+    fn pattern(&self) -> Vec<(usize, usize)> {
+        self.model.pattern.clone()
     }
 
     /// Passes the entries of the Jacobian. Columns that share no row are differentiated together, several such groups
     /// per run.
-    fn jacobian(&self, at: &Instant<'_, S>, entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
+    fn entries(&self, at: &Instant<'_, S>, entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
         let model = self.model;
         let mut bank = self.jacobian.borrow_mut();
         let bank = bank.get_or_insert_with(|| {
@@ -446,121 +589,22 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
         }
         true
     }
+}
 
-    fn next_break(&self, t: f64) -> f64 {
-        let ticks = self.ticking.iter().zip(&self.model.clocks).map(|(ticking, clock)| ticking.next_break(clock));
-        next_of(ticks.chain(self.delays.iter().map(|delay| delay.next_break(t))))
+impl<S: Scalar, B: Bank<S>> Bounds for Running<'_, S, B> {
+    fn of_guard(&self, index: usize, over: &Span<'_>) -> Enclosure {
+        self.enclose(index, over)
     }
 
-    fn longest_step(&self) -> f64 {
-        self.delays.iter().map(Delay::longest_step).fold(f64::INFINITY, f64::min)
-    }
-
-    fn remembers(&self) -> bool {
-        !self.delays.is_empty()
-    }
-
-    fn begin(&mut self, at: &Instant<'_, S>) {
-        // Delays of delays, and a quantity that contains its own past, need several passes.
-        for _ in 0..MOST_PASSES {
-            self.settle_modes(at);
-            let past = self.past(at);
-            let is_known = self.delays.iter().zip(&past).all(|(delay, past)| delay.before().value() == past.value());
-            self.delays.iter_mut().zip(past).for_each(|(delay, past)| delay.set_before(past));
-            if is_known {
-                break;
+    fn of_signal(&self, signal: usize, over: &Span<'_>) -> Enclosure {
+        match &self.model.signals[signal] {
+            Signal::State(state) => over.x[*state],
+            Signal::Input(input) => over.u[*input],
+            Signal::Tape(tape) => {
+                let mut registers = self.load_bounds(over);
+                tape.enclose(&mut registers);
+                registers[usize::from(tape.results[0])]
             }
-        }
-    }
-
-    fn past(&self, at: &Instant<'_, S>) -> Vec<S> {
-        let mut bank = self.bank.borrow_mut();
-        self.load(&mut bank, at);
-        self.model.delayed.run(&mut *bank);
-        self.model.delayed.results.iter().map(|&register| bank.get(register)).collect()
-    }
-
-    fn selected(&self, at: &Instant<'_, S>) -> Vec<Selected<S>> {
-        let (places, program) = &self.model.selections;
-        let mut bank = self.bank.borrow_mut();
-        self.load(&mut bank, at);
-        program.run(&mut *bank);
-        let values: Vec<S> = program.results.iter().map(|&register| bank.get(register)).collect();
-        let selected = |((place, rates), value): (&(String, Vec<usize>), &[S])| Selected {
-            place: place.clone(),
-            taken: value[0],
-            other: value[1],
-            rates: rates.clone(),
-        };
-        places.iter().zip(values.chunks(2)).map(selected).collect()
-    }
-
-    fn delays(&self) -> Vec<f64> {
-        self.delays.iter().map(|delay| delay.time().value()).collect()
-    }
-
-    fn clocks(&self) -> Vec<linear::Clock> {
-        let clock = |clock: &Clock| linear::Clock {
-            memory: clock.memory.clone(),
-            period: clock.period,
-            offset: clock.offset,
-            delay: clock.delay,
-        };
-        self.model.clocks.iter().map(clock).collect()
-    }
-
-    fn changes(&self, at: &Instant<'_, S>, dx: &mut [S]) {
-        for clock in &self.model.clocks {
-            let mut bank = self.bank.borrow_mut();
-            self.load(&mut bank, at);
-            clock.next.run(&mut *bank);
-            for (state, &register) in clock.memory.clone().zip(&clock.next.results) {
-                dx[state] = bank.get(register) - at.x[state];
-            }
-        }
-    }
-
-    fn hold(&mut self, past: &[S]) {
-        self.delays.iter_mut().zip(past).for_each(|(delay, &past)| delay.set_before(past));
-    }
-
-    fn remember(&mut self, over: &Past<'_, S>) -> bool {
-        remember_delays(&mut self.delays, &self.tolerance, over)
-    }
-
-    fn samples(&self) -> bool {
-        !self.ticking.is_empty() || self.remembers()
-    }
-
-    fn sample(&mut self, at: &Instant<'_, S>, x: &mut [S]) -> S {
-        let moves = pass_delays(self, |running| &mut running.delays, Self::settle_modes, at, x);
-        self.tick(at, x);
-        moves
-    }
-
-    fn settle(&mut self, at: &Instant<'_, S>) {
-        self.settle_modes(at);
-        if !std::mem::replace(&mut self.started, true) {
-            self.note_sizes(at.x);
-            for k in 0..self.phases.len() {
-                let passed = self.happening_guard(k, at).value() < 0.0;
-                self.phases[k] = if passed { Phase::Passed } else { Phase::Armed(0.0) };
-            }
-        }
-    }
-
-    fn linearised_at(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<Vec<usize>, Failure> {
-        Ok(self.look(at, at_rest))
-    }
-
-    /// Replaces a step limit by its cause, a condition that switched back and forth.
-    fn explain(&self, failure: Failure) -> Failure {
-        let mut jumping = self.model.switches.iter().zip(&self.flips);
-        match failure {
-            Failure::StepLimit(t, _) if jumping.any(|(switch, &flips)| switch.jumps && flips >= FLIPS) => {
-                Failure::EventsAccumulate(t, TO_AND_FRO.to_owned())
-            }
-            failure => failure,
         }
     }
 }

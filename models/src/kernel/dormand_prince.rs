@@ -4,9 +4,10 @@
 //! II.5.2 (coefficients), section II.6 (dense output); E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd
 //! edition (1996), section IV.2 (largest eigenvalue from the last two stages, which belong to one time).
 
-use mops_core::{Scalar, Work};
+use mops_core::{Plant, Scalar, Work};
 
-use super::Dynamics;
+use super::Driven;
+use super::integrable::{Integrable, WithInputs};
 use super::integrate::{Attempt, Method};
 use super::weights::Weights;
 
@@ -30,11 +31,11 @@ impl<S: Scalar> Method<S> for DormandPrince<S> {
     const ERROR_ORDER: f64 = 5.0;
     const IS_EXPLICIT: bool = true;
 
-    fn new<D: Dynamics<S> + ?Sized>(_: &D, x: &[S]) -> Self {
+    fn new<P: Integrable<S> + ?Sized>(_: &Driven<'_, S, P>, x: &[S]) -> Self {
         Self { k: std::array::from_fn(|_| x.to_vec()), stage: x.to_vec() }
     }
 
-    fn restart<D: Dynamics<S> + ?Sized>(&mut self, f: &D, t: f64, x: &[S], work: &mut Work) {
+    fn restart<P: Integrable<S> + ?Sized>(&mut self, f: &Driven<'_, S, P>, t: f64, x: &[S], work: &mut Work) {
         f.derivative(t, x, &mut self.k[0]);
         work.derivatives += 1;
     }
@@ -43,7 +44,13 @@ impl<S: Scalar> Method<S> for DormandPrince<S> {
         &self.k[0]
     }
 
-    fn attempt<D: Dynamics<S> + ?Sized>(&mut self, f: &D, at: Attempt<'_, S>, next: &mut [S], work: &mut Work) -> f64 {
+    fn attempt<P: Integrable<S> + ?Sized>(
+        &mut self,
+        f: &Driven<'_, S, P>,
+        at: Attempt<'_, S>,
+        next: &mut [S],
+        work: &mut Work,
+    ) -> f64 {
         work.derivatives += 6;
         f.attempt(self, at, next)
     }
@@ -77,9 +84,9 @@ impl<S: Scalar> Method<S> for DormandPrince<S> {
 impl<S: Scalar> DormandPrince<S> {
     /// Attempts a step with `N` states; `N = 0` means any number.
     #[inline(never)] // Inlined into the loop over steps, the stages lack registers, which costs a quarter of their time.
-    pub(super) fn attempt_of<D: Dynamics<S> + ?Sized, const N: usize>(
+    pub(super) fn attempt_of<P: Plant<S>, const N: usize>(
         &mut self,
-        f: &D,
+        f: &WithInputs<'_, '_, S, P>,
         at: Attempt<'_, S>,
         next: &mut [S],
     ) -> f64 {
@@ -100,8 +107,8 @@ fn cut<S>([k0, k1, k2, k3, k4, k5, k6]: &[Vec<S>; 7], n: usize) -> [&[S]; 7] {
 /// Computes the six new stages; `k[0]` is given, `k[6]` is the derivative at the new state.
 #[rustfmt::skip]
 #[inline(always)]
-fn stages<S: Scalar, D: Dynamics<S> + ?Sized>(
-    f: &D, (t, h): (f64, f64), x: &[S], k: &mut [Vec<S>; 7], stage: &mut [S], next: &mut [S],
+fn stages<S: Scalar, P: Plant<S>>(
+    f: &WithInputs<'_, '_, S, P>, (t, h): (f64, f64), x: &[S], k: &mut [Vec<S>; 7], stage: &mut [S], next: &mut [S],
 ) {
     let n = x.len();
     // Terms in the order of the stages, so that the newest derivative, the last to be available, is added last.

@@ -122,9 +122,12 @@ impl<'a, S: Scalar> Drive<'a, S> {
         self.input.is_some_and(|input| input.at(-f64::MIN_POSITIVE) != input.at(0.0))
     }
 
-    /// Returns the value just before time 0.
-    pub fn before(&self) -> S {
-        self.input.map_or(self.value, |input| S::from(input.at(-f64::MIN_POSITIVE)))
+    /// Takes the value just before `t`, up to the next break that is passed.
+    pub fn hold_before(&mut self, t: f64) {
+        if let Some(input) = self.input {
+            self.value = S::from(input.at(t.next_down()));
+            (self.slope, self.curve) = (0.0, None);
+        }
     }
 
     /// Returns true if the value is constant up to the next break.
@@ -196,7 +199,7 @@ impl<'a, S: Scalar> Drive<'a, S> {
     pub fn pass_break(&mut self, t: f64) {
         let Some(input) = self.input else { return };
         self.since = t;
-        self.slope = 0.0;
+        (self.value, self.slope) = (S::from(0.0), 0.0);
         match input {
             Input::Sine { amplitude, frequency, phase, offset } => {
                 self.value = S::from(*offset);

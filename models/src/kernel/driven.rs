@@ -1,258 +1,324 @@
-//! Plant together with its inputs.
-
-use std::cell::RefCell;
+//! Plant together with its inputs: the system that a simulation integrates.
 
 use mops_core::enclosure::Enclosure;
-use mops_core::{EventInstant, Failure, Instant, Plant, Scalar, Span};
+use mops_core::plant::{EventInstant, Stretch};
+use mops_core::{Failure, Instant, Plant, Scalar};
 
-use super::drive::Drive;
-use super::{Dynamics, Step, next_of, remember};
+use super::dormand_prince::DormandPrince;
+use super::inputs::Inputs;
+use super::integrable::Integrable;
+use super::integrate::Attempt;
+use super::{Step, common, next_of, shift};
 
-/// Plant with given inputs and without external forces: the system that a simulation integrates.
-pub struct Driven<'a, S, P> {
+/// Plant with its inputs and the forces on it. The plant comes last so that it can be of any kind: `dyn Integrable` too.
+pub struct Driven<'a, S, P: ?Sized> {
+    inputs: Inputs<'a, S>,
+    /// State that each signal equals, if any; signals beyond are computed.
+    shows: Vec<Option<usize>>,
+    /// Derivatives of the time of the current events, with value 0.
+    delay: S,
+    has_started: bool,
     /// Plant.
     pub plant: P,
-    drives: Vec<Drive<'a, S>>,
-    /// Inputs since the last break, if all of them are constant up to the next.
-    constant: Option<Vec<S>>,
-    /// Inputs at the time of the last evaluation.
-    inputs: RefCell<Vec<S>>,
-    /// Bounds of inputs and forces, to enclose guards.
-    bounds: RefCell<Vec<Enclosure>>,
-    /// External forces: all 0.
-    forces: Vec<S>,
-    /// Index of the state that each signal equals, if any.
-    shows: &'a [Option<usize>],
-    /// Delay of the current events: tangents with zero value.
-    delay: S,
-    /// True from the start of the simulation on.
-    has_started: bool,
 }
 
 impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
-    /// Combines the plant with its inputs, in the order of [`mops_core::Interface::inputs`]. `forces` is the number of
-    /// external forces; `shows` gives for each signal the state that it equals. Signals beyond the length of `shows`
+    /// Combines the plant with its inputs; `shows` gives for each signal the state that it equals. Signals beyond the length of `shows`
     /// are computed.
-    pub fn new(plant: P, drives: Vec<Drive<'a, S>>, forces: usize, shows: &'a [Option<usize>]) -> Self {
-        let zero = S::from(0.0);
-        let inputs = RefCell::new(vec![zero; drives.len()]);
-        let bounds = RefCell::default();
-        Self {
-            plant,
-            drives,
-            constant: None,
-            inputs,
-            bounds,
-            forces: vec![zero; forces],
-            shows,
-            delay: zero,
-            has_started: false,
-        }
+    pub fn new(plant: P, mut inputs: Inputs<'a, S>, shows: &[Option<usize>]) -> Self {
+        inputs.delay(|input| plant.dead_time(input));
+        Self { inputs, shows: shows.to_vec(), delay: S::from(0.0), has_started: false, plant }
     }
 
-    /// Passes on the past before the start at `t`: what is known of the inputs, as far back as the delays of the plant reach, with the
-    /// states at rest.
-    fn recall(&mut self, t: f64, x: &[S]) {
-        let reach: f64 = self.plant.delays().iter().sum();
-        let known = self.drives.iter().map(Drive::first_known).fold(t, f64::min);
-        let mut from = known.max(t - reach);
-        if from >= t || !from.is_finite() {
-            let u: Vec<S> = self.drives.iter().map(Drive::before).collect();
-            self.plant.begin(&Instant { t, x, u: &u, w: &self.forces });
-            return;
+    /// Combines a plant without inputs and forces.
+    pub fn alone(plant: P) -> Self {
+        Self::new(plant, Inputs::new(Vec::new(), 0), &[])
+    }
+}
+
+impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
+    /// Returns the states at the start.
+    ///
+    /// # Errors
+    /// The reason why the simulation cannot start.
+    pub fn begin(&mut self) -> Result<Vec<S>, Failure> {
+        let mut x = self.plant.start();
+        self.recall(&mut x);
+        self.inputs.arrive();
+        let [u, w] = self.inputs.at_event(0.0, S::from(0.0));
+        let before = x.clone();
+        let at = Instant { t: self.inputs.time(0.0), x: &before, u: &u, w: &w };
+        self.plant.begin(&at, &mut x)?;
+        let mut inputs = self.inputs.clone();
+        inputs.pass_all(0.0);
+        inputs.look(0.0, &x, |at| self.plant.can_start(at))?;
+        Ok(x)
+    }
+
+    /// Passes on the past before the start: what is known of the inputs, as far back as it matters, with the states at rest.
+    fn recall(&mut self, x: &mut [S]) {
+        let Some(reach) = self.plant.memory().map(|memory| memory.reach()) else { return };
+        let mut from = self.inputs.first_known().max(-reach);
+        let is_known = from < 0.0 && from.is_finite();
+        if is_known {
+            self.inputs.pass_all(from);
+        } else {
+            self.inputs.arrive();
+            from = 0.0;
         }
-        self.constant = None;
-        self.drives.iter_mut().for_each(|drive| drive.pass_break(from));
-        let u: Vec<S> = self.drives.iter().map(|drive| drive.at(from)).collect();
-        self.plant.begin(&Instant { t: from, x, u: &u, w: &self.forces });
-        while from < t {
-            let to = next_of(self.drives.iter().map(|drive| drive.next_break(from))).min(t);
-            self.accepted(&Step::resting(x, [from, to]));
-            self.drives.iter_mut().for_each(|drive| drive.pass_break(to));
+        let [u, w] = self.inputs.at_event(from, S::from(0.0));
+        let before = x.to_vec();
+        let at = Instant { t: self.inputs.time(from), x: &before, u: &u, w: &w };
+        if let Some(memory) = self.plant.memory_mut() {
+            memory.begin(&at, x);
+        }
+        while is_known && from < 0.0 {
+            let to = self.inputs.next_break().min(0.0);
+            self.remember(&Step::resting(x, [from, to]));
+            let inputs = &self.inputs;
+            if let Some(memory) = self.plant.memory_mut() {
+                let time = [from, to].map(|t| inputs.time(t));
+                let at = |time: f64| inputs.at_event(inputs.since_start(time), S::from(0.0));
+                let rate = |time: f64, input: usize| inputs.slope(input, inputs.since_start(time));
+                memory.follow(&Stretch { time, x, at: &at, rate: &rate });
+            }
+            if to < 0.0 {
+                self.jump_inputs(to, x);
+            }
             from = to;
         }
     }
 
-    /// Evaluates a function of the plant at a time and a state.
-    #[inline(always)]
-    fn look<R>(&self, t: f64, x: &[S], at: impl FnOnce(&P, &Instant<'_, S>) -> R) -> R {
-        if let Some(u) = &self.constant {
-            return at(&self.plant, &Instant { t, x, u, w: &self.forces });
-        }
-        let mut inputs = self.inputs.borrow_mut();
-        self.take_inputs(t, &mut inputs);
-        at(&self.plant, &Instant { t, x, u: &inputs, w: &self.forces })
+    /// Returns signals just before the start, at the states `start`, after [`Driven::begin`] and before a simulation.
+    pub fn initial(&mut self, start: &[S], signals: &[usize]) -> Vec<S> {
+        let [u, w] = self.inputs.at_event(0.0, S::from(0.0));
+        let at = Instant { t: self.inputs.time(0.0), x: start, u: &u, w: &w };
+        self.plant.settle(&at);
+        let signal = |&signal: &usize| match self.shows(signal) {
+            Some(state) => start[state],
+            None => self.plant.signal(signal, &at),
+        };
+        signals.iter().map(signal).collect()
     }
 
-    /// Evaluates bounds by the plant over a time span in which the states stay within `x`.
-    fn over(&self, time: Enclosure, x: &[Enclosure], bounds_of: impl FnOnce(&P, &Span<'_>) -> Enclosure) -> Enclosure {
-        let mut bounds = self.bounds.borrow_mut();
-        bounds.clear();
-        bounds.extend(self.drives.iter().map(|drive| drive.enclose(time)));
-        bounds.resize(self.drives.len() + self.forces.len(), Enclosure::from(0.0));
-        let (u, w) = bounds.split_at(self.drives.len());
-        bounds_of(&self.plant, &Span { time, x, u, w })
-    }
-
-    #[inline(always)]
-    fn take_inputs(&self, t: f64, inputs: &mut [S]) {
-        for (u, drive) in inputs.iter_mut().zip(&self.drives) {
-            *u = drive.at(t);
-        }
-    }
-
-    /// Checks that a simulation can start from these states at time 0.
-    ///
-    /// # Errors
-    /// The reason why it cannot.
-    pub fn can_start(&self, x: &[S]) -> Result<(), Failure> {
-        self.look(0.0, x, |plant, at| plant.can_start(at))
+    /// Returns the rate that a unit of each force adds to a state just before the start, given the state of each force; after
+    /// [`Driven::begin`] and before a simulation.
+    pub fn mobilities(&mut self, start: &[S], states: &[usize]) -> Vec<S> {
+        let [u, w] = self.inputs.at_event(0.0, S::from(0.0));
+        let at = Instant { t: self.inputs.time(0.0), x: start, u: &u, w: &w };
+        self.plant.settle(&at);
+        states.iter().enumerate().map(|(force, &state)| mobility(&self.plant, &at, force, state)).collect()
     }
 
     /// Returns true if an input jumps at time 0.
     pub fn jumps_at_start(&self) -> bool {
-        self.drives.iter().any(Drive::jumps_at_start)
+        self.inputs.jumps_at_start()
     }
 
-    /// Returns signals just before time 0, given a plant that has not been simulated.
-    pub fn initial(&self, mut plant: P, start: &[S], signals: &[usize]) -> Vec<S> {
-        let u: Vec<S> = self.drives.iter().map(Drive::before).collect();
-        let at = Instant { t: 0.0, x: start, u: &u, w: &self.forces };
-        if plant.remembers() {
-            plant.begin(&at);
-        }
-        plant.settle(&at);
-        let signal =
-            |&signal: &usize| self.shows[signal].map_or_else(|| plant.signal(signal, &at), |state| start[state]);
-        signals.iter().map(signal).collect()
+    /// Returns the time of the plant, s, at a time of the simulation.
+    pub fn time(&self, t: f64) -> f64 {
+        self.inputs.time(t)
     }
 
-    fn rates_of_inputs(&self, t: f64) -> Vec<f64> {
-        self.drives.iter().map(|drive| drive.slope(t)).collect()
+    /// Returns the inputs and the forces from outside at `t`.
+    pub fn inputs_at(&self, t: f64) -> [Vec<S>; 2] {
+        self.inputs.at_event(t, S::from(0.0))
     }
 
-    /// Applies a change to the plant at an event.
-    fn at_event<'p, R>(&'p mut self, t: f64, x: &[S], change: impl FnOnce(&'p mut P, &EventInstant<'_, S>) -> R) -> R {
-        let du = self.rates_of_inputs(t);
-        let moved = |(drive, rate): (&Drive<'_, S>, &f64)| match S::DIRECTIONS {
-            0 => drive.at(t),
-            _ => drive.at(t) + self.delay * *rate,
-        };
-        let u: Vec<S> = self.drives.iter().zip(&du).map(moved).collect();
-        let at = Instant { t, x, u: &u, w: &self.forces };
-        change(&mut self.plant, &EventInstant { at, du: &du, delay: self.delay })
-    }
-}
-
-impl<S: Scalar, P: Plant<S>> Dynamics<S> for Driven<'_, S, P> {
-    // Written out because closures are not inlined into the stages.
-    #[inline(always)]
-    fn derivative(&self, t: f64, x: &[S], dx: &mut [S]) {
-        if let Some(u) = &self.constant {
-            return self.plant.rates(&Instant { t, x, u, w: &self.forces }, dx);
-        }
-        let mut inputs = self.inputs.borrow_mut();
-        self.take_inputs(t, &mut inputs);
-        self.plant.rates(&Instant { t, x, u: &inputs, w: &self.forces }, dx);
-    }
-
-    #[inline(always)]
-    fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
-        self.look(t, x, |plant, at| plant.signal(signal, at))
-    }
-
-    fn guards(&self) -> usize {
-        self.plant.guards()
+    pub(super) fn inputs(&self) -> &Inputs<'_, S> {
+        &self.inputs
     }
 
     #[inline]
-    fn guard(&self, index: usize, t: f64, x: &[S]) -> S {
-        self.look(t, x, |plant, at| plant.guard(index, at))
+    pub(super) fn derivative(&self, t: f64, x: &[S], dx: &mut [S]) {
+        self.inputs.look(t, x, |at| self.plant.rates(at, dx));
     }
 
-    fn guard_shows(&self, index: usize) -> Option<(usize, f64)> {
-        self.plant.guard_shows(index)
+    #[inline]
+    pub(super) fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
+        self.inputs.look(t, x, |at| self.plant.signal(signal, at))
     }
 
-    fn guard_rate(&self, index: usize, t: f64, x: &[S]) -> Option<f64> {
-        let du = self.rates_of_inputs(t);
-        self.look(t, x, |plant, at| plant.guard_rate(index, at, &du))
+    pub(super) fn guards(&self) -> usize {
+        self.plant.events().map_or(0, |events| events.guards())
     }
 
-    fn switch(&mut self, index: usize, t: f64, x: &mut [S]) -> &str {
+    pub(super) fn guard_state(&self, index: usize) -> Option<(usize, f64)> {
+        self.plant.events()?.guard_state(index)
+    }
+
+    pub(super) fn guard_rate(&self, index: usize, t: f64, x: &[S]) -> Option<f64> {
+        let events = self.plant.events()?;
+        self.inputs.with_rates(t, |du| self.inputs.look(t, x, |at| events.guard_rate(index, at, du)))
+    }
+
+    pub(super) fn switch(&mut self, index: usize, t: f64, x: &mut [S]) -> &str {
         let before = x.to_vec();
-        self.at_event(t, &before, |plant, event| plant.switch(index, event, x))
+        let [u, w] = self.inputs.at_event(t, self.delay);
+        let at = Instant { t: self.inputs.time(t), x: &before, u: &u, w: &w };
+        let Some(events) = self.plant.events_mut() else { return "" };
+        let inputs = &self.inputs;
+        events.switch(index, &EventInstant { at, du: &|input| inputs.slope(input, t), delay: self.delay }, x)
     }
 
-    fn has_bounds(&self) -> bool {
-        self.plant.has_bounds()
-    }
-
-    fn enclose_guard(&self, index: usize, time: Enclosure, x: &[Enclosure]) -> Enclosure {
-        self.over(time, x, |plant, span| plant.enclose_guard(index, span))
-    }
-
-    fn enclose_signal(&self, signal: usize, time: Enclosure, x: &[Enclosure]) -> Enclosure {
-        self.over(time, x, |plant, span| plant.enclose_signal(signal, span))
-    }
-
-    fn rest(&mut self, index: usize, t: f64, close: f64, x: &mut [S]) -> Result<&str, String> {
+    pub(super) fn rest(&mut self, index: usize, t: f64, close: f64, x: &mut [S]) -> Result<&str, String> {
         let before = x.to_vec();
-        self.at_event(t, &before, |plant, event| plant.rest(index, event, close, x))
+        let [u, w] = self.inputs.at_event(t, self.delay);
+        let at = Instant { t: self.inputs.time(t), x: &before, u: &u, w: &w };
+        let Some(events) = self.plant.events_mut() else { return Ok("") };
+        let inputs = &self.inputs;
+        events.rest(index, &EventInstant { at, du: &|input| inputs.slope(input, t), delay: self.delay }, close, x)
     }
 
-    fn scale(&self, state: usize) -> Option<f64> {
-        self.plant.scale(state)
+    pub(super) fn has_bounds(&self) -> bool {
+        self.plant.bounds().is_some()
     }
 
-    fn delay_events(&mut self, delay: S) {
+    pub(super) fn enclose_guard(&self, index: usize, time: Enclosure, x: &[Enclosure]) -> Enclosure {
+        let Some(bounds) = self.plant.bounds() else { return Enclosure::UNKNOWN };
+        self.inputs.over(time, x, |over| bounds.of_guard(index, over))
+    }
+
+    pub(super) fn enclose_signal(&self, signal: usize, time: Enclosure, x: &[Enclosure]) -> Enclosure {
+        let Some(bounds) = self.plant.bounds() else { return Enclosure::UNKNOWN };
+        self.inputs.over(time, x, |over| bounds.of_signal(signal, over))
+    }
+
+    /// Sets the derivatives of the time of the events that follow, with value 0: the time and the inputs that resets read move with the
+    /// event.
+    pub(super) fn delay_events(&mut self, delay: S) {
         self.delay = delay;
     }
 
-    fn shows(&self, signal: usize) -> Option<usize> {
+    pub(super) fn shows(&self, signal: usize) -> Option<usize> {
         self.shows.get(signal).copied().flatten()
     }
 
-    fn next_break(&self, t: f64) -> f64 {
-        let of_inputs = self.drives.iter().map(|drive| drive.next_break(t));
-        next_of(of_inputs.chain(std::iter::once_with(|| self.plant.next_break(t))))
+    /// Returns the next time after `t`, s, at which an input jumps or the plant samples; infinity if none follows.
+    pub(super) fn next_break(&self, t: f64) -> f64 {
+        let of_inputs = self.inputs.next_break();
+        let Some(breaks) = self.plant.breaks() else { return of_inputs };
+        next_of([of_inputs, self.inputs.since_start(breaks.next(self.inputs.time(t)))].into_iter())
     }
 
-    fn longest_step(&self) -> f64 {
-        self.drives.iter().map(Drive::longest_step).fold(self.plant.longest_step(), f64::min)
+    pub(super) fn longest_step(&self) -> f64 {
+        self.inputs.longest_step().min(self.plant.longest_step())
     }
 
-    fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {
-        self.plant.jacobian_pattern()
+    pub(super) fn jacobian_pattern(&self) -> Option<Vec<(usize, usize)>> {
+        self.plant.jacobian().map(|jacobian| jacobian.pattern())
     }
 
-    fn jacobian(&self, t: f64, x: &[S], entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
-        self.look(t, x, |plant, at| plant.jacobian(at, entry))
+    pub(super) fn jacobian(&self, t: f64, x: &[S], entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
+        let Some(jacobian) = self.plant.jacobian() else { return false };
+        self.inputs.look(t, x, |at| jacobian.entries(at, entry))
     }
 
-    fn remembers(&self) -> bool {
-        self.plant.remembers()
+    /// Returns true if [`Driven::remember`] is to be called for accepted steps.
+    pub(super) fn remembers(&self) -> bool {
+        self.plant.memory().is_some()
     }
 
-    fn accepted(&mut self, step: &Step<S>) {
-        let past = |of: &Self, t: f64, x: &[S]| of.look(t, x, |plant, at| plant.past(at));
-        remember(self, step, &past, &|of, over| of.plant.remember(over));
-    }
-
-    fn pass_break(&mut self, t: f64, x: &mut [S]) -> S {
-        if !std::mem::replace(&mut self.has_started, true) && self.plant.remembers() {
-            self.recall(t, x);
-        }
-        self.drives.iter_mut().for_each(|drive| drive.pass_break(t));
-        let mut inputs = self.inputs.borrow_mut();
-        self.take_inputs(t, &mut inputs);
-        self.constant = self.drives.iter().all(Drive::is_constant).then(|| inputs.clone());
-        let mut moves = S::from(0.0);
-        if self.plant.samples() {
+    /// Handles a break, and is called once at the start: inputs take their new values, then the plant passes its own breaks. Returns the
+    /// derivatives of the time of the break along the directions of the scalar, with value 0.
+    pub(super) fn pass_break(&mut self, t: f64, x: &mut [S]) -> S {
+        let of_inputs = self.jump_inputs(t, x);
+        self.inputs.settle(t);
+        let mut moves = of_inputs.unwrap_or(S::from(0.0));
+        if let Some(breaks) = self.plant.breaks_mut() {
             let before = x.to_vec();
-            moves = self.plant.sample(&Instant { t, x: &before, u: &inputs, w: &self.forces }, x);
+            let own = self.inputs.look(t, &before, |at| breaks.pass(at, x));
+            moves = match of_inputs.filter(|_| own.tangents().iter().any(|&tangent| tangent != 0.0)) {
+                Some(of_inputs) => common(of_inputs, own),
+                None => of_inputs.unwrap_or(own),
+            };
         }
-        self.plant.settle(&Instant { t, x, u: &inputs, w: &self.forces });
+        let has_started = std::mem::replace(&mut self.has_started, true);
+        let plant = &mut self.plant;
+        self.inputs.look(t, x, |at| {
+            plant.settle(at);
+            if !has_started && let Some(events) = plant.events_mut() {
+                events.arm(at);
+            }
+        });
         moves
     }
+
+    /// Lets the inputs jump that do so at `t`: those without a dead time, then each of the others at its own time. Returns the
+    /// derivatives of the time of the latter.
+    fn jump_inputs(&mut self, t: f64, x: &mut [S]) -> Option<S> {
+        if self.inputs.jumps_at(t) {
+            self.jump(t, x, S::from(0.0), |inputs| inputs.pass(t));
+        }
+        let mut moves: Option<S> = None;
+        while let Some((k, late)) = self.inputs.late_at(t) {
+            self.jump(t, x, late, |inputs| inputs.pass_late(k));
+            moves = Some(moves.map_or(late, |moves| common(moves, late)));
+        }
+        moves
+    }
+
+    /// Passes a jump of inputs whose time has the derivatives `late`: the state moves along the rates before the jump, and back along
+    /// those after it.
+    fn jump(&mut self, t: f64, x: &mut [S], late: S, pass: impl FnOnce(&mut Inputs<'_, S>)) {
+        let moves = late.tangents().iter().any(|&tangent| tangent != 0.0);
+        let mut rates = if moves { x.to_vec() } else { Vec::new() };
+        if moves {
+            shift(self, t, x, &mut rates, late);
+        }
+        let before = self.plant.memory().is_some().then(|| {
+            let slopes: Vec<f64> = (0..self.inputs.len()).map(|input| self.inputs.slope(input, t)).collect();
+            (self.inputs.at_event(t, late), slopes)
+        });
+        pass(&mut self.inputs);
+        if let Some(([u, w], slopes)) = before
+            && let Some(memory) = self.plant.memory_mut()
+        {
+            let inputs = &self.inputs;
+            let [u_after, w_after] = inputs.at_event(t, late);
+            let before = Instant { t: inputs.time(t), x, u: &u, w: &w };
+            let after = Instant { u: &u_after, w: &w_after, ..before };
+            memory.jump(
+                &EventInstant { at: before, du: &|input| slopes[input], delay: late },
+                &EventInstant { at: after, du: &|input| inputs.slope(input, t), delay: late },
+            );
+        }
+        if moves {
+            shift(self, t, x, &mut rates, -late);
+        }
+    }
+}
+
+impl<S: Scalar, P: Integrable<S> + ?Sized> Driven<'_, S, P> {
+    pub(super) fn signal_at(&self, signal: usize, times: &[f64; 5], states: &[Vec<S>; 5]) -> [S; 5] {
+        self.plant.signals(&self.inputs, signal, times, states)
+    }
+
+    pub(super) fn guard(&self, index: usize, t: f64, x: &[S]) -> S {
+        self.plant.guard(&self.inputs, index, t, x)
+    }
+
+    pub(super) fn guard_at(&self, index: usize, times: &[f64; 3], states: &[Vec<S>; 3]) -> [S; 3] {
+        self.plant.guards(&self.inputs, index, times, states)
+    }
+
+    pub(super) fn attempt(&self, method: &mut DormandPrince<S>, at: Attempt<'_, S>, next: &mut [S]) -> f64 {
+        self.plant.attempt(&self.inputs, method, at, next)
+    }
+}
+
+/// Returns the rate that a unit of a force adds to a state.
+pub(crate) fn mobility<S: Scalar>(
+    plant: &(impl Plant<S> + ?Sized),
+    at: &Instant<'_, S>,
+    force: usize,
+    state: usize,
+) -> S {
+    let rate = |unit: f64| {
+        let (mut w, mut rates) = (at.w.to_vec(), at.x.to_vec());
+        w[force] = S::from(unit);
+        plant.rates(&Instant { w: &w, ..*at }, &mut rates);
+        rates[state]
+    };
+    rate(1.0) - rate(0.0)
 }

@@ -13,8 +13,9 @@
 use mops_core::math;
 use mops_core::{Scalar, Work};
 
-use super::Dynamics;
+use super::Driven;
 use super::banded::Banded;
+use super::integrable::Integrable;
 use super::integrate::{Attempt, Method};
 use super::weights::Weights;
 
@@ -80,7 +81,7 @@ impl<S: Scalar> Method<S> for Esdirk<S> {
     const ERROR_ORDER: f64 = 4.0;
     const IS_EXPLICIT: bool = false;
 
-    fn new<D: Dynamics<S> + ?Sized>(f: &D, x: &[S]) -> Self {
+    fn new<P: Integrable<S> + ?Sized>(f: &Driven<'_, S, P>, x: &[S]) -> Self {
         let n = x.len();
         let rows = match f.jacobian_pattern() {
             Some(pattern) => {
@@ -109,7 +110,7 @@ impl<S: Scalar> Method<S> for Esdirk<S> {
         }
     }
 
-    fn restart<D: Dynamics<S> + ?Sized>(&mut self, f: &D, t: f64, x: &[S], work: &mut Work) {
+    fn restart<P: Integrable<S> + ?Sized>(&mut self, f: &Driven<'_, S, P>, t: f64, x: &[S], work: &mut Work) {
         f.derivative(t, x, &mut self.k[0]);
         work.derivatives += 1;
         self.factors_for = 0.0;
@@ -120,7 +121,13 @@ impl<S: Scalar> Method<S> for Esdirk<S> {
         &self.k[0]
     }
 
-    fn attempt<D: Dynamics<S> + ?Sized>(&mut self, f: &D, at: Attempt<'_, S>, next: &mut [S], work: &mut Work) -> f64 {
+    fn attempt<P: Integrable<S> + ?Sized>(
+        &mut self,
+        f: &Driven<'_, S, P>,
+        at: Attempt<'_, S>,
+        next: &mut [S],
+        work: &mut Work,
+    ) -> f64 {
         // Factors for a similar step size are reused: Newton's method corrects the difference.
         if self.factors_for == 0.0 || !(0.8..=1.25).contains(&(at.h / self.factors_for)) {
             self.factorise(f, &at, work);
@@ -160,7 +167,7 @@ impl<S: Scalar> Method<S> for Esdirk<S> {
 
 impl<S: Scalar> Esdirk<S> {
     /// Computes the factors for a step, with a new Jacobian unless it was evaluated in the current step.
-    fn factorise<D: Dynamics<S> + ?Sized>(&mut self, f: &D, at: &Attempt<'_, S>, work: &mut Work) {
+    fn factorise<P: Integrable<S> + ?Sized>(&mut self, f: &Driven<'_, S, P>, at: &Attempt<'_, S>, work: &mut Work) {
         if !self.fresh {
             self.take_jacobian(f, at, work);
             self.fresh = true;
@@ -172,7 +179,7 @@ impl<S: Scalar> Esdirk<S> {
         self.contraction = 1.0;
     }
 
-    fn take_jacobian<D: Dynamics<S> + ?Sized>(&mut self, f: &D, at: &Attempt<'_, S>, work: &mut Work) {
+    fn take_jacobian<P: Integrable<S> + ?Sized>(&mut self, f: &Driven<'_, S, P>, at: &Attempt<'_, S>, work: &mut Work) {
         let Attempt { t, h, x, weights } = *at;
         self.jacobian.clear();
         let jacobian = &mut self.jacobian;
@@ -206,9 +213,9 @@ impl<S: Scalar> Esdirk<S> {
     }
 
     /// Solves one stage and writes it to `z`; returns false if Newton's method does not converge.
-    fn stage<D: Dynamics<S> + ?Sized>(
+    fn stage<P: Integrable<S> + ?Sized>(
         &mut self,
-        f: &D,
+        f: &Driven<'_, S, P>,
         at: &Attempt<'_, S>,
         stage: usize,
         z: &mut [S],
@@ -277,7 +284,14 @@ impl<S: Scalar> Esdirk<S> {
     }
 
     /// Computes the Newton step from `z`, value and tangents, into `update`.
-    fn newton_step<D: Dynamics<S> + ?Sized>(&mut self, f: &D, t: f64, h: f64, z: &[S], work: &mut Work) {
+    fn newton_step<P: Integrable<S> + ?Sized>(
+        &mut self,
+        f: &Driven<'_, S, P>,
+        t: f64,
+        h: f64,
+        z: &[S],
+        work: &mut Work,
+    ) {
         f.derivative(t, z, &mut self.update);
         work.derivatives += 1;
         for (j, update) in self.update.iter_mut().enumerate() {
@@ -287,9 +301,9 @@ impl<S: Scalar> Esdirk<S> {
     }
 
     /// Iterates the tangents of a stage whose value is frozen.
-    fn finish_tangents<D: Dynamics<S> + ?Sized>(
+    fn finish_tangents<P: Integrable<S> + ?Sized>(
         &mut self,
-        f: &D,
+        f: &Driven<'_, S, P>,
         t: f64,
         h: f64,
         z: &mut [S],
@@ -364,7 +378,7 @@ pub(crate) fn groups(rows: &[Vec<usize>]) -> Vec<Vec<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::{Dual, Failure};
+    use mops_core::{Dual, Failure, Instant, Plant};
 
     use super::super::{IntegrationMethod, Tolerance, integrate};
     use super::*;
@@ -375,8 +389,12 @@ mod tests {
 
     /// Van der Pol oscillator `x'' = mu (1 - x^2) x' - x`.
     struct VanDerPol<S>(S);
-    impl<S: Scalar> Dynamics<S> for VanDerPol<S> {
-        fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
+    impl<S: Scalar> Plant<S> for VanDerPol<S> {
+        fn start(&self) -> Vec<S> {
+            vec![S::from(2.0), S::from(0.0)]
+        }
+        fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+            let x = at.x;
             dx.copy_from_slice(&[x[1], self.0 * (-x[0] * x[0] + 1.0) * x[1] - x[0]]);
         }
     }
@@ -384,10 +402,11 @@ mod tests {
     #[test]
     fn van_der_pol_agrees_with_its_published_value() {
         // Reference at t = 2000 for mu = 1000 from (2, 0): 1.706167732170483 (test set for IVP solvers, Bari, vdpolm).
-        let (x, work) = integrate(&mut VanDerPol(1000.0), 0.0, 2000.0, &[2.0, 0.0], &stiff(1e-8), &mut ()).unwrap();
+        let (x, work) =
+            integrate(&mut Driven::alone(VanDerPol(1000.0)), 0.0, 2000.0, &[2.0, 0.0], &stiff(1e-8), &mut ()).unwrap();
         assert!((x[0] - 1.706_167_732_170_483).abs() < 1e-6, "{x:?} {work:?}");
         let explicit = Tolerance { method: IntegrationMethod::Explicit, ..stiff(1e-8) };
-        let failure = integrate(&mut VanDerPol(1000.0), 0.0, 2000.0, &[2.0, 0.0], &explicit, &mut ());
+        let failure = integrate(&mut Driven::alone(VanDerPol(1000.0)), 0.0, 2000.0, &[2.0, 0.0], &explicit, &mut ());
         assert!(matches!(failure, Err(Failure::StepLimit(..))));
     }
 
@@ -395,21 +414,25 @@ mod tests {
     fn the_error_falls_with_the_fourth_power_of_the_step() {
         // The solution of `x' = -cos(t) x^2`, `x(0) = 1` is `1/(1 + sin t)`.
         struct Rational;
-        impl Dynamics<f64> for Rational {
-            fn derivative(&self, t: f64, x: &[f64], dx: &mut [f64]) {
-                dx[0] = -math::cos(t) * x[0] * x[0];
+        impl Plant<f64> for Rational {
+            fn start(&self) -> Vec<f64> {
+                vec![1.0]
+            }
+            fn rates(&self, at: &Instant<'_, f64>, dx: &mut [f64]) {
+                dx[0] = -math::cos(at.t) * at.x[0] * at.x[0];
             }
         }
         let fixed = |steps: u32| {
             let h = 2.0 / f64::from(steps);
             let (mut x, mut next, mut work) = ([1.0], [0.0], Work::default());
-            let weights = Weights::new(&Rational, &x, 2.0, &stiff(1e-10));
-            let mut method = Esdirk::new(&Rational, &x);
+            let rational = Driven::alone(Rational);
+            let weights = Weights::new(&rational, &x, 2.0, &stiff(1e-10));
+            let mut method = Esdirk::new(&rational, &x);
             for i in 0..steps {
                 let t = h * f64::from(i);
-                method.restart(&Rational, t, &x, &mut work);
+                method.restart(&rational, t, &x, &mut work);
                 let attempt = Attempt { t, h, x: &x, weights: &weights };
-                assert!(method.attempt(&Rational, attempt, &mut next, &mut work).is_finite());
+                assert!(method.attempt(&rational, attempt, &mut next, &mut work).is_finite());
                 x = next;
             }
             (x[0] - 1.0 / (1.0 + math::sin(2.0))).abs()
@@ -421,9 +444,11 @@ mod tests {
     #[test]
     fn tangents_are_exact_and_change_no_value() {
         let tolerance = stiff(1e-9);
-        let run = |mu: f64| integrate(&mut VanDerPol(mu), 0.0, 5.0, &[2.0, 0.0], &tolerance, &mut ()).unwrap().0;
+        let run = |mu: f64| {
+            integrate(&mut Driven::alone(VanDerPol(mu)), 0.0, 5.0, &[2.0, 0.0], &tolerance, &mut ()).unwrap().0
+        };
         let start = [Dual::from(2.0), Dual::from(0.0)];
-        let mut dual = VanDerPol(Dual::<1>::variable(10.0, 0));
+        let mut dual = Driven::alone(VanDerPol(Dual::<1>::variable(10.0, 0)));
         let (x, _) = integrate(&mut dual, 0.0, 5.0, &start, &tolerance, &mut ()).unwrap();
         assert_eq!(x.iter().map(|x| x.value).collect::<Vec<_>>(), run(10.0));
         let (high, low) = (run(10.0 + 1e-3), run(10.0 - 1e-3));
@@ -437,15 +462,18 @@ mod tests {
     fn a_chain_that_rests_at_zero_is_driven() {
         /// Chain of integrators `x1' = x2`, ..., `xn' = push(t)`, with all states 0 at the start.
         struct Chain<const N: usize>(fn(f64) -> f64);
-        impl<const N: usize> Dynamics<f64> for Chain<N> {
-            fn derivative(&self, t: f64, x: &[f64], dx: &mut [f64]) {
-                dx.copy_from_slice(x);
+        impl<const N: usize> Plant<f64> for Chain<N> {
+            fn start(&self) -> Vec<f64> {
+                vec![0.0; N]
+            }
+            fn rates(&self, at: &Instant<'_, f64>, dx: &mut [f64]) {
+                dx.copy_from_slice(at.x);
                 dx.rotate_left(1);
-                dx[N - 1] = self.0(t);
+                dx[N - 1] = self.0(at.t);
             }
         }
         fn end<const N: usize>(push: fn(f64) -> f64) -> f64 {
-            integrate(&mut Chain::<N>(push), 0.0, 1.0, &[0.0; N], &stiff(1e-8), &mut ()).unwrap().0[0]
+            integrate(&mut Driven::alone(Chain::<N>(push)), 0.0, 1.0, &[0.0; N], &stiff(1e-8), &mut ()).unwrap().0[0]
         }
         for unit in [1.0, 1e-30, 1e30] {
             let near = |found: f64, exact: f64| assert!((found - exact).abs() < 1e-6 * exact.abs(), "{found} {exact}");

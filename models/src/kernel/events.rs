@@ -1,11 +1,11 @@
 //! Events: when they occur, in which order, and how often.
 //!
 //! **Guards.** A mode is active while its guards are not negative. An event is the first instant at which a guard is
-//! negative. [`Dynamics::switch`] then changes the mode, and the state where it jumps. Events do not depend on where
+//! negative. [`mops_core::plant::Events::switch`] then changes the mode, and the state where it jumps. Events do not depend on where
 //! steps end.
 //!
 //! **Location.** Within a step the state is a polynomial in time, so that every guard is a function of time.
-//! [`Dynamics::enclose_guard`] may give bounds of a guard and of its rate over a part of the step. The first zero
+//! [`mops_core::plant::Bounds::of_guard`] may give bounds of a guard and of its rate over a part of the step. The first zero
 //! crossing is then found by branch and bound. A part whose bounds exclude negative values is discarded. A part over
 //! which the guard is monotone is decided by its ends. Any other part is halved, the earlier half first. This finds a
 //! guard that is negative only briefly, however long the step is. The guard may depend on states, on inputs or on time.
@@ -18,15 +18,15 @@
 //! from there.
 //!
 //! **Simultaneous events.** Instants closer than the resolution count as one. At an instant inputs and clocks first
-//! take their new values ([`Dynamics::pass_break`]). Then the negative guard with the lowest index switches, until no
+//! take their new values ([`mops_core::plant::Breaks::pass`]). Then the negative guard with the lowest index switches, until no
 //! guard is negative. An event therefore sees the inputs that are valid from its instant on, at all rates of samples
 //! and events.
 //!
-//! **Arming.** The state of a guard after its event, armed or not, is part of the mode and decided by the dynamics.
+//! **Arming.** The state of a guard after its event, armed or not, is part of the mode and decided by the system.
 //!
 //! **Accumulation (Zeno behaviour).** The events of a guard accumulate if it switches [`REPEATS`] times in succession
 //! at decreasing intervals below [`CLOSE`] of the simulated time. Intervals below [`NONE`] of the simulated time count
-//! as zero. [`Dynamics::rest`] may then move the state to its rest state; otherwise the simulation fails, as it cannot
+//! as zero. [`mops_core::plant::Events::rest`] may then move the state to its rest state; otherwise the simulation fails, as it cannot
 //! proceed beyond that instant.
 //!
 //! Source: T. Park, P. Barton, State event location in differential-algebraic models, ACM TOMACS 6 (1996) 137-165; J. Esposito,
@@ -35,10 +35,11 @@
 
 use mops_core::enclosure::Enclosure;
 use mops_core::math;
-use mops_core::{Failure, Scalar};
+use mops_core::{Failure, Plant, Scalar};
 
+use super::integrable::Integrable;
 use super::step::Step;
-use super::{Dynamics, Sink};
+use super::{Driven, Sink};
 
 /// Number of successive switches of a guard at decreasing intervals from which its events count as accumulating. A
 /// sequence that does not accumulate reaches this number very rarely by chance, and intervals still exceed rounding.
@@ -115,43 +116,43 @@ impl<S: Scalar> Events<S> {
     /// Handles all events of an instant: the negative guard with the lowest index switches, until no guard is negative. Each event occurs
     /// at the time of its own crossing, the events that it causes at the same time: for the derivatives, the state is moved there before
     /// an event, and back after the last one.
-    pub(super) fn settle<D: Dynamics<S> + ?Sized>(
+    pub(super) fn settle<P: Integrable<S> + ?Sized>(
         &mut self,
-        dynamics: &mut D,
+        system: &mut Driven<'_, S, P>,
         (t, crossings): (f64, &[Crossing<S>]),
         (x, spare): (&mut [S], &mut [S]),
-        sink: &mut impl Sink<S, D>,
+        sink: &mut impl Sink<S, P>,
     ) -> Result<(), Failure> {
         let mut index = 0;
         let mut late = S::from(0.0);
-        self.values.resize(dynamics.guards(), 0.0);
+        self.values.resize(system.guards(), 0.0);
         while index < self.values.len() {
-            let value = dynamics.guard(index, t, x).value();
+            let value = system.guard(index, t, x).value();
             self.values[index] = value;
             if value >= 0.0 || value.is_nan() {
                 index += 1;
                 continue;
             }
             if let Some(own) = crossings.iter().find(|crossing| crossing.guard == index) {
-                shift(dynamics, t, x, spare, own.late - late);
+                shift(system, t, x, spare, own.late - late);
                 late = own.late;
-                dynamics.delay_events(late);
+                system.delay_events(late);
             }
             if self.accumulates(index, t) {
-                match dynamics.rest(index, t, CLOSE * self.span, x) {
+                match system.rest(index, t, CLOSE * self.span, x) {
                     Ok(rest) => sink.event(t, rest),
                     Err(why) => return Err(Failure::EventsAccumulate(t, why)),
                 }
                 self.past[index].closer = 0;
             } else {
-                sink.event(t, dynamics.switch(index, t, x));
+                sink.event(t, system.switch(index, t, x));
             }
-            self.values.resize(dynamics.guards(), 0.0);
+            self.values.resize(system.guards(), 0.0);
             index = 0;
         }
         if !crossings.is_empty() {
-            dynamics.delay_events(S::from(0.0));
-            shift(dynamics, t, x, spare, -late);
+            system.delay_events(S::from(0.0));
+            shift(system, t, x, spare, -late);
         }
         Ok(())
     }
@@ -172,9 +173,9 @@ impl<S: Scalar> Events<S> {
 
     /// Returns the guard that is the first to become negative within the step, and ends the step there. `arrival` is
     /// the time and state at the end of the step.
-    pub(super) fn first<D: Dynamics<S> + ?Sized>(
+    pub(super) fn first<P: Integrable<S> + ?Sized>(
         &mut self,
-        dynamics: &D,
+        system: &Driven<'_, S, P>,
         step: &mut Step<S>,
         arrival: (f64, &[S]),
         x: &mut [S],
@@ -184,7 +185,7 @@ impl<S: Scalar> Events<S> {
         if !self.are_watched() {
             return None;
         }
-        let has_bounds = dynamics.has_bounds();
+        let has_bounds = system.has_bounds();
         if has_bounds {
             step.enclose(0.0, 1.0, &mut self.whole);
         }
@@ -192,23 +193,23 @@ impl<S: Scalar> Events<S> {
         for index in 0..self.values.len() {
             let mut value = |theta: f64| {
                 if theta >= 1.0 {
-                    return dynamics.guard(index, arrival.0, arrival.1).value();
+                    return system.guard(index, arrival.0, arrival.1).value();
                 }
                 step.at(theta, x);
-                dynamics.guard(index, step.time(theta), x).value()
+                system.guard(index, step.time(theta), x).value()
             };
             let start = self.values[index];
             let last = value(end);
             let time = |from: f64, to: f64| Enclosure::of_time(step.time(from), step.time(to));
             let whole = match has_bounds {
-                true => dynamics.enclose_guard(index, time(0.0, 1.0), &self.whole),
+                true => system.enclose_guard(index, time(0.0, 1.0), &self.whole),
                 false => Enclosure::UNKNOWN,
             };
             let ends = [(0.0, start), (end, last)];
             let bounds = &mut self.bounds;
             let mut enclose = |from: f64, to: f64| {
                 step.enclose(from, to, bounds);
-                dynamics.enclose_guard(index, time(from, to), bounds)
+                system.enclose_guard(index, time(from, to), bounds)
             };
             let bracket = if whole.value.low >= 0.0 {
                 None
@@ -218,7 +219,7 @@ impl<S: Scalar> Events<S> {
             } else if has_bounds || end < 1.0 {
                 let inner = INNER.map(|place| value(place * end));
                 looks(&mut value, ends, inner)
-            } else if let Some((state, factor)) = dynamics.guard_shows(index) {
+            } else if let Some((state, factor)) = system.guard_state(index) {
                 let inner = INNER.map(|place| (step.component(place, state) * factor).value());
                 looks(&mut value, ends, inner)
             } else {
@@ -226,7 +227,7 @@ impl<S: Scalar> Events<S> {
                     step.states_at(&INNER, &mut self.inner);
                     has_inner = true;
                 }
-                let inner = dynamics.guard_at(index, &INNER.map(|place| step.time(place)), &self.inner);
+                let inner = system.guard_at(index, &INNER.map(|place| step.time(place)), &self.inner);
                 looks(&mut value, ends, inner.map(Scalar::value))
             };
             // Most steps end without an event; the values at their end are those at the start of the next step.
@@ -437,7 +438,12 @@ const SAME: f64 = 1e-6;
 
 impl<S: Scalar> Crossing<S> {
     /// Returns the crossings at the end of the step, the first of them found in it; only that one without tangents.
-    pub(super) fn all<D: Dynamics<S> + ?Sized>(f: &D, first: usize, step: &Step<S>, x: &mut [S]) -> Vec<Self> {
+    pub(super) fn all<P: Integrable<S> + ?Sized>(
+        f: &Driven<'_, S, P>,
+        first: usize,
+        step: &Step<S>,
+        x: &mut [S],
+    ) -> Vec<Self> {
         let of = |guard: usize, x: &mut [S]| Self { guard, late: delay(f, guard, step, x) };
         let mut all = vec![of(first, x)];
         if S::DIRECTIONS > 0 {
@@ -465,12 +471,12 @@ pub(crate) fn common<S: Scalar>(a: S, b: S) -> S {
 }
 
 /// Returns the tangents of the event time, as a number with zero value: `dt = -dg / (dg/dt)` by the implicit function
-/// theorem. The rate of the guard along the solution is exact if the dynamics provide it, else taken from the dense
+/// theorem. The rate of the guard along the solution is exact if the system provide it, else taken from the dense
 /// output. If the guard only grazes zero, the event time has no derivative and 0 is returned.
 ///
 /// Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition (1993), section
 /// I.14; jumps of tangents at events: S. Galan, W. Feehery, P. Barton, Applied Numerical Mathematics 31 (1999) 17-47.
-fn delay<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, index: usize, step: &Step<S>, x: &mut [S]) -> S {
+fn delay<S: Scalar, P: Integrable<S> + ?Sized>(f: &Driven<'_, S, P>, index: usize, step: &Step<S>, x: &mut [S]) -> S {
     /// Distance of the two evaluations that give the rate from the event, as a fraction of the step.
     const APART: f64 = 1e-3;
     if S::DIRECTIONS == 0 {
@@ -491,7 +497,13 @@ fn delay<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, index: usize, step: &Step<S>
 }
 
 /// Moves the state by `delay` along its derivative, to first order; the value of the state does not change.
-pub(crate) fn shift<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, t: f64, x: &mut [S], dx: &mut [S], delay: S) {
+pub(crate) fn shift<S: Scalar, P: Plant<S> + ?Sized>(
+    f: &Driven<'_, S, P>,
+    t: f64,
+    x: &mut [S],
+    dx: &mut [S],
+    delay: S,
+) {
     if S::DIRECTIONS > 0 {
         f.derivative(t, x, dx);
         for (x, dx) in x.iter_mut().zip(dx.iter()) {

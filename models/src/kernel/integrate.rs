@@ -5,10 +5,11 @@ use mops_core::{Failure, Scalar, Work};
 use super::dormand_prince::DormandPrince;
 use super::esdirk::Esdirk;
 use super::events::{Crossing, Events, common};
+use super::integrable::Integrable;
 use super::step::Step;
 use super::step_size::{StepSizes, first_step};
 use super::weights::Weights;
-use super::{Dynamics, Integrated, IntegrationMethod, Sink, Tolerance};
+use super::{Driven, Integrated, IntegrationMethod, Sink, Tolerance};
 
 /// Growth of the longest stable step over a step that does not show it.
 const RELAXED: f64 = 1.5;
@@ -28,16 +29,22 @@ pub(super) trait Method<S: Scalar> {
     /// True for an explicit method, which damps fast decaying modes only in short steps.
     const IS_EXPLICIT: bool;
 
-    fn new<D: Dynamics<S> + ?Sized>(f: &D, x: &[S]) -> Self;
+    fn new<P: Integrable<S> + ?Sized>(f: &Driven<'_, S, P>, x: &[S]) -> Self;
 
     /// Restarts at `x`: at the start, and where an event or a break made the right-hand side jump.
-    fn restart<D: Dynamics<S> + ?Sized>(&mut self, f: &D, t: f64, x: &[S], work: &mut Work);
+    fn restart<P: Integrable<S> + ?Sized>(&mut self, f: &Driven<'_, S, P>, t: f64, x: &[S], work: &mut Work);
 
     /// Returns the derivative at the start of the next step.
     fn slope(&self) -> &[S];
 
     /// Computes the state after the step. Returns the weighted error norm, NaN if there is none.
-    fn attempt<D: Dynamics<S> + ?Sized>(&mut self, f: &D, at: Attempt<'_, S>, next: &mut [S], work: &mut Work) -> f64;
+    fn attempt<P: Integrable<S> + ?Sized>(
+        &mut self,
+        f: &Driven<'_, S, P>,
+        at: Attempt<'_, S>,
+        next: &mut [S],
+        work: &mut Work,
+    ) -> f64;
 
     /// Returns the longest step that damps all modes, estimated from the step last attempted; `None` for a method that damps them
     /// in every step, or if the step does not show it.
@@ -57,7 +64,7 @@ pub(super) trait Method<S: Scalar> {
 struct Limits {
     /// Number of steps that end at a break.
     breaks: usize,
-    /// Number of steps as long as the dynamics or the tolerance allow.
+    /// Number of steps as long as the system or the tolerance allow.
     longest: usize,
 }
 
@@ -85,55 +92,55 @@ impl Limits {
 ///
 /// # Errors
 /// The state becomes infinite, the step limit is reached, or the step size underflows.
-pub fn integrate<S: Scalar, D: Dynamics<S> + ?Sized>(
-    dynamics: &mut D,
+pub fn integrate<S: Scalar, P: Integrable<S> + ?Sized>(
+    system: &mut Driven<'_, S, P>,
     t: f64,
     end: f64,
     x: &[S],
     tolerance: &Tolerance,
-    sink: &mut impl Sink<S, D>,
+    sink: &mut impl Sink<S, P>,
 ) -> Integrated<S> {
     match tolerance.method {
-        IntegrationMethod::Explicit => run::<S, D, DormandPrince<S>>(dynamics, (t, end), x, tolerance, sink),
-        IntegrationMethod::Stiff => run::<S, D, Esdirk<S>>(dynamics, (t, end), x, tolerance, sink),
+        IntegrationMethod::Explicit => run::<S, P, DormandPrince<S>>(system, (t, end), x, tolerance, sink),
+        IntegrationMethod::Stiff => run::<S, P, Esdirk<S>>(system, (t, end), x, tolerance, sink),
     }
 }
 
-fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
-    dynamics: &mut D,
+fn run<S: Scalar, P: Integrable<S> + ?Sized, M: Method<S>>(
+    system: &mut Driven<'_, S, P>,
     (mut t, end): (f64, f64),
     start: &[S],
     tolerance: &Tolerance,
-    sink: &mut impl Sink<S, D>,
+    sink: &mut impl Sink<S, P>,
 ) -> Integrated<S> {
     let span = end - t;
     let mut x = start.to_vec();
     let mut work = Work::default();
-    let mut method = M::new(dynamics, &x);
-    let mut weights = Weights::new(dynamics, &x, span, tolerance);
+    let mut method = M::new(system, &x);
+    let mut weights = Weights::new(system, &x, span, tolerance);
     let mut events = Events::new(span, &x);
     let mut next = x.clone();
     let mut spare = x.clone();
     let mut step = Step::new(&x);
 
-    dynamics.pass_break(t, &mut x);
-    events.settle(dynamics, (t, &[]), (&mut x, &mut spare), sink)?;
-    method.restart(dynamics, t, &x, &mut work);
-    let mut proposed = first_step(dynamics, (t, end), &x, method.slope(), M::ERROR_ORDER);
+    system.pass_break(t, &mut x);
+    events.settle(system, (t, &[]), (&mut x, &mut spare), sink)?;
+    method.restart(system, t, &x, &mut work);
+    let mut proposed = first_step(system, (t, end), &x, method.slope(), M::ERROR_ORDER);
     work.derivatives += 1;
     let mut sizes = StepSizes::new(M::ERROR_ORDER);
     // Rejected attempts at the current step.
     let mut rejected = 0;
-    let damped = if M::IS_EXPLICIT { dynamics.damped_step() } else { f64::INFINITY };
+    let damped = if M::IS_EXPLICIT { system.plant.damped_step() } else { f64::INFINITY };
     // Longest step that damps all modes, as far as the accepted steps show it. The error alone does not limit a step at rest: there
     // the tangents would grow while the state does not.
     let mut stable = f64::INFINITY;
-    let longest = dynamics.longest_step().min(damped).min(tolerance.max_step.unwrap_or(f64::INFINITY));
+    let longest = system.longest_step().min(damped).min(tolerance.max_step.unwrap_or(f64::INFINITY));
 
     let mut limits = Limits::default();
-    let remembers = dynamics.remembers();
+    let remembers = system.remembers();
     // The next break changes only at an event or at the break itself, unless accepted steps move it.
-    let mut stop = dynamics.next_break(t).min(end);
+    let mut stop = system.next_break(t).min(end);
 
     while t < end {
         if work.steps + work.rejected >= tolerance.max_steps {
@@ -143,7 +150,7 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
             return Err(failure);
         }
         if remembers {
-            stop = dynamics.next_break(t).min(end);
+            stop = system.next_break(t).min(end);
         }
         proposed = proposed.min(longest).min(stable);
         // A step that would leave a sliver before the stop is lengthened to reach it. Cutting a step does not change
@@ -154,8 +161,8 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
         if !reaches && h <= 16.0 * f64::EPSILON * t.abs() {
             return Err(Failure::StepTooSmall(t));
         }
-        work.derivatives += weights.feel(dynamics, (t, h, &x), rejected);
-        let error = method.attempt(dynamics, Attempt { t, h, x: &x, weights: &weights }, &mut next, &mut work);
+        work.derivatives += weights.feel(system, (t, h, &x), rejected);
+        let error = method.attempt(system, Attempt { t, h, x: &x, weights: &weights }, &mut next, &mut work);
         if !error.is_finite() || error > 1.0 {
             if !error.is_finite() && (h < 1e-12 * span || !all_finite(&x)) {
                 return Err(Failure::Diverged(t));
@@ -172,10 +179,10 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
             method.dense(h, &x, &next, &mut step.dense);
         }
         let arrival = if reaches { stop } else { t + h };
-        let event = events.first(dynamics, &mut step, (arrival, &next), &mut spare);
-        sink.step(&step, dynamics);
+        let event = events.first(system, &mut step, (arrival, &next), &mut spare);
+        sink.step(&step, system);
         if remembers {
-            dynamics.accepted(&step);
+            system.remember(&step);
         }
         stable = method.stable_step(&next, &weights).unwrap_or(RELAXED * stable);
         let factor = sizes.after_acceptance(error, rejected > 0);
@@ -189,16 +196,16 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
                 method.advance();
                 continue;
             }
-            let moves = pass_break(dynamics, (t, end), &mut x, sink);
+            let moves = pass_break(system, (t, end), &mut x, sink);
             sink.restart(t, moves);
-            events.settle(dynamics, (t, &[]), (&mut x, &mut spare), sink)?;
+            events.settle(system, (t, &[]), (&mut x, &mut spare), sink)?;
             if t < end {
-                stop = dynamics.next_break(t).min(end);
-                method.restart(dynamics, t, &x, &mut work);
+                stop = system.next_break(t).min(end);
+                method.restart(system, t, &x, &mut work);
             }
             continue;
         };
-        let crossings = Crossing::all(dynamics, first, &step, &mut spare);
+        let crossings = Crossing::all(system, first, &step, &mut spare);
         let here = step.time(step.share);
         let at_stop = reaches && stop - here <= events.resolution(stop);
         if at_stop {
@@ -210,40 +217,41 @@ fn run<S: Scalar, D: Dynamics<S> + ?Sized, M: Method<S>>(
         }
         let mut moves = Crossing::common(&crossings);
         if at_stop {
-            let mut values = |dynamics: &D, x: &[S]| (S::DIRECTIONS > 0).then(|| values(dynamics, t, x, &mut spare));
-            let before = values(dynamics, &x);
-            let of_break = pass_break(dynamics, (t, end), &mut x, sink);
+            let mut values =
+                |system: &Driven<'_, S, P>, x: &[S]| (S::DIRECTIONS > 0).then(|| values(system, t, x, &mut spare));
+            let before = values(system, &x);
+            let of_break = pass_break(system, (t, end), &mut x, sink);
             // A break at which nothing jumps leaves the time of the event alone.
-            if before != values(dynamics, &x) {
+            if before != values(system, &x) {
                 moves = common(moves, of_break);
             }
         }
         sink.restart(t, moves);
-        events.settle(dynamics, (t, &crossings), (&mut x, &mut spare), sink)?;
+        events.settle(system, (t, &crossings), (&mut x, &mut spare), sink)?;
         weights.follow(&x);
-        stop = dynamics.next_break(t).min(end);
-        method.restart(dynamics, t, &x, &mut work);
+        stop = system.next_break(t).min(end);
+        method.restart(system, t, &x, &mut work);
     }
     if all_finite(&x) { Ok((x, work)) } else { Err(Failure::Diverged(t)) }
 }
 
 /// Returns the values of the state and of its rates.
-fn values<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, t: f64, x: &[S], dx: &mut [S]) -> Vec<f64> {
+fn values<S: Scalar, P: Integrable<S> + ?Sized>(f: &Driven<'_, S, P>, t: f64, x: &[S], dx: &mut [S]) -> Vec<f64> {
     f.derivative(t, x, dx);
     x.iter().chain(&*dx).map(|value| value.value()).collect()
 }
 
 /// Sets the inputs to their values at the break. At the end of the simulation, reports them to the sink. Returns the derivatives of
 /// the time of the break.
-fn pass_break<S: Scalar, D: Dynamics<S> + ?Sized>(
-    dynamics: &mut D,
+fn pass_break<S: Scalar, P: Integrable<S> + ?Sized>(
+    system: &mut Driven<'_, S, P>,
     (t, end): (f64, f64),
     x: &mut [S],
-    sink: &mut impl Sink<S, D>,
+    sink: &mut impl Sink<S, P>,
 ) -> S {
-    let moves = dynamics.pass_break(t, x);
+    let moves = system.pass_break(t, x);
     if t >= end {
-        sink.end(t, x, dynamics);
+        sink.end(t, x, system);
     }
     moves
 }
@@ -255,13 +263,17 @@ fn all_finite<S: Scalar>(x: &[S]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mops_core::{Dual, math};
+    use mops_core::plant::{self, InputRates};
+    use mops_core::{Dual, EventInstant, Instant, Plant, math};
 
     /// Harmonic oscillator `x'' = -x`.
     struct Oscillator;
-    impl<S: Scalar> Dynamics<S> for Oscillator {
-        fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
-            dx.copy_from_slice(&[x[1], -x[0]]);
+    impl<S: Scalar> Plant<S> for Oscillator {
+        fn start(&self) -> Vec<S> {
+            vec![S::from(1.0), S::from(0.0)]
+        }
+        fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+            dx.copy_from_slice(&[at.x[1], -at.x[0]]);
         }
     }
 
@@ -270,37 +282,41 @@ mod tests {
     #[test]
     fn the_harmonic_oscillator_comes_back_after_a_period() {
         let period = std::f64::consts::TAU;
-        let (x, work) = integrate(&mut Oscillator, 0.0, period, &[1.0, 0.0], &TIGHT, &mut ()).unwrap();
+        let (x, work) = integrate(&mut Driven::alone(Oscillator), 0.0, period, &[1.0, 0.0], &TIGHT, &mut ()).unwrap();
         assert!((x[0] - 1.0).abs() < 1e-8 && x[1].abs() < 1e-8, "{x:?} {work:?}");
     }
 
     #[test]
     fn tangents_are_exact_and_change_no_value() {
-        let (plain, _) = integrate(&mut Oscillator, 0.0, 3.0, &[1.0, 0.5], &TIGHT, &mut ()).unwrap();
+        let (plain, _) = integrate(&mut Driven::alone(Oscillator), 0.0, 3.0, &[1.0, 0.5], &TIGHT, &mut ()).unwrap();
         let x0 = [Dual::<1>::variable(1.0, 0), Dual::from(0.5)];
-        let (dual, _) = integrate(&mut Oscillator, 0.0, 3.0, &x0, &TIGHT, &mut ()).unwrap();
+        let (dual, _) = integrate(&mut Driven::alone(Oscillator), 0.0, 3.0, &x0, &TIGHT, &mut ()).unwrap();
         assert_eq!([dual[0].value, dual[1].value], [plain[0], plain[1]]);
         assert!((dual[0].tangent[0] - math::cos(3.0)).abs() < 1e-9);
     }
 
     /// System `x' = x^2`, whose solution from `x = 1` is infinite at `t = 1`.
     struct Explosion;
-    impl Dynamics<f64> for Explosion {
-        fn derivative(&self, _: f64, x: &[f64], dx: &mut [f64]) {
-            dx[0] = x[0] * x[0];
+    impl Plant<f64> for Explosion {
+        fn start(&self) -> Vec<f64> {
+            vec![1.0]
+        }
+        fn rates(&self, at: &Instant<'_, f64>, dx: &mut [f64]) {
+            dx[0] = at.x[0] * at.x[0];
         }
     }
 
     #[test]
     fn a_solution_that_becomes_infinite_is_a_failure() {
-        let failure = integrate(&mut Explosion, 0.0, 2.0, &[1.0], &TIGHT, &mut ()).unwrap_err();
+        let failure = integrate(&mut Driven::alone(Explosion), 0.0, 2.0, &[1.0], &TIGHT, &mut ()).unwrap_err();
         assert!(matches!(failure, Failure::Diverged(_) | Failure::StepTooSmall(_)), "{failure:?}");
     }
 
     #[test]
     fn steps_are_limited() {
         let tolerance = Tolerance { max_steps: 10, ..TIGHT };
-        let failure = integrate(&mut Oscillator, 0.0, 100.0, &[1.0, 0.0], &tolerance, &mut ()).unwrap_err();
+        let failure =
+            integrate(&mut Driven::alone(Oscillator), 0.0, 100.0, &[1.0, 0.0], &tolerance, &mut ()).unwrap_err();
         assert!(matches!(failure, Failure::StepLimit(..)), "{failure:?}");
     }
 
@@ -309,31 +325,42 @@ mod tests {
         rebound: S,
         bounces: Vec<f64>,
     }
-    impl<S: Scalar> Dynamics<S> for Ball<S> {
-        fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
-            dx.copy_from_slice(&[x[1], S::from(-9.81)]);
+    impl<S: Scalar> Plant<S> for Ball<S> {
+        fn start(&self) -> Vec<S> {
+            vec![S::from(1.0), S::from(0.0)]
         }
+        fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+            dx.copy_from_slice(&[at.x[1], S::from(-9.81)]);
+        }
+        fn events(&self) -> Option<&dyn plant::Events<S>> {
+            Some(self)
+        }
+        fn events_mut(&mut self) -> Option<&mut dyn plant::Events<S>> {
+            Some(self)
+        }
+    }
+    impl<S: Scalar> plant::Events<S> for Ball<S> {
         fn guards(&self) -> usize {
             1
         }
-        fn guard(&self, _: usize, _: f64, x: &[S]) -> S {
-            x[0]
+        fn guard(&self, _: usize, at: &Instant<'_, S>, _: InputRates<'_>) -> S {
+            at.x[0]
         }
-        fn switch(&mut self, _: usize, t: f64, x: &mut [S]) -> &str {
+        fn switch(&mut self, _: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str {
             x.copy_from_slice(&[S::from(0.0), -x[1] * self.rebound]);
-            self.bounces.push(t);
+            self.bounces.push(event.at.t);
             "bounce"
         }
     }
 
     #[test]
     fn events_are_located_to_rounding() {
-        let mut ball = Ball { rebound: 1.0, bounces: Vec::new() };
+        let mut ball = Driven::alone(Ball { rebound: 1.0, bounces: Vec::new() });
         integrate(&mut ball, 0.0, 3.0, &[1.0, 0.0], &TIGHT, &mut ()).unwrap();
         let fall = (2.0 / 9.81_f64).sqrt();
         let exact: Vec<f64> = [1.0, 3.0, 5.0].iter().map(|n| n * fall).filter(|&t| t < 3.0).collect();
-        assert_eq!(ball.bounces.len(), exact.len());
-        for (t, exact) in ball.bounces.iter().zip(exact) {
+        assert_eq!(ball.plant.bounces.len(), exact.len());
+        for (t, exact) in ball.plant.bounces.iter().zip(exact) {
             assert!((t - exact).abs() < 1e-10, "{t} {exact}");
         }
     }
@@ -348,7 +375,7 @@ mod tests {
             let (up, t) = (g * fall * rebound * rebound, 1.2 - second);
             [up * t - 0.5 * g * t * t, up - g * t]
         };
-        let mut ball = Ball { rebound: Dual::<2>::variable(0.8, 1), bounces: Vec::new() };
+        let mut ball = Driven::alone(Ball { rebound: Dual::<2>::variable(0.8, 1), bounces: Vec::new() });
         let start = [Dual::variable(1.0, 0), Dual::from(0.0)];
         let (x, _) = integrate(&mut ball, 0.0, 1.2, &start, &TIGHT, &mut ()).unwrap();
         let h = 1e-5;

@@ -1,6 +1,6 @@
 //! Model equations at one point with exact derivatives, for linearisation there.
 
-use mops_core::{DIRECTIONS, Dual, Dual7, Failure, Instant, Local, OperatingPoint, Plant, Scalar, Selected};
+use mops_core::{DIRECTIONS, Dual, Dual7, Failure, Instant, LeftOut, Local, OperatingPoint, Plant, Scalar, Selected};
 use nalgebra::DMatrix;
 
 use super::PlantModel;
@@ -14,31 +14,24 @@ pub fn rests<S: Scalar>(at_rest: bool, speed: S) -> bool {
     at_rest || speed.value().abs() <= STILL
 }
 
-/// Values of the equations at an operating point.
-struct Here<S> {
-    /// Rates of the states, or changes of memory at an instant, then the signals, then the quantities whose past matters.
-    values: Vec<S>,
-    /// Positions, as states, of the joints whose dry friction is left out.
-    left_out: Vec<usize>,
-    /// Values that conditions select.
-    selected: Vec<Selected<S>>,
-    /// Limit beyond which the point lies.
-    exceeded: Option<&'static str>,
-}
-
-fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Result<Here<S>, Failure> {
+/// Values of the equations at an operating point: rates of the states, or changes of memory at an instant, then the signals, then the
+/// quantities whose past matters.
+fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Result<(Vec<S>, LeftOut<S>), Failure> {
     let mut plant = model.plant(at.parameters)?;
-    plant.hold(at.past);
+    if let Some(memory) = plant.memory_mut() {
+        memory.hold(at.past);
+    }
     let w = vec![S::from(0.0); model.interface().forces()];
     let here = Instant { t: 0.0, x: at.states, u: at.inputs, w: &w };
-    let left_out = plant.linearised_at(&here, at.at_rest)?;
+    let left_out = plant.linearise(&here, at.at_rest)?;
     let mut values = at.states.to_vec();
     plant.rates(&here, &mut values);
-    plant.changes(&here, &mut values);
+    if let Some(breaks) = plant.breaks() {
+        breaks.changes(&here, &mut values);
+    }
     values.extend((0..model.interface().signals.len()).map(|signal| plant.signal(signal, &here)));
-    values.extend(plant.past(&here));
-    let (selected, exceeded) = (plant.selected(&here), plant.exceeded(&here));
-    Ok(Here { values, left_out, selected, exceeded })
+    values.extend(plant.memory().map_or_else(Vec::new, |memory| memory.past(&here)));
+    Ok((values, left_out))
 }
 
 /// Linearises a model given by its plant; implements [`mops_core::Model::local`].
@@ -47,7 +40,7 @@ fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Resul
 /// The parameters are outside the domain of the model, or derivatives at the operating point are not finite.
 pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, Failure> {
     let OperatingPoint { parameters, states, inputs, past, at_rest } = *at;
-    let Here { values, left_out, selected, exceeded } = look(model, at)?;
+    let (values, LeftOut { frictionless, selected, exceeded }) = look(model, at)?;
     let constants: Vec<Dual7> = parameters.iter().map(|&p| p.into()).collect();
     let columns = states.len() + inputs.len() + past.len();
     let mut slopes = DMatrix::zeros(values.len(), columns);
@@ -69,13 +62,13 @@ pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, 
         let all: Vec<Dual7> = states.iter().chain(inputs).chain(past).enumerate().map(variable).collect();
         let (states, others) = all.split_at(states.len());
         let (inputs, past) = others.split_at(inputs.len());
-        let along = look(model, &OperatingPoint { parameters: &constants, states, inputs, past, at_rest })?;
+        let (along, left_out) = look(model, &OperatingPoint { parameters: &constants, states, inputs, past, at_rest })?;
         let last = columns.min(first + DIRECTIONS);
-        for (of, along) in selected.iter_mut().zip(&along.selected) {
+        for (of, along) in selected.iter_mut().zip(&left_out.selected) {
             of.taken[first..last].copy_from_slice(&along.taken.tangent[..last - first]);
             of.other[first..last].copy_from_slice(&along.other.tangent[..last - first]);
         }
-        for (i, row) in along.values.iter().enumerate() {
+        for (i, row) in along.iter().enumerate() {
             for j in first..last {
                 slopes[(i, j)] = row.tangent[j - first];
             }
@@ -89,7 +82,7 @@ pub fn local(model: &impl PlantModel, at: &OperatingPoint<'_>) -> Result<Local, 
         ));
     }
     let names = model.states();
-    let frictionless = left_out.into_iter().map(|position| names[position].name.clone()).collect();
+    let frictionless = frictionless.into_iter().map(|position| names[position].name.clone()).collect();
     let [rates, signals, past] = [rates, signals, past].map(<[f64]>::to_vec);
     Ok(Local { rates, signals, past, slopes, frictionless, selected, exceeded })
 }

@@ -1,6 +1,9 @@
 //! Mechanisms: joints coupled by a mass matrix, with bearing friction.
 
-use mops_core::{EventInstant, Failure, Instant, Interface, Parameter, Plant, Port, Scalar, State, Unit, Variable};
+use mops_core::plant::{Events, InputRates};
+use mops_core::{
+    EventInstant, Failure, Instant, Interface, LeftOut, Parameter, Plant, Port, Scalar, State, Unit, Variable,
+};
 
 use super::elements::BearingFriction;
 use super::friction::{Contact, Moment, balance};
@@ -180,11 +183,41 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize> Plant<S> for Mechanism<S, B, N>
         }
     }
 
+    fn settle(&mut self, at: &Instant<'_, S>) {
+        let wish = if self.started { self.contact } else { [Contact::Stuck; N] };
+        self.started = true;
+        self.find_contacts(at, &wish, None);
+    }
+
+    fn linearise(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<LeftOut<S>, Failure> {
+        let mut frictionless = Vec::new();
+        for i in 0..N {
+            let speed = at.x[2 * i + 1];
+            if rests(at_rest, speed) && !self.friction[i].is_viscous() {
+                frictionless.push(2 * i);
+                self.friction[i] = BearingFriction::none();
+            }
+            self.contact[i] = Contact::of(speed.value());
+            self.line[i] = self.friction[i].table().line_at(speed.abs());
+        }
+        Ok(LeftOut { frictionless, ..LeftOut::default() })
+    }
+
+    fn events(&self) -> Option<&dyn Events<S>> {
+        Some(self)
+    }
+
+    fn events_mut(&mut self) -> Option<&mut dyn Events<S>> {
+        Some(self)
+    }
+}
+
+impl<S: Scalar, B: Bodies<S, N>, const N: usize> Events<S> for Mechanism<S, B, N> {
     fn guards(&self) -> usize {
         self.guards.len()
     }
 
-    fn guard(&self, index: usize, at: &Instant<'_, S>) -> S {
+    fn guard(&self, index: usize, at: &Instant<'_, S>, _: InputRates<'_>) -> S {
         let speed = |i: usize| at.x[2 * i + 1];
         match self.guards[index] {
             Guard::Contact(i) if self.contact[i] == Contact::Stuck => {
@@ -200,7 +233,7 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize> Plant<S> for Mechanism<S, B, N>
         }
     }
 
-    fn guard_shows(&self, index: usize) -> Option<(usize, f64)> {
+    fn guard_state(&self, index: usize) -> Option<(usize, f64)> {
         match self.guards[index] {
             Guard::Contact(i) if self.contact[i] != Contact::Stuck => Some((2 * i + 1, self.contact[i].sign())),
             _ => None,
@@ -232,26 +265,6 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize> Plant<S> for Mechanism<S, B, N>
                 self.events[i][usize::from(self.contact[i] != Contact::Stuck)]
             }
         }
-    }
-
-    fn settle(&mut self, at: &Instant<'_, S>) {
-        let wish = if self.started { self.contact } else { [Contact::Stuck; N] };
-        self.started = true;
-        self.find_contacts(at, &wish, None);
-    }
-
-    fn linearised_at(&mut self, at: &Instant<'_, S>, at_rest: bool) -> Result<Vec<usize>, Failure> {
-        let mut left_out = Vec::new();
-        for i in 0..N {
-            let speed = at.x[2 * i + 1];
-            if rests(at_rest, speed) && !self.friction[i].is_viscous() {
-                left_out.push(2 * i);
-                self.friction[i] = BearingFriction::none();
-            }
-            self.contact[i] = Contact::of(speed.value());
-            self.line[i] = self.friction[i].table().line_at(speed.abs());
-        }
-        Ok(left_out)
     }
 }
 

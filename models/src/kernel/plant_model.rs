@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use mops_core::linear::Clock;
 use mops_core::{
-    Analysis, Cut, Dual7, Failure, Input, Interface, Job, Local, Model, Open, OperatingPoint, Plant, Scalar,
+    Analysis, Cut, Dual7, Failure, Input, Interface, Job, Local, Model, OperatingPoint, Plant, Ported, Scalar,
     StudyError, Variable, WithTangents,
 };
 
 use super::drive::Drive;
-use super::{Driven, Dynamics, Recording, Tolerance, local, record, tangents_of, wanted};
+use super::{Driven, Inputs, Integrable, Recording, Tolerance, Wanted, local, record, tangents_of, wanted};
 
 /// Plant that is written once over the scalar, with its interface; [`Simulated`] turns it into a model.
 ///
@@ -29,7 +29,7 @@ pub trait PlantModel: Send + Sync {
     ///
     /// # Errors
     /// See [`PlantModel::plant`].
-    fn open_plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
+    fn ported_plant<'a, S: Scalar>(&'a self, parameters: &'a [S]) -> Result<impl Plant<S>, Failure> {
         self.plant(parameters)
     }
 
@@ -179,21 +179,56 @@ impl<M: PlantModel> Simulated<M> {
         if !job.case.disturbances.is_empty() {
             return Err(Failure::Undefined("external forces need a model with open equations".into()));
         }
-        let plant = self.of.plant(parameters)?;
-        let start = plant.start();
-        let input =
-            |(i, input): (usize, &Variable)| Drive::new(job.case.input(&input.name).or_else(|| self.of.input(i)));
-        let drives = interface.inputs.iter().enumerate().map(input).collect();
-        let mut driven = Driven::new(plant, drives, interface.forces(), &self.shows);
-        driven.can_start(&start)?;
-        let wanted = wanted(job, &interface.signals);
-        let tolerance = self.of.tolerance();
-        let recording = record(&mut driven as &mut dyn Dynamics<S>, &start, job.horizon, &tolerance, &wanted);
+        let simulation = Simulation {
+            plant: &|| self.of.plant(parameters),
+            inputs: &|| {
+                let input = |(i, input): (usize, &Variable)| {
+                    Drive::new(job.case.input(&input.name).or_else(|| self.of.input(i)))
+                };
+                let drives = interface.inputs.iter().enumerate().map(input).collect();
+                Inputs::new(drives, interface.forces()).beginning_at(job.case.begins)
+            },
+            shows: &self.shows,
+            tolerance: &self.of.tolerance(),
+        };
+        Ok(simulation.run(job, &wanted(job, &interface.signals))?.0)
+    }
+}
+
+/// Simulation of a plant.
+pub(crate) struct Simulation<'s, 'a, S, P> {
+    /// Makes the plant.
+    pub plant: &'s dyn Fn() -> Result<P, Failure>,
+    /// Makes its inputs.
+    pub inputs: &'s dyn Fn() -> Inputs<'a, S>,
+    /// State that each signal equals, if any.
+    pub shows: &'s [Option<usize>],
+    /// Accuracy and limits.
+    pub tolerance: &'s Tolerance,
+}
+
+impl<'a, S: Scalar, P: Plant<S>> Simulation<'_, 'a, S, P> {
+    /// Simulates over the horizon of a job and records signals. Returns the plant at the end as well.
+    ///
+    /// # Errors
+    /// The failure of the simulation.
+    pub fn run(&self, job: &Job<'_>, wanted: &Wanted) -> Result<(Recording, P), Failure> {
+        let mut driven = self.driven()?;
+        let start = driven.begin()?;
+        let jumps = driven.jumps_at_start();
+        let integrated: &mut Driven<'_, S, dyn Integrable<S> + '_> = &mut driven;
+        let recording = record(integrated, &start, job.horizon, self.tolerance, wanted);
         let mut recording = recording.map_err(|failure| driven.plant.explain(failure))?;
-        if driven.jumps_at_start() {
-            recording.set_initial(&driven.initial(self.of.plant(parameters)?, &start, job.signals));
+        if jumps {
+            let mut before = self.driven()?;
+            let start = before.begin()?;
+            recording.set_initial(&before.initial(&start, job.signals));
         }
-        Ok(recording)
+        Ok((recording, driven.plant))
+    }
+
+    fn driven(&self) -> Result<Driven<'a, S, P>, Failure> {
+        Ok(Driven::new((self.plant)()?, (self.inputs)(), self.shows))
     }
 }
 
@@ -241,11 +276,11 @@ impl<M: PlantModel> Model for Simulated<M> {
     }
 
     fn delays(&self, parameters: &[f64]) -> Result<Vec<f64>, Failure> {
-        Ok(self.of.plant(parameters)?.delays())
+        Ok(self.of.plant(parameters)?.memory().map_or_else(Vec::new, |memory| memory.delays()))
     }
 
     fn clocks(&self, parameters: &[f64]) -> Result<Vec<Clock>, Failure> {
-        Ok(self.of.plant(parameters)?.clocks())
+        Ok(self.of.plant(parameters)?.breaks().map_or_else(Vec::new, |breaks| breaks.clocks()))
     }
 
     fn not_linear(&self) -> Option<&'static str> {
@@ -264,18 +299,18 @@ impl<M: PlantModel> Model for Simulated<M> {
         self.of.with_constant(name, value)
     }
 
-    fn ported(&self) -> Option<&dyn Open> {
+    fn ported(&self) -> Option<&dyn Ported> {
         (!self.of.interface().ports.is_empty()).then_some(self)
     }
 }
 
-impl<M: PlantModel> Open for Simulated<M> {
-    fn open<'a>(&'a self, parameters: &'a [f64]) -> Result<Box<dyn Plant<f64> + 'a>, Failure> {
-        Ok(Box::new(self.of.open_plant(parameters)?))
+impl<M: PlantModel> Ported for Simulated<M> {
+    fn plant<'a>(&'a self, parameters: &'a [f64]) -> Result<Box<dyn Plant<f64> + 'a>, Failure> {
+        Ok(Box::new(self.of.ported_plant(parameters)?))
     }
 
-    fn open_dual<'a>(&'a self, parameters: &'a [Dual7]) -> Result<Box<dyn Plant<Dual7> + 'a>, Failure> {
-        Ok(Box::new(self.of.open_plant(parameters)?))
+    fn dual_plant<'a>(&'a self, parameters: &'a [Dual7]) -> Result<Box<dyn Plant<Dual7> + 'a>, Failure> {
+        Ok(Box::new(self.of.ported_plant(parameters)?))
     }
 
     fn tolerance(&self) -> Tolerance {

@@ -2,11 +2,12 @@
 
 use mops_core::enclosure::Enclosure;
 use mops_core::{
-    Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Past, Response, Scalar, Trace, WithTangents,
+    Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Response, Scalar, Trace, WithTangents,
 };
 
+use super::integrable::Integrable;
 use super::weights::{PERTURBATION, SHARE, perturbed};
-use super::{Dynamics, Sink, Step, Tolerance, integrate};
+use super::{Driven, Sink, Step, Tolerance, integrate};
 
 /// Recorded simulation: the signals and their derivatives in every direction of the scalar.
 pub struct Recording {
@@ -134,58 +135,9 @@ pub(crate) fn allowed(tolerance: &Tolerance, largest: f64, size: f64) -> f64 {
     OFF * (absolute.unwrap_or(SHARE * relative * largest) + relative * size) + SMALLEST
 }
 
-/// Stores the past of a plant over a part of a step, halved until one quartic per part suffices. `past` evaluates the quantities at
-/// a time and a state; `store` stores them.
-pub(crate) fn remember<S: Scalar, D>(
-    of: &mut D,
-    step: &Step<S>,
-    past: &impl Fn(&D, f64, &[S]) -> Vec<S>,
-    store: &impl Fn(&mut D, &Past<'_, S>) -> bool,
-) {
-    remember_part(of, step, past, store, ([0.0, 1.0], HALVINGS_OF_PAST));
-}
-
-fn remember_part<S: Scalar, D>(
-    of: &mut D,
-    step: &Step<S>,
-    past: &impl Fn(&D, f64, &[S]) -> Vec<S>,
-    store: &impl Fn(&mut D, &Past<'_, S>) -> bool,
-    ([from, to], halvings): ([f64; 2], u32),
-) {
-    let time = |s: f64| step.start + s * step.taken;
-    let at = |s: f64| {
-        let s = from + s * (to - from);
-        past(of, time(s), &step.state_at(s))
-    };
-    let (values, checks) = (Trace::NODES.map(at), Trace::CHECKS.map(at));
-    let over = Past {
-        time: [time(from), time(to)],
-        values: &values,
-        checks: &checks,
-        roughness: &[],
-        is_last: halvings == 0,
-        restarts: step.restarts && from == 0.0,
-    };
-    if store(of, &over) {
-        return;
-    }
-    // A difference of large terms is as rough as these are rounded; shorter parts do not help.
-    let (middle, state) = (time(0.5 * (from + to)), step.state_at(0.5 * (from + to)));
-    let (here, there) = (past(of, middle, &state), past(of, middle, &perturbed(&state)));
-    let roughness: Vec<f64> = here.iter().zip(&there).map(|(a, b)| (a.value() - b.value()).abs()).collect();
-    if !store(of, &Past { roughness: &roughness, ..over }) {
-        let middle = 0.5 * (from + to);
-        remember_part(of, step, past, store, ([from, middle], halvings - 1));
-        remember_part(of, step, past, store, ([middle, to], halvings - 1));
-    }
-}
-
 /// Limit on the number of halvings of a step for a signal: parts as short as the resolution of the clock. Rounding ends them before, and
 /// so does the size of the recording.
 const HALVINGS: u32 = 40;
-
-/// Limit on the number of halvings of a step for the past of a delay, whose size has no limit of its own.
-const HALVINGS_OF_PAST: u32 = 12;
 
 /// Ratio to the longest compared step beyond which a step is compared again.
 const LONGER: f64 = 1.2;
@@ -251,21 +203,21 @@ impl<S: Scalar> Recorder<'_, S> {
 
     /// Returns true if the bounds of a signal over the part `[from, to]` of a step are so much wider than the values there that something
     /// may hide between them.
-    fn hides<D: Dynamics<S> + ?Sized>(
+    fn hides<P: Integrable<S> + ?Sized>(
         &mut self,
-        (step, dynamics): (&Step<S>, &D),
+        (step, system): (&Step<S>, &Driven<'_, S, P>),
         index: usize,
         [from, to]: [f64; 2],
         values: &[S; 5],
     ) -> bool {
-        if !dynamics.has_bounds() || self.resolved[index].looks == 0 || step.taken <= SHORT * self.span {
+        if !system.has_bounds() || self.resolved[index].looks == 0 || step.taken <= SHORT * self.span {
             return false;
         }
         let share = step.taken / step.length;
         step.enclose(from * share, to * share, &mut self.bounds);
         let time = [from, to].map(|s| step.start + s * step.taken);
         let over =
-            dynamics.enclose_signal(self.signals[index].0, Enclosure::of_time(time[0], time[1]), &self.bounds).value;
+            system.enclose_signal(self.signals[index].0, Enclosure::of_time(time[0], time[1]), &self.bounds).value;
         let width = over.high - over.low;
         if !width.is_finite() {
             return false;
@@ -280,43 +232,43 @@ impl<S: Scalar> Recorder<'_, S> {
     }
 
     /// Finds the size of what hides in the part `[from, to]` of a step: the accuracy of a signal is relative to its size.
-    fn measure<D: Dynamics<S> + ?Sized>(
+    fn measure<P: Integrable<S> + ?Sized>(
         &mut self,
-        (step, dynamics): (&Step<S>, &D),
+        (step, system): (&Step<S>, &Driven<'_, S, P>),
         index: usize,
         [from, to]: [f64; 2],
         halvings: u32,
     ) {
         let which = self.signals[index].0;
-        let signal = |t: f64, x: &[S]| dynamics.signal(which, t, x);
+        let signal = |t: f64, x: &[S]| system.signal(which, t, x);
         let middle = 0.5 * (from + to);
         for part in [[from, middle], [middle, to]] {
             let mut state = self.states[0].clone();
             let values = Trace::NODES.map(|s| At::State.within(part, s, step, &mut state, &signal));
             let resolved = &mut self.resolved[index];
             resolved.size = resolved.size.max(largest(&values));
-            if halvings > 0 && self.hides((step, dynamics), index, part, &values) {
-                self.measure((step, dynamics), index, part, halvings - 1);
+            if halvings > 0 && self.hides((step, system), index, part, &values) {
+                self.measure((step, system), index, part, halvings - 1);
             }
         }
     }
 
     /// Adds the part `[from, to]` of a step to the traces of a signal, halved until one quartic per part suffices.
-    fn refine<D: Dynamics<S> + ?Sized>(
+    fn refine<P: Integrable<S> + ?Sized>(
         &mut self,
-        (step, dynamics): (&Step<S>, &D),
+        (step, system): (&Step<S>, &Driven<'_, S, P>),
         index: usize,
         [from, to]: [f64; 2],
         halvings: u32,
     ) {
         let which = self.signals[index].0;
-        let signal = |t: f64, x: &[S]| dynamics.signal(which, t, x);
+        let signal = |t: f64, x: &[S]| system.signal(which, t, x);
         let mut state = self.states[0].clone();
         let mut at = |s: f64, at: At| at.within([from, to], s, step, &mut state, &signal);
         let values = Trace::NODES.map(|s| at(s, At::State));
         let ends = halvings == 0 || self.taken > self.room || self.cancellation.requested().is_some();
         let fit = self.fit(index, &values, &mut at);
-        if ends || fit != Fit::Off && !self.hides((step, dynamics), index, [from, to], &values) {
+        if ends || fit != Fit::Off && !self.hides((step, system), index, [from, to], &values) {
             // Where a signal jumps, a quartic would exceed its values.
             let line = |s: f64| values[0] + (values[4] - values[0]) * s;
             let recorded = if fit == Fit::Quartic { values } else { Trace::NODES.map(line) };
@@ -328,7 +280,7 @@ impl<S: Scalar> Recorder<'_, S> {
         }
         let middle = 0.5 * (from + to);
         for half in [[from, middle], [middle, to]] {
-            self.refine((step, dynamics), index, half, halvings - 1);
+            self.refine((step, system), index, half, halvings - 1);
         }
     }
 }
@@ -385,8 +337,8 @@ fn largest<S: Scalar>(values: &[S; 5]) -> f64 {
     values.iter().fold(0.0, |most, value| most.max(value.value().abs()))
 }
 
-impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
-    fn step(&mut self, step: &Step<S>, dynamics: &D) {
+impl<S: Scalar, P: Integrable<S> + ?Sized> Sink<S, P> for Recorder<'_, S> {
+    fn step(&mut self, step: &Step<S>, system: &Driven<'_, S, P>) {
         let computes = self.shows.iter().any(Option::is_none);
         if computes {
             step.states(&Trace::NODES, &mut self.states);
@@ -401,9 +353,9 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
                 self.push(i, end, &std::array::from_fn(value));
                 continue;
             }
-            let computed = |t: f64, x: &[S]| dynamics.signal(*signal, t, x);
+            let computed = |t: f64, x: &[S]| system.signal(*signal, t, x);
             let time = |s: f64| step.start + s * step.taken;
-            let values = dynamics.signal_at(*signal, &Trace::NODES.map(time), &self.states);
+            let values = system.signal_at(*signal, &Trace::NODES.map(time), &self.states);
             self.resolved[i].size = self.resolved[i].size.max(largest(&values));
             let mut is_resolved = true;
             if self.must_compare(i, step.taken, &values) {
@@ -415,7 +367,7 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
                     *longest = longest.max(step.taken);
                 }
             }
-            let hides = self.hides((step, dynamics), i, [0.0, 1.0], &values);
+            let hides = self.hides((step, system), i, [0.0, 1.0], &values);
             if is_resolved && !hides {
                 self.push(i, end, &values);
                 continue;
@@ -423,11 +375,11 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
             if hides {
                 // What is found here is recorded afterwards.
                 let looks = self.resolved[i].looks;
-                self.measure((step, dynamics), i, [0.0, 1.0], HALVINGS);
+                self.measure((step, system), i, [0.0, 1.0], HALVINGS);
                 self.resolved[i].looks = looks;
             }
             for half in [[0.0, 0.5], [0.5, 1.0]] {
-                self.refine((step, dynamics), i, half, HALVINGS);
+                self.refine((step, system), i, half, HALVINGS);
             }
         }
     }
@@ -439,11 +391,11 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
         }
     }
 
-    fn end(&mut self, t: f64, x: &[S], dynamics: &D) {
+    fn end(&mut self, t: f64, x: &[S], system: &Driven<'_, S, P>) {
         for (i, (signal, _)) in self.signals.iter().enumerate() {
             // An input jump at the end of the simulation appears in the signals that depend on it directly; a sampled state may jump
             // itself.
-            let value = self.shows[i].map_or_else(|| dynamics.signal(*signal, t, x), |state| x[state]);
+            let value = self.shows[i].map_or_else(|| system.signal(*signal, t, x), |state| x[state]);
             let before = self.traces[0][i].last();
             if (value.value() - before).abs() > self.allowed(i, before.abs().max(value.value().abs())) {
                 self.traces[0][i].jump_at_end(value.value());
@@ -473,14 +425,14 @@ impl<S: Scalar, D: Dynamics<S> + ?Sized> Sink<S, D> for Recorder<'_, S> {
 ///
 /// # Errors
 /// The failure of the simulation.
-pub fn record<S: Scalar, D: Dynamics<S> + ?Sized>(
-    dynamics: &mut D,
+pub fn record<S: Scalar, P: Integrable<S> + ?Sized>(
+    system: &mut Driven<'_, S, P>,
     start: &[S],
     end: f64,
     tolerance: &Tolerance,
     wanted: &Wanted,
 ) -> Result<Recording, Failure> {
-    record_within(ROOM, dynamics, (start, end), tolerance, wanted)
+    record_within(ROOM, system, (start, end), tolerance, wanted)
 }
 
 impl Recording {
@@ -496,9 +448,9 @@ impl Recording {
 }
 
 /// Implements [`record`] with a limit on the recorded bytes.
-fn record_within<S: Scalar, D: Dynamics<S> + ?Sized>(
+fn record_within<S: Scalar, P: Integrable<S> + ?Sized>(
     room: usize,
-    dynamics: &mut D,
+    system: &mut Driven<'_, S, P>,
     (start, end): (&[S], f64),
     tolerance: &Tolerance,
     wanted: &Wanted,
@@ -508,7 +460,7 @@ fn record_within<S: Scalar, D: Dynamics<S> + ?Sized>(
     let segments = (FIRST_ROOM / SEGMENT / traces.max(1)).min(256);
     let mut recorder = Recorder {
         signals,
-        shows: signals.iter().map(|(signal, _)| dynamics.shows(*signal)).collect(),
+        shows: signals.iter().map(|(signal, _)| system.shows(*signal)).collect(),
         cancellation,
         taken: 0,
         room,
@@ -521,7 +473,7 @@ fn record_within<S: Scalar, D: Dynamics<S> + ?Sized>(
         span: end,
         bounds: Vec::new(),
     };
-    let (_, work) = integrate(dynamics, 0.0, end, start, tolerance, &mut recorder)?;
+    let (_, work) = integrate(system, 0.0, end, start, tolerance, &mut recorder)?;
     for direction in 0..S::DIRECTIONS {
         let moves = |&(t, moves): &(f64, S)| (t, moves.tangents()[direction]);
         let moves: Vec<(f64, f64)> = recorder.restarts.iter().map(moves).collect();

@@ -6,7 +6,8 @@
 
 use mops_core::{Scalar, math};
 
-use super::Dynamics;
+use super::Driven;
+use super::integrable::Integrable;
 
 /// PI control of the step size. The next step size is `0.9 error^-(1/q - 0.75 beta) last_error^beta` times the last. As
 /// in the authors' DOPRI5 `beta = 0.04`; `q` is the order of the error in the step size.
@@ -76,8 +77,8 @@ fn exp2(x: f64) -> f64 {
 /// Returns an initial step size (algorithm II.4.14 of the source). Times are in units of the interval, and each state
 /// in units of its size, so that the guess depends on no unit. The size of a state that starts at 0 is its initial rate
 /// times a thousandth of the interval.
-pub(super) fn first_step<S: Scalar, D: Dynamics<S> + ?Sized>(
-    f: &D,
+pub(super) fn first_step<S: Scalar, P: Integrable<S> + ?Sized>(
+    f: &Driven<'_, S, P>,
     (t, end): (f64, f64),
     x: &[S],
     slope: &[S],

@@ -2,7 +2,8 @@
 
 use mops_core::{Scalar, Tolerance};
 
-use super::Dynamics;
+use super::Driven;
+use super::integrable::Integrable;
 
 /// Weights of the errors of all states: `relative |x_i| + floor_i`.
 ///
@@ -50,9 +51,14 @@ const OFTEN: usize = 64;
 pub(super) const PERTURBATION: f64 = 16.0 * f64::EPSILON;
 
 impl Weights {
-    pub(super) fn new<S: Scalar, D: Dynamics<S> + ?Sized>(f: &D, x: &[S], span: f64, tolerance: &Tolerance) -> Self {
+    pub(super) fn new<S: Scalar, P: Integrable<S> + ?Sized>(
+        f: &Driven<'_, S, P>,
+        x: &[S],
+        span: f64,
+        tolerance: &Tolerance,
+    ) -> Self {
         let n = x.len();
-        let scales = (0..n).map(|i| f.scale(i).unwrap_or(0.0)).collect();
+        let scales = (0..n).map(|i| f.plant.scale(i).unwrap_or(0.0)).collect();
         let mut weights = Self {
             relative: tolerance.relative,
             floor: tolerance
@@ -89,9 +95,9 @@ impl Weights {
     /// rates are compared with those of a [`perturbed`] state. After the third rejection, the state after a step of length `h` along
     /// the rates counts as well: states that are 0 before the step have no rounding errors yet. Returns the number of
     /// evaluations of the rates.
-    pub(super) fn feel<S: Scalar, D: Dynamics<S> + ?Sized>(
+    pub(super) fn feel<S: Scalar, P: Integrable<S> + ?Sized>(
         &mut self,
-        f: &D,
+        f: &Driven<'_, S, P>,
         (t, h, x): (f64, f64, &[S]),
         rejected: usize,
     ) -> usize {
@@ -114,7 +120,12 @@ impl Weights {
     }
 
     /// Raises the roughness to the difference of the rates at a state and at the perturbed state. `here` becomes the rates.
-    fn compare<S: Scalar, D: Dynamics<S> + ?Sized>(&mut self, f: &D, (t, x): (f64, &[S]), here: &mut [S]) {
+    fn compare<S: Scalar, P: Integrable<S> + ?Sized>(
+        &mut self,
+        f: &Driven<'_, S, P>,
+        (t, x): (f64, &[S]),
+        here: &mut [S],
+    ) {
         let mut there = x.to_vec();
         f.derivative(t, x, here);
         f.derivative(t, &perturbed(x), &mut there);

@@ -3,10 +3,10 @@
 //! The rates of a plant are affine in its forces, `v' = a + B f`. The friction forces of stuck joints make their
 //! accelerations vanish, so no mass matrix is needed.
 
-use mops_core::{DryFriction, Opening, Scalar};
+use mops_core::{DryFriction, EventInstant, PlantScalar, Scalar};
 use nalgebra::{DMatrix, DVector};
 
-use super::dynamics::Driven;
+use super::plant::{Affected, with_states};
 use crate::kernel::friction::Contact;
 
 /// Joints with dry friction.
@@ -19,7 +19,7 @@ pub(super) struct Contacts {
 #[derive(Debug, Clone)]
 struct Joint {
     /// Effects that give the friction: the joint sticks or slides as a whole, and their friction adds up.
-    actors: Vec<usize>,
+    effects: Vec<usize>,
     /// Force in the equation of the joint.
     w: usize,
     /// Speed of the joint, as a state.
@@ -28,10 +28,10 @@ struct Joint {
 }
 
 impl Contacts {
-    pub(super) fn add(&mut self, actor: usize, w: usize, velocity: usize) {
+    pub(super) fn add(&mut self, effect: usize, w: usize, velocity: usize) {
         match self.joints.iter_mut().find(|joint| joint.w == w) {
-            Some(joint) => joint.actors.push(actor),
-            None => self.joints.push(Joint { actors: vec![actor], w, velocity, contact: Contact::Stuck }),
+            Some(joint) => joint.effects.push(effect),
+            None => self.joints.push(Joint { effects: vec![effect], w, velocity, contact: Contact::Stuck }),
         }
     }
 
@@ -60,27 +60,27 @@ impl Contacts {
 
     /// Returns 1 if the joint of this effect slides forward, -1 if backward; `None` if it is stuck or has no dry
     /// friction.
-    pub(super) fn direction(&self, actor: usize) -> Option<f64> {
-        let joint = self.joints.iter().find(|joint| joint.actors.contains(&actor))?;
+    pub(super) fn direction(&self, effect: usize) -> Option<f64> {
+        let joint = self.joints.iter().find(|joint| joint.effects.contains(&effect))?;
         (joint.contact != Contact::Stuck).then(|| joint.contact.sign())
     }
 }
 
-impl<S: Opening> Driven<'_, S> {
+impl<S: PlantScalar> Affected<'_, S> {
     /// Adds the friction forces of stuck joints to `w`, so that their accelerations are 0. Returns the friction force
     /// of each contact, 0 if it slides.
-    pub(super) fn hold(&self, t: f64, x: &[S], u: &[S], w: &mut [S], dx: &mut [S]) -> Vec<S> {
+    pub(super) fn hold(&self, here: &EventInstant<'_, S>, u: &[S], w: &mut [S], dx: &mut [S]) -> Vec<S> {
         let joints = &self.contacts.joints;
         let stuck: Vec<usize> = (0..joints.len()).filter(|&i| joints[i].contact == Contact::Stuck).collect();
         let n = stuck.len();
         let mut moved = w.to_vec();
-        self.moved(t, x, u, &mut moved, dx);
+        self.moved(here, u, &mut moved, dx);
         let free: Vec<S> = stuck.iter().map(|&i| dx[joints[i].velocity]).collect();
         let mut columns = Vec::with_capacity(n);
         for &j in &stuck {
             moved.copy_from_slice(w);
             moved[joints[j].w] += S::from(1.0);
-            self.moved(t, x, u, &mut moved, dx);
+            self.moved(here, u, &mut moved, dx);
             columns.push((0..n).map(|i| dx[joints[stuck[i]].velocity] - free[i]).collect::<Vec<S>>());
         }
         // Joints that the plant itself keeps stuck need no force, and do not move.
@@ -92,7 +92,7 @@ impl<S: Opening> Driven<'_, S> {
             forces[stuck[k]] = held;
             w[joints[stuck[k]].w] += held;
         }
-        self.moved(t, x, u, w, dx);
+        self.moved(here, u, w, dx);
         for &j in &stuck {
             dx[joints[j].velocity] = S::from(0.0);
         }
@@ -100,12 +100,12 @@ impl<S: Opening> Driven<'_, S> {
     }
 
     /// Returns the friction at a joint with a contact: sliding forces and limits against forward and backward motion.
-    fn friction(&self, joint: &Joint, t: f64, x: &[S], u: &[S]) -> DryFriction<S> {
+    fn friction(&self, joint: &Joint, here: &EventInstant<'_, S>, u: &[S]) -> DryFriction<S> {
         let mut sum = DryFriction { sliding: [S::from(0.0); 2], limit: [S::from(0.0); 2] };
-        for &index in &joint.actors {
-            let actor = &self.actors[index];
-            let at = self.at(actor, t, x, u, S::from(0.0));
-            let one = actor.acting.friction(&at, self.states(actor, x)).expect("it has friction from the start");
+        for &index in &joint.effects {
+            let effect = &self.effects[index];
+            let at = self.at(effect, here, u, S::from(0.0));
+            let one = effect.effect.friction(&at, effect.states(here.at.x)).expect("it has friction from the start");
             for side in 0..2 {
                 sum.sliding[side] += one.sliding[side];
                 sum.limit[side] += one.limit[side];
@@ -114,40 +114,42 @@ impl<S: Opening> Driven<'_, S> {
         sum
     }
 
-    pub(super) fn contact_guard(&self, index: usize, t: f64, x: &[S], u: &mut Vec<S>, w: &mut Vec<S>) -> S {
+    pub(super) fn contact_guard(&self, index: usize, here: &EventInstant<'_, S>) -> S {
         let joint = &self.contacts.joints[index];
         if joint.contact != Contact::Stuck {
-            return x[joint.velocity] * joint.contact.sign();
+            return here.at.x[joint.velocity] * joint.contact.sign();
         }
-        let mut dx = vec![S::from(0.0); self.own];
-        let held = self.balance(t, x, u, w, &mut dx)[index] * self.forward(joint.w);
-        // A backward friction force is limited by the friction against forward motion.
-        let friction = self.friction(joint, t, x, u);
-        friction.limit[usize::from(held.value() > 0.0)] - held.abs()
+        self.balanced_with(here, |u, _, held| {
+            let held = held[index] * self.forward(joint.w);
+            // A backward friction force is limited by the friction against forward motion.
+            let friction = self.friction(joint, here, u);
+            friction.limit[usize::from(held.value() > 0.0)] - held.abs()
+        })
     }
 
     /// Returns for each stuck joint its force, its speed as a state, and the largest force that holds it.
-    pub(super) fn holding(&self, t: f64, x: &[S], u: &[S]) -> Vec<(usize, usize, f64)> {
+    pub(super) fn holding(&self, here: &EventInstant<'_, S>) -> Vec<(usize, usize, f64)> {
         let stuck = self.contacts.joints.iter().filter(|joint| joint.contact == Contact::Stuck);
         let most = |joint: &Joint| {
-            let limit = self.friction(joint, t, x, u).limit;
+            let limit = self.friction(joint, here, here.at.u).limit;
             limit[0].value().max(limit[1].value())
         };
         stuck.map(|joint| (joint.w, joint.velocity, most(joint))).collect()
     }
 
     /// Switches a contact after its guard became negative. Returns true if the joint is now stuck.
-    pub(super) fn contact_switch(&mut self, index: usize, t: f64, x: &mut [S]) -> bool {
+    pub(super) fn contact_switch(&mut self, index: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> bool {
         let Joint { w: force, velocity, contact, .. } = self.contacts.joints[index];
         if contact == Contact::Stuck {
             let (mut u, mut w, mut dx) = (Vec::new(), Vec::new(), vec![S::from(0.0); self.own]);
-            let held = self.balance(t, x, &mut u, &mut w, &mut dx)[index].value() * self.forward(force);
+            let held = self.balance(event, &mut u, &mut w, &mut dx)[index].value() * self.forward(force);
             self.contacts.joints[index].contact = if held < 0.0 { Contact::Forward } else { Contact::Backward };
-            self.settle_contacts(t, x, Some(index));
+            self.settle_contacts(event, Some(index));
         } else {
             x[velocity] = S::from(0.0);
             self.contacts.joints[index].contact = Contact::Stuck;
-            self.settle_contacts(t, x, None);
+            let now = x.to_vec();
+            self.settle_contacts(&with_states(event, &now), None);
         }
         self.contacts.joints[index].contact == Contact::Stuck
     }
@@ -155,13 +157,13 @@ impl<S: Opening> Driven<'_, S> {
     /// Finds the contacts of joints at rest that are consistent with the forces and nearest to the previous contacts.
     /// Moving joints slide in their direction of motion. The joint `released` has just exceeded its limit and does not
     /// stick again.
-    pub(super) fn settle_contacts(&mut self, t: f64, x: &[S], released: Option<usize>) {
+    pub(super) fn settle_contacts(&mut self, here: &EventInstant<'_, S>, released: Option<usize>) {
         const CHOICES: [Contact; 3] = [Contact::Stuck, Contact::Forward, Contact::Backward];
         let n = self.contacts.len();
         let before: Vec<Contact> = self.contacts.joints.iter().map(|joint| joint.contact).collect();
         let mut resting = Vec::new();
         for i in 0..n {
-            let speed = x[self.contacts.joints[i].velocity].value();
+            let speed = here.at.x[self.contacts.joints[i].velocity].value();
             if speed == 0.0 {
                 resting.push(i);
             } else {
@@ -179,14 +181,14 @@ impl<S: Opening> Driven<'_, S> {
                 self.contacts.joints[i].contact = CHOICES[digits % 3];
                 digits /= 3;
             }
-            let held = self.balance(t, x, &mut u, &mut w, &mut dx);
+            let held = self.balance(here, &mut u, &mut w, &mut dx);
             let mut excess: f64 = 0.0;
             let mut departures = 0.0;
             for &i in &resting {
                 let joint = &self.contacts.joints[i];
                 departures += f64::from(u8::from(joint.contact != before[i]));
                 if joint.contact == Contact::Stuck {
-                    let friction = self.friction(joint, t, x, &u);
+                    let friction = self.friction(joint, here, &u);
                     let held = held[i].value() * self.forward(joint.w);
                     let limit = friction.limit[usize::from(held > 0.0)].value();
                     let never = limit == 0.0 || released == Some(i);

@@ -1,10 +1,10 @@
-//! Edges of effects, at which their laws change, and hysteresis states: their guards, and what happens there.
+//! Edges of effects, at which their laws change, and hysteresis states: their guards, what happens there, and how they start.
 
-use mops_core::{Opening, PortState};
+use mops_core::plant::Stretch;
+use mops_core::{EventInstant, Failure, Instant, PlantScalar, PortState};
 
 use super::Site;
-use super::command::Command;
-use super::dynamics::{Actor, Driven};
+use super::plant::{Affected, PlacedEffect, fixed, with_states};
 
 /// Half the time over which the rate of a value at an actuator or a sensor is a difference, as a fraction of the horizon: it resolves
 /// 10,000 oscillations, and rounding of the value changes the rate by 1e-9 of the value per horizon.
@@ -19,13 +19,33 @@ const RUN_UP_PARTS: f64 = 16.0;
 /// Width of the bracket in which a hysteresis guard crosses zero before time 0, relative to a part.
 const RUN_UP_RESOLUTION: f64 = 1e-10;
 
-impl<S: Opening> Actor<S> {
+impl<S: PlantScalar> PlacedEffect<S> {
     /// Returns the output of the effect at an actuator or a sensor.
     pub(super) fn passed(&self, at: &PortState<'_, S>, z: &[S]) -> S {
-        match &self.memory[..] {
-            [] => self.acting.value(at, z),
-            memory => self.acting.hysteresis_value(at, memory),
+        match &self.hysteresis[..] {
+            [] => self.effect.value(at, z),
+            hysteresis => self.effect.hysteresis_value(at, hysteresis),
         }
+    }
+
+    /// Returns the states of the effect.
+    pub(super) fn states<'b>(&self, x: &'b [S]) -> &'b [S] {
+        &x[self.states.0..self.states.0 + self.states.1]
+    }
+
+    /// Updates the hysteresis state to an instant.
+    fn follow(&mut self, at: &PortState<'_, S>) {
+        let first = self.hysteresis[0].value().is_nan();
+        self.effect.update_hysteresis(at, &mut self.hysteresis);
+        if first {
+            self.hysteresis[0] += self.first_offset;
+            self.effect.update_hysteresis(at, &mut self.hysteresis);
+        }
+    }
+
+    /// Returns true if the effect has a hysteresis state that is known.
+    fn has_begun(&self) -> bool {
+        self.hysteresis.first().is_some_and(|first| !first.value().is_nan())
     }
 
     /// Returns true if the effect acts at an actuator.
@@ -44,108 +64,136 @@ impl<S: Opening> Actor<S> {
     }
 }
 
-impl<S: Opening> Driven<'_, S> {
+impl<S: PlantScalar> Affected<'_, S> {
     /// Returns the number of gaps, and of effects with a hysteresis state.
     pub(super) fn edges(&self) -> [usize; 2] {
-        let count = |has: fn(&&Actor<S>) -> bool| self.actors.iter().filter(has).count();
-        [count(|actor| actor.closed.is_some()), count(|actor| !actor.memory.is_empty())]
+        let count = |has: fn(&&PlacedEffect<S>) -> bool| self.effects.iter().filter(has).count();
+        [count(|effect| effect.closed.is_some()), count(|effect| !effect.hysteresis.is_empty())]
+    }
+
+    /// Returns true if effects follow jumps of the inputs.
+    pub(super) fn has_hysteresis(&self) -> bool {
+        self.effects.iter().any(|e| !e.hysteresis.is_empty() || e.is_at_actuator() && e.closed.is_some())
     }
 
     /// Returns the index of an effect with a gap, or of one with a hysteresis state, by the number of the edge: first the gaps.
     fn of_edge(&self, number: usize) -> (usize, bool) {
-        let all = || self.actors.iter().enumerate();
-        let gaps = all().filter(|(_, actor)| actor.closed.is_some()).map(|(index, _)| (index, true));
-        let turns = all().filter(|(_, actor)| !actor.memory.is_empty()).map(|(index, _)| (index, false));
+        let all = || self.effects.iter().enumerate();
+        let gaps = all().filter(|(_, effect)| effect.closed.is_some()).map(|(index, _)| (index, true));
+        let turns = all().filter(|(_, effect)| !effect.hysteresis.is_empty()).map(|(index, _)| (index, false));
         gaps.chain(turns).nth(number).expect("the number is valid")
     }
 
     /// Returns the value that reaches an effect at an actuator or a sensor; 0 for other effects.
-    pub(super) fn arriving(&self, index: usize, t: f64, x: &[S]) -> S {
-        match self.actors[index].place.site {
+    pub(super) fn arriving(&self, index: usize, here: &EventInstant<'_, S>) -> S {
+        match self.effects[index].place.site {
             Site::Actuator { .. } => {
-                self.inputs(t, x, &mut Vec::new());
+                self.inputs(here, &mut Vec::new());
                 self.incoming.borrow()[index]
             }
-            Site::Sensor { signal } => self.seen(signal, index, t, x),
+            Site::Sensor { signal } => self.seen(signal, index, here),
             Site::Joint { .. } | Site::Process { .. } => S::from(0.0),
         }
     }
 
     /// Returns what an effect with an edge receives; for an effect with a hysteresis state with the rate of its value, per s.
-    fn at_edge(&self, index: usize, t: f64, x: &[S]) -> PortState<'static, S> {
-        let actor = &self.actors[index];
-        let at = self.at(actor, t, x, &[], self.arriving(index, t, x));
-        let v = if actor.memory.is_empty() { at.v } else { self.arriving_rate(index, t, x) };
+    fn at_edge(&self, index: usize, here: &EventInstant<'_, S>) -> PortState<'static, S> {
+        let effect = &self.effects[index];
+        let at = self.at(effect, here, &[], self.arriving(index, here));
+        let arriving = |here: &EventInstant<'_, S>| self.arriving(index, here);
+        let v = if effect.hysteresis.is_empty() { at.v } else { self.rate_of(here, arriving) };
         PortState { v, u: &[], ..at }
     }
 
-    fn arriving_rate(&self, index: usize, t: f64, x: &[S]) -> S {
-        let mut rates = vec![S::from(0.0); x.len()];
+    /// Returns the rate of a value along the solution, per s.
+    fn rate_of(&self, here: &EventInstant<'_, S>, value: impl Fn(&EventInstant<'_, S>) -> S) -> S {
+        let mut rates = vec![S::from(0.0); here.at.x.len()];
         if self.started {
-            self.rates(t, x, &mut rates);
+            self.all_rates(here, &mut rates);
         }
         let there = |by: f64| {
-            let x: Vec<S> = x.iter().zip(&rates).map(|(&x, &rate)| x + rate * by).collect();
-            self.arriving(index, t + by, &x)
+            let x: Vec<S> = here.at.x.iter().zip(&rates).map(|(&x, &rate)| x + rate * by).collect();
+            let u: Vec<S> = here.at.u.iter().enumerate().map(|(input, &u)| u + (here.du)(input) * by).collect();
+            let at = Instant { t: here.at.t + by, x: &x, u: &u, w: here.at.w };
+            value(&EventInstant { at, ..*here })
         };
         (there(self.blink) - there(-self.blink)) / (2.0 * self.blink)
     }
 
-    /// Returns the guard of an edge, by its number.
-    pub(super) fn edge_guard(&self, number: usize, t: f64, x: &[S]) -> S {
-        let (index, is_gap) = self.of_edge(number);
-        let (actor, at) = (&self.actors[index], self.at_edge(index, t, x));
-        if !is_gap {
-            return actor.acting.hysteresis_guard(&at, &actor.memory);
+    /// Returns the rate of an input as it reaches the plant, per s.
+    pub(super) fn rate_of_input(&self, input: usize, here: &EventInstant<'_, S>) -> f64 {
+        let acts = |e: &PlacedEffect<S>| matches!(e.place.site, Site::Actuator { input: i } if i == input);
+        if !self.effects.iter().any(acts) {
+            return (here.du)(input);
         }
-        let gap = actor.acting.gap(&at).expect("the effect had a gap at the start");
-        if actor.closed == Some(true) { -gap } else { gap }
+        let reaching = |here: &EventInstant<'_, S>| {
+            let mut u = Vec::new();
+            self.inputs(here, &mut u);
+            u[input]
+        };
+        self.rate_of(here, reaching).value()
+    }
+
+    /// Returns the guard of an edge, by its number.
+    pub(super) fn edge_guard(&self, number: usize, here: &EventInstant<'_, S>) -> S {
+        let (index, is_gap) = self.of_edge(number);
+        let (effect, at) = (&self.effects[index], self.at_edge(index, here));
+        if !is_gap {
+            return effect.effect.hysteresis_guard(&at, &effect.hysteresis);
+        }
+        let gap = effect.effect.gap(&at).expect("the effect had a gap at the start");
+        if effect.closed == Some(true) { -gap } else { gap }
     }
 
     /// Finds the side of their edges on which all effects are: at the start, and after a jump of the plant state.
-    pub(super) fn settle_gaps(&mut self, t: f64, x: &[S]) {
-        (0..self.actors.len()).for_each(|index| self.settle_gap(index, t, x));
+    pub(super) fn settle_gaps(&mut self, here: &EventInstant<'_, S>) {
+        (0..self.effects.len()).for_each(|index| self.settle_gap(index, here));
     }
 
-    fn settle_gap(&mut self, index: usize, t: f64, x: &[S]) {
+    fn settle_gap(&mut self, index: usize, here: &EventInstant<'_, S>) {
         // The sign decides where the side is unknown.
-        self.actors[index].closed = None;
-        let gap = self.actors[index].acting.gap(&self.at_edge(index, t, x));
-        self.actors[index].closed = gap.map(|gap| gap.value() < 0.0);
+        self.effects[index].closed = None;
+        let gap = self.effects[index].effect.gap(&self.at_edge(index, here));
+        self.effects[index].closed = gap.map(|gap| gap.value() < 0.0);
     }
 
     /// Takes the effects from `first` on to the values that they receive after a jump, in their order, as each receives the output of those
     /// before it: their hysteresis states, and of some the side of the edge.
-    pub(super) fn follow(&mut self, t: f64, x: &[S], first: usize, settles: impl Fn(&Actor<S>) -> bool) {
-        for index in first..self.actors.len() {
-            let actor = &self.actors[index];
-            if (actor.is_at_actuator() || actor.is_at_sensor()) && actor.closed.is_some() && settles(actor) {
-                self.settle_gap(index, t, x);
+    pub(super) fn follow_jump(
+        &mut self,
+        here: &EventInstant<'_, S>,
+        first: usize,
+        settles: impl Fn(&PlacedEffect<S>) -> bool,
+    ) {
+        for index in first..self.effects.len() {
+            let effect = &self.effects[index];
+            if (effect.is_at_actuator() || effect.is_at_sensor()) && effect.closed.is_some() && settles(effect) {
+                self.settle_gap(index, here);
             }
-            if !self.actors[index].memory.is_empty() {
-                self.update_hysteresis_of(index, t, x);
+            if self.effects[index].has_begun() {
+                self.update_hysteresis_of(index, here);
             }
         }
     }
 
     /// Passes an edge after its guard became negative. Returns what happened; empty at actuators and sensors.
-    pub(super) fn edge_switch(&mut self, number: usize, t: f64, x: &[S]) -> &'static str {
+    pub(super) fn edge_switch(&mut self, number: usize, event: &EventInstant<'_, S>) -> &'static str {
         let (index, is_gap) = self.of_edge(number);
         if !is_gap {
-            self.update_hysteresis_of(index, t, x);
+            self.update_hysteresis_of(index, event);
             return "";
         }
-        let before = self.onward_of(index, t, x);
+        let before = self.onward_of(index, event);
         self.cross(index);
-        if (self.onward_of(index, t, x) - before).value().abs() > JUMP * before.value().abs() {
+        if (self.onward_of(index, event) - before).value().abs() > JUMP * before.value().abs() {
             // The value that is passed on jumps, as that of a sensor with a gap: what comes after goes up to the jump, then over it.
             self.cross(index);
-            self.update_hysteresis(t, x, |_| true);
+            self.update_hysteresis(event, |_| true);
             self.cross(index);
-            self.follow(t, x, index + 1, |_| true);
+            self.follow_jump(event, index + 1, |_| true);
         }
-        let actor = &self.actors[index];
-        match (actor.place.site, actor.closed == Some(true)) {
+        let effect = &self.effects[index];
+        match (effect.place.site, effect.closed == Some(true)) {
             (Site::Process { .. }, true) => "a level rises above an edge",
             (Site::Process { .. }, false) => "a level falls below an edge",
             (Site::Joint { .. }, true) => "a contact closes",
@@ -156,45 +204,56 @@ impl<S: Opening> Driven<'_, S> {
 
     /// Takes an effect to the other side of its edge.
     fn cross(&mut self, index: usize) {
-        let closed = self.actors[index].closed.as_mut().expect("the effect has a gap");
+        let closed = self.effects[index].closed.as_mut().expect("the effect has a gap");
         *closed = !*closed;
     }
 
     /// Returns the value that an effect at an actuator or a sensor passes on; 0 for other effects.
-    fn onward_of(&self, index: usize, t: f64, x: &[S]) -> S {
-        let actor = &self.actors[index];
-        match actor.place.site {
+    fn onward_of(&self, index: usize, here: &EventInstant<'_, S>) -> S {
+        let effect = &self.effects[index];
+        match effect.place.site {
             Site::Actuator { .. } | Site::Sensor { .. } => {
-                actor.passed(&self.at(actor, t, x, &[], self.arriving(index, t, x)), self.states(actor, x))
+                effect.passed(&self.at(effect, here, &[], self.arriving(index, here)), effect.states(here.at.x))
             }
             Site::Joint { .. } | Site::Process { .. } => S::from(0.0),
         }
     }
 
-    pub(super) fn update_hysteresis_of(&mut self, index: usize, t: f64, x: &[S]) {
-        let at = self.at_edge(index, t, x);
-        self.actors[index].follow(&at);
+    fn update_hysteresis_of(&mut self, index: usize, here: &EventInstant<'_, S>) {
+        let at = self.at_edge(index, here);
+        self.effects[index].follow(&at);
     }
 
     /// Updates the hysteresis states of some effects, in their order.
-    pub(super) fn update_hysteresis(&mut self, t: f64, x: &[S], which: impl Fn(&Actor<S>) -> bool) {
-        for index in 0..self.actors.len() {
-            if which(&self.actors[index]) && !self.actors[index].memory.is_empty() {
-                self.update_hysteresis_of(index, t, x);
+    pub(super) fn update_hysteresis(&mut self, here: &EventInstant<'_, S>, which: impl Fn(&PlacedEffect<S>) -> bool) {
+        for index in 0..self.effects.len() {
+            if which(&self.effects[index]) && self.effects[index].has_begun() {
+                self.update_hysteresis_of(index, here);
             }
         }
     }
 
-    /// Updates the hysteresis states of the effects at actuators up to the end of a time span in which no command jumps or bends, also
-    /// where their laws change within it.
-    fn run_up(&mut self, [start, end]: [f64; 2], x: &[S]) {
+    /// Updates the hysteresis states of the effects at actuators up to the end of a stretch of the past, also where their laws change
+    /// within it.
+    pub(super) fn run_up(&mut self, over: &Stretch<'_, S>) {
+        fn look<S: PlantScalar, R>(over: &Stretch<'_, S>, t: f64, of: impl FnOnce(&EventInstant<'_, S>) -> R) -> R {
+            let [u, w] = (over.at)(t);
+            let at = Instant { t, x: over.x, u: &u, w: &w };
+            of(&EventInstant { at, du: &|input| (over.rate)(t, input), delay: S::from(0.0) })
+        }
         let lowest = |of: &Self, t: f64| {
-            let acts = |(_, actor): &(usize, &Actor<S>)| actor.is_at_actuator() && !actor.memory.is_empty();
-            let guard = |(index, actor): (usize, &Actor<S>)| {
-                actor.acting.hysteresis_guard(&of.at_edge(index, t, x), &actor.memory)
-            };
-            of.actors.iter().enumerate().filter(acts).map(|e| guard(e).value()).fold(f64::INFINITY, f64::min)
+            let acts = |(_, e): &(usize, &PlacedEffect<S>)| e.is_at_actuator() && !e.hysteresis.is_empty();
+            look(over, t, |here| {
+                let guard = |(index, e): (usize, &PlacedEffect<S>)| {
+                    e.effect.hysteresis_guard(&of.at_edge(index, here), &e.hysteresis)
+                };
+                of.effects.iter().enumerate().filter(acts).map(|e| guard(e).value()).fold(f64::INFINITY, f64::min)
+            })
         };
+        let update = |of: &mut Self, t: f64| {
+            look(over, t, |here| of.update_hysteresis(here, PlacedEffect::is_at_actuator));
+        };
+        let [start, end] = over.time;
         let part = (end - start) / RUN_UP_PARTS;
         let mut t = start;
         while t < end {
@@ -210,51 +269,92 @@ impl<S: Opening> Driven<'_, S> {
                     }
                     *(if lowest(self, middle) < 0.0 { &mut high } else { &mut low }) = middle;
                 }
-                self.update_hysteresis(high, x, Actor::is_at_actuator);
+                update(self, high);
                 // A guard that is negative again at once, by rounding, is read at the end of the part.
                 high = if high - t > 2.0 * near { high } else { to };
             }
             t = high;
         }
-        self.update_hysteresis(end, x, Actor::is_at_actuator);
+        update(self, end);
     }
 
-    /// Moves the commands to time 0 from the left, and initialises the states and the hysteresis states of the effects at actuators, as
-    /// if the command just before time 0 had been constant for long. Hysteresis states follow the earlier samples of a record.
+    fn at_actuators(&self) -> Vec<usize> {
+        (0..self.effects.len()).filter(|&index| self.effects[index].is_at_actuator()).collect()
+    }
+
+    /// Initialises the states of an effect at an actuator, as if the value that reaches it had been constant for long. Returns what
+    /// reaches it.
     ///
-    /// N.B.: effects before them on the same actuator that depend on the state of the plant, or have states, are
-    /// evaluated as at time 0.
-    pub(super) fn start_actuators(&mut self, x: &mut [S], parameters: &[S]) {
-        let next = |of: &Self| of.commands.iter().map(Command::next_break).fold(0.0, f64::min);
-        let mut t = next(self);
-        for index in (0..self.actors.len()).filter(|&index| self.actors[index].is_at_actuator()).collect::<Vec<_>>() {
-            self.start_actuator(index, t, x);
-            if !self.actors[index].memory.is_empty() {
-                self.update_hysteresis_of(index, t, x);
-            }
-        }
-        while t < 0.0 {
-            self.commands.iter_mut().for_each(|command| command.pass_break(t));
-            self.update_hysteresis(t, x, Actor::is_at_actuator);
-            let end = next(self);
-            self.run_up([t, end], x);
-            t = end;
-        }
-        for index in (0..self.actors.len()).filter(|&index| self.actors[index].is_at_actuator()).collect::<Vec<_>>() {
-            self.start_actuator(index, 0.0, x);
-            let actor = &mut self.actors[index];
-            let ahead = actor.place.starts.map_or(&[][..], |starts| &parameters[starts..]);
-            x[actor.z.0..actor.z.0 + actor.z.1].iter_mut().zip(ahead).for_each(|(z, &ahead)| *z += ahead);
-            if let Some(output) = actor.memory.first_mut() {
-                *output += ahead.first().copied().unwrap_or(S::from(0.0));
-                self.update_hysteresis_of(index, 0.0, x);
+    /// N.B.: effects before it on the same actuator that depend on the state of the plant, or have states, are evaluated as at the start.
+    fn start_actuator(&mut self, index: usize, at: &Instant<'_, S>, x: &mut [S]) {
+        let now = x.to_vec();
+        let state = self.at_edge(index, &with_states(&fixed(at), &now));
+        let effect = &mut self.effects[index];
+        effect.effect.start(&state, &mut x[effect.states.0..effect.states.0 + effect.states.1]);
+    }
+
+    /// Initialises the effects at actuators for inputs that have been constant for long.
+    pub(super) fn start_past(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
+        for index in self.at_actuators() {
+            self.start_actuator(index, at, x);
+            if !self.effects[index].hysteresis.is_empty() {
+                let now = x.to_vec();
+                self.update_hysteresis_of(index, &with_states(&fixed(at), &now));
             }
         }
     }
 
-    /// Initialises the states of an effect at an actuator, as if the value that reaches it had been constant for long.
-    fn start_actuator(&self, index: usize, t: f64, x: &mut [S]) {
-        let (at, actor) = (self.at_edge(index, t, x), &self.actors[index]);
-        actor.acting.start(&at, &mut x[actor.z.0..actor.z.0 + actor.z.1]);
+    /// Initialises the effects at actuators just before the start, with their offsets; their hysteresis states have followed the past.
+    pub(super) fn start_actuators(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
+        for index in self.at_actuators() {
+            self.start_actuator(index, at, x);
+            let effect = &mut self.effects[index];
+            let z = effect.states.0..effect.states.0 + effect.states.1;
+            x[z].iter_mut().zip(&effect.offsets).for_each(|(z, &offset)| *z += offset);
+            if let Some(output) = effect.hysteresis.first_mut() {
+                *output += effect.offsets.first().copied().unwrap_or(S::from(0.0));
+                let now = x.to_vec();
+                self.update_hysteresis_of(index, &with_states(&fixed(at), &now));
+            }
+        }
+    }
+
+    /// Initialises the states of all other effects and finds the joints with dry friction; `u` are the inputs that reach the plant.
+    ///
+    /// # Errors
+    /// Dry friction acts elsewhere.
+    pub(super) fn start_others(&mut self, at: &Instant<'_, S>, u: &[S], x: &mut [S]) -> Result<(), Failure> {
+        let (last, first): (Vec<usize>, Vec<usize>) =
+            (0..self.effects.len()).partition(|&index| self.effects[index].is_at_sensor());
+        // What sensors measure depends on all other effects, and on the sensor effects before.
+        for index in first.into_iter().chain(last) {
+            if self.effects[index].is_at_actuator() {
+                continue;
+            }
+            let now = x.to_vec();
+            let here = with_states(&fixed(at), &now);
+            let effect = &self.effects[index];
+            let (first, count) = effect.states;
+            let state = self.at(effect, &here, u, self.arriving(index, &here));
+            let mut z = vec![S::from(0.0); count];
+            effect.effect.start(&state, &mut z);
+            if effect.effect.friction(&state, &z).is_some() {
+                let Site::Joint { w, velocity, .. } = effect.place.site else {
+                    return Err(Failure::Undefined("dry friction acts at a joint".into()));
+                };
+                self.contacts.add(index, w, velocity);
+            }
+            let effect = &mut self.effects[index];
+            z.iter_mut().zip(&effect.offsets).for_each(|(z, &over)| *z += over);
+            effect.first_offset = effect.offsets.first().copied().unwrap_or(S::from(0.0));
+            x[first..first + count].copy_from_slice(&z);
+            if !effect.hysteresis.is_empty() {
+                let now = x.to_vec();
+                self.update_hysteresis_of(index, &with_states(&fixed(at), &now));
+            }
+        }
+        let now = x.to_vec();
+        self.settle_gaps(&with_states(&fixed(at), &now));
+        Ok(())
     }
 }

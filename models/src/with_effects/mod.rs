@@ -2,21 +2,23 @@
 //! effects.
 
 mod along;
-mod command;
 mod contacts;
-mod dynamics;
 mod edges;
+mod plant;
 mod sensors;
 
 use std::sync::Arc;
 
 use mops_core::{
-    Analysis, Case, Dimension, Earlier, Failure, InitialGrid, Interface, Job, Model, Opening, Parameter, ParameterKind,
-    Placement, Port, Scalar, State, StudyError, Unit, Variable, WithTangents,
+    Analysis, Case, Dimension, Earlier, Failure, InitialGrid, Interface, Job, Model, Parameter, ParameterKind,
+    Placement, PlantScalar, Port, Ported, Scalar, State, StudyError, Unit, Variable, WithTangents,
 };
 
-use crate::kernel::{Recording, Tolerance, record, tangents_of, wanted};
-pub use along::{Moment, Sliding};
+use crate::kernel::drive::Drive;
+use crate::kernel::{Driven, Inputs, Recording, Simulation, Tolerance, shown, tangents_of, wanted};
+pub use along::{Along, Moment, Sliding, Tick};
+use edges::BLINK;
+use plant::{Affected, PlacedEffect};
 
 /// Model with effects.
 ///
@@ -26,6 +28,12 @@ pub struct WithEffects {
     placements: Vec<Placement>,
     places: Vec<Place>,
     interface: Interface,
+    /// Number of states of the model.
+    states: usize,
+    /// State whose equation contains each force.
+    balances: Vec<usize>,
+    /// State that each signal equals, if any.
+    shows: Vec<Option<usize>>,
     max_steps: usize,
     /// Relative tolerance that suffices; 0 for that of the model.
     loosest: f64,
@@ -125,7 +133,11 @@ impl WithEffects {
             }
             places.push(Place { site: sites.0, companion: sites.1, parameters, starts });
         }
-        Ok(Self { model, placements, places, interface, max_steps: usize::MAX, loosest: 0.0 })
+        let balances = balances(of).filter_map(|state| states.iter().position(|s| s.name == *state)).collect();
+        let shows = shown(of, &states);
+        let states = states.len();
+        let (max_steps, loosest) = (usize::MAX, 0.0);
+        Ok(Self { model, placements, places, interface, states, balances, shows, max_steps, loosest })
     }
 
     /// Limits the number of steps: a simulation that needs more fails. Some parameter values make effects stiff.
@@ -142,8 +154,8 @@ impl WithEffects {
         self
     }
 
-    fn tolerance(&self, open: &dyn mops_core::Open) -> Tolerance {
-        let tolerance = open.tolerance();
+    fn tolerance(&self) -> Tolerance {
+        let tolerance = self.ported_model().tolerance();
         Tolerance {
             max_steps: tolerance.max_steps.min(self.max_steps),
             relative: tolerance.relative.max(self.loosest),
@@ -185,21 +197,108 @@ impl WithEffects {
         }
     }
 
-    fn simulate<S: Opening>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
+    /// Returns the indices of the effects that may change the response or its tangents.
+    fn acting<S: Scalar>(&self, parameters: &[S]) -> Vec<usize> {
+        (0..self.placements.len()).filter(|&index| self.acts(index, parameters)).collect()
+    }
+
+    fn ported_model(&self) -> &dyn Ported {
+        self.model.ported().expect("checked on creation")
+    }
+
+    /// Returns the plant with the effects of these indices.
+    fn affected<'a, S: PlantScalar>(
+        &'a self,
+        acting: &[usize],
+        job: &Job<'_>,
+        parameters: &'a [S],
+    ) -> Result<Affected<'a, S>, Failure> {
+        let plant = S::plant(self.ported_model(), &parameters[..self.own()])?;
+        let mut size = self.states;
+        let placed = |&index: &usize| {
+            let (effect, place) = (&self.placements[index].effect, self.places[index]);
+            let first = size;
+            size += effect.states();
+            PlacedEffect {
+                effect: S::bind(effect.as_ref(), &parameters[place.parameters..][..effect.parameters().len()]),
+                place,
+                states: (first, effect.states()),
+                hysteresis: vec![S::from(f64::NAN); effect.hysteresis_states()],
+                offsets: place
+                    .starts
+                    .map_or_else(Vec::new, |at| parameters[at..][..effect.free_starts().len()].to_vec()),
+                first_offset: S::from(0.0),
+                closed: None,
+                inertial: effect.is_inertial(),
+            }
+        };
+        let effects = acting.iter().map(placed).collect();
+        let sizes = [self.states, self.model.interface().forces()];
+        Ok(Affected::new(plant, effects, sizes, &self.shows, BLINK * job.horizon))
+    }
+
+    /// Returns the inputs of a case, with its disturbances; `acting` are the effects.
+    fn inputs<'a, S: PlantScalar>(
+        &self,
+        acting: &[usize],
+        job: &Job<'a>,
+        parameters: &[S],
+    ) -> Result<Inputs<'a, S>, Failure> {
+        let of = self.model.interface();
+        let drives = of.inputs.iter().map(|input| Drive::new(job.case.input(&input.name))).collect();
+        // The output of a sensor effect may be rough, so steps end at all samples.
+        let at_sensors = acting.iter().any(|&index| matches!(self.places[index].site, Site::Sensor { .. }));
+        let inputs = Inputs::new(drives, of.forces()).beginning_at(job.case.begins).at_every_sample(at_sensors);
+        if job.case.disturbances.is_empty() {
+            return Ok(inputs);
+        }
+        let of_state = |state: &String| job.case.disturbances.iter().find(|(name, _)| name == state).map(|(_, of)| of);
+        let drives = balances(of).map(|state| Drive::new(of_state(state)));
+        let per_rate = self.bare_mobilities(job, parameters)?.into_iter().map(|mobility| S::from(1.0) / mobility);
+        Ok(inputs.with_forces(drives.zip(per_rate).collect()))
+    }
+
+    /// Returns the rate that a unit force at each balance adds to its state at the start, without effects.
+    fn bare_mobilities<S: PlantScalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Vec<S>, Failure> {
+        let bare = Job { case: &Case { disturbances: Vec::new(), ..job.case.clone() }, ..*job };
+        let plant = S::plant(self.ported_model(), &parameters[..self.own()])?;
+        let mut driven = Driven::new(plant, self.inputs(&[], &bare, parameters)?, &[]);
+        let start = driven.begin()?;
+        Ok(driven.mobilities(&start, &self.balances))
+    }
+
+    /// Returns for each signal the state that it equals, if no effect changes it.
+    fn untouched(&self, acting: &[usize]) -> Vec<Option<usize>> {
+        let touched = |k: usize| {
+            acting.iter().any(|&index| matches!(self.places[index].site, Site::Sensor { signal } if signal == k))
+        };
+        (0..self.shows.len()).map(|k| self.shows[k].filter(|_| !touched(k))).collect()
+    }
+
+    fn simulate<S: PlantScalar>(&self, job: &Job<'_>, parameters: &[S]) -> Result<Recording, Failure> {
         self.check_disturbances(job.case)?;
-        let open = self.model.ported().expect("checked on creation");
-        let plant = S::open(open, &parameters[..self.own()])?;
-        let acting: Vec<usize> = (0..self.placements.len()).filter(|&i| self.acts(i, parameters)).collect();
-        let mut dynamics = self.driven(plant, &acting, job, parameters);
-        let start = dynamics.start(parameters)?;
+        let acting = self.acting(parameters);
+        let inputs = self.inputs(&acting, job, parameters)?;
+        let simulation = Simulation {
+            plant: &|| self.affected(&acting, job, parameters),
+            inputs: &|| inputs.clone(),
+            shows: &self.untouched(&acting),
+            tolerance: &self.tolerance(),
+        };
         let signals = wanted(job, &self.interface.signals);
-        let initial: Vec<S> = job.signals.iter().map(|&signal| dynamics.measured(signal, 0.0, &start)).collect();
-        let mut recording = record(&mut dynamics, &start, job.horizon, &self.tolerance(open), &signals)?;
-        recording.set_initial(&initial);
+        let (recording, plant) = simulation.run(job, &signals)?;
         // What a recorded signal was before the record is not known.
         let earlier = if job.case.experiment.is_some() { Earlier::Extrapolated } else { Earlier::Constant };
-        Ok(dynamics.delayed_sensors(recording, &signals.signals, earlier))
+        Ok(plant.delayed_sensors(recording, &signals.signals, earlier))
     }
+}
+
+/// Returns the names of the states whose equations contain a force, in the order of the forces.
+fn balances(of: &Interface) -> impl Iterator<Item = &String> {
+    of.ports.iter().filter_map(|port| match port {
+        Port::Process { state, .. } => Some(state),
+        _ => None,
+    })
 }
 
 impl Site {

@@ -1,12 +1,12 @@
 //! Sensor effects with a delay: applied after the simulation, as no other quantity depends on them.
 
-use mops_core::{Earlier, Opening};
+use mops_core::{Earlier, PlantScalar};
 
 use super::Site;
-use super::dynamics::Driven;
+use super::plant::Affected;
 use crate::kernel::Recording;
 
-impl<S: Opening> Driven<'_, S> {
+impl<S: PlantScalar> Affected<'_, S> {
     /// Applies sensor effects with a delay to the recording.
     pub(super) fn delayed_sensors(
         &self,
@@ -14,10 +14,10 @@ impl<S: Opening> Driven<'_, S> {
         signals: &[(usize, String)],
         earlier: Earlier,
     ) -> Recording {
-        for actor in &self.actors {
-            let Site::Sensor { signal } = actor.place.site else { continue };
+        for effect in &self.effects {
+            let Site::Sensor { signal } = effect.place.site else { continue };
             let Some(index) = signals.iter().position(|(s, _)| *s == signal) else { continue };
-            if let Some(delay) = actor.acting.delay() {
+            if let Some(delay) = effect.effect.delay() {
                 let time = delay.value();
                 let value = &mut recording.response.traces[index].1;
                 for (tangent, &late) in recording.tangents.iter_mut().zip(delay.tangents()) {

@@ -15,6 +15,8 @@ use crate::equations::EquationsOptions;
 use crate::kernel::{PlantModel, Simulated, mechanism};
 use crate::tests::{check_tangents_by, respond};
 
+mod past;
+
 fn equations(text: &str) -> Arc<dyn Model> {
     let options: EquationsOptions = toml::from_str(text).expect("it is TOML");
     Arc::from(options.build().expect("it is a model"))
@@ -135,7 +137,7 @@ fn a_disturbance_acts_as_an_input_that_adds_the_same_rate() {
             let job = Job { case, parameters, signals: &[0, 1], horizon: 4.9 };
             model.along(&job, &[0.55, 2.05]).expect("it simulates")
         });
-        for (a, b) in moments[0].iter().zip(&moments[1]) {
+        for (a, b) in moments[0].moments.iter().zip(&moments[1].moments) {
             assert!((a.rates[1] - b.rates[1]).abs() < 1e-7, "{:?} {:?}", a.rates, b.rates);
             // The columns of the input and of the force are equal.
             assert_eq!(a.b[(1, 0)], a.b[(1, 1)]);
@@ -230,7 +232,7 @@ fn a_stop_is_a_spring_in_the_linear_system_while_it_is_reached() {
     let job = Job { case: &Case::default(), parameters: &parameters, signals: &[0], horizon: 0.3 };
     // Reached at 0.1 s, for at most half a period, 63 ms.
     let moments = model.along(&job, &[0.05, 0.12, 0.2]).expect("it simulates");
-    let stiffness: Vec<f64> = moments.iter().map(|moment| moment.a[(1, 0)]).collect();
+    let stiffness: Vec<f64> = moments.moments.iter().map(|moment| moment.a[(1, 0)]).collect();
     assert_eq!(stiffness, [0.0, -k / m, 0.0]);
 }
 

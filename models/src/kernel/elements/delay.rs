@@ -2,14 +2,15 @@
 
 use std::collections::VecDeque;
 
-use mops_core::{Instant, Past, Plant, Scalar, Tolerance, Trace};
+use mops_core::plant::{Memory, Past};
+use mops_core::{Instant, Plant, Scalar, Tolerance, Trace};
 
 use crate::kernel::{allowed, common, is_due};
 
 /// Delay `y(t) = u(t - time)`, with `u(t) = before` for t < 0.
 ///
 /// The model that owns a delay takes steps no longer than [`Delay::longest_step`] and ends steps at
-/// [`Delay::next_break`]. It passes on `u` along every accepted step ([`crate::kernel::Dynamics::accepted`]). `u` is
+/// [`Delay::next_break`]. It passes on `u` along every accepted step ([`Memory::remember`]). `u` is
 /// stored as the quartic through its values at five nodes of each step. A step ends where a jump of `u`, of its rate or of its
 /// curvature reaches the output.
 ///
@@ -110,6 +111,13 @@ impl<S: Scalar> Delay<S> {
     /// Returns the largest absolute value of the signal so far.
     pub fn size(&self) -> f64 {
         self.size
+    }
+
+    /// Takes the past as constant.
+    pub fn hold(&mut self, before: S) {
+        self.before = before;
+        self.pieces.clear();
+        self.ahead.clear();
     }
 
     /// Sets the value before the start.
@@ -221,7 +229,7 @@ const BENDING: u8 = 1;
 /// Lets the jumps of delayed quantities that are due take effect; `settle` determines the mode of the plant. A jump that moves with
 /// the parameters moves the state by the jump of its rates. Returns the derivatives of the time of the jump of lowest derivative,
 /// NaN if several signals jump or bend with different ones.
-pub(crate) fn pass_delays<S: Scalar, P: Plant<S>>(
+pub(crate) fn pass_delays<S: Scalar, P: Plant<S> + Memory<S>>(
     plant: &mut P,
     delays: impl Fn(&mut P) -> &mut [Delay<S>],
     settle: impl Fn(&mut P, &Instant<'_, S>),

@@ -1,11 +1,11 @@
 //! Elements in small systems, compared with closed forms.
 
-use mops_core::math;
-use mops_core::{Dual, Scalar, Trace};
+use mops_core::plant::{Breaks, Events, InputRates, Memory, Past};
+use mops_core::{Dual, EventInstant, Instant, Plant, Scalar, Trace, math};
 
 use super::delay::Restart;
 use super::*;
-use crate::kernel::{Dynamics, Sink, Step, Tolerance, integrate};
+use crate::kernel::{Driven, Sink, Step, Tolerance, integrate};
 
 const TIGHT: Tolerance = Tolerance { relative: 1e-10, absolute: Some(1e-12), max_steps: 100_000, ..Tolerance::DEFAULT };
 
@@ -17,12 +17,12 @@ struct Record<F> {
     events: Vec<f64>,
 }
 
-impl<D: Dynamics<f64>, F: Fn(&D, f64, &[f64]) -> f64> Sink<f64, D> for Record<F> {
-    fn step(&mut self, step: &Step<f64>, dynamics: &D) {
+impl<P: Plant<f64>, F: Fn(&P, f64, &[f64]) -> f64> Sink<f64, P> for Record<F> {
+    fn step(&mut self, step: &Step<f64>, system: &Driven<'_, f64, P>) {
         let mut x = vec![0.0; self.states];
         let values = Trace::NODES.map(|s| {
             step.state(s, &mut x);
-            (self.signal)(dynamics, step.start + s * step.taken, &x)
+            (self.signal)(&system.plant, step.start + s * step.taken, &x)
         });
         self.trace.push(step.start + step.taken, values);
     }
@@ -32,14 +32,14 @@ impl<D: Dynamics<f64>, F: Fn(&D, f64, &[f64]) -> f64> Sink<f64, D> for Record<F>
     }
 }
 
-fn simulate<D: Dynamics<f64>, F: Fn(&D, f64, &[f64]) -> f64>(
-    mut dynamics: D,
+fn simulate<P: Plant<f64>, F: Fn(&P, f64, &[f64]) -> f64>(
+    plant: P,
     start: &[f64],
     end: f64,
     signal: F,
 ) -> (Trace, Vec<f64>) {
     let mut record = Record { states: start.len(), signal, trace: Trace::starting_at(0.0, 64), events: Vec::new() };
-    integrate(&mut dynamics, 0.0, end, start, &TIGHT, &mut record).expect("it simulates");
+    integrate(&mut Driven::alone(plant), 0.0, end, start, &TIGHT, &mut record).expect("it simulates");
     (record.trace, record.events)
 }
 
@@ -85,9 +85,12 @@ fn invalid_bearing_friction_is_an_error() {
 
 /// Mass on a spring and a damper.
 struct Sprung(SpringDamper<f64>);
-impl Dynamics<f64> for Sprung {
-    fn derivative(&self, _: f64, x: &[f64], dx: &mut [f64]) {
-        dx.copy_from_slice(&[x[1], -self.0.torque(x[0], x[1])]);
+impl Plant<f64> for Sprung {
+    fn start(&self) -> Vec<f64> {
+        Vec::new()
+    }
+    fn rates(&self, at: &Instant<'_, f64>, dx: &mut [f64]) {
+        dx.copy_from_slice(&[at.x[1], -self.0.torque(at.x[0], at.x[1])]);
     }
 }
 
@@ -150,21 +153,33 @@ impl Element for Backlash<f64> {
     }
 }
 
-impl<E: Element> Dynamics<f64> for Through<E> {
-    fn derivative(&self, t: f64, _: &[f64], dx: &mut [f64]) {
-        dx[0] = self.0.output(2.0 * math::sin(t));
+impl<E: Element> Plant<f64> for Through<E> {
+    fn start(&self) -> Vec<f64> {
+        Vec::new()
+    }
+    fn rates(&self, at: &Instant<'_, f64>, dx: &mut [f64]) {
+        dx[0] = self.0.output(2.0 * math::sin(at.t));
     }
     fn longest_step(&self) -> f64 {
         0.4
     }
+    fn events(&self) -> Option<&dyn Events<f64>> {
+        Some(self)
+    }
+    fn events_mut(&mut self) -> Option<&mut dyn Events<f64>> {
+        Some(self)
+    }
+}
+
+impl<E: Element> Events<f64> for Through<E> {
     fn guards(&self) -> usize {
         1
     }
-    fn guard(&self, _: usize, t: f64, _: &[f64]) -> f64 {
-        self.0.guard(2.0 * math::sin(t), 2.0 * math::cos(t))
+    fn guard(&self, _: usize, at: &Instant<'_, f64>, _: InputRates<'_>) -> f64 {
+        self.0.guard(2.0 * math::sin(at.t), 2.0 * math::cos(at.t))
     }
-    fn switch(&mut self, _: usize, t: f64, _: &mut [f64]) -> &str {
-        self.0.switch(2.0 * math::sin(t));
+    fn switch(&mut self, _: usize, event: &EventInstant<'_, f64>, _: &mut [f64]) -> &str {
+        self.0.switch(2.0 * math::sin(event.at.t));
         ""
     }
 }
@@ -222,16 +237,19 @@ fn a_backlash_that_is_moved_by_a_jump_is_pushed_along() {
 
 /// First-order lag `T y' = 1 - y`.
 struct Lagging<S>(Lag<S>);
-impl<S: Scalar> Dynamics<S> for Lagging<S> {
-    fn derivative(&self, _: f64, x: &[S], dx: &mut [S]) {
-        dx[0] = self.0.derivative(S::from(1.0), x[0]);
+impl<S: Scalar> Plant<S> for Lagging<S> {
+    fn start(&self) -> Vec<S> {
+        Vec::new()
+    }
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        dx[0] = self.0.derivative(S::from(1.0), at.x[0]);
     }
 }
 
 #[test]
 fn a_lag_approaches_a_step_exponentially() {
     let start = [Dual::<1>::from(0.0)];
-    let mut lag = Lagging(Lag { time: Dual::variable(0.5, 0) });
+    let mut lag = Driven::alone(Lagging(Lag { time: Dual::variable(0.5, 0) }));
     let (y, _) = integrate(&mut lag, 0.0, 2.0, &start, &TIGHT, &mut ()).unwrap();
     // y = 1 - exp(-t/T), dy/dT = -t/T^2 exp(-t/T).
     near(y[0].value, 1.0 - math::exp(-4.0), 1e-10);
@@ -240,32 +258,57 @@ fn a_lag_approaches_a_step_exponentially() {
 
 /// Delayed feedback `y' = -y(t - T)`, with `y = 1` up to time 0.
 struct Delayed<S>(Delay<S>);
-impl<S: Scalar> Dynamics<S> for Delayed<S> {
-    fn derivative(&self, t: f64, _: &[S], dx: &mut [S]) {
-        dx[0] = -self.0.at(t);
+impl<S: Scalar> Plant<S> for Delayed<S> {
+    fn start(&self) -> Vec<S> {
+        Vec::new()
+    }
+    fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
+        dx[0] = -self.0.at(at.t);
     }
     fn longest_step(&self) -> f64 {
         self.0.longest_step()
     }
-    fn next_break(&self, t: f64) -> f64 {
+    fn breaks(&self) -> Option<&dyn Breaks<S>> {
+        Some(self)
+    }
+    fn breaks_mut(&mut self) -> Option<&mut dyn Breaks<S>> {
+        Some(self)
+    }
+    fn memory(&self) -> Option<&dyn Memory<S>> {
+        Some(self)
+    }
+    fn memory_mut(&mut self) -> Option<&mut dyn Memory<S>> {
+        Some(self)
+    }
+}
+
+impl<S: Scalar> Breaks<S> for Delayed<S> {
+    fn next(&self, t: f64) -> f64 {
         self.0.next_break(t)
     }
-    fn pass_break(&mut self, t: f64, _: &mut [S]) -> S {
-        let derivative = self.0.pass_break(t).map(|arrival| arrival.derivative + 1);
+    fn pass(&mut self, at: &Instant<'_, S>, _: &mut [S]) -> S {
+        let derivative = self.0.pass_break(at.t).map(|arrival| arrival.derivative + 1);
         self.0.restart(Restart { derivative, moves: S::from(0.0), jumps: true });
         S::from(0.0)
     }
-    fn remembers(&self) -> bool {
+}
+
+impl<S: Scalar> Memory<S> for Delayed<S> {
+    fn begin(&mut self, _: &Instant<'_, S>, _: &mut [S]) {}
+    fn delays(&self) -> Vec<f64> {
+        vec![self.0.time().value()]
+    }
+    fn past(&self, at: &Instant<'_, S>) -> Vec<S> {
+        at.x.to_vec()
+    }
+    fn remember(&mut self, over: &Past<'_, S>) -> bool {
+        self.0.push(over.time, over.values.each_ref().map(|values| values[0]), 1e-10);
         true
     }
-    fn accepted(&mut self, step: &Step<S>) {
-        let mut x = [S::from(0.0)];
-        let nodes = Trace::NODES.map(|s| {
-            step.state(s, &mut x);
-            x[0]
-        });
-        self.0.push([step.start, step.start + step.taken], nodes, 1e-10);
+    fn delayed(&self, t: f64) -> Vec<S> {
+        vec![self.0.at(t)]
     }
+    fn hold(&mut self, _: &[S]) {}
 }
 
 #[test]
@@ -280,35 +323,65 @@ fn a_delayed_feedback_is_its_polynomials() {
         near(y.at(t), exact(t), 1e-9);
     }
     // dy/dT at t = 2.5: -(t - T) + (t - 2T)^2 at T = 1.
-    let mut dynamics = Delayed(Delay::new(Dual::<1>::variable(1.0, 0), Dual::from(1.0)));
-    let (y, _) = integrate(&mut dynamics, 0.0, 2.5, &[Dual::from(1.0)], &TIGHT, &mut ()).unwrap();
+    let mut delayed = Driven::alone(Delayed(Delay::new(Dual::<1>::variable(1.0, 0), Dual::from(1.0))));
+    let (y, _) = integrate(&mut delayed, 0.0, 2.5, &[Dual::from(1.0)], &TIGHT, &mut ()).unwrap();
     near(y[0].tangent[0], -1.5 + 0.25, 1e-8);
 }
 
 /// Integral of a step from 0 to 1 at 0.3 s, delayed by half a second.
 struct DelayedStep(Delay<f64>, f64);
-impl Dynamics<f64> for DelayedStep {
-    fn derivative(&self, t: f64, _: &[f64], dx: &mut [f64]) {
-        dx[0] = self.0.at(t);
+impl Plant<f64> for DelayedStep {
+    fn start(&self) -> Vec<f64> {
+        Vec::new()
+    }
+    fn rates(&self, at: &Instant<'_, f64>, dx: &mut [f64]) {
+        dx[0] = self.0.at(at.t);
     }
     fn longest_step(&self) -> f64 {
         self.0.longest_step()
     }
-    fn next_break(&self, t: f64) -> f64 {
+    fn breaks(&self) -> Option<&dyn Breaks<f64>> {
+        Some(self)
+    }
+    fn breaks_mut(&mut self) -> Option<&mut dyn Breaks<f64>> {
+        Some(self)
+    }
+    fn memory(&self) -> Option<&dyn Memory<f64>> {
+        Some(self)
+    }
+    fn memory_mut(&mut self) -> Option<&mut dyn Memory<f64>> {
+        Some(self)
+    }
+}
+
+impl Breaks<f64> for DelayedStep {
+    fn next(&self, t: f64) -> f64 {
         self.0.next_break(t).min(if t < 0.3 { 0.3 } else { f64::INFINITY })
     }
-    fn pass_break(&mut self, t: f64, _: &mut [f64]) -> f64 {
-        self.0.pass_break(t);
+    fn pass(&mut self, at: &Instant<'_, f64>, _: &mut [f64]) -> f64 {
+        self.0.pass_break(at.t);
         self.0.restart(Restart::fixed());
-        self.1 = f64::from(u8::from(t >= 0.3));
+        self.1 = f64::from(u8::from(at.t >= 0.3));
         0.0
     }
-    fn remembers(&self) -> bool {
+}
+
+impl Memory<f64> for DelayedStep {
+    fn begin(&mut self, _: &Instant<'_, f64>, _: &mut [f64]) {}
+    fn delays(&self) -> Vec<f64> {
+        vec![self.0.time().value()]
+    }
+    fn past(&self, _: &Instant<'_, f64>) -> Vec<f64> {
+        vec![self.1]
+    }
+    fn remember(&mut self, over: &Past<'_, f64>) -> bool {
+        self.0.push(over.time, over.values.each_ref().map(|values| values[0]), 1e-10);
         true
     }
-    fn accepted(&mut self, step: &Step<f64>) {
-        self.0.push([step.start, step.start + step.taken], [self.1; 5], 1e-10);
+    fn delayed(&self, t: f64) -> Vec<f64> {
+        vec![self.0.at(t)]
     }
+    fn hold(&mut self, _: &[f64]) {}
 }
 
 #[test]

@@ -4,7 +4,7 @@ use mops_core::math;
 use mops_core::{Dual, Scalar};
 
 use super::*;
-use crate::kernel::{Driven, Dynamics, Sink, Step, Tolerance, integrate};
+use crate::kernel::{Driven, Inputs, Sink, Step, Tolerance, integrate};
 
 const TIGHT: Tolerance = Tolerance { relative: 1e-11, absolute: Some(1e-12), max_steps: 100_000, ..Tolerance::DEFAULT };
 
@@ -25,14 +25,14 @@ fn mechanism<S: Scalar, B: Bodies<S, N>, const N: usize>(
 where
     Mechanism<S, B, N>: 'static,
 {
-    Driven::new(Mechanism::new(bodies, friction, joints, start), Vec::new(), N, &[])
+    Driven::new(Mechanism::new(bodies, friction, joints, start), Inputs::new(Vec::new(), N), &[])
 }
 
 #[derive(Default)]
 struct Events(Vec<(f64, String)>);
 
-impl<S: Scalar, D: Dynamics<S>> Sink<S, D> for Events {
-    fn step(&mut self, _: &Step<S>, _: &D) {}
+impl<S: Scalar, P: Plant<S>> Sink<S, P> for Events {
+    fn step(&mut self, _: &Step<S>, _: &Driven<'_, S, P>) {}
     fn reads_steps(&self) -> bool {
         false
     }

@@ -2,17 +2,20 @@
 
 use super::*;
 use mops_core::Halt;
-use mops_core::math;
+use mops_core::{Instant, Plant, math};
 
 /// State with this constant rate, 0 or that of the clock, so that steps are as long as possible. The signal is a
 /// function of time and state.
 struct Idle<F>(f64, F);
-impl<S: Scalar, F: Fn(f64, S) -> S> Dynamics<S> for Idle<F> {
-    fn derivative(&self, _: f64, _: &[S], dx: &mut [S]) {
+impl<S: Scalar, F: Fn(f64, S) -> S> Plant<S> for Idle<F> {
+    fn start(&self) -> Vec<S> {
+        vec![S::from(0.0)]
+    }
+    fn rates(&self, _: &Instant<'_, S>, dx: &mut [S]) {
         dx[0] = S::from(self.0);
     }
-    fn signal(&self, _: usize, t: f64, x: &[S]) -> S {
-        self.1(t, x[0])
+    fn signal(&self, _: usize, at: &Instant<'_, S>) -> S {
+        self.1(at.t, at.x[0])
     }
 }
 
@@ -22,7 +25,7 @@ const TOLERANCE: Tolerance = Tolerance { max_steps: 1000, ..Tolerance::DEFAULT }
 /// times.
 fn difference<S: Scalar>(start: S, rate: f64, horizon: f64, f: impl Fn(f64, S) -> S) -> [f64; 2] {
     let signals = vec![(0, "y".to_owned())].into();
-    let recording = record(&mut Idle(rate, &f), &[start], horizon, &TOLERANCE, &signals).unwrap();
+    let recording = record(&mut Driven::alone(Idle(rate, &f)), &[start], horizon, &TOLERANCE, &signals).unwrap();
     let traces = std::iter::once(&recording.response).chain(&recording.tangents).map(|r| &r.traces[0].1);
     let mut largest = [0.0_f64; 2];
     for (k, trace) in traces.enumerate() {
@@ -73,7 +76,7 @@ fn a_signal_far_faster_than_its_state_keeps_its_size() {
 fn a_signal_that_jumps_within_a_step_is_recorded_all_the_same() {
     let signals = vec![(0, "y".to_owned())].into();
     let jump = |t: f64, _: f64| if t < 7.3 { 0.0 } else { 1.0 };
-    let recording = record(&mut Idle(0.0, jump), &[0.0], 10.0, &TOLERANCE, &signals).unwrap();
+    let recording = record(&mut Driven::alone(Idle(0.0, jump)), &[0.0], 10.0, &TOLERANCE, &signals).unwrap();
     let trace = &recording.response.traces[0].1;
     assert!(trace.knots().len() < 200, "{}", trace.knots().len());
     assert!((trace.at(7.29), trace.at(7.31)) == (0.0, 1.0));
@@ -81,16 +84,19 @@ fn a_signal_that_jumps_within_a_step_is_recorded_all_the_same() {
 
 /// System `y' = 1` in steps of 1 s. Every signal is `y`; each evaluation calls the function with its time.
 struct Clock<F>(F);
-impl<S: Scalar, F: Fn(f64)> Dynamics<S> for Clock<F> {
-    fn derivative(&self, _: f64, _: &[S], dx: &mut [S]) {
+impl<S: Scalar, F: Fn(f64)> Plant<S> for Clock<F> {
+    fn start(&self) -> Vec<S> {
+        vec![S::from(0.0)]
+    }
+    fn rates(&self, _: &Instant<'_, S>, dx: &mut [S]) {
         dx[0] = S::from(1.0);
     }
     fn longest_step(&self) -> f64 {
         1.0
     }
-    fn signal(&self, _: usize, t: f64, x: &[S]) -> S {
-        self.0(t);
-        x[0]
+    fn signal(&self, _: usize, at: &Instant<'_, S>) -> S {
+        self.0(at.t);
+        at.x[0]
     }
 }
 
@@ -101,12 +107,12 @@ fn the_limit_of_a_recording_counts_tangents_and_signals() {
         let wanted = (0..signals).map(|i| (i, format!("y{i}"))).collect::<Vec<_>>().into();
         let room = 100 * signals * SEGMENT;
         // Steps of 1 s: the limit allows 100 of them, and a quarter of that with three tangents.
-        let run = |end: f64| record_within(room, &mut Clock(|_| ()), (&[0.0], end), &endless, &wanted);
+        let run = |end: f64| record_within(room, &mut Driven::alone(Clock(|_| ())), (&[0.0], end), &endless, &wanted);
         assert!(run(95.0).is_ok());
         let Err(Failure::RecordLimit(t)) = run(1e300) else { panic!("it ends") };
         assert!((95.0..=105.0).contains(&t), "{t}");
         let start = [Dual::<3>::from(0.0)];
-        let run = |end: f64| record_within(room, &mut Clock(|_| ()), (&start, end), &endless, &wanted);
+        let run = |end: f64| record_within(room, &mut Driven::alone(Clock(|_| ())), (&start, end), &endless, &wanted);
         assert!(run(20.0).is_ok());
         let Err(Failure::RecordLimit(t)) = run(1e300) else { panic!("it ends") };
         assert!((20.0..=30.0).contains(&t), "{t}");
@@ -123,14 +129,14 @@ fn a_simulation_ends_at_the_step_after_the_request() {
             wanted.cancellation = request.patient();
         }
         // Requested during the simulation, at 50 s.
-        let mut clock = Clock(|t: f64| {
+        let mut clock = Driven::alone(Clock(|t: f64| {
             if t > 50.0 {
                 request.request(why);
             }
             if t > 80.0 {
                 request.insist();
             }
-        });
+        }));
         let end = if patient { 70.0 } else { 1e300 };
         let found = record(&mut clock, &[0.0], end, &endless, &wanted);
         assert_eq!(found.err(), (!patient).then_some(Failure::Cancelled));
