@@ -9,7 +9,7 @@ use mops::core::{DIRECTIONS, Dual, Dual7, Job, Work};
 use mops::models::furuta::{Furuta, FurutaPlant};
 use mops::models::kernel::drive::Drive;
 use mops::models::kernel::friction::Contact;
-use mops::models::kernel::{Driven, Inputs, Sink, Step, Tolerance, integrate};
+use mops::models::kernel::{Driven, Inputs, Integrable, Sink, Step, Tolerance, integrate};
 use mops::{Analysis, Case, Input, Model, Scalar};
 
 const END: f64 = 3.0;
@@ -125,7 +125,11 @@ fn median(mut numbers: Vec<f64>) -> f64 {
 }
 
 /// Simulates the plant of the model with the kernel.
-fn simulate<S: Scalar>(parameters: [S; 8], input: &Input, sink: &mut impl Sink<S, FurutaPlant<S>>) -> (Vec<S>, Work) {
+fn simulate<S: Scalar>(
+    parameters: [S; 8],
+    input: &Input,
+    sink: &mut impl for<'p> Sink<S, dyn Integrable<S> + 'p>,
+) -> (Vec<S>, Work) {
     let [a, b, c, d, ba, bp, ca, cp] = parameters;
     let start = START.map(S::from);
     let plant = FurutaPlant { a, b, c, d, viscous: [bp, ba], coulomb: [cp, ca], start, contact: [Contact::Forward; 2] };
@@ -147,7 +151,7 @@ fn analysis(physical: [f64; 8]) -> impl Fn() -> Analysis {
 /// Counts events.
 struct Events(usize);
 
-impl<P> Sink<f64, P> for Events {
+impl<P: ?Sized> Sink<f64, P> for Events {
     fn step(&mut self, _: &Step<f64>, _: &Driven<'_, f64, P>) {}
     fn event(&mut self, _: f64, _: &str) {
         self.0 += 1;
@@ -164,7 +168,7 @@ fn sample_time(i: usize) -> f64 {
     END * i as f64 / (SAMPLES - 1) as f64
 }
 
-impl<P> Sink<f64, P> for Samples {
+impl<P: ?Sized> Sink<f64, P> for Samples {
     fn step(&mut self, step: &Step<f64>, _: &Driven<'_, f64, P>) {
         while self.states.len() < SAMPLES && sample_time(self.states.len()) <= step.start + step.taken {
             let mut x = [0.0; 4];

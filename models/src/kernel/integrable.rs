@@ -37,11 +37,15 @@ impl<S: Scalar, P: Plant<S>> WithInputs<'_, '_, S, P> {
     // Not a closure: those are not inlined into the stages.
     #[inline(always)]
     pub(super) fn derivative(&self, t: f64, x: &[S], dx: &mut [S]) {
-        if let Some(at) = self.inputs.constant_at(t, x) {
-            return self.plant.rates(&at, dx);
-        }
-        let varying = self.inputs.varying_at(t);
-        self.plant.rates(&varying.at(x), dx);
+        let varying;
+        let at = match self.inputs.constant_at(t, x) {
+            Some(at) => at,
+            None => {
+                varying = self.inputs.varying_at(t);
+                varying.at(x)
+            }
+        };
+        self.plant.rates(&at, dx);
     }
 }
 

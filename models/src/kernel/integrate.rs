@@ -1,6 +1,6 @@
 //! Integration over all steps, with breaks and events.
 
-use mops_core::{Failure, Scalar, Work};
+use mops_core::{Failure, Plant, Scalar, Work};
 
 use super::dormand_prince::DormandPrince;
 use super::esdirk::Esdirk;
@@ -88,21 +88,33 @@ impl Limits {
     }
 }
 
-/// Integrates from `t` to `end` and reports every step and event to `sink`.
+/// Integrates from `t` to `end` and reports every step and event to `sink`. The loop is compiled once for all plants.
 ///
 /// # Errors
 /// The state becomes infinite, the step limit is reached, or the step size underflows.
-pub fn integrate<S: Scalar, P: Integrable<S> + ?Sized>(
+pub fn integrate<S: Scalar, P: Plant<S>>(
     system: &mut Driven<'_, S, P>,
     t: f64,
     end: f64,
     x: &[S],
     tolerance: &Tolerance,
+    sink: &mut impl for<'p> Sink<S, dyn Integrable<S> + 'p>,
+) -> Integrated<S> {
+    let system: &mut Driven<'_, S, dyn Integrable<S> + '_> = system;
+    integrate_for(system, (t, end), x, tolerance, sink)
+}
+
+/// Integrates for a sink that looks into the plant; otherwise as [`integrate`].
+pub(crate) fn integrate_for<S: Scalar, P: Integrable<S> + ?Sized>(
+    system: &mut Driven<'_, S, P>,
+    span: (f64, f64),
+    x: &[S],
+    tolerance: &Tolerance,
     sink: &mut impl Sink<S, P>,
 ) -> Integrated<S> {
     match tolerance.method {
-        IntegrationMethod::Explicit => run::<S, P, DormandPrince<S>>(system, (t, end), x, tolerance, sink),
-        IntegrationMethod::Stiff => run::<S, P, Esdirk<S>>(system, (t, end), x, tolerance, sink),
+        IntegrationMethod::Explicit => run::<S, P, DormandPrince<S>>(system, span, x, tolerance, sink),
+        IntegrationMethod::Stiff => run::<S, P, Esdirk<S>>(system, span, x, tolerance, sink),
     }
 }
 
@@ -264,7 +276,7 @@ fn all_finite<S: Scalar>(x: &[S]) -> bool {
 mod tests {
     use super::*;
     use mops_core::plant::{self, InputRates};
-    use mops_core::{Dual, EventInstant, Instant, Plant, math};
+    use mops_core::{Dual, EventInstant, Instant, math};
 
     /// Harmonic oscillator `x'' = -x`.
     struct Oscillator;

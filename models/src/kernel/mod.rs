@@ -69,6 +69,7 @@ pub(crate) use events::{common, shift};
 pub use inputs::Inputs;
 pub use integrable::Integrable;
 pub use integrate::integrate;
+pub(crate) use integrate::integrate_for;
 pub(crate) use local::rests;
 pub use plant_model::{PlantModel, Simulated};
 pub(crate) use plant_model::{Simulation, cut_at, shown};

@@ -9,7 +9,7 @@ use mops_core::{
 };
 
 use super::drive::Drive;
-use super::{Driven, Inputs, Integrable, Recording, Tolerance, Wanted, local, record, tangents_of, wanted};
+use super::{Driven, Inputs, Recording, Tolerance, Wanted, local, record, tangents_of, wanted};
 
 /// Plant that is written once over the scalar, with its interface; [`Simulated`] turns it into a model.
 ///
@@ -216,8 +216,7 @@ impl<'a, S: Scalar, P: Plant<S>> Simulation<'_, 'a, S, P> {
         let mut driven = self.driven()?;
         let start = driven.begin()?;
         let jumps = driven.jumps_at_start();
-        let integrated: &mut Driven<'_, S, dyn Integrable<S> + '_> = &mut driven;
-        let recording = record(integrated, &start, job.horizon, self.tolerance, wanted);
+        let recording = record(&mut driven, &start, job.horizon, self.tolerance, wanted);
         let mut recording = recording.map_err(|failure| driven.plant.explain(failure))?;
         if jumps {
             let mut before = self.driven()?;

@@ -2,7 +2,7 @@
 
 use mops_core::enclosure::Enclosure;
 use mops_core::{
-    Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Response, Scalar, Trace, WithTangents,
+    Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Plant, Response, Scalar, Trace, WithTangents,
 };
 
 use super::integrable::Integrable;
@@ -425,7 +425,7 @@ impl<S: Scalar, P: Integrable<S> + ?Sized> Sink<S, P> for Recorder<'_, S> {
 ///
 /// # Errors
 /// The failure of the simulation.
-pub fn record<S: Scalar, P: Integrable<S> + ?Sized>(
+pub fn record<S: Scalar, P: Plant<S>>(
     system: &mut Driven<'_, S, P>,
     start: &[S],
     end: f64,
@@ -448,7 +448,7 @@ impl Recording {
 }
 
 /// Implements [`record`] with a limit on the recorded bytes.
-fn record_within<S: Scalar, P: Integrable<S> + ?Sized>(
+fn record_within<S: Scalar, P: Plant<S>>(
     room: usize,
     system: &mut Driven<'_, S, P>,
     (start, end): (&[S], f64),

@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 
 use super::WithEffects;
 use super::plant::{Affected, fixed};
-use crate::kernel::{Driven, Sink, Step, integrate, is_due};
+use crate::kernel::{Driven, Sink, Step, integrate_for, is_due};
 
 /// Simulation with its linearisation along it.
 ///
@@ -203,7 +203,7 @@ impl WithEffects {
             sliding: Vec::new(),
             found: Vec::with_capacity(all.len()),
         };
-        integrate(&mut driven, 0.0, end, &start, &self.tolerance(), &mut looks)?;
+        integrate_for(&mut driven, (0.0, end), &start, &self.tolerance(), &mut looks)?;
 
         let parameters: Vec<Dual7> = job.parameters.iter().map(|&p| p.into()).collect();
         let inputs = self.inputs(&acting, job, &parameters)?;
@@ -448,6 +448,8 @@ impl Linear<'_, '_> {
 
 #[cfg(test)]
 mod tests {
+    use mops_core::math;
+
     use super::*;
 
     #[test]
@@ -468,7 +470,7 @@ mod tests {
             }
             let found = system.lu().solve(&right).expect("it is regular");
             let [real, imaginary] = [0, LINE].map(|first| found.rows(first, LINE).sum());
-            let off = (real - mops_core::math::cos(w)).hypot(imaginary + mops_core::math::sin(w));
+            let off = math::hypot(real - math::cos(w), imaginary + math::sin(w));
             assert!(off < 0.01, "{w}: {real} {imaginary}");
         }
     }

@@ -9,22 +9,16 @@ use crate::kernel::{Driven, Sink, Step, Tolerance, integrate};
 
 const TIGHT: Tolerance = Tolerance { relative: 1e-10, absolute: Some(1e-12), max_steps: 100_000, ..Tolerance::DEFAULT };
 
-/// Records a signal and the times of the events.
-struct Record<F> {
-    states: usize,
-    signal: F,
+/// Records signal 0 and the times of the events.
+struct Record {
     trace: Trace,
     events: Vec<f64>,
 }
 
-impl<P: Plant<f64>, F: Fn(&P, f64, &[f64]) -> f64> Sink<f64, P> for Record<F> {
+impl<P: Plant<f64> + ?Sized> Sink<f64, P> for Record {
     fn step(&mut self, step: &Step<f64>, system: &Driven<'_, f64, P>) {
-        let mut x = vec![0.0; self.states];
-        let values = Trace::NODES.map(|s| {
-            step.state(s, &mut x);
-            (self.signal)(&system.plant, step.start + s * step.taken, &x)
-        });
-        self.trace.push(step.start + step.taken, values);
+        let value = |s: f64| system.signal(0, step.start + s * step.taken, &step.state_at(s));
+        self.trace.push(step.start + step.taken, Trace::NODES.map(value));
     }
 
     fn event(&mut self, t: f64, _: &str) {
@@ -32,13 +26,9 @@ impl<P: Plant<f64>, F: Fn(&P, f64, &[f64]) -> f64> Sink<f64, P> for Record<F> {
     }
 }
 
-fn simulate<P: Plant<f64>, F: Fn(&P, f64, &[f64]) -> f64>(
-    plant: P,
-    start: &[f64],
-    end: f64,
-    signal: F,
-) -> (Trace, Vec<f64>) {
-    let mut record = Record { states: start.len(), signal, trace: Trace::starting_at(0.0, 64), events: Vec::new() };
+/// Returns the first state, or signal 0 of a plant that has signals, and the times of the events.
+fn simulate(plant: impl Plant<f64>, start: &[f64], end: f64) -> (Trace, Vec<f64>) {
+    let mut record = Record { trace: Trace::starting_at(0.0, 64), events: Vec::new() };
     integrate(&mut Driven::alone(plant), 0.0, end, start, &TIGHT, &mut record).expect("it simulates");
     (record.trace, record.events)
 }
@@ -99,7 +89,7 @@ fn a_mass_on_a_spring_and_a_damper_is_a_damped_oscillation() {
     // x'' + 2 D w x' + w^2 (x - 1) = 0 with w = 3, D = 0.2, starting at rest from x = 2.
     let (w, d): (f64, f64) = (3.0, 0.2);
     let element = SpringDamper { spring: w * w, damper: 2.0 * d * w, rest: 1.0 };
-    let (x, _) = simulate(Sprung(element), &[2.0, 0.0], 4.0, |_, _, x| x[0]);
+    let (x, _) = simulate(Sprung(element), &[2.0, 0.0], 4.0);
     let wd = w * (1.0 - d * d).sqrt();
     for t in [0.3_f64, 1.0, 2.7, 4.0] {
         let exact = 1.0 + math::exp(-d * w * t) * (math::cos(wd * t) + d * w / wd * math::sin(wd * t));
@@ -109,7 +99,14 @@ fn a_mass_on_a_spring_and_a_damper_is_a_damped_oscillation() {
 }
 
 /// System `x' = y`, where `y` is the response of an element with modes to `2 sin t`.
-struct Through<E>(E);
+struct Through<E>(E, Shown);
+
+/// Signal 0: the integral, or the output of the element.
+#[derive(PartialEq)]
+enum Shown {
+    Integral,
+    Output,
+}
 
 trait Element {
     fn output(&self, u: f64) -> f64;
@@ -160,6 +157,9 @@ impl<E: Element> Plant<f64> for Through<E> {
     fn rates(&self, at: &Instant<'_, f64>, dx: &mut [f64]) {
         dx[0] = self.0.output(2.0 * math::sin(at.t));
     }
+    fn signal(&self, _: usize, at: &Instant<'_, f64>) -> f64 {
+        if self.1 == Shown::Integral { at.x[0] } else { self.0.output(2.0 * math::sin(at.t)) }
+    }
     fn longest_step(&self) -> f64 {
         0.4
     }
@@ -188,7 +188,7 @@ use std::f64::consts::{FRAC_PI_6, PI, TAU};
 
 #[test]
 fn a_saturated_sine_is_clipped_at_the_limit() {
-    let (integral, events) = simulate(Through(Saturation::new(-1.0, 1.0)), &[0.0], TAU, |_, _, x| x[0]);
+    let (integral, events) = simulate(Through(Saturation::new(-1.0, 1.0), Shown::Integral), &[0.0], TAU);
     for (event, exact) in events.iter().zip([1.0, 5.0, 7.0, 11.0].map(|k| k * FRAC_PI_6)) {
         near(*event, exact, 1e-9);
     }
@@ -200,7 +200,7 @@ fn a_saturated_sine_is_clipped_at_the_limit() {
 
 #[test]
 fn a_dead_zone_responds_only_outside_its_limits() {
-    let (integral, events) = simulate(Through(DeadZone::new(-1.0, 1.0)), &[0.0], TAU, |_, _, x| x[0]);
+    let (integral, events) = simulate(Through(DeadZone::new(-1.0, 1.0), Shown::Integral), &[0.0], TAU);
     for (event, exact) in events.iter().zip([1.0, 5.0, 7.0, 11.0].map(|k| k * FRAC_PI_6)) {
         near(*event, exact, 1e-9);
     }
@@ -210,8 +210,7 @@ fn a_dead_zone_responds_only_outside_its_limits() {
 
 #[test]
 fn play_is_crossed_at_every_reversal() {
-    let (y, events) =
-        simulate(Through(Backlash::new(1.0, 0.0)), &[0.0], TAU, |through, t, _| through.0.output(2.0 * math::sin(t)));
+    let (y, events) = simulate(Through(Backlash::new(1.0, 0.0), Shown::Output), &[0.0], TAU);
     // Contact at sin = 1/4, reversal at pi/2, contact below at 2 sin t = 1.5 - 0.5, reversal at 3 pi/2, and contact
     // above.
     let exact = [math::asin(0.25), 0.5 * PI, 5.0 * FRAC_PI_6, 1.5 * PI, 11.0 * FRAC_PI_6];
@@ -318,7 +317,7 @@ fn a_delayed_feedback_is_its_polynomials() {
         1.0 - t + math::powi((t - 1.0).max(0.0), 2) / 2.0 - math::powi((t - 2.0).max(0.0), 3) / 6.0
             + math::powi((t - 3.0).max(0.0), 4) / 24.0
     };
-    let (y, _) = simulate(Delayed(Delay::new(1.0, 1.0)), &[1.0], 4.0, |_, _, x| x[0]);
+    let (y, _) = simulate(Delayed(Delay::new(1.0, 1.0)), &[1.0], 4.0);
     for t in [0.5, 1.0, 1.3, 2.2, 3.0, 4.0] {
         near(y.at(t), exact(t), 1e-9);
     }
@@ -386,7 +385,7 @@ impl Memory<f64> for DelayedStep {
 
 #[test]
 fn a_jump_comes_out_of_a_delay_as_a_jump() {
-    let (y, _) = simulate(DelayedStep(Delay::new(0.5, 0.0), 0.0), &[0.0], 2.0, |_, _, x| x[0]);
+    let (y, _) = simulate(DelayedStep(Delay::new(0.5, 0.0), 0.0), &[0.0], 2.0);
     near(y.at(0.8), 0.0, 1e-14);
     near(y.at(2.0), 1.2, 1e-12);
 }

@@ -31,7 +31,7 @@ where
 #[derive(Default)]
 struct Events(Vec<(f64, String)>);
 
-impl<S: Scalar, P: Plant<S>> Sink<S, P> for Events {
+impl<S: Scalar, P: ?Sized> Sink<S, P> for Events {
     fn step(&mut self, _: &Step<S>, _: &Driven<'_, S, P>) {}
     fn reads_steps(&self) -> bool {
         false
