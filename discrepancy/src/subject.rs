@@ -219,13 +219,11 @@ impl Subject {
         }
         let parameters = study.parameters(&study.jobs()[first], &study.start());
         if model.clocks(&parameters).is_ok_and(|clocks| !clocks.is_empty()) {
-            notes.push(
-                "a window of a record begins with the phase of each clock, and with its memory fitted".to_owned(),
-            );
+            notes.push("windows of a record start with the phase of each clock; its memory is fitted".to_owned());
         }
         if model.delays(&parameters).is_ok_and(|delays| !delays.is_empty()) {
             notes.push(
-                "before a window of a record, delayed inputs are as recorded, and delayed states as at its begin"
+                "before a window of a record, delayed inputs have their recorded values, and delayed states those at its start"
                     .to_owned(),
             );
         }

@@ -358,6 +358,53 @@ mod tests {
     outputs    = { a = { value = "(u - d*v - k*x - 3 [1/m2]*k*x^3)/m", unit = "m/s^2" } }
     "#;
 
+    /// Mass that a sampled controller with a computing delay moves to the input.
+    const SAMPLED: &str = r#"
+    states     = { x = "m", v = "m/s" }
+    inputs     = { u = "m" }
+    parameters = { m = "kg", bias = { unit = "N", default = 0 } }
+    constants  = { T = "70 ms", kp = "30 N/m", ki = "20 N/(m s)", kd = "8 N s/m" }
+    der        = { x = "v", v = "m*v' = f + bias - 3 [N s/m]*v" }
+    let        = { next = "s + T*(u - x)" }
+    clocks.c   = { every = "T", delay = "25 ms", memory = { f = "N", s = "m s" }, next = { s = "next", f = "kp*(u - x) + ki*next - kd*v" } }
+    tolerance  = { relative = 1e-10 }
+    "#;
+
+    /// Mass on a spring whose force arrives late.
+    const LATE: &str = r#"
+    states     = { x = "m", v = "m/s" }
+    inputs     = { u = "N" }
+    parameters = { m = "kg", bias = { unit = "N", default = 0 } }
+    der        = { x = "v", v = "m*v' = u + bias - 5 [N/m]*delay(x, 0.1 [s]) - 2 [N s/m]*v" }
+    tolerance  = { relative = 1e-10 }
+    "#;
+
+    #[test]
+    fn a_force_beside_clocks_and_delays_has_the_tangent_of_the_simulation() {
+        // A delay line is a Pade approximant.
+        for (text, amplitude, states, allowed) in [(SAMPLED, 0.8, 4, 1e-7), (LATE, 2.0, 2, 1e-4)] {
+            let truth: Vec<f64> = [2.0, 0.5].into_iter().chain(std::iter::repeat_n(0.1, states)).collect();
+            let subject = subject(text, &truth, states, vec![record(&["x", "v"], amplitude, 0.02)]);
+            let simulations = Meter::new(&());
+            let (fit, variant, mut at, _) = fitted(&subject, &simulations);
+            at.globals = truth[..2].to_vec();
+            at.locals = vec![truth[2..].to_vec()];
+            let along = super::Trajectory::new(&fit, &variant.model, 0, &at).expect("it simulates");
+            let unit = vec![1.0; along.moments.len()];
+            let response = along.response(along.inputs(), &unit);
+            let piece = &fit.pieces[0];
+            let job = Job { case: &piece.case, parameters: &truth, signals: &[0, 1], horizon: piece.horizon };
+            let seed = (0..truth.len()).map(|i| f64::from(u8::from(i == 1))).collect();
+            let (_, tangents) = variant.model.tangents(&job, &[seed]).expect("exact").expect("it simulates");
+            for (s, response) in piece.series.iter().zip(response.chunks(200)) {
+                let expected = tangents[0].trace(&s.name).sample(&s.times);
+                let largest = expected.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
+                let off = response.iter().zip(&expected).map(|(r, e)| (r * s.noise - e).abs()).fold(0.0, f64::max);
+                assert!(off < allowed * largest, "{} {states}: {off} of {largest}", s.name);
+            }
+        }
+    }
+
     fn record(names: &[&'static str], amplitude: f64, step: f64) -> Record {
         let times: Vec<f64> = (0..200).map(|k| f64::from(k) * step).collect();
         let values = times.iter().map(|t| amplitude * math::sin(3.0 * t)).collect();

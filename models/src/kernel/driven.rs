@@ -45,7 +45,7 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
         let mut x = self.plant.start();
         self.recall(&mut x);
         self.inputs.arrive();
-        let [u, w] = self.inputs.at_event(0.0, S::from(0.0));
+        let [u, w] = self.inputs_at(0.0);
         let before = x.clone();
         let at = Instant { t: self.inputs.time(0.0), x: &before, u: &u, w: &w };
         self.plant.begin(&at, &mut x)?;
@@ -66,7 +66,7 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
             self.inputs.arrive();
             from = 0.0;
         }
-        let [u, w] = self.inputs.at_event(from, S::from(0.0));
+        let [u, w] = self.inputs_at(from);
         let before = x.to_vec();
         let at = Instant { t: self.inputs.time(from), x: &before, u: &u, w: &w };
         if let Some(memory) = self.plant.memory_mut() {
@@ -74,7 +74,9 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
         }
         while is_known && from < 0.0 {
             let to = self.inputs.next_break().min(0.0);
-            self.remember(&Step::resting(x, [from, to]));
+            if self.remembers() {
+                self.remember(&Step::resting(x, [from, to]));
+            }
             let inputs = &self.inputs;
             if let Some(memory) = self.plant.memory_mut() {
                 let time = [from, to].map(|t| inputs.time(t));
@@ -89,25 +91,30 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
         }
     }
 
-    /// Returns signals just before the start, at the states `start`, after [`Driven::begin`] and before a simulation.
-    pub fn initial(&mut self, start: &[S], signals: &[usize]) -> Vec<S> {
-        let [u, w] = self.inputs.at_event(0.0, S::from(0.0));
+    /// Evaluates a function of the plant just before the start, at the states `start` and in its mode there; after [`Driven::begin`] and
+    /// before a simulation.
+    fn look_before<R>(&mut self, start: &[S], of: impl FnOnce(&Self, &Instant<'_, S>) -> R) -> R {
+        let [u, w] = self.inputs_at(0.0);
         let at = Instant { t: self.inputs.time(0.0), x: start, u: &u, w: &w };
         self.plant.settle(&at);
-        let signal = |&signal: &usize| match self.shows(signal) {
-            Some(state) => start[state],
-            None => self.plant.signal(signal, &at),
-        };
-        signals.iter().map(signal).collect()
+        of(self, &at)
+    }
+
+    /// Returns signals just before the start; after [`Driven::begin`] and before a simulation.
+    pub fn initial(&mut self, start: &[S], signals: &[usize]) -> Vec<S> {
+        self.look_before(start, |of, at| {
+            let signal =
+                |&signal: &usize| of.shows(signal).map_or_else(|| of.plant.signal(signal, at), |state| start[state]);
+            signals.iter().map(signal).collect()
+        })
     }
 
     /// Returns the rate that a unit of each force adds to a state just before the start, given the state of each force; after
     /// [`Driven::begin`] and before a simulation.
     pub fn mobilities(&mut self, start: &[S], states: &[usize]) -> Vec<S> {
-        let [u, w] = self.inputs.at_event(0.0, S::from(0.0));
-        let at = Instant { t: self.inputs.time(0.0), x: start, u: &u, w: &w };
-        self.plant.settle(&at);
-        states.iter().enumerate().map(|(force, &state)| mobility(&self.plant, &at, force, state)).collect()
+        self.look_before(start, |of, at| {
+            states.iter().enumerate().map(|(force, &state)| mobility(&of.plant, at, force, state)).collect()
+        })
     }
 
     /// Returns true if an input jumps at time 0.
@@ -214,9 +221,9 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
         self.inputs.look(t, x, |at| jacobian.entries(at, entry))
     }
 
-    /// Returns true if [`Driven::remember`] is to be called for accepted steps.
+    /// Returns true if quantities are delayed: [`Driven::remember`] is to be called for accepted steps.
     pub(super) fn remembers(&self) -> bool {
-        self.plant.memory().is_some()
+        self.plant.memory().is_some_and(|memory| !memory.delays().is_empty())
     }
 
     /// Handles a break, and is called once at the start: inputs take their new values, then the plant passes its own breaks. Returns the

@@ -22,7 +22,7 @@
 //! guard is negative. An event therefore sees the inputs that are valid from its instant on, at all rates of samples
 //! and events.
 //!
-//! **Arming.** The state of a guard after its event, armed or not, is part of the mode and decided by the system.
+//! **Arming.** The state of a guard after its event, armed or not, is part of the mode and decided by the plant.
 //!
 //! **Accumulation (Zeno behaviour).** The events of a guard accumulate if it switches [`REPEATS`] times in succession
 //! at decreasing intervals below [`CLOSE`] of the simulated time. Intervals below [`NONE`] of the simulated time count
@@ -471,7 +471,7 @@ pub(crate) fn common<S: Scalar>(a: S, b: S) -> S {
 }
 
 /// Returns the tangents of the event time, as a number with zero value: `dt = -dg / (dg/dt)` by the implicit function
-/// theorem. The rate of the guard along the solution is exact if the system provide it, else taken from the dense
+/// theorem. The rate of the guard along the solution is exact if the plant provides it, else taken from the dense
 /// output. If the guard only grazes zero, the event time has no derivative and 0 is returned.
 ///
 /// Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition (1993), section

@@ -128,11 +128,6 @@ impl<'a, S: Scalar> Inputs<'a, S> {
         self.drives.len()
     }
 
-    /// Returns the number of forces.
-    pub fn forces(&self) -> usize {
-        self.still.len()
-    }
-
     /// Evaluates a function at a time and a state.
     #[inline(always)]
     pub(super) fn look<R>(&self, t: f64, x: &[S], at: impl FnOnce(&Instant<'_, S>) -> R) -> R {

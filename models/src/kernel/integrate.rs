@@ -64,7 +64,7 @@ pub(super) trait Method<S: Scalar> {
 struct Limits {
     /// Number of steps that end at a break.
     breaks: usize,
-    /// Number of steps as long as the system or the tolerance allow.
+    /// Number of steps as long as the plant, its inputs or the tolerance allow.
     longest: usize,
 }
 

@@ -12,9 +12,7 @@ const HALVINGS: u32 = 12;
 impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
     /// Stores the past of the plant over a step, halved until one quartic per part suffices.
     pub(super) fn remember(&mut self, step: &Step<S>) {
-        if self.plant.memory().is_some() {
-            self.remember_part(step, [0.0, 1.0], HALVINGS);
-        }
+        self.remember_part(step, [0.0, 1.0], HALVINGS);
     }
 
     fn past(&self, t: f64, x: &[S]) -> Vec<S> {

@@ -57,7 +57,7 @@ pub struct Selected<S> {
     pub rates: Vec<usize>,
 }
 
-/// What a linearisation leaves out at a point.
+/// Dry friction omitted by a linearisation at a point, and the conditions under which the linearisation is valid there.
 #[derive(Debug, Clone)]
 pub struct LeftOut<S> {
     /// Positions, as states, of the joints without dry friction.
