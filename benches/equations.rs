@@ -5,11 +5,15 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::Criterion;
-use mops::core::Job;
-use mops::models::equations::{Equations, EquationsOptions};
-use mops::models::furuta::Furuta;
-use mops::models::kernel::{Simulated, Tolerance};
-use mops::{Case, Input, Model};
+use mops::{
+    Case, Input, Model,
+    core::Job,
+    models::{
+        equations::{Equations, EquationsOptions},
+        furuta::Furuta,
+        kernel::{Simulated, Tolerance},
+    },
+};
 
 const END: f64 = 3.0;
 /// Parameters `a`, `b`, `c`, `d`, `ba`, `bp`.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
-use mops::core::{Budget, Oracle, Problem, Run};
-use mops_core::math;
+use mops::core::{Oracle, Problem, Run, run::Budget};
+use mops_math as math;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 const STUDIES: [&str; 3] = ["pid-design", "pid-design-multi-case", "furuta-swing"];
@@ -109,6 +109,6 @@ fn median(mut numbers: Vec<f64>) -> f64 {
 
 fn shipped(name: &str) -> Problem {
     let study = mops::studies::shipped().into_iter().find(|study| study.name == name).expect("it is shipped");
-    let file = study.open(&mops::catalogue(), &[]).expect("it is right");
+    let file = mops::file::read_shipped(&mops::catalogue(), &study, &[]).expect("it is right");
     Problem::new(Arc::new(file.study))
 }

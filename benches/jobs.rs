@@ -8,13 +8,12 @@ mod common;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use mops::Usage;
-use mops::core::{Budget, Run, Shape};
-use mops::core::{Solver, SolverOptions};
-use mops::solvers::genetic::GeneticOptions;
-use mops::solvers::pattern_search::PatternSearchOptions;
-use mops::solvers::sqp::SqpOptions;
-use mops_core::math;
+use mops::{
+    Usage,
+    core::{Run, Shape, Solver, SolverOptions, run::Budget},
+    solvers::{genetic::GeneticOptions, pattern_search::PatternSearchOptions, sqp::SqpOptions},
+};
+use mops_math as math;
 
 use common::ClosedForm;
 

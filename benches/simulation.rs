@@ -5,12 +5,15 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::Criterion;
-use mops::core::{DIRECTIONS, Dual, Dual7, Job, Work};
-use mops::models::furuta::{Furuta, FurutaPlant};
-use mops::models::kernel::drive::Drive;
-use mops::models::kernel::friction::Contact;
-use mops::models::kernel::{Driven, Inputs, Integrable, Sink, Step, Tolerance, integrate};
-use mops::{Analysis, Case, Input, Model, Scalar};
+use mops::{
+    Analysis, Case, Input, Model, Scalar,
+    core::{Job, model::Work},
+    language::{DIRECTIONS, Dual, Dual7},
+    models::{
+        furuta::{Furuta, FurutaPlant},
+        kernel::{Driven, Inputs, Integrable, Sink, Step, Tolerance, drive::Drive, friction::Contact, integrate},
+    },
+};
 
 const END: f64 = 3.0;
 const ABSOLUTE: f64 = 1e-8;
@@ -181,7 +184,7 @@ impl<P: ?Sized> Sink<f64, P> for Samples {
 /// Hand-written method: plain arrays, one plant, one tolerance; no events, no failures, no dense output.
 mod hand_written {
     use super::{ABSOLUTE, TOLERANCE};
-    use mops_core::math;
+    use mops_math as math;
 
     type State = [f64; 4];
 

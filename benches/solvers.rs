@@ -6,17 +6,16 @@
 mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
-use mops::Usage;
-use mops::core::{Budget, Objective, Run, Shape, Solver, SolverOptions};
-use mops::solvers::auto::AutoOptions;
-use mops::solvers::cma_es::CmaEsOptions;
-use mops::solvers::differential_evolution::DifferentialEvolutionOptions;
-use mops::solvers::genetic::GeneticOptions;
-use mops::solvers::nsga2::Nsga2Options;
-use mops::solvers::nsga3::Nsga3Options;
-use mops::solvers::pattern_search::PatternSearchOptions;
-use mops::solvers::sqp::SqpOptions;
-use mops_core::math;
+use mops::{
+    Usage,
+    core::{Objective, Run, Shape, Solver, SolverOptions, run::Budget},
+    solvers::{
+        auto::AutoOptions, cma_es::CmaEsOptions, differential_evolution::DifferentialEvolutionOptions,
+        genetic::GeneticOptions, nsga2::Nsga2Options, nsga3::Nsga3Options, pattern_search::PatternSearchOptions,
+        sqp::SqpOptions,
+    },
+};
+use mops_math as math;
 
 use common::ClosedForm;
 

@@ -3,12 +3,16 @@
 use std::hint::black_box;
 
 use criterion::Criterion;
-use mops::core::Job;
-use mops::models::equations::{Equations, EquationsOptions};
-use mops::models::kernel::{Driven, IntegrationMethod, Simulated, Tolerance, integrate};
-use mops::{Case, Model, Scalar};
-use mops_core::plant::Jacobian;
-use mops_core::{Instant, Plant, math};
+use mops::{
+    Case, Model, Scalar,
+    core::Job,
+    models::{
+        equations::{Equations, EquationsOptions},
+        kernel::{Driven, IntegrationMethod, Simulated, Tolerance, integrate},
+    },
+};
+use mops_core::{Instant, Plant, plant::Jacobian};
+use mops_math as math;
 
 const CELLS: usize = 100;
 /// Heat exchange between neighbouring cells, 1/s.

@@ -1,9 +1,10 @@
 //! Runs a solver of mops under argmin's executor: a problem with argmin's traits, bounds, and CMA-ES with restarts.
 
 use argmin::core::{CostFunction, Error, Executor, State};
-use mops::core::math;
-use mops::solvers::argmin_solver::ArgminSolver;
-use mops::solvers::cma_es::CmaEsOptions;
+use mops::{
+    math,
+    solvers::{argmin_solver::ArgminSolver, cma_es::CmaEsOptions},
+};
 
 /// Rastrigin's function: about `10^n` local minima, with the global minimum 0 at the origin.
 struct Rastrigin;

@@ -3,9 +3,11 @@
 //! A pothole gives a wheel suspension `m x'' = -k x - d x'` an initial speed of 1 m/s. Spring and damper are tuned for a short
 //! settling time and a small acceleration of the load.
 
-use mops::criteria::settling_time::SettlingTime;
-use mops::models::kernel::{PlantModel, Simulated};
-use mops::prelude::*;
+use mops::{
+    criteria::settling_time::SettlingTime,
+    models::kernel::{PlantModel, Simulated},
+    prelude::*,
+};
 
 /// Mass, kg.
 const MASS: f64 = 250.0;

@@ -5,8 +5,8 @@
 use std::error::Error;
 use std::path::Path;
 
-use mops::core::file::{self, Files};
-use mops::core::{Study, StudyBuilder, Task, TunerBuilder};
+use mops::language::files::Files;
+use mops::{Study, StudyBuilder, Task, TunerBuilder, file};
 
 /// Folder that data paths are relative to.
 const FOLDER: &str = "studies/furuta-swing";

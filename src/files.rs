@@ -8,8 +8,9 @@ use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+use mops_data::as_text;
+
 pub(crate) use inputs::Inputs;
-use mops_core::data::as_text;
 
 use crate::plain::plain;
 
@@ -205,7 +206,7 @@ pub(crate) fn is_at(path: &Path, _: &Metadata) -> bool {
 /// # Errors
 /// If the file cannot be read or is not a regular file.
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
-    mops_core::data::read_regular(path)
+    mops_language::files::read_regular(path)
 }
 
 #[cfg(test)]

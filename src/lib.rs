@@ -68,16 +68,28 @@ mod guide {}
 
 pub use mops_core as core;
 pub use mops_core::{
-    Analysis, BuiltStudy, Cancellation, Case, CaseBuilder, Catalogue, Criterion, CriterionBuilder, CriterionKind,
-    CriterionOptions, CriterionSpec, Diagnostic, EffectBuilder, Failure, Input, Instant, Interface, Model,
-    ModelBuilder, ModelKind, ModelOptions, Objective, Outcome, Parameter, Plant, Quantity, Scalar, Shipped, SolverKind,
-    Study, StudyBuilder, StudyError, Task, Trace, TunerBuilder, Unit, Usage, Value, Variable, Watch,
+    Analysis, Cancellation, Case, Catalogue, Criterion, CriterionOptions, CriterionSpec, Failure, Input, Instant,
+    Interface, Model, ModelOptions, Objective, Parameter, Plant, Study, StudyBuilder, StudyError, Task, Trace, Usage,
+    Value, Variable, Watch,
+    catalogue::{BuiltStudy, CriterionKind, ModelKind, Shipped, SolverKind},
+    effect::EffectBuilder,
+    study::{CaseBuilder, CriterionBuilder, ModelBuilder, TunerBuilder},
 };
 pub use mops_criteria as criteria;
+pub use mops_data as data;
 pub use mops_discrepancy as discrepancy;
 pub use mops_effects as effects;
+pub use mops_file as file;
+pub use mops_file::{parse_study, read_study};
+pub use mops_language as language;
+pub use mops_language::{Diagnostic, Quantity, Scalar, Unit};
+pub use mops_linear as linear;
+pub use mops_math as math;
 pub use mops_models as models;
+pub use mops_outcome as outcome;
+pub use mops_outcome::Outcome;
 pub use mops_solvers as solvers;
+pub use mops_statistics as statistics;
 pub use mops_studies as studies;
 pub use search::{DEFAULT_EVALUATIONS, EvaluationStore, Options, SolveError, Solved, suits};
 pub use solve::solve;

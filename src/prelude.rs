@@ -7,5 +7,5 @@ pub use crate::{
     Analysis, BuiltStudy, Case, CaseBuilder, Catalogue, Criterion, CriterionBuilder, CriterionKind, CriterionOptions,
     CriterionSpec, EffectBuilder, Failure, Input, Instant, Interface, Model, ModelBuilder, ModelKind, ModelOptions,
     Objective, Options, Outcome, Parameter, Plant, Quantity, Scalar, Shipped, Solved, SolverKind, Study, StudyBuilder,
-    StudyError, Task, Trace, TunerBuilder, Unit, Usage, Value, Variable, catalogue, solve,
+    StudyError, Task, Trace, TunerBuilder, Unit, Usage, Value, Variable, catalogue, read_study, solve,
 };

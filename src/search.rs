@@ -4,10 +4,14 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mops_core::{
-    Beyond, Budget, Cancellation, Contradiction, DerivativesReport, Effect, End, Ending, Evaluation, Linearisation,
-    Objective, Optimality, Oracle, Outcome, Pareto, Patience, Place, Problem, Quiet, Record, Role, Run, Shape,
-    SlopesReport, Solver, SolverChoice, Stop, Store, Study, StudyError, Task, Watch, conclude,
+    Cancellation, Effect, Evaluation, Objective, Oracle, Problem, Role, Run, Shape, Solver, Stop, Study, StudyError,
+    Task, Watch,
+    catalogue::SolverChoice,
+    run::{Budget, Patience, Quiet, Record, Store},
+    solver::{Linearisation, Optimality, Pareto},
+    study::Place,
 };
+use mops_outcome::{Beyond, Contradiction, DerivativesReport, End, Ending, Outcome, SlopesReport, conclude};
 
 use crate::numbers::{counted, significant};
 

@@ -1,6 +1,6 @@
 //! Entry point that performs the task of a study.
 
-use mops_core::{Cancellation, Evaluation, Halt, RunState, Study, Watch};
+use mops_core::{Cancellation, Evaluation, Halt, Study, Watch, run::State as RunState};
 
 use crate::search::{Options, SolveError, Solved};
 use crate::tasks;

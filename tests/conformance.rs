@@ -5,14 +5,14 @@ mod function;
 
 use std::sync::Arc;
 
-use mops::core::{Budget, Oracle, Problem, Run, Stop};
 use mops::{
     Analysis, Case, Criterion, CriterionBuilder, CriterionSpec, Interface, Objective, SolverKind, Study, StudyBuilder,
     StudyError, TunerBuilder, Unit, Usage, Value, Watch,
+    core::{Oracle, Problem, Run, Stop, run::Budget},
 };
 
 use function::{End, Function};
-use mops_core::math;
+use mops_math as math;
 
 /// Study of `f` over the box [-2, 2]^n with the initial guess 1.5 and one usage per value.
 fn study(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> Study {
@@ -362,7 +362,7 @@ fn an_integer_tuner_with_five_values_ends_at_the_best_without_repeated_evaluatio
     let whole = [Objective::Max, Objective::Each].map(|objective| {
         let whole = study_of(objective, 1, &[Usage::Minimise], |x| Some(vec![math::powi(x[0] - 1.3, 2)]));
         let mut parts = whole.into_parts();
-        parts.tuners[0].grid = mops::core::Grid::Integer;
+        parts.tuners[0].grid = mops::core::study::Grid::Integer;
         parts.tuners[0].start = -2.0;
         Problem::new(Arc::new(Study::from_parts(parts)))
     });

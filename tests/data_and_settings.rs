@@ -1,7 +1,7 @@
 //! Numbers without units in channels, and settings of the command line that are not TOML.
 
 use assert_cmd::cargo::cargo_bin_cmd;
-use mops_core::math;
+use mops_math as math;
 use serde_json::Value;
 
 const STUDY: &str = r#"

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
-use mops_core::math;
+use mops_math as math;
 use serde_json::Value;
 
 /// An integrating loop with a lag, `k/(s (s + 1))`: phase margin 51.8 deg at k = 1, bandwidth and crossover near 1 rad/s.

@@ -1,8 +1,10 @@
 //! Cases of the benchmark of the diagnosis: simulated experiments with a known missing effect.
 
-use mops::core::file::Files;
-use mops::discrepancy::{Diagnosis, Verdict};
-use mops::{Catalogue, Options, catalogue};
+use mops::{
+    Catalogue, Options, catalogue,
+    discrepancy::{Diagnosis, Verdict},
+    language::files::Files,
+};
 use mops_testbed::{Missing, Trial, generate};
 
 /// Data files of a case.
@@ -36,7 +38,7 @@ fn diagnosis(case: &Trial, shuffled: bool) -> Diagnosis {
 
 /// Diagnoses a case with a catalogue and a seed.
 fn diagnosis_among(case: &Trial, catalogue: Catalogue, seed: u64) -> Diagnosis {
-    let file = mops::core::file::read(&catalogue, "study.toml", &case.study, &[], &Data(case));
+    let file = mops::file::read(&catalogue, "study.toml", &case.study, &[], &Data(case));
     let mut study = file.unwrap_or_else(|mistake| panic!("{}: {mistake}", case.name)).study;
     study.set_seed(seed);
     let options = Options { effects: catalogue.effects, ..Options::default() };

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use mops::{EffectBuilder, ModelBuilder};
-use mops_core::math;
+use mops_math as math;
 use serde_json::Value;
 
 /// Torsion pendulum `th'' = -4 th`; the tests insert effects and tuners.

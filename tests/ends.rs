@@ -213,7 +213,7 @@ fn lags(folder: &Path, records: u32, stated_noise: f64) -> String {
     for record in 0..records {
         let mut noise = noise(u64::from(record) + 1);
         let rows = (0..200).map(|k| f64::from(k) * 0.05).map(|t| {
-            let y = 2.0 * (1.0 - mops_core::math::exp(-t / 3.0)) + 0.05 * noise();
+            let y = 2.0 * (1.0 - mops_math::exp(-t / 3.0)) + 0.05 * noise();
             format!("{t},{y}\n")
         });
         let text = "t [s],y\n".to_owned() + &rows.collect::<String>();
@@ -271,7 +271,7 @@ fn two_points_that_fit_equally_well_are_not_one_optimum() {
     let mut noise = noise(3);
     let rows = (0..=200).map(|k| {
         let t = 0.1 * f64::from(k);
-        format!("{t},1,{}\n", 2.0 * (1.0 - mops_core::math::exp(-t / 3.0)) + 0.01 * noise())
+        format!("{t},1,{}\n", 2.0 * (1.0 - mops_math::exp(-t / 3.0)) + 0.01 * noise())
     });
     std::fs::write(folder.path().join("step.csv"), format!("t[s],u,y\n{}", rows.collect::<String>())).unwrap();
     let study = folder.path().join("study.toml");

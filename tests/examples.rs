@@ -1,6 +1,6 @@
 //! The examples run and give the stated results.
 
-use mops_core::math;
+use mops_math as math;
 
 #[path = "../examples/own_study.rs"]
 mod own_study;
@@ -84,7 +84,7 @@ fn the_executor_of_argmin_runs_a_solver_to_the_global_minimum() {
 /// Files of the recordings, by name, with the columns that each of them has.
 struct AnyRecording;
 
-impl mops::core::file::Files for AnyRecording {
+impl mops::language::files::Files for AnyRecording {
     fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
         let columns: &[&str] = match path {
             "FurutaData.mat" => &["phi", "theta"],
@@ -113,7 +113,7 @@ fn studies_of_recordings_have_the_declared_roles_of_experiments() {
         ("pendulum-multiarm", include_str!("../examples/recordings/pendulum-multiarm.toml"), [9, 3, 6]),
         ("pendulum-dfki", include_str!("../examples/recordings/pendulum-dfki.toml"), [3, 0, 1]),
     ] {
-        let read = mops::core::file::read(&mops::catalogue(), "study.toml", text, &[], &AnyRecording);
+        let read = mops::file::read(&mops::catalogue(), "study.toml", text, &[], &AnyRecording);
         let study = read.unwrap_or_else(|mistake| panic!("{name}: {mistake}")).study;
         assert_eq!(study.name(), name);
         let of = |role| study.cases().iter().filter(|case| case.role() == role).count();
@@ -181,7 +181,7 @@ fn a_panic_of_a_closure_is_a_failure_of_its_point_that_names_the_model_or_criter
 #[test]
 fn a_panic_of_the_function_that_builds_a_study_is_an_error_that_names_the_study() {
     let broken = mops::BuiltStudy::new("broken", "", || panic!("no data"));
-    let error = mops::core::file::built(&mops::catalogue(), &broken, &[]).err().unwrap();
+    let error = mops::file::built(&mops::catalogue(), &broken, &[]).err().unwrap();
     assert_eq!(error.message, "the function that builds the study `broken` panicked: no data");
 }
 

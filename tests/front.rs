@@ -7,7 +7,7 @@ use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use mops::core::front::hypervolume;
-use mops_core::math;
+use mops_math as math;
 use serde_json::Value;
 
 /// Settling time, s, and overshoot of points of the front of the PID design. Source: independent computation with SciPy, the

@@ -9,11 +9,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use mops::Catalogue;
-use mops::core::Expression;
-use mops::core::data::DataFile;
-use mops::core::expression::{DEEPEST, FUNCTIONS, equation};
-use mops::core::file::Files;
+use mops::{
+    Catalogue,
+    data::DataFile,
+    language::{
+        Expression,
+        expression::{DEEPEST, FUNCTIONS, equation},
+        files::Files,
+    },
+};
 use rand::prelude::*;
 use rand::rngs::SmallRng;
 
@@ -320,7 +324,7 @@ fn a_study(corpus: &Corpus, random: &mut SmallRng) {
         false => Vec::new(),
     };
     let files = Anything(&corpus.data);
-    if let Err(mistake) = mops::core::file::read(&corpus.catalogue, "study.toml", &text, &settings, &files) {
+    if let Err(mistake) = mops::file::read(&corpus.catalogue, "study.toml", &text, &settings, &files) {
         let _ = (mistake.line_column(), mistake.to_string());
     }
 }

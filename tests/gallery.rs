@@ -5,8 +5,10 @@ use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
 
 use assert_cmd::cargo::cargo_bin_cmd;
-use mops::core::linear::Complex;
-use mops::core::math::{self, complex};
+use mops::{
+    linear::Complex,
+    math::{self, complex},
+};
 use serde_json::Value;
 
 #[path = "common/studies.rs"]

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use assert_cmd::cargo::cargo_bin_cmd;
-use mops_core::math;
+use mops_math as math;
 use serde_json::Value;
 
 fn mops(arguments: &[&str]) -> Command {

@@ -1,8 +1,9 @@
 //! Models that take another one as their base, and loops cut at a variable, compared with loops written by hand.
 
 use assert_cmd::cargo::cargo_bin_cmd;
-use mops_core::linear::Complex;
-use mops_core::math::{self, complex};
+use mops_linear::Complex;
+use mops_math as math;
+use mops_math::complex;
 use serde_json::Value;
 
 #[path = "common/studies.rs"]

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use mops::core::file::digest;
+use mops::file::digest;
 
 /// Pictures in docs/pictures, each with its study.
 const PICTURES: [(&str, &str); 2] = [("design", "pid-design"), ("diagnosis", "furuta-discrepancy")];

@@ -2,8 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mops::core::file::{self, Folder};
-use mops::core::{Catalogue, Diagnostic, Problem};
+use mops::{
+    core::{Catalogue, Problem},
+    file,
+    language::{Diagnostic, files::Folder},
+};
 use serde_json::Value;
 use toml::Value as Toml;
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use assert_cmd::Command;
-use mops_core::math;
+use mops_math as math;
 
 fn mops(folder: &Path, arguments: &[&str]) -> (i32, String) {
     let output = Command::cargo_bin("mops").unwrap().current_dir(folder).args(arguments).output().unwrap();

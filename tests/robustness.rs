@@ -8,20 +8,23 @@ mod result;
 use std::path::Path;
 
 use assert_cmd::cargo::cargo_bin_cmd;
-use mops::core::{
-    ChannelBuilder, Chosen, DistributionBuilder, Job, Measured, MonteCarloTask, Place, Response, RobustTask,
-    SensitivityMethod, SensitivityTask, TasksBuilder, UncertainBuilder, UncertaintyTask, WorstCaseTask,
-    statistics::Sampling,
-};
-use mops::criteria::normalised_error::NormalisedError;
 use mops::{
     Analysis, CaseBuilder, CriterionBuilder, Failure, Interface, Model, Options, Outcome, Parameter, StudyBuilder,
     Task, Trace, TunerBuilder, Usage, Variable,
+    core::{
+        Job, Response,
+        study::{
+            ChannelBuilder, Chosen, DistributionBuilder, Measured, MonteCarloTask, Place, RobustTask,
+            SensitivityMethod, SensitivityTask, TasksBuilder, UncertainBuilder, UncertaintyTask, WorstCaseTask,
+        },
+    },
+    criteria::normalised_error::NormalisedError,
+    statistics::Sampling,
 };
 use serde_json::Value as Json;
 
 use function::{End, Function};
-use mops_core::math;
+use mops_math as math;
 
 fn end(i: usize, demand: f64, usage: Usage) -> (String, CriterionBuilder) {
     (format!("c{i}"), CriterionBuilder::minimise(End(format!("f{i}")), demand).used_as(usage))
@@ -501,7 +504,7 @@ fn samples_are_written_to_the_folder_of_the_result() {
 /// The study has no data.
 struct NoFiles;
 
-impl mops::core::file::Files for NoFiles {
+impl mops::language::files::Files for NoFiles {
     fn read(&self, path: &str) -> std::io::Result<Vec<u8>> {
         panic!("{path} is not needed")
     }
@@ -526,7 +529,7 @@ fn the_robust_pid_design_satisfies_its_worst_case_on_an_independent_grid() {
 
     let text =
         std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("studies/pid-robust/study.toml")).unwrap();
-    let study = mops::core::file::read(&mops::catalogue(), "study.toml", &text, &[], &NoFiles).unwrap().study;
+    let study = mops::file::read(&mops::catalogue(), "study.toml", &text, &[], &NoFiles).unwrap().study;
     let design: Vec<f64> = (0..3).map(|i| result["tuners"][i]["value"].as_f64().unwrap()).collect();
     let over = study.over_uncertain(&design);
     let problem = mops::core::Problem::new(std::sync::Arc::new(over.clone()));

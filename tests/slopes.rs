@@ -16,7 +16,7 @@ mod systems;
 
 use std::collections::BTreeMap;
 
-use mops_core::{Analysis, Case, Job, Tangent, Value};
+use mops_core::{Analysis, Case, Job, Value, criterion::Tangent};
 use rayon::prelude::*;
 
 use criteria::{Asked, asked};

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use assert_cmd::Command;
-use mops::core::math;
+use mops::math;
 use serde_json::Value;
 
 fn mops(folder: &Path, arguments: &[&str]) -> (i32, String) {

@@ -1,6 +1,6 @@
 //! Problem whose scaled values are a closed form, for benchmarks of the solvers.
 
-use mops::core::{Evaluation, Evaluator, Shape};
+use mops::core::{Evaluation, Shape, problem::Evaluator};
 
 /// Problem over the unit box, whose tuners are its coordinates.
 pub struct ClosedForm {

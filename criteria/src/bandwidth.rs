@@ -1,7 +1,8 @@
 //! Bandwidth.
 
-use mops_core::linear::bandwidth;
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError};
+use mops_language::Unit;
+use mops_linear::bandwidth;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

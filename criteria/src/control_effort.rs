@@ -1,9 +1,9 @@
 //! Control effort.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StudyError, Unit, Value,
-    Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value, Variable,
 };
+use mops_language::{Quantity, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -90,7 +90,7 @@ impl Criterion for Bound {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::math;
+    use mops_math as math;
     use std::f64::consts::TAU;
 
     use super::*;

@@ -1,9 +1,9 @@
 //! Gain crossover frequency of a feedback loop.
 
-use mops_core::math::complex;
-use mops_core::{
-    AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StateSpace, StudyError, Unit, Value,
-};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value};
+use mops_language::Unit;
+use mops_linear::StateSpace;
+use mops_math::complex;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -56,8 +56,8 @@ impl CriterionSpec for CrossoverFrequency {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::Missed;
-    use mops_core::math;
+    use mops_core::criterion::Missed;
+    use mops_math as math;
 
     use super::*;
     use crate::common::testing::{assert_near, linear, value};

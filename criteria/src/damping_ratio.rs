@@ -1,8 +1,9 @@
 //! Smallest damping ratio of all poles.
 
-use mops_core::linear::Complex;
-use mops_core::math::complex;
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError};
+use mops_language::Unit;
+use mops_linear::Complex;
+use mops_math::complex;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -1,9 +1,10 @@
 //! Disk margin of feedback loops.
 
-use mops_core::linear::disk_margin;
 use mops_core::{
-    Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit, Value,
+    Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value,
 };
+use mops_language::Unit;
+use mops_linear::disk_margin;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -3,11 +3,18 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use mops_core::expression::units::{Dimensions, Measure, Named};
-use mops_core::expression::{Expression as Formula, Reduced, Reduction, SyntaxError};
 use mops_core::{
-    Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Missed, Other, StudyError,
-    Trace, Unit, Value, Variable, suggestion,
+    Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, StudyError, Trace, Value,
+    Variable,
+    criterion::{Missed, Other},
+};
+use mops_language::{
+    Expression as Formula, Unit,
+    expression::{
+        Reduced, Reduction, SyntaxError,
+        units::{Dimensions, Measure, Named},
+    },
+    suggestion,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -366,7 +373,8 @@ impl Criterion for Bound {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, simulated};
-    use mops_core::{Parameter, math};
+    use mops_core::Parameter;
+    use mops_math as math;
 
     fn model() -> Interface {
         Interface {

@@ -1,8 +1,7 @@
 //! Value of a signal at the end.
 
-use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, StudyError, Unit, Value, Variable,
-};
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, StudyError, Value, Variable};
+use mops_language::Unit;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -54,7 +53,7 @@ impl Criterion for Bound {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, bound, mistake, simulated, value};
-    use mops_core::math;
+    use mops_math as math;
 
     #[test]
     fn the_value_at_the_end_is_that_of_the_curve() {

@@ -1,9 +1,10 @@
 //! Fit to a measurement: the integral of the squared residual.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Loss, Samples, Sense, StudyError, Tangent,
-    Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value, Variable,
+    criterion::{Loss, Samples, Tangent},
 };
+use mops_language::Unit;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -122,7 +123,7 @@ impl Bound {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, bound, measured, mistake, simulated, undefined_in, value_in};
-    use mops_core::math;
+    use mops_math as math;
 
     #[test]
     fn the_fit_is_the_trapezoid_sum_and_that_of_its_residuals() {

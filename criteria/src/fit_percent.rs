@@ -1,8 +1,7 @@
 //! Fit to a measurement, in percent.
 
-use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit, Value,
-};
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value};
+use mops_language::Unit;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -1,9 +1,10 @@
 //! Fit to a measured frequency response.
 
-use mops_core::linear::Complex;
 use mops_core::{
-    Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit, Value,
+    Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value,
 };
+use mops_language::Unit;
+use mops_linear::Complex;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -101,8 +102,8 @@ impl Criterion for Bound {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::math::complex;
-    use mops_core::{Experiment, ResponseData};
+    use mops_core::case::{Experiment, ResponseData};
+    use mops_math::complex;
 
     use super::*;
     use crate::common::testing::{assert_near, channel, linear, mistake, undefined_in, value_in};

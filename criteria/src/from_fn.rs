@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use mops_core::{Analysis, Case, Criterion, CriterionSpec, Interface, StudyError, Trace, Unit, Value};
+use mops_core::{Analysis, Case, Criterion, CriterionSpec, Interface, StudyError, Trace, Value};
+use mops_language::Unit;
 
 /// Value of the time responses.
 type ValueFn = Arc<dyn Fn(&[&Trace]) -> f64 + Send + Sync>;
@@ -19,7 +20,8 @@ pub struct FnCriterion {
 /// value in `unit`; a value that is not finite makes the point fail.
 ///
 /// ```
-/// use mops_core::{CriterionBuilder, Unit};
+/// use mops_core::study::CriterionBuilder;
+/// use mops_language::Unit;
 ///
 /// // Root mean square of the signal `a`.
 /// let shaking = mops_criteria::from_fn(["a"], Unit::known("m/s2"), |traces| {

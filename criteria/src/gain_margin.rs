@@ -1,6 +1,7 @@
 //! Gain margin of a feedback loop.
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError};
+use mops_language::Unit;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -51,7 +52,7 @@ impl CriterionSpec for GainMargin {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, linear, linear_delayed, undefined, value};
-    use mops_core::math;
+    use mops_math as math;
 
     #[test]
     fn the_margin_of_a_third_order_lag_has_its_closed_form() {

@@ -1,10 +1,9 @@
 //! Gain within a mask over frequency.
 
-use mops_core::linear::{Mask, Masked};
-use mops_core::{
-    AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StateSpace, StudyError, Unit,
-    Value, math,
-};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value};
+use mops_language::{Quantity, Unit};
+use mops_linear::{Mask, Masked, StateSpace};
+use mops_math as math;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

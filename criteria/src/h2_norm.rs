@@ -1,7 +1,7 @@
 //! H2 norm.
 
-use mops_core::linear::h2_norm;
 use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError};
+use mops_linear::h2_norm;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -1,7 +1,7 @@
 //! Hinf norm.
 
-use mops_core::linear::hinf_norm;
 use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError};
+use mops_linear::hinf_norm;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -55,6 +55,6 @@ mod tests {
         assert_near(found, 1.0 / (0.02 * f64::sqrt(1.0 - 1e-4)), 1e-6);
         assert!(undefined(&HinfNorm::default(), &linear(&[1.0], &[1.0, -1.0])).contains("not stable"));
         let actuated = HinfNorm::default().bind(&channel("V", "m")).unwrap();
-        assert_eq!(actuated.unit(), mops_core::Unit::known("m/V"));
+        assert_eq!(actuated.unit(), mops_language::Unit::known("m/V"));
     }
 }

@@ -1,6 +1,7 @@
 //! Integral of the absolute error.
 
-use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, StudyError};
+use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, StudyError};
+use mops_language::Quantity;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -46,7 +47,7 @@ impl CriterionSpec for Iae {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, bound, simulated, value};
-    use mops_core::math;
+    use mops_math as math;
 
     fn iae() -> Iae {
         Iae { signal: "y".into(), target: Some(1.0.into()), ..Iae::default() }
@@ -56,7 +57,7 @@ mod tests {
     fn a_first_order_lag_has_its_time_constant() {
         let (lag, length) = (simulated(12.0, |t| 1.0 - math::exp(-t / 3.0)), 12.0f64);
         assert_near(value(&iae(), &lag).number, 3.0 * (1.0 - math::exp(-length / 3.0)), 1e-12);
-        assert_eq!(bound(&iae()).unit(), mops_core::Unit::known("m s"));
+        assert_eq!(bound(&iae()).unit(), mops_language::Unit::known("m s"));
     }
 
     #[test]

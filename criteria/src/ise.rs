@@ -1,6 +1,7 @@
 //! Integral of the squared error.
 
-use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, StudyError};
+use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, StudyError};
+use mops_language::Quantity;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -45,7 +46,7 @@ impl CriterionSpec for Ise {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, bound, simulated, value};
-    use mops_core::math;
+    use mops_math as math;
 
     fn ise() -> Ise {
         Ise { signal: "y".into(), target: Some(1.0.into()), ..Ise::default() }
@@ -55,7 +56,7 @@ mod tests {
     fn a_first_order_lag_has_half_its_time_constant() {
         let (lag, length) = (simulated(12.0, |t| 1.0 - math::exp(-t / 3.0)), 12.0f64);
         assert_near(value(&ise(), &lag).number, 1.5 * (1.0 - math::exp(-2.0 * length / 3.0)), 1e-12);
-        assert_eq!(bound(&ise()).unit(), mops_core::Unit::known("m2 s"));
+        assert_eq!(bound(&ise()).unit(), mops_language::Unit::known("m2 s"));
     }
 
     #[test]

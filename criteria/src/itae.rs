@@ -1,6 +1,7 @@
 //! Integral of time and absolute error.
 
-use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, StudyError};
+use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, StudyError};
+use mops_language::Quantity;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -47,7 +48,7 @@ impl CriterionSpec for Itae {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, bound, simulated, value};
-    use mops_core::math;
+    use mops_math as math;
 
     fn itae() -> Itae {
         Itae { signal: "y".into(), target: Some(1.0.into()), ..Itae::default() }
@@ -57,7 +58,7 @@ mod tests {
     fn a_first_order_lag_has_its_time_constant_squared() {
         let (lag, ratio) = (simulated(12.0, |t| 1.0 - math::exp(-t / 3.0)), 4f64);
         assert_near(value(&itae(), &lag).number, 9.0 * (1.0 - math::exp(-ratio) * (1.0 + ratio)), 1e-12);
-        assert_eq!(bound(&itae()).unit(), mops_core::Unit::known("m s2"));
+        assert_eq!(bound(&itae()).unit(), mops_language::Unit::known("m s2"));
     }
 
     #[test]

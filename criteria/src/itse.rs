@@ -1,6 +1,7 @@
 //! Integral of time and squared error.
 
-use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, StudyError};
+use mops_core::{Criterion, CriterionOptions, CriterionSpec, Interface, StudyError};
+use mops_language::Quantity;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -46,7 +47,7 @@ impl CriterionSpec for Itse {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, bound, simulated, value};
-    use mops_core::math;
+    use mops_math as math;
 
     fn itse() -> Itse {
         Itse { signal: "y".into(), target: Some(1.0.into()), ..Itse::default() }
@@ -56,7 +57,7 @@ mod tests {
     fn a_first_order_lag_has_a_quarter_of_its_time_constant_squared() {
         let (lag, ratio) = (simulated(12.0, |t| 1.0 - math::exp(-t / 3.0)), 8f64);
         assert_near(value(&itse(), &lag).number, 2.25 * (1.0 - math::exp(-ratio) * (1.0 + ratio)), 1e-12);
-        assert_eq!(bound(&itse()).unit(), mops_core::Unit::known("m2 s2"));
+        assert_eq!(bound(&itse()).unit(), mops_language::Unit::known("m2 s2"));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! A study file refers to them by kind; a study written in Rust sets their options:
 //!
 //! ```
-//! use mops_core::CriterionBuilder;
+//! use mops_core::study::CriterionBuilder;
 //! use mops_criteria::overshoot::Overshoot;
 //!
 //! let overshoot = Overshoot { signal: "y".into(), target: Some(1.0.into()), ..Overshoot::default() };
@@ -51,8 +51,9 @@ mod common;
 #[cfg(test)]
 mod tests;
 
+use mops_core::catalogue::CriterionKind;
+
 pub use from_fn::{FnCriterion, from_fn};
-use mops_core::CriterionKind;
 
 /// Returns all kinds of criteria. A new kind needs a file and a line here.
 pub fn kinds() -> Vec<CriterionKind> {

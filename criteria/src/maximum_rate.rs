@@ -1,8 +1,9 @@
 //! Largest rate of change of a signal.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value, Variable,
 };
+use mops_language::Unit;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -76,7 +77,7 @@ impl Criterion for Bound {
 #[cfg(test)]
 mod tests {
     use mops_core::Trace;
-    use mops_core::math;
+    use mops_math as math;
 
     use super::*;
     use crate::common::testing::{analysis, assert_near, bound, simulated, undefined, value};

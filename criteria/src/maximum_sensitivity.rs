@@ -1,6 +1,7 @@
 //! Maximum sensitivity of a feedback loop.
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError};
+use mops_language::Unit;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

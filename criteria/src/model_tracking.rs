@@ -1,9 +1,8 @@
 //! Deviation of a step response from that of a reference model.
 
-use mops_core::math;
-use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StudyError, Unit, Value,
-};
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value};
+use mops_language::{Quantity, Unit};
+use mops_math as math;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

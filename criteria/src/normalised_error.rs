@@ -1,9 +1,11 @@
 //! Fit to a measurement, in units of its noise level.
 
 use mops_core::{
-    Analysis, Case, Channel, Criterion, CriterionOptions, CriterionSpec, Interface, Loss, Quantity, Samples, Sense,
-    StudyError, Tangent, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value,
+    case::Channel,
+    criterion::{Loss, Samples, Tangent},
 };
+use mops_language::{Quantity, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

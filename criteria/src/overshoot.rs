@@ -1,9 +1,10 @@
 //! Overshoot of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Mark, Quantity, Sense, Side,
-    StudyError, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Sense, StudyError, Value,
+    criterion::{Mark, Side},
 };
+use mops_language::{Quantity, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -95,7 +96,7 @@ impl Criterion for Bound {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::math;
+    use mops_math as math;
     use std::f64::consts::PI;
 
     use super::*;

@@ -1,9 +1,10 @@
 //! Largest or smallest value of a signal.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Mark, Sense, Side, StudyError, Unit,
-    Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Sense, StudyError, Value, Variable,
+    criterion::{Mark, Side},
 };
+use mops_language::Unit;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -108,7 +109,7 @@ impl Criterion for Bound {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::math;
+    use mops_math as math;
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;

@@ -2,7 +2,8 @@
 
 use std::f64::consts::PI;
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError};
+use mops_language::Unit;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -49,7 +50,7 @@ impl CriterionSpec for PhaseMargin {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, linear, linear_delayed, undefined, value};
-    use mops_core::math;
+    use mops_math as math;
 
     #[test]
     fn the_margin_of_the_second_order_loop_has_its_closed_form() {

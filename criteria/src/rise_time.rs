@@ -1,8 +1,7 @@
 //! Rise time of a step response.
 
-use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StudyError, Unit, Value,
-};
+use mops_core::{Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value};
+use mops_language::{Quantity, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -96,8 +95,8 @@ impl Criterion for Bound {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::Missed;
-    use mops_core::math;
+    use mops_core::criterion::Missed;
+    use mops_math as math;
 
     use super::*;
     use crate::common::testing::{assert_near, mistake, second_order, simulated, value};

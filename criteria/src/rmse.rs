@@ -1,8 +1,9 @@
 //! Root mean square difference from a measurement.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value, Variable,
 };
+use mops_language::Unit;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -1,9 +1,10 @@
 //! Settling time of a step response.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Mark, Quantity, Sense, Side,
-    StudyError, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Sense, StudyError, Value,
+    criterion::{Mark, Side},
 };
+use mops_language::{Quantity, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -141,8 +142,8 @@ impl Criterion for Bound {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::math;
-    use mops_core::{Missed, Trace};
+    use mops_core::{Trace, criterion::Missed};
+    use mops_math as math;
 
     use super::*;
     use crate::common::testing::{analysis, assert_near, bound, mistake, quantity, second_order, simulated, value};

@@ -1,6 +1,7 @@
 //! Slowest pole.
 
-use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Unit};
+use mops_core::{AnalysisKind, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError};
+use mops_language::Unit;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -1,9 +1,9 @@
 //! Steady-state error.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Quantity, Sense, StudyError, Unit, Value,
-    Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Interface, Sense, StudyError, Value, Variable,
 };
+use mops_language::{Quantity, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -79,7 +79,7 @@ impl Criterion for Bound {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, mistake, quantity, simulated, undefined, value};
-    use mops_core::math;
+    use mops_math as math;
 
     fn steady(target: f64, window: Option<&str>) -> SteadyStateError {
         SteadyStateError { signal: "y".into(), target: target.into(), window: window.map(quantity) }

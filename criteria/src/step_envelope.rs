@@ -1,9 +1,11 @@
 //! Distance of a response from an envelope.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Mark, Quantity, Sense, Side,
-    StudyError, Trace, Unit, Value, Variable,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Sense, StudyError, Trace, Value,
+    Variable,
+    criterion::{Mark, Side},
 };
+use mops_language::{Quantity, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -141,7 +143,7 @@ impl Criterion for Bound {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, mistake, quantity, second_order, simulated, undefined, value};
-    use mops_core::math;
+    use mops_math as math;
 
     fn points(points: &[[f64; 2]]) -> Vec<[Quantity; 2]> {
         points.iter().map(|point| point.map(Quantity::from)).collect()

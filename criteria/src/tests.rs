@@ -3,12 +3,14 @@
 use std::collections::HashSet;
 use std::io;
 
-use mops_core::file::{Files, describe, read};
-use mops_core::math;
 use mops_core::{
-    Analysis, AnalysisKind, Catalogue, Failure, Interface, Job, Model, ModelKind, ModelOptions, Problem, Response,
-    Solver, SolverKind, SolverOptions, StudyError, Trace, Variable,
+    Analysis, AnalysisKind, Catalogue, Failure, Interface, Job, Model, ModelOptions, Problem, Response, Solver,
+    SolverOptions, StudyError, Trace, Variable,
+    catalogue::{ModelKind, SolverKind},
 };
+use mops_file::{describe, read};
+use mops_language::files::Files;
+use mops_math as math;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -124,7 +126,7 @@ fn a_mistake_in_an_option_is_reported_at_its_place() {
     assert!(wrong.to_string().contains(":14:50: expected a quantity in `m`, found `s`"), "{wrong}");
 }
 
-fn read_study(criteria: &str) -> Result<mops_core::Study, mops_core::Diagnostic> {
+fn read_study(criteria: &str) -> Result<mops_core::Study, mops_language::Diagnostic> {
     let catalogue = Catalogue { criteria: kinds(), ..Catalogue::default() }
         .with_model(ModelKind::of::<Lag>())
         .with_model(ModelKind::of::<LinearLag>())

@@ -1,9 +1,10 @@
 //! Undershoot of a step response: its largest excursion in the wrong direction.
 
 use mops_core::{
-    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Mark, Quantity, Sense, Side,
-    StudyError, Unit, Value,
+    Analysis, Case, Criterion, CriterionOptions, CriterionSpec, Demand, Interface, Sense, StudyError, Value,
+    criterion::{Mark, Side},
 };
+use mops_language::{Quantity, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -96,7 +97,7 @@ impl Criterion for Bound {
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, second_order, simulated, value};
-    use mops_core::math;
+    use mops_math as math;
 
     /// Returns the step response of `(1 - s)/(s + 1)^2`: smallest at t = 1/2.
     fn inverse(t: f64) -> f64 {

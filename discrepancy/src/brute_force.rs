@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use mops_core::math;
 use mops_core::{Effect, Study, StudyError};
+use mops_math as math;
 use rayon::prelude::*;
 
 use crate::estimation::Errors;

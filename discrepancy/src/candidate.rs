@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use mops_core::diagnosis::both_places;
-use mops_core::math;
 use mops_core::{
-    Between, Dimension, Effect, EffectParameter, InitialGrid, Interface, ParameterKind, Placement, Port, PortKind,
-    PortState, Unit,
+    Effect, Interface,
+    effect::{Between, Dimension, EffectParameter, InitialGrid, ParameterKind, Placement, Port, PortKind, PortState},
 };
+use mops_language::Unit;
+use mops_math as math;
+use mops_outcome::diagnosis::both_places;
 
 use crate::gap::Gap;
 use crate::quantum::quantum;

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use mops_core::diagnosis::Diagnosis;
 use mops_core::{Effect, Role, Study, StudyError, Watch};
+use mops_outcome::diagnosis::Diagnosis;
 
 use crate::meter::Meter;
 use crate::report::Findings;

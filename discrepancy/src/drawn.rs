@@ -5,7 +5,8 @@
 //! Where the formula is the right one, the points lie about its curve. Source: F. R. Wood, The use of individual effects and
 //! residuals in fitting equations to data, Technometrics 15 (1973) 677.
 
-use mops_core::Port;
+use mops_core::effect::Port;
+use mops_outcome::diagnosis::Evidence;
 
 use crate::candidate::Candidate;
 use crate::locate::{Located, located, thinning};
@@ -13,7 +14,6 @@ use crate::scene::Scene;
 use crate::selection::FittedSet;
 use crate::trace_of::{Spot, View, spot};
 use crate::unknown::respond;
-use mops_core::diagnosis::Evidence;
 
 /// Draws what was found into the evidence of the places where effects were added.
 pub fn draw(places: &mut [Located], set: &FittedSet<'_>) {

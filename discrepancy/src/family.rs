@@ -3,10 +3,10 @@
 
 use std::ops::Range;
 
+use mops_math as math;
 use nalgebra::DMatrix;
 
 use crate::gaussian::{joined, matern};
-use mops_core::math;
 
 /// What a signal is a function of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -46,7 +46,7 @@ pub fn gap(values: &[f64], noise: f64) -> Option<Gap> {
 mod tests {
     use super::*;
     use crate::testing::white;
-    use mops_core::math;
+    use mops_math as math;
 
     const NOISE: f64 = 1e-3;
 

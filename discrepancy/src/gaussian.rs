@@ -4,7 +4,7 @@
 //! Source: D. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415 (evidence, effective number of parameters); C. Rasmussen,
 //! C. Williams, Gaussian Processes for Machine Learning (2006), equation 4.17 (Matern covariance) and section 5.4.
 
-use mops_core::math;
+use mops_math as math;
 use nalgebra::linalg::SymmetricTridiagonal;
 use nalgebra::{DMatrix, DVector};
 

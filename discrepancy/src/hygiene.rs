@@ -1,6 +1,6 @@
 //! What the samples of a channel tell before any model is looked at: their noise, and samples that stand alone.
 
-use mops_core::math;
+use mops_math as math;
 
 use crate::settings::settings;
 

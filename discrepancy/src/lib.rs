@@ -36,7 +36,7 @@ mod windows;
 pub use brute_force::{BruteForce, brute_force};
 pub use diagnose::{Options, diagnose};
 pub use hygiene::noise_of;
-pub use mops_core::diagnosis::{
+pub use mops_outcome::diagnosis::{
     Curve, Dependence, Diagnosis, Evidence, ExperimentError, ForecastOf, Found, HangsOn, HeldBack, Noticeable,
     ParameterMove, Prediction, Ranked, Removed, Rival, Rule, Stability, Step, StrengthValue, Unexplained, Verdict,
     WindowErrors, together,

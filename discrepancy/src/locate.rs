@@ -8,8 +8,9 @@
 //! Source: T. Rogers, T. Friis, A latent restoring force approach to nonlinear system identification, Mechanical Systems and
 //! Signal Processing 180 (2022) 109426; here with knots instead of a state-space form.
 
-use mops_core::Port;
+use mops_core::effect::Port;
 use mops_models::WithEffects;
+use mops_outcome::diagnosis::{Curve, Evidence};
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -17,7 +18,6 @@ use crate::family::Over;
 use crate::fit::Fit;
 use crate::scene::Scene;
 use crate::unknown::{Term, Unknown};
-use mops_core::diagnosis::{Curve, Evidence};
 
 /// A place with the signal that is likeliest there.
 pub struct Located {
@@ -156,7 +156,7 @@ impl Units {
         let states = model.model().equation_states();
         let all = || states.iter().chain(&interface.signals).chain(&interface.inputs);
         let unit = |name: &str| all().find(|v| v.name == name).map(|v| v.unit.clone());
-        let text = |unit: Option<mops_core::Unit>| unit.map_or_else(String::new, |u| u.to_string());
+        let text = |unit: Option<mops_language::Unit>| unit.map_or_else(String::new, |u| u.to_string());
         let rate = |name: &str| text(unit(name).map(|u| u.power(1, -1)));
         let first = interface.inputs.first().map(|input| input.unit.to_string()).unwrap_or_default();
         match port {

@@ -1,13 +1,13 @@
 //! Places of residuals, on a mass with spring and damper behind a slow motor; the data come from equations of their own.
 
-use mops_core::math;
-use mops_core::{Hold, Input};
+use mops_core::{Input, case::Hold};
+use mops_math as math;
+use mops_outcome::diagnosis::Evidence;
 
 use crate::locate::{Located, locate};
 use crate::meter::Meter;
 use crate::subject::Subject;
 use crate::testing::{Record, fitted, integrated, subject, white};
-use mops_core::diagnosis::Evidence;
 
 const PLANT: &str = r#"
 states     = { x = "m", v = "m/s", f = "N" }

@@ -3,7 +3,7 @@
 //! Source: D. G. Kendall, Hunting quanta, Philosophical Transactions of the Royal Society A 276 (1974) 231: the cosine
 //! quantogram, here the mean of the cosines.
 
-use mops_core::math;
+use mops_math as math;
 use std::f64::consts::TAU;
 
 use crate::settings::settings;

@@ -3,7 +3,12 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
-use mops_core::{Case, Dual, Effect, Job, Model, ParameterSource, Port, Role, Scalar, Scale, Study, StudyError};
+use mops_core::{
+    Case, Effect, Job, Model, Role, Study, StudyError,
+    effect::Port,
+    study::{ParameterSource, Scale},
+};
+use mops_language::{Dual, Scalar};
 
 use crate::candidate::{Candidate, candidates};
 use crate::hygiene::{noise_of, without_spikes};

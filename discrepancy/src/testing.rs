@@ -2,12 +2,15 @@
 
 use std::sync::{Arc, OnceLock};
 
-use mops_core::math;
 use mops_core::{
-    Case, Channel, Effect, Experiment, Grid, Input, JobPlan, Model, ModelOptions, ParameterSource, Role, Scale, Study,
-    StudyParts, Task, Tuner, Unit, stream,
+    Case, Effect, Input, Model, ModelOptions, Role, Study, Task, Tuner,
+    case::{Channel, Experiment},
+    study::{Grid, JobPlan, ParameterSource, Scale, StudyParts},
 };
 use mops_effects::effects;
+use mops_language::Unit;
+use mops_math as math;
+use mops_math::stream;
 use mops_models::equations::EquationsOptions;
 
 use crate::base::{first_locals, pieces};

@@ -1,12 +1,16 @@
 //! The trace of a candidate: what it would add to the residuals, to first order in its size, along the motion of the model.
 
-use mops_core::{BoundEffect, Hold, InitialGrid, Input, Port, PortState};
+use mops_core::{
+    Input,
+    case::Hold,
+    effect::{BoundEffect, InitialGrid, Port, PortState},
+};
+use mops_models::{Moment, WithEffects};
 
 use crate::candidate::{Candidate, Sizes};
 use crate::fit::Piece;
 use crate::gap::gap;
 use crate::trajectory::Trajectory;
-use mops_models::{Moment, WithEffects};
 
 /// Indices of a candidate's places in a model.
 #[derive(Debug, Clone, Copy)]

@@ -4,7 +4,7 @@
 //! Between samples the linear system is solved with two Gauss nodes and a fourth-order Magnus expansion (S. Blanes, F. Casas,
 //! J. Oteo, J. Ros, The Magnus expansion and some of its applications, Physics Reports 470 (2009) 151, section 5).
 
-use mops_core::{Failure, Job, Port};
+use mops_core::{Failure, Job, effect::Port};
 use mops_models::{Along, Moment, WithEffects};
 use nalgebra::allocator::Allocator;
 use nalgebra::{Const, DMatrix, DefaultAllocator, Dim, Dyn, OMatrix};
@@ -344,8 +344,8 @@ where
 
 #[cfg(test)]
 mod tests {
-    use mops_core::math;
-    use mops_core::{Hold, Input, Job, Model};
+    use mops_core::{Input, Job, Model, case::Hold};
+    use mops_math as math;
 
     use crate::meter::Meter;
     use crate::testing::{Record, fitted, subject};

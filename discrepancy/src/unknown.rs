@@ -1,6 +1,6 @@
 //! An unknown signal at a place: what it may be a function of, and what it would do to the residuals.
 
-use mops_core::Port;
+use mops_core::effect::Port;
 use mops_models::WithEffects;
 use nalgebra::{DMatrix, DVector};
 

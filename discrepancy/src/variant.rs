@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use mops_core::{DeclaredTerm, Dimension, EffectParameter, InitialGrid, Model, Port, Role, Scope};
+use mops_core::{
+    Model, Role,
+    effect::{DeclaredTerm, Dimension, EffectParameter, InitialGrid, Port, Scope},
+};
 use mops_models::WithEffects;
 
 use crate::base::globals;

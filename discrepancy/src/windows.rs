@@ -4,8 +4,8 @@
 //! Source: H. G. Bock, Recent advances in parameter identification techniques for ODE, in Numerical Treatment of Inverse
 //! Problems (1983) 95.
 
-use mops_core::math;
 use mops_core::{Case, Model};
+use mops_math as math;
 
 use crate::fit::Piece;
 use crate::subject::{Local, Measurement, Series};
@@ -60,7 +60,7 @@ pub fn cut(index: usize, measurement: &Measurement, model: &dyn Model, count: us
 /// Start values of all states at a time, read off the measured signals where that is possible.
 fn starts(measurement: &Measurement, model: &dyn Model, at: f64, length: f64) -> Vec<Local> {
     let interface = model.interface();
-    let start = |state: &mops_core::State| {
+    let start = |state: &mops_core::model::State| {
         let parameter = interface.parameters.iter().position(|p| p.variable.name == state.start)?;
         let known = measurement.locals.iter().find(|local| local.parameter == parameter);
         let series = |name: &str| measurement.series.iter().find(|s| s.name == name);

@@ -1,9 +1,9 @@
 //! Elastic coupling with backlash.
 
-use mops_core::{
-    BoundEffect, DeclaredTerm, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind,
-    PortState, Scalar,
+use mops_core::effect::{
+    BoundEffect, DeclaredTerm, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind, PortState,
 };
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, Pressed};

@@ -1,9 +1,10 @@
 //! Dry friction with elastic presliding.
 
-use mops_core::{
+use mops_core::effect::{
     BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind,
-    PortState, Scalar,
+    PortState,
 };
+use mops_language::Scalar;
 
 use super::Definition;
 

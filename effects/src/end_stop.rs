@@ -1,9 +1,10 @@
 //! Elastic end stops with dampers that cannot pull.
 
-use mops_core::{
+use mops_core::effect::{
     BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind,
-    PortState, Scalar,
+    PortState,
 };
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::{ANY, NOT_NEGATIVE, Pressed};

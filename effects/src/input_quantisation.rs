@@ -1,6 +1,7 @@
 //! Quantised input.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::effect::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState};
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::quantised;

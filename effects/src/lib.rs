@@ -75,17 +75,20 @@ mod wind_gust;
 /// Names that the definition of an effect needs, to be imported at once.
 pub mod prelude {
     pub use crate::{Definition, effect};
-    pub use mops_core::{
+    pub use mops_core::effect::{
         BoundEffect, Characteristic, DeclaredTerm, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid,
-        PortKind, PortState, Scalar,
+        PortKind, PortState,
     };
+    pub use mops_language::Scalar;
 }
 
 use std::sync::Arc;
 
 use mops_core::{
-    BoundEffect, Characteristic, DeclaredTerm, Dimension, Dual7, Effect, EffectClass, EffectParameter, PortKind, Scalar,
+    Effect,
+    effect::{BoundEffect, Characteristic, DeclaredTerm, Dimension, EffectClass, EffectParameter, PortKind},
 };
+use mops_language::{Dual7, Scalar};
 
 /// Definition of an effect in its file; see [`Effect`] for the meaning of each item.
 pub trait Definition: Send + Sync + 'static {

@@ -1,8 +1,9 @@
 //! Dry friction proportional to the transmitted load.
 
-use mops_core::{
-    BoundEffect, Characteristic, Dimension, DryFriction, EffectClass, EffectParameter, PortKind, PortState, Scalar,
+use mops_core::effect::{
+    BoundEffect, Characteristic, Dimension, DryFriction, EffectClass, EffectParameter, PortKind, PortState,
 };
+use mops_language::Scalar;
 
 use super::Definition;
 

@@ -1,9 +1,10 @@
 //! Dry friction of elastic bristles that slip.
 
-use mops_core::{
+use mops_core::effect::{
     BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind,
-    PortState, Scalar,
+    PortState,
 };
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;

@@ -1,6 +1,7 @@
 //! Mass that decreases with time.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, MOST_LOST, PortKind, PortState, Scalar};
+use mops_core::effect::{BoundEffect, Dimension, EffectClass, EffectParameter, MOST_LOST, PortKind, PortState};
+use mops_language::Scalar;
 
 use super::Definition;
 

@@ -1,8 +1,9 @@
 //! Friction proportional to a power of the speed.
 
-use mops_core::{
-    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+use mops_core::effect::{
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState,
 };
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::{power, sign};

@@ -2,7 +2,8 @@
 
 use std::f64::consts::PI;
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::effect::{BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState};
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::ANY;

@@ -1,8 +1,9 @@
 //! Dead zone of a sensor.
 
-use mops_core::{
-    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+use mops_core::effect::{
+    BoundEffect, Characteristic, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState,
 };
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::{ANY, without_gap};

@@ -1,8 +1,9 @@
 //! Overflow above a level into another store.
 
-use mops_core::{
-    BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind, PortState, Scalar,
+use mops_core::effect::{
+    BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind, PortState,
 };
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::{ANY, NOT_NEGATIVE, over};

@@ -1,8 +1,9 @@
 //! Spring with backlash.
 
-use mops_core::{
-    BoundEffect, DeclaredTerm, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar,
+use mops_core::effect::{
+    BoundEffect, DeclaredTerm, Dimension, EffectClass, EffectParameter, InitialGrid, PortKind, PortState,
 };
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::{NOT_NEGATIVE, sign};

@@ -1,9 +1,10 @@
 //! Dry friction that decreases with speed.
 
-use mops_core::{
+use mops_core::effect::{
     BoundEffect, Characteristic, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, ParameterKind,
-    PortKind, PortState, Scalar,
+    PortKind, PortState,
 };
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;

@@ -1,9 +1,9 @@
 //! Dry friction as a table over the speed.
 
-use mops_core::{
-    BoundEffect, Characteristic, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind,
-    PortState, Scalar,
+use mops_core::effect::{
+    BoundEffect, Characteristic, Dimension, DryFriction, EffectClass, EffectParameter, InitialGrid, PortKind, PortState,
 };
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;

@@ -2,7 +2,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use mops_core::{Dimension, EffectParameter, InitialGrid, ParameterKind, Scalar};
+use mops_core::effect::{Dimension, EffectParameter, InitialGrid, ParameterKind};
+use mops_language::Scalar;
 
 /// Bounds of a parameter that may be any number.
 pub(super) const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];

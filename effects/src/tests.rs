@@ -2,8 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use mops_core::math;
-use mops_core::{BoundEffect, Dual7, Effect, EffectClass, EffectParameter, InitialGrid, PortKind, PortState, Scalar};
+use mops_core::{
+    Effect,
+    effect::{BoundEffect, EffectClass, EffectParameter, InitialGrid, PortKind, PortState},
+};
+use mops_language::{Dual7, Scalar};
+use mops_math as math;
 
 use super::effects;
 

@@ -1,8 +1,9 @@
 //! Spring with hysteresis.
 
-use mops_core::{
-    BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind, PortState, Scalar,
+use mops_core::effect::{
+    BoundEffect, Dimension, EffectClass, EffectParameter, InitialGrid, ParameterKind, PortKind, PortState,
 };
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::NOT_NEGATIVE;

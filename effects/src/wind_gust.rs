@@ -1,6 +1,7 @@
 //! Single gust.
 
-use mops_core::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState, Scalar};
+use mops_core::effect::{BoundEffect, Dimension, EffectClass, EffectParameter, PortKind, PortState};
+use mops_language::Scalar;
 
 use super::Definition;
 use super::terms::{Span, from, length};

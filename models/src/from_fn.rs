@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use mops_core::{Analysis, Failure, Instant, Interface, Job, Model, Plant, Scalar};
+use mops_core::{Analysis, Failure, Instant, Interface, Job, Model, Plant};
+use mops_language::Scalar;
 
 use crate::kernel::{PlantModel, Simulated};
 
@@ -104,7 +105,11 @@ impl Model for FnModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mops_core::{Case, Input, Linearise, Linearised, Parameter, Variable, math};
+    use mops_core::{
+        Case, Input, Parameter, Variable,
+        model::{Linearise, Linearised},
+    };
+    use mops_math as math;
 
     /// `T = P/k (1 - exp(-k t/C))`.
     #[test]

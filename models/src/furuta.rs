@@ -1,10 +1,11 @@
 //! Furuta pendulum: an arm that turns about the vertical axis, and a pendulum that swings at its end.
 
-use mops_core::plant::{Events, InputRates};
 use mops_core::{
-    EventInstant, Failure, Instant, Interface, LeftOut, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, State,
-    StudyError, Unit, Variable,
+    Failure, Instant, Interface, Model, ModelOptions, Parameter, Plant, StudyError, Variable,
+    model::State,
+    plant::{EventInstant, Events, InputRates, LeftOut},
 };
+use mops_language::{Quantity, Scalar, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -1,6 +1,7 @@
 //! Furuta pendulum as two rigid bodies with two bearings.
 
-use mops_core::{Failure, Interface, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, StudyError, Variable};
+use mops_core::{Failure, Interface, Model, ModelOptions, Parameter, Plant, StudyError, Variable};
+use mops_language::{Quantity, Scalar};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -1,6 +1,7 @@
 //! Furuta pendulum whose pendulum can also tilt sideways against a spring.
 
-use mops_core::{Failure, Interface, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, StudyError};
+use mops_core::{Failure, Interface, Model, ModelOptions, Parameter, Plant, StudyError};
+use mops_language::{Quantity, Scalar};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -1,6 +1,7 @@
 //! Furuta pendulum linearised about its upright position.
 
-use mops_core::{Failure, Instant, Interface, Model, ModelOptions, Parameter, Plant, Quantity, Scalar, StudyError};
+use mops_core::{Failure, Instant, Interface, Model, ModelOptions, Parameter, Plant, StudyError};
+use mops_language::{Quantity, Scalar};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

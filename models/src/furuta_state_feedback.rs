@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use mops_core::plant::{Events, InputRates};
 use mops_core::{
-    Cut, EventInstant, Failure, Instant, Interface, LeftOut, Model, ModelOptions, Parameter, Quantity, Scalar,
-    StudyError, Variable,
+    Failure, Instant, Interface, Model, ModelOptions, Parameter, StudyError, Variable,
+    model::Cut,
+    plant::{EventInstant, Events, InputRates, LeftOut},
 };
+use mops_language::{Quantity, Scalar};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -16,8 +16,9 @@ pub mod state_space;
 pub mod transfer_function;
 mod with_effects;
 
+use mops_core::catalogue::ModelKind;
+
 pub use from_fn::{FnModel, from_fn};
-use mops_core::ModelKind;
 pub use with_effects::{Along, Moment, Sliding, Tick, WithEffects};
 
 /// Returns all kinds of models. To add a model, write its file and add a line here.

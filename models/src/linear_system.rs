@@ -3,12 +3,16 @@
 
 use std::fmt;
 
-use mops_core::expression::units::{Conflict, Dimensions, Measure, Named};
-use mops_core::plant::{Breaks, Memory, Past};
 use mops_core::{
-    Analysis, AnalysisKind, DIRECTIONS, Dual, Dual7, Expression, Failure, Instant, Interface, Job, Parameter, Plant,
-    Quantity, Scalar, StateSpace, StudyError, Unit, Variable, WithTangents,
+    Analysis, AnalysisKind, Failure, Instant, Interface, Job, Parameter, Plant, StudyError, Variable,
+    model::WithTangents,
+    plant::{Breaks, Memory, Past},
 };
+use mops_language::{
+    DIRECTIONS, Dual, Dual7, Expression, Quantity, Scalar, Unit,
+    expression::units::{Conflict, Dimensions, Measure, Named},
+};
+use mops_linear::StateSpace;
 use nalgebra::DMatrix;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
@@ -359,7 +363,7 @@ impl Units<'_> {
         for (name, unit) in self.0 {
             let wrong = |fact: String, help: String| StudyError::new(name, fact).with_help(help).within("units");
             if !known.contains(&name.as_str()) {
-                let help = mops_core::suggestion(name, known.iter().copied());
+                let help = mops_language::suggestion(name, known.iter().copied());
                 return Err(wrong(format!("the system has no parameter, input or output `{name}`"), help));
             }
             let unit = Unit::parse(unit)

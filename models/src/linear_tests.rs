@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
-use mops_core::linear::{Complex, Loop, TransferFunction};
-use mops_core::math::{self, complex};
 use mops_core::{
-    Analysis, Case, Input, Job, Linearise, Linearised, Model, ModelOptions, OperatingPoint, Quantity, StateSpace,
+    Analysis, Case, Input, Job, Model, ModelOptions,
+    model::{Linearise, Linearised, OperatingPoint},
 };
+use mops_language::Quantity;
+use mops_linear::{Complex, Loop, StateSpace, TransferFunction};
+use mops_math as math;
+use mops_math::complex;
 
 use crate::furuta::Furuta;
 use crate::kernel::Tolerance;

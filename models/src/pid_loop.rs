@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use mops_core::plant::{Breaks, Events, InputRates};
 use mops_core::{
-    Cut, EventInstant, Failure, Input, Instant, Interface, LeftOut, Model, ModelOptions, Parameter, Plant, Quantity,
-    Scalar, StudyError, Unit, Variable,
+    Failure, Input, Instant, Interface, Model, ModelOptions, Parameter, Plant, StudyError, Variable,
+    model::Cut,
+    plant::{Breaks, EventInstant, Events, InputRates, LeftOut},
 };
+use mops_language::{Quantity, Scalar, Unit};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -1,9 +1,10 @@
 //! Loop transfer function of a PID controller and its plant.
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, Parameter, Scalar, StudyError, Variable,
-    WithTangents,
+    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, Parameter, StudyError, Variable,
+    model::WithTangents,
 };
+use mops_language::Scalar;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

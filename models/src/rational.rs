@@ -1,6 +1,7 @@
 //! Plant given by its transfer function or by matrices, whose entries may be parameters of the model.
 
-use mops_core::{Failure, Scalar, StudyError};
+use mops_core::{Failure, StudyError};
+use mops_language::Scalar;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
@@ -268,7 +269,7 @@ pub(crate) fn from_roots<S: Scalar>(roots: &[S]) -> Vec<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mops_core::{Dual, Dual7};
+    use mops_language::{Dual, Dual7};
 
     #[test]
     fn matrices_have_the_transfer_function_of_the_resolvent() {
@@ -286,7 +287,7 @@ mod tests {
     fn the_tangents_of_the_coefficients_are_those_of_the_entries() {
         // 1/(s^2 + b s + a), with both derivatives.
         let seed = |value: f64, direction: usize| {
-            let mut tangent = [0.0; mops_core::DIRECTIONS];
+            let mut tangent = [0.0; mops_language::DIRECTIONS];
             tangent[direction] = 1.0;
             Dual { value, tangent }
         };

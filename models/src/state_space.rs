@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, Quantity, Scalar, StudyError, Variable,
-    WithTangents,
+    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, StudyError, Variable, model::WithTangents,
 };
+use mops_language::{Quantity, Scalar};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -63,7 +63,7 @@ impl ModelOptions for StateSpaceOptions {
     fn build(self) -> Result<Box<dyn Model>, StudyError> {
         let n = self.a.len();
         let (inputs, outputs) = (self.b.first().map_or(0, Vec::len), self.c.len());
-        let zeros = || vec![vec![Entry(mops_core::Expression::parse("0").expect("a number")); inputs]; outputs];
+        let zeros = || vec![vec![Entry(mops_language::Expression::parse("0").expect("a number")); inputs]; outputs];
         let d = self.d.unwrap_or_else(zeros);
         for (key, rows, [height, width]) in [
             ("a", &self.a, [n, n]),

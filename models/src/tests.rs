@@ -5,8 +5,8 @@ mod effects_together;
 mod furuta_bodies;
 mod state_feedback;
 
-use mops_core::math;
 use mops_core::{Case, Input, Job, Model, ModelOptions, Parameter, Response};
+use mops_math as math;
 
 use crate::furuta::Furuta;
 use crate::kernel::Tolerance;
@@ -272,7 +272,7 @@ fn coulomb_friction_brings_the_pendulum_to_rest_and_it_stays_there_exactly() {
 
 #[test]
 fn a_stuck_arm_breaks_away_when_the_torque_exceeds_its_friction() {
-    let ramp = Input::Sampled { times: vec![0.0, 1.0], values: vec![0.0, 4e-3], hold: mops_core::Hold::First };
+    let ramp = Input::Sampled { times: vec![0.0, 1.0], values: vec![0.0, 4e-3], hold: mops_core::case::Hold::First };
     let case = Case { inputs: vec![("u".into(), ramp)], ..Case::default() };
     // Hanging at rest, only the input torque acts on the arm: the arm breaks away when the ramp reaches 1e-3, at 0.25
     // s.

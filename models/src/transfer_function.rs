@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use mops_core::{
-    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, Quantity, Scalar, StudyError, Variable,
-    WithTangents,
+    Analysis, AnalysisKind, Failure, Interface, Job, Model, ModelOptions, StudyError, Variable, model::WithTangents,
 };
+use mops_language::{Quantity, Scalar};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

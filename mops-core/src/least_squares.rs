@@ -1,6 +1,6 @@
 //! Levenberg-Marquardt iteration within bounds, by QR factorisation: the core of the solver of that name and of the fits of the diagnosis.
 
-use crate::math;
+use mops_math as math;
 use nalgebra::{DMatrix, DVector};
 
 /// Iterate of the Levenberg-Marquardt method for a sum of squares `r'r` with bounds:

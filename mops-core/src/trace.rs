@@ -2,7 +2,7 @@
 //!
 //! Criteria read traces, not samples, so that a peak or a settling time does not depend on the step size.
 
-use crate::scalar::Scalar;
+use mops_language::Scalar;
 
 /// A signal as a piecewise quartic over consecutive segments, with jumps allowed between them.
 ///
@@ -577,7 +577,7 @@ fn bisect(mut a: f64, mut b: f64, f: impl Fn(f64) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math;
+    use mops_math as math;
 
     /// `sin t` over [0, 10] in 200 segments.
     fn sine() -> Trace {

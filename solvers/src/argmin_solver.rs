@@ -4,9 +4,10 @@ use std::collections::HashMap;
 
 use argmin::core::{CostFunction, Error, IterState, KV, Problem, State as _, TerminationReason};
 use mops_core::{
-    Differences, Evaluation, Halt, Linearisation, Merit, Oracle, Progress, Shape, Solver, SolverOptions, Stream, Usage,
-    stream,
+    Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver, SolverOptions, Usage,
+    solver::{Differences, Linearisation},
 };
+use mops_math::{Stream, stream};
 
 /// Solver of mops as argmin's `Solver`, for problems with a [`CostFunction`] of real variables in a box.
 ///
@@ -240,7 +241,7 @@ impl<O: CostFunction<Param = Vec<f64>, Output = f64>> Oracle for ArgminOracle<'_
 #[cfg(test)]
 mod tests {
     use argmin::core::Executor;
-    use mops_core::math;
+    use mops_math as math;
 
     use super::*;
     use crate::nelder_mead::NelderMeadOptions;

@@ -1,7 +1,8 @@
 //! Default solver, which chooses a method for the problem.
 
 use mops_core::{
-    Basins, Evaluation, Halt, Merit, Objective, Optimality, Oracle, Progress, Shape, Solver, SolverOptions,
+    Evaluation, Halt, Merit, Objective, Oracle, Progress, Shape, Solver, SolverOptions,
+    solver::{Basins, Optimality},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -1,6 +1,9 @@
 //! Cost of confirming an optimum, limited in proportion to the cost of finding it.
 
-use mops_core::{Basins, Merit, Optimality, Oracle, SMALL_OBJECTIVE};
+use mops_core::{
+    Merit, Oracle,
+    solver::{Basins, Optimality, SMALL_OBJECTIVE},
+};
 
 /// Evaluations of a search up to its last gain, and since then.
 ///

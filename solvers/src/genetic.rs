@@ -1,6 +1,7 @@
 //! Real-coded genetic algorithm.
 
-use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
+use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions};
+use mops_math::Stream;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;

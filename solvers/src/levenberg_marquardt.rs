@@ -1,7 +1,10 @@
 //! Levenberg-Marquardt method for sums of squares, with bounds and multistart.
 
-use mops_core::math;
-use mops_core::{Evaluation, Halt, LeastSquares, Linearisation, Oracle, Progress, Shape, Solver, SolverOptions};
+use mops_core::{
+    Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions, least_squares::LeastSquares,
+    solver::Linearisation,
+};
+use mops_math as math;
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -42,14 +42,15 @@ mod start;
 mod variation;
 pub mod weighted_chebyshev;
 
-use mops_core::SolverKind;
+use mops_core::catalogue::SolverKind;
 
 /// Names that the definition of a solver needs, to be imported at once.
 pub mod prelude {
     pub use mops_core::{
-        Evaluation, Halt, Linearisation, Merit, Objective, Oracle, Progress, Shape, Solver, SolverKind, SolverOptions,
-        Stop, Stream,
+        Evaluation, Halt, Merit, Objective, Oracle, Progress, Shape, Solver, SolverOptions, Stop,
+        catalogue::SolverKind, solver::Linearisation,
     };
+    pub use mops_math::Stream;
 }
 
 pub use optimality::{Certificate, certificate, optimality};

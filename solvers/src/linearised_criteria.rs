@@ -1,6 +1,6 @@
 //! Criteria linearised at a point, grouped by usage.
 
-use mops_core::{Linearisation, Objective, Shape, Usage};
+use mops_core::{Objective, Shape, Usage, solver::Linearisation};
 
 use crate::active_set::dot;
 

@@ -1,6 +1,7 @@
 //! Archive of the best point of one run among several.
 
-use mops_core::{Evaluation, Halt, Linearisation, Oracle, Shape, Stream};
+use mops_core::{Evaluation, Halt, Oracle, Shape, solver::Linearisation};
+use mops_math::Stream;
 
 /// Oracle of one run, whose best point is the best of that run only.
 pub struct LocalArchive<'a> {

@@ -1,7 +1,7 @@
 //! Combination of a quasi-Newton method and a pattern search from the same starting point.
 
-use mops_core::math;
 use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver};
+use mops_math as math;
 
 use crate::chaining::Chain;
 use crate::local_archive::LocalArchive;

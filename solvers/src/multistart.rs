@@ -5,7 +5,10 @@
 //! [`crate::confirmation`]), or until the residuals of a calibration are noise. A run that comes close to the end of an earlier one
 //! is not continued. If enabled, runs from points around the best one follow until nothing changes.
 
-use mops_core::{Basins, Evaluation, Halt, Merit, Optimality, Oracle, Progress, SMALL_OBJECTIVE, Shape, Solver};
+use mops_core::{
+    Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver,
+    solver::{Basins, Optimality, SMALL_OBJECTIVE},
+};
 
 use crate::confirmation::{Confirmation, SAMPLE, factor, is_gain};
 use crate::local_archive::LocalArchive;

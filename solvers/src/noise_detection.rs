@@ -1,7 +1,7 @@
 //! Detection of noise and kinks in the criteria near a point, from values along lines.
 
-use mops_core::math;
 use mops_core::{Halt, Oracle, Usage};
+use mops_math as math;
 use rand::Rng;
 
 /// Smoothness of the criteria along lines.
@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn noise_is_found_on_a_parabola_and_smooth_functions_have_none() {
-        let mut random = mops_core::stream(1, "noise");
+        let mut random = mops_math::stream(1, "noise");
         let mut ratios = Vec::new();
         for _ in 0..100 {
             let mut noisy = |i: u32| 3.0 + math::powi(f64::from(i) * 1e-3, 2) + 1e-4 * random.random_range(-1.0..1.0);

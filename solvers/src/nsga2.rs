@@ -4,8 +4,8 @@ mod pruning;
 
 use std::cmp::Ordering;
 
-use mops_core::front::FrontSorter;
-use mops_core::{Solver, SolverOptions, Stream};
+use mops_core::{Solver, SolverOptions, front::FrontSorter};
+use mops_math::Stream;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -4,8 +4,8 @@ mod normalisation;
 
 use std::cmp::Ordering;
 
-use mops_core::front::FrontSorter;
-use mops_core::{Solver, SolverOptions, Stream};
+use mops_core::{Solver, SolverOptions, front::FrontSorter};
+use mops_math::Stream;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;

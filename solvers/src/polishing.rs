@@ -1,6 +1,7 @@
 //! Polishing: the best points of a global search are the starting points of local ones.
 
-use mops_core::{Evaluation, Halt, Linearisation, Merit, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
+use mops_core::{Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver, SolverOptions, solver::Linearisation};
+use mops_math::Stream;
 
 use crate::levenberg_marquardt::LevenbergMarquardtOptions;
 use crate::multistart::Multistart;

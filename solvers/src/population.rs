@@ -1,6 +1,7 @@
 //! Population of points and its stagnation test.
 
-use mops_core::{Evaluation, Halt, Merit, Oracle, Stream};
+use mops_core::{Evaluation, Halt, Merit, Oracle};
+use mops_math::Stream;
 
 use crate::ranking::compare;
 use crate::start::latin_hypercube;

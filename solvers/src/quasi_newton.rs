@@ -1,6 +1,6 @@
 //! BFGS with a line search, for one function that may have kinks.
 
-use mops_core::{Halt, Linearisation, Objective, Oracle, Progress, Shape, Solver, Usage};
+use mops_core::{Halt, Objective, Oracle, Progress, Shape, Solver, Usage, solver::Linearisation};
 use nalgebra::{DMatrix, DVector};
 
 use crate::linearised_criteria::LinearisedCriteria;

@@ -1,7 +1,8 @@
 //! Simulated annealing.
 
-use mops_core::math;
-use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
+use mops_core::{Halt, Oracle, Progress, Shape, Solver, SolverOptions};
+use mops_math as math;
+use mops_math::Stream;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;

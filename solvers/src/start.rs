@@ -1,6 +1,7 @@
 //! Starting points and samples of the box.
 
-use mops_core::{Halt, Oracle, Stream};
+use mops_core::{Halt, Oracle};
+use mops_math::Stream;
 use rand::Rng;
 use rand::seq::SliceRandom;
 

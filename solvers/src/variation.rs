@@ -1,7 +1,7 @@
 //! Crossover and mutation of real numbers in the unit box, without allocation.
 
-use mops_core::Stream;
-use mops_core::math;
+use mops_math as math;
+use mops_math::Stream;
 use rand::Rng;
 
 /// Simulated binary crossover and polynomial mutation, the latter within the bounds.
@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn children_stay_in_the_box_and_keep_the_mean_of_their_parents_inside_it() {
-        let mut random = mops_core::stream(1, "variation");
+        let mut random = mops_math::stream(1, "variation");
         let variation = Variation { crossover: 1.0, ..Variation::usual(1) };
         let (mut mean, count) = (0.0, 20_000);
         for _ in 0..count {
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn mutations_stay_in_the_box_also_at_its_faces() {
-        let mut random = mops_core::stream(2, "variation");
+        let mut random = mops_math::stream(2, "variation");
         let variation = Variation { mutation: 1.0, ..Variation::usual(1) };
         for start in [0.0, 1e-9, 0.5, 1.0] {
             let mut moved = false;

@@ -1,12 +1,14 @@
 //! Memory allocations of solvers between evaluations.
 
-use mops_core::{Budget, Evaluation, Halt, Linearisation, Oracle, Progress, Run, Shape, Solver, SolverOptions, Stream};
+use mops_core::{
+    Evaluation, Halt, Oracle, Progress, Run, Shape, Solver, SolverOptions, run::Budget, solver::Linearisation,
+};
+use mops_math::Stream;
 use mops_problems::{Posed, Slope, suites};
-use mops_solvers::cma_es::CmaEsOptions;
-use mops_solvers::differential_evolution::DifferentialEvolutionOptions;
-use mops_solvers::genetic::GeneticOptions;
-use mops_solvers::pattern_search::PatternSearchOptions;
-use mops_solvers::sqp::SqpOptions;
+use mops_solvers::{
+    cma_es::CmaEsOptions, differential_evolution::DifferentialEvolutionOptions, genetic::GeneticOptions,
+    pattern_search::PatternSearchOptions, sqp::SqpOptions,
+};
 
 /// Oracle whose own allocations are not counted.
 struct UncountedOracle<'a>(&'a mut dyn Oracle);

@@ -1,12 +1,17 @@
 //! Fronts computed by `weighted-chebyshev`, `nsga2` and `nsga3`, compared with known fronts.
 
-use mops_core::front::{hypervolume, inverted_generational_distance, thinned};
-use mops_core::math;
-use mops_core::{Budget, Run, Stop};
+use mops_core::{
+    Run, Stop,
+    front::{hypervolume, inverted_generational_distance, thinned},
+    run::Budget,
+};
+use mops_math as math;
 use mops_problems::{Answer, Posed, Slope};
-use mops_solvers::evolution::{Evolution, Survival};
-use mops_solvers::nsga2::Nsga2Options;
-use mops_solvers::nsga3::Nsga3Options;
+use mops_solvers::{
+    evolution::{Evolution, Survival},
+    nsga2::Nsga2Options,
+    nsga3::Nsga3Options,
+};
 
 /// Hypervolume of the whole front of a run, relative to the known hypervolume, for every problem of a suite.
 fn shares<S: Survival>(suite: &str, search: impl Fn() -> Evolution<S>) -> Vec<(String, f64)> {

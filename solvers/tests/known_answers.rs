@@ -129,7 +129,7 @@ fn solutions_lie_inside_boxes_that_are_not_the_problems_own() {
         for problem in problems(suite).iter().filter(|problem| matches!(problem.answer, Answer::Minima(_))) {
             let posed = Posed::new(problem, Slope::Exact);
             let own = |j: usize, side: usize| problem.bounds.get(j).is_some_and(|bounds| bounds[side].is_finite());
-            let mut run = mops_core::Run::new(&posed, mops_core::Budget { evaluations: 20_000 }, &());
+            let mut run = mops_core::Run::new(&posed, mops_core::run::Budget { evaluations: 20_000 }, &());
             let kind = mops_solvers::kinds().into_iter().find(|kind| kind.name == "sqp").expect("sqp is a kind");
             run.solve(kind.default_choice().make().as_mut(), &posed.start());
             let best = mops_core::Oracle::best(&run).expect("the start has a value").point.clone();

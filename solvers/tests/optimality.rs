@@ -1,7 +1,13 @@
 //! Points whose optimality is known.
 
-use mops_core::math;
-use mops_core::{Budget, Evaluation, Evaluator, Objective, Optimality, Pareto, Run, Shape, Usage, stream};
+use mops_core::{
+    Evaluation, Objective, Run, Shape, Usage,
+    problem::Evaluator,
+    run::Budget,
+    solver::{Optimality, Pareto},
+};
+use mops_math as math;
+use mops_math::stream;
 use mops_solvers::{certificate, optimality};
 use rand::Rng;
 

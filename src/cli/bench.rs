@@ -5,7 +5,8 @@ use std::process::ExitCode;
 
 use clap::Args;
 use maud::{PreEscaped, html};
-use mops_core::{Catalogue, Diagnostic, Halt, SMALL_OBJECTIVE, Stop, Study, Task, Usage};
+use mops_core::{Catalogue, Halt, Stop, Study, Task, Usage, solver::SMALL_OBJECTIVE};
+use mops_language::Diagnostic;
 use serde::Serialize;
 
 use super::default_folder;

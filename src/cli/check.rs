@@ -4,9 +4,11 @@ use std::process::ExitCode;
 
 use clap::Args;
 use mops_core::{
-    Case, Catalogue, Channel, Demand, Experiment, Grid, JobPlan, Parameter, ParameterSource, Scale, Study,
-    uncertain_reports,
+    Case, Catalogue, Demand, Parameter, Study,
+    case::{Channel, Experiment},
+    study::{Grid, JobPlan, ParameterSource, Scale},
 };
+use mops_outcome::robustness::uncertain_reports;
 
 use super::families::folded;
 use super::places::places;

@@ -5,7 +5,8 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use mops_core::{Catalogue, Diagnostic, Problem};
+use mops_core::{Catalogue, Problem};
+use mops_language::Diagnostic;
 use serde_json::{Value, json};
 
 use super::past_run::PastRun;

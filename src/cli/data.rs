@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::Diagnostic;
-use mops_core::data::{DataFile, unit_since_1970};
-use mops_core::identification::{excitation_report, spacing};
+use mops_data::{DataFile, unit_since_1970};
 use mops_discrepancy::noise_of;
+use mops_language::Diagnostic;
+use mops_outcome::identification::{excitation_report, spacing};
 
 use super::findings;
 use crate::files::{Inputs, Outputs};

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use mops_core::{Catalogue, Diagnostic};
+use mops_core::Catalogue;
+use mops_language::Diagnostic;
 
 use super::past_run::PastRun;
 use super::study::Home;

@@ -3,7 +3,11 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, CatalogueStudy, Diagnostic, ModelKind, nearest};
+use mops_core::{
+    Catalogue,
+    catalogue::{CatalogueStudy, ModelKind},
+};
+use mops_language::{Diagnostic, nearest};
 use schemars::Schema;
 
 use super::effect;
@@ -25,15 +29,15 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     let criteria = catalogue.criteria.iter().map(|k| (k.name, k.schema));
     let solvers = catalogue.solvers.iter().map(|k| (k.name, k.schema));
     let mut kinds = models.chain(criteria).chain(solvers);
-    if let Some((table, schema)) = mops_core::file::tables().into_iter().find(|(table, _)| *table == name) {
-        print(&mops_core::file::describe(&format!("[{table}] of a study file"), &schema))?;
+    if let Some((table, schema)) = mops_file::tables().into_iter().find(|(table, _)| *table == name) {
+        print(&mops_file::describe(&format!("[{table}] of a study file"), &schema))?;
         return Ok(ExitCode::SUCCESS);
     }
     if let Some((name, schema)) = kinds.clone().find(|(known, _)| *known == name) {
         let model = catalogue.models.iter().find(|kind| kind.name == name).and_then(ModelKind::default_model);
         let places = model.map_or_else(String::new, |model| places(model.interface()));
         let places = if places.is_empty() { places } else { format!("\nPlaces for effects:\n  {places}\n") };
-        print(&(mops_core::file::describe(name, &schema()) + &places))?;
+        print(&(mops_file::describe(name, &schema()) + &places))?;
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(effect) = catalogue.effects.iter().find(|effect| effect.name() == name) {
@@ -44,7 +48,7 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         print(&page_of(study))?;
         return Ok(ExitCode::SUCCESS);
     }
-    let tables = mops_core::file::tables().into_iter().map(|(table, schema)| (format!("[{table}]"), schema));
+    let tables = mops_file::tables().into_iter().map(|(table, schema)| (format!("[{table}]"), schema));
     let pages = keys_named(name, tables.chain(kinds.clone().map(|(kind, schema)| (kind.to_owned(), schema()))));
     if !pages.is_empty() {
         print(&pages)?;
@@ -55,7 +59,7 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         .map(|(name, _)| name)
         .chain(catalogue.effects.iter().map(|effect| effect.name()))
         .chain(catalogue.studies.iter().map(CatalogueStudy::name))
-        .chain(mops_core::file::tables().into_iter().map(|(table, _)| table))
+        .chain(mops_file::tables().into_iter().map(|(table, _)| table))
         .collect();
     let help = nearest(name, known.iter().copied()).map_or_else(
         || "`mops list` shows the kinds, effects and studies".to_owned(),
@@ -69,7 +73,7 @@ fn keys_named(key: &str, schemas: impl Iterator<Item = (String, Schema)>) -> Str
     // Keys with identical documentation share one entry.
     let mut pages: Vec<(String, Vec<String>)> = Vec::new();
     for (of, schema) in schemas {
-        for (path, page) in mops_core::file::places_of(key, &schema) {
+        for (path, page) in mops_file::places_of(key, &schema) {
             let place = if path == key { of.clone() } else { format!("{of} ({path})") };
             match pages.iter_mut().find(|(known, _)| *known == page) {
                 Some((_, places)) => places.push(place),

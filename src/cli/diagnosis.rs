@@ -1,6 +1,6 @@
 //! Text of a diagnosis on the terminal: verdict, effects found, errors before and after, indistinguishable effects.
 
-use mops_core::diagnosis::{Diagnosis, Verdict};
+use mops_outcome::diagnosis::{Diagnosis, Verdict};
 
 use crate::diagnosis::{errors, words};
 use crate::numbers::significant;

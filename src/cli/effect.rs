@@ -1,7 +1,11 @@
 //! Manual page of an effect.
 
+use mops_core::{
+    Effect,
+    effect::{Dimension, EffectParameter, PortKind, Scope},
+};
+
 use crate::terminal::number;
-use mops_core::{Dimension, Effect, EffectParameter, PortKind, Scope};
 
 /// Formats the page of an effect: definition, formula, places, parameters and source.
 pub(super) fn page(effect: &dyn Effect) -> String {
@@ -100,7 +104,7 @@ fn unit(dimension: Dimension) -> String {
 #[cfg(test)]
 mod tests {
     use super::unit;
-    use mops_core::Dimension;
+    use mops_core::effect::Dimension;
 
     #[test]
     fn a_unit_is_spelt_out_as_powers() {

@@ -1,7 +1,10 @@
 //! Text of the findings of tasks and of the identifiability of a calibration, for the terminal.
 
-use mops_core::identification::{ExcitationReport, RegressionReport, SensitivityReport, excitation_words};
-use mops_core::{Outcome, Pareto, SweepReport, TradeOffs};
+use mops_core::solver::Pareto;
+use mops_outcome::{
+    Outcome, SweepReport, TradeOffs,
+    identification::{ExcitationReport, RegressionReport, SensitivityReport, excitation_words},
+};
 use serde_json::{Map, Value};
 
 use super::robustness;

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Diagnostic};
+use mops_core::Catalogue;
+use mops_language::Diagnostic;
 use serde_json::{Value, json};
 
 use super::past_run::PastRun;

@@ -1,8 +1,8 @@
 //! Plots of a linear system: Bode, Nyquist, root locus.
 
-use mops_core::StateSpace;
-use mops_core::linear::{Complex, eigenvalues, zeros};
-use mops_core::math::{self, complex};
+use mops_linear::{Complex, StateSpace, eigenvalues, zeros};
+use mops_math as math;
+use mops_math::complex;
 
 use crate::report::{Color, Curve, CurveStyle, FrequencyCurve, Level, Plot, bode, nyquist};
 

@@ -9,11 +9,13 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use mops_core::linear::{Complex, TransferFunction, eigenvalues, zeros};
 use mops_core::{
-    Analysis, AnalysisKind, Catalogue, Diagnostic, Failure, Job, JobPlan, Linearise, Linearised, Quantity, Resting,
-    StateSpace, Study, StudyError, suggestion,
+    Analysis, AnalysisKind, Catalogue, Failure, Job, Study, StudyError,
+    model::{Linearise, Linearised, Resting},
+    study::JobPlan,
 };
+use mops_language::{Diagnostic, Quantity, suggestion};
+use mops_linear::{Complex, StateSpace, TransferFunction, eigenvalues, zeros};
 use serde_json::{Value, json};
 
 use self::feedback::Wanted;

@@ -2,9 +2,10 @@
 
 use std::process::ExitCode;
 
+use mops_core::{Catalogue, catalogue::CatalogueStudy};
+
 use crate::terminal::{CommandError, print, table};
 use clap::{Args, ValueEnum};
-use mops_core::{Catalogue, CatalogueStudy};
 
 use super::study::text_of;
 

@@ -4,8 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic};
+use mops_core::Catalogue;
+use mops_file::StudyFile;
+use mops_language::Diagnostic;
 use serde_json::Value;
 
 use super::run_files::DIAGNOSIS;

@@ -6,10 +6,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use mops_core::file::StudyFile;
-use mops_core::{
-    Budget, Catalogue, Diagnostic, Evaluation, Oracle, Problem, Run, Stop, Study, Usage, criterion_reports, suggestion,
-};
+use mops_core::{Catalogue, Evaluation, Oracle, Problem, Run, Stop, Study, Usage, run::Budget};
+use mops_file::StudyFile;
+use mops_language::{Diagnostic, suggestion};
+use mops_outcome::criterion_reports;
 use serde_json::Value;
 
 use super::reading;

@@ -4,7 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use mops_core::Catalogue;
-use mops_core::file::{Folder, StudyFile};
+use mops_file::StudyFile;
+use mops_language::files::Folder;
 
 use super::study::Home;
 use crate::{files, store};

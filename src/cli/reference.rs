@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 use clap::CommandFactory;
-use mops_core::file;
+use mops_file as file;
 use schemars::Schema;
 use serde_json::Value;
 
@@ -71,7 +71,7 @@ fn pages_of_kinds_show_the_catalogue() {
 fn the_page_of_effects_shows_the_catalogue() {
     let section = |effect: &dyn mops_core::Effect| {
         let facts: String = effect::facts(effect).into_iter().map(|fact| fact + ".\n").collect();
-        let parameter = |of: &mops_core::EffectParameter| {
+        let parameter = |of: &mops_core::effect::EffectParameter| {
             format!("- `{}` ({}): {}\n", of.name, effect::parameter_facts(of), on_one_line(of.about))
         };
         let parameters: String = effect.parameters().iter().map(parameter).collect();
@@ -190,7 +190,7 @@ fn text(schema: &Value) -> String {
 
 #[test]
 fn the_page_of_the_result_shows_its_schema() {
-    let root = mops_core::result_schema();
+    let root = mops_outcome::result_schema();
     let mut sections = Sections { root: &root, described: HashMap::new() };
     check("result-json.md", &sections.of(&Part { path: String::new(), schema: root.clone() }));
 }

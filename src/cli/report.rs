@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Diagnostic, Stop, Task, suggestion};
+use mops_core::{Catalogue, Stop, Task};
+use mops_language::{Diagnostic, suggestion};
 
 use super::past_run::PastRun;
 use super::resume;
@@ -133,7 +134,11 @@ fn ended_early(run: &RunRow) -> bool {
 }
 
 /// Returns the options of the run. An unfinished run is replayed as far as it came.
-fn options(catalogue: &Catalogue, of_file: &mops_core::SolverChoice, run: &RunRow) -> Result<Options, Diagnostic> {
+fn options(
+    catalogue: &Catalogue,
+    of_file: &mops_core::catalogue::SolverChoice,
+    run: &RunRow,
+) -> Result<Options, Diagnostic> {
     let solver = if of_file.kind == run.solver {
         of_file.clone()
     } else {

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use mops_core::file::StudyFile;
-use mops_core::{Diagnostic, SensitivityMethod, Stop, Study, Task, Watch};
+use mops_core::{Stop, Study, Task, Watch, study::SensitivityMethod};
+use mops_file::StudyFile;
+use mops_language::Diagnostic;
 
 use super::study::{Home, StudyArguments};
 use crate::search::{EvaluationStore, Options, SolveError, Solved, solves};

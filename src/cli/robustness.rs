@@ -1,8 +1,12 @@
 //! Text of the findings over uncertain parameters: worst cases, distributions and sensitivities.
 
-use mops_core::{
-    Estimated, Findings, GlobalSensitivityReport, MonteCarloReport, RobustReport, SensitivityMethod, Subject,
-    UncertainReport, UncertaintyReport, WorstCaseReport, WorstReport,
+use mops_core::study::SensitivityMethod;
+use mops_outcome::{
+    Findings, UncertaintyReport,
+    robustness::{
+        Estimated, GlobalSensitivityReport, MonteCarloReport, RobustReport, Subject, UncertainReport, WorstCaseReport,
+        WorstReport,
+    },
 };
 
 use super::findings::{known, sentences, share};

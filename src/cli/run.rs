@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use mops_core::file::StudyFile;
-use mops_core::{Catalogue, Diagnostic, SolverChoice, Stop, Study, StudyError, Task, Watch, suggestion};
+use mops_core::{Catalogue, Stop, Study, StudyError, Task, Watch, catalogue::SolverChoice};
+use mops_file::StudyFile;
+use mops_language::{Diagnostic, suggestion};
 
 use super::run_files::{DISK_TIMEOUT, RunFiles, check_run};
 use super::study::{StudyArguments, home, open_as, outputs, without_settings};

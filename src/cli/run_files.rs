@@ -8,8 +8,9 @@ use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use mops_core::diagnosis::Diagnosis;
-use mops_core::{Diagnostic, Effect, MonteCarloReport, Shipped, Task};
+use mops_core::{Effect, Task, catalogue::Shipped};
+use mops_language::Diagnostic;
+use mops_outcome::{diagnosis::Diagnosis, robustness::MonteCarloReport};
 
 use super::study::Home;
 use crate::diagnosis::{Original, predictions, repaired, source};
@@ -323,7 +324,7 @@ fn relative(folder: &Path, file: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use mops_core::Catalogue;
-    use mops_core::diagnosis::Removed;
+    use mops_outcome::diagnosis::Removed;
 
     use super::super::study::{StudyArguments, home, open};
     use super::*;

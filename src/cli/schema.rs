@@ -3,9 +3,9 @@
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
+use mops_core::Catalogue;
 
 use crate::terminal::{CommandError, print};
-use mops_core::Catalogue;
 
 /// Arguments of `mops schema`.
 #[derive(Args)]
@@ -27,8 +27,8 @@ pub(super) enum File {
 /// Returns the schema as text.
 pub(super) fn text(of: File, catalogue: &Catalogue) -> String {
     let schema = match of {
-        File::Study => mops_core::file::study_schema(catalogue),
-        File::Result => mops_core::result_schema(),
+        File::Study => mops_file::study_schema(catalogue),
+        File::Result => mops_outcome::result_schema(),
     };
     serde_json::to_string_pretty(&schema).expect("a schema is JSON") + "\n"
 }

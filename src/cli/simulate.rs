@@ -5,9 +5,8 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
-use mops_core::{
-    Analysis, Catalogue, Diagnostic, Failure, JobPlan, Problem, Quantity, Response, Study, Usage, suggestion,
-};
+use mops_core::{Analysis, Catalogue, Failure, Problem, Response, Study, Usage, study::JobPlan};
+use mops_language::{Diagnostic, Quantity, suggestion};
 
 use super::families::{folded, runs, spelled};
 use super::study::{StudyArguments, home, open, outputs};
@@ -64,7 +63,7 @@ pub(super) fn simulate(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     let start = problem.evaluate_at(&study.start());
     let here = problem.evaluate_at(&tuners);
     let pick = |evaluation| {
-        let mut reports = mops_core::criterion_reports(study, evaluation);
+        let mut reports = mops_outcome::criterion_reports(study, evaluation);
         reports.retain(|report| wanted(&report.case));
         reports
     };

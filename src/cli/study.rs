@@ -5,8 +5,12 @@ use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use mops_core::file::StudyFile;
-use mops_core::{BuiltStudy, Catalogue, CatalogueStudy, Diagnostic, Shipped, Source, StudyFolder, suggestion};
+use mops_core::{
+    Catalogue,
+    catalogue::{BuiltStudy, CatalogueStudy, Shipped, StudyFolder},
+};
+use mops_file::StudyFile;
+use mops_language::{Diagnostic, Source, suggestion};
 
 use super::reading;
 use crate::files::{Inputs, Outputs};
@@ -109,12 +113,12 @@ pub(super) fn open_as(
     let settings = settings.as_slice();
     let path = match home(catalogue, arguments) {
         Home::File(path) => path,
-        Home::Shipped(shipped) => return shipped.open(catalogue, settings),
-        Home::Built(built) => return mops_core::file::built(catalogue, &built, settings),
+        Home::Shipped(shipped) => return mops_file::read_shipped(catalogue, &shipped, settings),
+        Home::Built(built) => return mops_file::built(catalogue, &built, settings),
     };
     let bytes = read_text(&path).map_err(|error| no_study(catalogue, study, &error))?;
     let source = Source::from_bytes(&path.display().to_string(), bytes)?;
-    mops_core::file::read(catalogue, &source.name, &source.text, settings, &reading::folder(catalogue, &path))
+    mops_file::read(catalogue, &source.name, &source.text, settings, &reading::folder(catalogue, &path))
 }
 
 /// Returns the text of a file of a shipped study or of a study folder.
@@ -135,7 +139,7 @@ pub(super) fn digest_of_program() -> Result<String, Diagnostic> {
         Diagnostic::new(format!("cannot read this program, whose digest identifies its runs: {error}"))
             .with_help("give the user read permission for it")
     })?;
-    Ok(mops_core::file::digest(&bytes))
+    Ok(mops_file::digest(&bytes))
 }
 
 /// Adds the studies in `folders` to the catalogue: every subfolder that has a `study.toml`. A folder that is given twice is
@@ -191,9 +195,9 @@ pub(super) fn read_at(
     let name = home.display().to_string();
     match catalogue.study(&name) {
         Some(CatalogueStudy::Shipped(shipped)) => {
-            return mops_core::file::read(catalogue, &format!("{name}/study.toml"), text, settings, shipped);
+            return mops_file::read(catalogue, &format!("{name}/study.toml"), text, settings, shipped);
         }
-        Some(CatalogueStudy::Built(built)) => return mops_core::file::built(catalogue, built, settings),
+        Some(CatalogueStudy::Built(built)) => return mops_file::built(catalogue, built, settings),
         // Only a study built in Rust has no text.
         None if text.trim().is_empty() => {
             return Err(Diagnostic::new(format!("this program has no study `{name}`, which was built in Rust"))
@@ -201,7 +205,7 @@ pub(super) fn read_at(
         }
         _ => {}
     }
-    mops_core::file::read(catalogue, &name, text, settings, &reading::folder(catalogue, home))
+    mops_file::read(catalogue, &name, text, settings, &reading::folder(catalogue, home))
 }
 
 /// Returns the text of a study file without the settings of the command line that were appended to it.

@@ -1,8 +1,10 @@
 //! Tables of criteria and tuners on the terminal, and the summary of a run.
 
+use mops_core::{Stop, Task, Usage};
+use mops_outcome::{CriterionReport, Outcome};
+
 use crate::numbers::counted;
 use crate::terminal::{number, table};
-use mops_core::{CriterionReport, Outcome, Stop, Task, Usage};
 
 /// Formats the criteria at the start values and at another point, side by side.
 pub(super) fn criteria(start: &[CriterionReport], best: &[CriterionReport], best_name: &str) -> String {

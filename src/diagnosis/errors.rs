@@ -1,6 +1,6 @@
 //! Errors of the nominal and the recalibrated model, one line per channel, for the terminal and the report.
 
-use mops_core::diagnosis::{Diagnosis, ExperimentError, WindowErrors};
+use mops_outcome::diagnosis::{Diagnosis, ExperimentError, WindowErrors};
 
 use crate::numbers::significant;
 

@@ -1,11 +1,11 @@
 //! Made-up diagnoses for tests of the output.
 
 use mops_core::Role;
-use mops_core::diagnosis::{
+use mops_math as math;
+use mops_outcome::diagnosis::{
     Change, Curve, Dependence, Diagnosis, Evidence, ExperimentError, Found, HangsOn, Noticeable, ParameterMove,
     Prediction, Ranked, Rival, Rule, Stability, Step, StrengthValue, Unexplained, Verdict,
 };
-use mops_core::math;
 
 /// Returns a pseudorandom value between -1 and 1.
 fn chance(i: usize) -> f64 {

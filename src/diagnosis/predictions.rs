@@ -1,6 +1,6 @@
 //! Outputs predicted by the recalibrated model, one table per experiment.
 
-use mops_core::diagnosis::{Diagnosis, Prediction};
+use mops_outcome::diagnosis::{Diagnosis, Prediction};
 
 use crate::files::write_header;
 use crate::numbers::{FileNames, significant};

@@ -3,9 +3,13 @@
 use std::fmt::Write;
 use std::sync::Arc;
 
-use mops_core::diagnosis::{Alignment, Diagnosis, Found, StrengthValue};
-use mops_core::math;
-use mops_core::{AnalysisKind, Effect, EffectParameter, Quantity, Scope, Study, Unit};
+use mops_core::{
+    AnalysisKind, Effect, Study,
+    effect::{EffectParameter, Scope},
+};
+use mops_language::{Quantity, Unit};
+use mops_math as math;
+use mops_outcome::diagnosis::{Alignment, Diagnosis, Found, StrengthValue};
 
 use super::words;
 use crate::toml_text::{TomlText, key, number, quoted, settled};
@@ -227,8 +231,9 @@ fn range(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::diagnosis::Removed;
-    use mops_core::file::{Files, StudyFile};
+    use mops_file::StudyFile;
+    use mops_language::files::Files;
+    use mops_outcome::diagnosis::Removed;
 
     use super::super::made_up;
     use super::*;
@@ -272,7 +277,7 @@ free     = [\"phi\", \"theta\"]
 
     fn read(text: &str) -> StudyFile {
         let settings: [String; 0] = [];
-        mops_core::file::read(&crate::catalogue(), "study.toml", text, &settings, &Memory)
+        mops_file::read(&crate::catalogue(), "study.toml", text, &settings, &Memory)
             .unwrap_or_else(|e| panic!("{e}\n{text}"))
     }
 
@@ -330,7 +335,7 @@ free     = [\"phi\", \"theta\"]
         let given = "[experiments.e]\ninputs = { u = \"u\", w = { column = \"w\", shift = \"10 ms\" } }\n";
         let mut text = TomlText::new(given);
         let mut diagnosis = Diagnosis::default();
-        let of = |input: &str| Alignment { input: input.to_owned(), shift: -0.02, hold: mops_core::Hold::First };
+        let of = |input: &str| Alignment { input: input.to_owned(), shift: -0.02, hold: mops_core::case::Hold::First };
         diagnosis.alignment = vec![of("u"), of("w")];
         alignment(&mut text, &diagnosis);
         let found: toml::Table = text.into_text().parse().expect("TOML");

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use mops_core::diagnosis::Diagnosis;
+use mops_outcome::diagnosis::Diagnosis;
 use toml::{Table, Value};
 
 use super::words;
@@ -41,7 +41,8 @@ pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String 
     let sensors: Vec<String> = entries(&study, "sensors").filter_map(noise).collect();
     let sensors = if sensors.is_empty() { String::new() } else { format!("        sensors: {},\n", items(sensors, 8)) };
     let quantities = format!("{tuners}{sensors}");
-    imports.extend(["Quantity", "Scale", "Unit"].iter().filter(|name| quantities.contains(&format!("{name}::"))));
+    let scale = if quantities.contains("Scale::") { "use mops::core::study::Scale;\n" } else { "" };
+    imports.extend(["Quantity", "Unit"].iter().filter(|name| quantities.contains(&format!("{name}::"))));
     imports.sort_unstable();
     let seed = study.get("study").and_then(|s| s.get("seed")).and_then(Value::as_integer);
     let seed = seed.map_or_else(String::new, |seed| format!("        seed: {seed},\n"));
@@ -54,8 +55,8 @@ pub(crate) fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String 
 use std::error::Error;
 use std::path::Path;
 
-use mops::core::file::{{self, Files}};
-use mops::core::{{{imports}}};
+{scale}use mops::language::files::Files;
+use mops::{{{imports}, file}};
 
 /// Folder that data paths are relative to.
 const FOLDER: &str = {folder:?};
@@ -223,8 +224,8 @@ fn tuner(tuner: &Value) -> String {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::CatalogueStudy;
-    use mops_core::diagnosis::Removed;
+    use mops_core::catalogue::CatalogueStudy;
+    use mops_outcome::diagnosis::Removed;
 
     use super::super::made_up;
     use super::super::repaired::{Original, repaired};
@@ -239,7 +240,7 @@ mod tests {
         };
         let text = std::str::from_utf8(shipped.file("study.toml").unwrap()).unwrap();
         let settings = ["tuners.ca.max=6e-3".to_owned()];
-        let study = mops_core::file::read(&catalogue, "study.toml", text, &settings, shipped).unwrap().study;
+        let study = mops_file::read(&catalogue, "study.toml", text, &settings, shipped).unwrap().study;
         // Without the effect: the model of the pendulum contains it as a term.
         let removed = vec![Removed { term: "bp".into(), place: "joint:theta".into() }];
         let mut diagnosis = made_up::coulomb();

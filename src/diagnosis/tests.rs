@@ -1,7 +1,6 @@
 //! The block `diagnosis` of `result.json`.
 
-use mops_core::Findings;
-use mops_core::diagnosis::Diagnosis;
+use mops_outcome::{Findings, diagnosis::Diagnosis};
 use serde_json::{Value, json};
 
 use super::made_up;
@@ -42,7 +41,7 @@ fn the_block_has_the_documented_keys_and_values() {
 
 #[test]
 fn the_block_agrees_with_the_schema_of_results() {
-    let mut schema = mops_core::result_schema();
+    let mut schema = mops_outcome::result_schema();
     // Without the rest of the result.
     schema["required"] = json!([]);
     let validator = jsonschema::validator_for(&schema).unwrap();

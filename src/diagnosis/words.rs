@@ -1,7 +1,7 @@
 //! Sentences on a diagnosis, for the terminal and the report; names are between backticks.
 
 use mops_core::Role;
-use mops_core::diagnosis::{
+use mops_outcome::diagnosis::{
     Alignment, Dependence, Diagnosis, Found, HeldBack, Removed, Rival, Rule, StrengthValue, Verdict, together,
 };
 

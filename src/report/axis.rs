@@ -1,7 +1,8 @@
 //! Axes: ticks at round values, and their labels.
 
+use mops_math as math;
+
 use super::range::drawable;
-use mops_core::math;
 
 /// Axis of a plot, with its ticks.
 #[derive(Debug, Clone)]

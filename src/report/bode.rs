@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use mops_core::StateSpace;
-use mops_core::linear::{Complex, zeros};
-use mops_core::math::{self, complex};
+use mops_linear::{Complex, StateSpace, zeros};
+use mops_math as math;
+use mops_math::complex;
 
 use super::plot::{Curve, Plot};
 
@@ -99,7 +99,7 @@ pub(super) fn unwrapped(values: &[Complex]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::linear::TransferFunction;
+    use mops_linear::TransferFunction;
 
     use super::*;
 

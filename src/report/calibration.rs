@@ -1,7 +1,7 @@
 //! Tables of a calibration: estimates with their errors, and the fit of every channel.
 
 use maud::{Markup, html};
-use mops_core::{CalibrationReport, ChannelReport, FailureReport, ParameterReport};
+use mops_outcome::{CalibrationReport, ChannelReport, FailureReport, ParameterReport};
 
 use super::page::scrolling;
 use super::sensitivity;

@@ -1,7 +1,7 @@
 //! Interactive plots of a page: data for the script `charts.js`, which draws them with uPlot in place of the SVG.
 
 use maud::{Markup, PreEscaped, html};
-use mops_core::Side;
+use mops_core::criterion::Side;
 use serde_json::{Value, json};
 
 use super::clip::{Point, simplified};
@@ -134,7 +134,7 @@ fn number(value: f64) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::math;
+    use mops_math as math;
 
     use super::*;
 

@@ -1,6 +1,6 @@
 //! Curves on the drawing: clipped at the frame and simplified.
 
-use mops_core::math;
+use mops_math as math;
 
 /// Point of the drawing: x to the right, y down.
 pub(super) type Point = [f64; 2];

@@ -1,6 +1,6 @@
 //! Plots of a signal at the initial guess and at the reported point, with measurements if there are any.
 
-use mops_core::{Analysis, Channel, Failure, Mark, Row, Trace, Variable};
+use mops_core::{Analysis, Failure, Trace, Variable, case::Channel, criterion::Mark, study::Row};
 
 use super::plot::{Band, Bound, Color, Curve, CurveStyle, Plot};
 use super::sampling;

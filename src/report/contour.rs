@@ -43,7 +43,7 @@ fn cut(corners: [f64; 4], [x, y]: [f64; 2], level: f64, segments: &mut Vec<[[f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mops_core::math;
+    use mops_math as math;
 
     #[test]
     fn the_contour_of_a_cone_is_a_circle_of_the_right_length() {

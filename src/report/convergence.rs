@@ -1,6 +1,6 @@
 //! Convergence: objective and constraint violation of the best point over the evaluations.
 
-use mops_core::{FEASIBLE, Merit, Objective, Record, Study, Task, Usage};
+use mops_core::{Merit, Objective, Study, Task, Usage, evaluation::FEASIBLE, run::Record};
 
 use super::figures::{Figure, Group};
 use super::plot::{Color, Curve, CurveStyle, Level, Plot};

@@ -1,7 +1,8 @@
 //! Table of criteria, with bars that mark the demand.
 
 use maud::{Markup, html};
-use mops_core::{CriterionReport, Task, Usage};
+use mops_core::{Task, Usage};
+use mops_outcome::CriterionReport;
 
 use super::Report;
 use super::page::scrolling;

@@ -1,8 +1,10 @@
 //! Persistent excitation of the inputs: sentences, a table, eigenvalues over the order; and regressions.
 
 use maud::{Markup, html};
-use mops_core::ExcitationFindings;
-use mops_core::identification::{ExcitationReport, RegressionReport, excitation_words};
+use mops_outcome::{
+    ExcitationFindings,
+    identification::{ExcitationReport, RegressionReport, excitation_words},
+};
 
 use super::figures::{Figure, Group};
 use super::page::scrolling;

@@ -1,8 +1,9 @@
 //! Pareto front: plots over pairs of criteria and of the tuners, and a table of all points.
 
 use maud::{Markup, html};
-use mops_core::math;
-use mops_core::{Analysis, FrontCriterion, FrontObjective, Pareto, TradeOffs, Tuner};
+use mops_core::{Analysis, Tuner, problem::FrontObjective, solver::Pareto};
+use mops_math as math;
+use mops_outcome::{FrontCriterion, TradeOffs};
 
 use super::Report;
 use super::figures::{Figure, Group};
@@ -81,7 +82,7 @@ fn tuners(report: &Report<'_>) -> Vec<Quantity> {
         name: tuner.name.clone(),
         unit: tuner.unit.to_string(),
         values: report.front.iter().map(|at| at.tuners[i]).collect(),
-        log: tuner.scale == mops_core::Scale::Log,
+        log: tuner.scale == mops_core::study::Scale::Log,
         demand: None,
     };
     study.tuners().iter().enumerate().filter(|(_, tuner)| tuner.active).map(quantity).collect()

@@ -1,7 +1,7 @@
 //! Table of the jumps of criteria near a design.
 
 use maud::{Markup, html};
-use mops_core::{JumpReport, JumpsReport, MovedKind};
+use mops_outcome::{JumpReport, JumpsReport, MovedKind};
 
 use super::page::scrolling;
 use crate::numbers::{apart, counted, percent, with_unit};
@@ -42,7 +42,7 @@ pub(super) fn section(found: &JumpsReport) -> Markup {
 fn row(jump: &JumpReport) -> Markup {
     let unit = if jump.unit == "1" { String::new() } else { format!(" {}", jump.unit) };
     let quantity = |value: f64, other: f64| format!("{}{unit}", apart(value, Some(other), 5));
-    let distance = if jump.distance <= mops_core::ON_JUMP { "none".to_owned() } else { percent(jump.distance) };
+    let distance = if jump.distance <= mops_outcome::ON_JUMP { "none".to_owned() } else { percent(jump.distance) };
     html! {
         tr {
             th scope="row" { (jump.name) @if jump.kind == MovedKind::Initial { " (initial value)" } }

@@ -1,7 +1,8 @@
 //! Criteria by case: a table of scaled values, shaded by the distance from the demand.
 
 use maud::{Markup, html};
-use mops_core::{CriterionReport, Outcome, Usage};
+use mops_core::Usage;
+use mops_outcome::{CriterionReport, Outcome};
 
 use super::page::scrolling;
 use crate::numbers::{significant, with_unit};

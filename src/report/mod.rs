@@ -43,7 +43,8 @@ mod verdict;
 use std::io;
 use std::path::Path;
 
-use mops_core::{Evaluation, Outcome, Problem, Record, Stop, Task};
+use mops_core::{Evaluation, Problem, Stop, Task, run::Record};
+use mops_outcome::Outcome;
 
 use crate::files::Outputs;
 use crate::numbers::FileNames;

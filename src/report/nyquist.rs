@@ -1,7 +1,8 @@
 //! Nyquist plot of a loop transfer function.
 
-use mops_core::linear::Complex;
-use mops_core::math::{self, complex};
+use mops_linear::Complex;
+use mops_math as math;
+use mops_math::complex;
 
 use super::bode::FrequencyCurve;
 use super::plot::{Color, Curve, CurveStyle, Plot};

@@ -2,14 +2,14 @@
 //! tables interactive.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use mops_core::{CalibrationReport, Task};
+use mops_core::Task;
+use mops_outcome::CalibrationReport;
 
-use super::Report;
 use super::figures::{Figure, Group};
 use super::verdict::{self, Tone};
 use super::{
-    calibration, chart, criteria, diagnosis, excitation, front, jumps, matrix, robustness, sensitivity, slopes, tuners,
-    uncertainty,
+    Report, calibration, chart, criteria, diagnosis, excitation, front, jumps, matrix, robustness, sensitivity, slopes,
+    tuners, uncertainty,
 };
 use crate::numbers::significant;
 use crate::plain::plain;

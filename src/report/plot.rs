@@ -2,7 +2,7 @@
 
 use std::io;
 
-use mops_core::Side;
+use mops_core::criterion::Side;
 
 use super::scene::Scene;
 use super::{png, svg};

@@ -3,6 +3,7 @@
 use std::io;
 use std::sync::Once;
 
+use mops_math as math;
 use plotters::backend::{BitMapBackend, DrawingBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontStyle, FontTransform, IntoFont, RGBColor, TextStyle, WHITE, register_font};
@@ -11,7 +12,6 @@ use super::clip::{Point, distance};
 use super::plot::Color;
 use super::scene::{Anchor, Mark, SIZE, Scene};
 use super::svg::rgb;
-use mops_core::math;
 
 /// Pixels per unit of the scene.
 const SCALE: f64 = 2.0;

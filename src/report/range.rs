@@ -1,7 +1,8 @@
 //! Ranges of the axes.
 
+use mops_math as math;
+
 use super::plot::Plot;
-use mops_core::math;
 
 /// Returns a value, or its decimal logarithm if `log`; `None` if it cannot be drawn.
 pub(super) fn drawable(value: f64, log: bool) -> Option<f64> {

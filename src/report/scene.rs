@@ -1,6 +1,6 @@
 //! Layout of a plot: lines, dots, rectangles and texts with their coordinates, for SVG and PNG alike.
 
-use mops_core::Side;
+use mops_core::criterion::Side;
 
 use super::axis::Axis;
 use super::clip::{Frame, Point, visible};

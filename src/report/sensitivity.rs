@@ -1,7 +1,7 @@
 //! Identifiability of the tuners, or sensitivity of the criteria: sentences, standard errors, correlations, eigenvectors.
 
 use maud::{Markup, html};
-use mops_core::identification::{SensitivityReport, TunerSensitivity};
+use mops_outcome::identification::{SensitivityReport, TunerSensitivity};
 
 use super::page::{rich, scrolling};
 use crate::numbers::{number, percent, significant};

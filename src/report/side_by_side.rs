@@ -3,10 +3,9 @@
 use maud::{Markup, html};
 use mops_core::{Analysis, Problem};
 
-use super::chart;
 use super::page::{document, scrolling, section};
 use super::plot::{Color, Curve, Plot};
-use super::sampling;
+use super::{chart, sampling};
 use crate::numbers::labelled;
 
 /// Run with responses to plot.

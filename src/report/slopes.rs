@@ -1,7 +1,7 @@
 //! Sensitivities of a design's criteria to its tuners at the reported point, as a shaded table.
 
 use maud::{Markup, html};
-use mops_core::SlopesReport;
+use mops_outcome::SlopesReport;
 
 use super::page::scrolling;
 use crate::numbers::significant;

@@ -1,11 +1,12 @@
 //! Three-dimensional plots: points in a box in parallel projection, which a page can rotate.
 
+use mops_math as math;
+
 use super::axis::Axis;
 use super::clip::Point;
 use super::plot::{Color, Plot};
 use super::range::{drawable, range_of};
 use super::scene::{ADVANCE, Anchor, Mark, SIZE, Scene};
-use mops_core::math;
 
 /// Point in the box, `[x, y, z]` with z upwards; each coordinate is from -1 to 1.
 pub(super) type Point3 = [f64; 3];

@@ -1,6 +1,7 @@
 //! Plot of a sweep: the objective over one tuner as a curve, over two tuners as a surface.
 
-use mops_core::{FEASIBLE, SweepAxis, SweepReport};
+use mops_core::evaluation::FEASIBLE;
+use mops_outcome::{SweepAxis, SweepReport};
 
 use super::figures::{Figure, Group};
 use super::plot::{Color, Curve, CurveStyle, Plot, Surface};

@@ -2,13 +2,16 @@
 
 use std::sync::Arc;
 
-use mops_core::math;
 use mops_core::{
-    Analysis, Budget, CalibrationReport, Case, CaseBuilder, ChannelBuilder, Criterion, CriterionBuilder,
-    CriterionSlopes, CriterionSpec, Ending, Evaluation, Failure, Interface, Job, Measured, Model, Oracle, Outcome,
-    Parameter, Pareto, Problem, Record, Response, Role, Run, SlopesReport, Stop, StudyBuilder, StudyError, Trace,
-    TunerBuilder, Unit, Usage, Value, Variable, conclude, criterion_reports,
+    Analysis, Case, Criterion, CriterionSpec, Evaluation, Failure, Interface, Job, Model, Oracle, Parameter, Problem,
+    Response, Role, Run, Stop, StudyBuilder, StudyError, Trace, Usage, Value, Variable,
+    run::{Budget, Record},
+    solver::Pareto,
+    study::{CaseBuilder, ChannelBuilder, CriterionBuilder, Measured, TunerBuilder},
 };
+use mops_language::Unit;
+use mops_math as math;
+use mops_outcome::{CalibrationReport, CriterionSlopes, Ending, Outcome, SlopesReport, conclude, criterion_reports};
 
 use super::plot::{Curve, CurveStyle, Plot, ZAxis};
 use super::{Level, Report};

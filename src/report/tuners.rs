@@ -1,7 +1,7 @@
 //! Table of tuners, with their positions within the bounds.
 
 use maud::{Markup, html};
-use mops_core::{Scale, Tuner};
+use mops_core::{Tuner, study::Scale};
 
 use super::Report;
 use super::page::scrolling;

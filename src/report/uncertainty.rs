@@ -1,7 +1,7 @@
 //! Uncertainty of the estimates in addition to standard errors: profiles, bootstrap, bands.
 
 use maud::{Markup, html};
-use mops_core::{BandReport, BootstrapReport, ProfileReport, UncertaintyReport};
+use mops_outcome::{BandReport, BootstrapReport, ProfileReport, UncertaintyReport};
 
 use super::figures::{Figure, Group};
 use super::page::scrolling;

@@ -1,6 +1,7 @@
 //! Verdict of a run, in one to three sentences, and warnings.
 
-use mops_core::{ChannelReport, CriterionReport, Outcome, Pareto, Record, Role, Stop, Task, Usage};
+use mops_core::{Role, Stop, Task, Usage, run::Record, solver::Pareto};
+use mops_outcome::{ChannelReport, CriterionReport, Outcome};
 
 use super::Report;
 use crate::numbers::{counted, percent, significant, with_unit};

@@ -5,8 +5,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mops_core::{
-    Analysis, CaseBuilder, CriterionBuilder, Failure, Halt, Interface, Job, Known, Model, ModelBuilder, Parameter,
-    Response, RowSlopes, StudyBuilder, Trace, TunerBuilder, Variable,
+    Analysis, Failure, Halt, Interface, Job, Model, Parameter, Response, StudyBuilder, Trace, Variable,
+    run::{Known, RowSlopes},
+    study::{CaseBuilder, CriterionBuilder, ModelBuilder, TunerBuilder},
 };
 use mops_criteria::overshoot::Overshoot;
 
@@ -34,7 +35,7 @@ impl Model for Watched {
             return Err(Failure::Cancelled);
         }
         let mut y = Trace::starting_at(0.0, 1);
-        y.push(1.0, Trace::NODES.map(|s| s + mops_core::math::powi(job.parameters[0] - 1.0, 2) * s * (1.0 - s)));
+        y.push(1.0, Trace::NODES.map(|s| s + mops_math::powi(job.parameters[0] - 1.0, 2) * s * (1.0 - s)));
         Ok(Analysis::Time(Response { traces: vec![("y".into(), y)], ..Response::default() }))
     }
 }

@@ -1,6 +1,6 @@
 //! Conversion of numbers to little-endian bytes, without loss of bits.
 
-use mops_core::{RowSlopes, Value};
+use mops_core::{Value, run::RowSlopes};
 
 /// Converts numbers to bytes.
 pub(super) fn of_numbers(numbers: &[f64]) -> Vec<u8> {

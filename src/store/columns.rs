@@ -1,6 +1,10 @@
 //! Conversion between a stored point and the columns of its table.
 
-use mops_core::{Failure, JobValues, Known, Missed, Study, Value};
+use mops_core::{
+    Failure, Study, Value,
+    criterion::Missed,
+    run::{JobValues, Known},
+};
 use rusqlite::Row;
 use serde_json::json;
 

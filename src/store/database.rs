@@ -5,7 +5,10 @@ use std::fs::{self, Metadata};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use mops_core::{Known, RowSlopes, Study};
+use mops_core::{
+    Study,
+    run::{Known, RowSlopes},
+};
 use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, Row, params};
 
 use super::bytes;

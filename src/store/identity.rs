@@ -1,7 +1,7 @@
 //! Identity of a run, and the differences between two studies that change the values of points.
 
 use mops_core::Study;
-use mops_core::file::StudyFile;
+use mops_file::StudyFile;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

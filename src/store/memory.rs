@@ -4,7 +4,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::sync::{PoisonError, RwLock};
 
-use mops_core::{Cancellation, Evaluation, Known, RowSlopes, RunState, Store};
+use mops_core::{
+    Cancellation, Evaluation,
+    run::{Known, RowSlopes, State as RunState, Store},
+};
 
 use super::bytes;
 use super::database::{PointRow, Points, Slopes};

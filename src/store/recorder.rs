@@ -9,7 +9,8 @@ use std::sync::{Arc, PoisonError, RwLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use mops_core::{Cancellation, Diagnostic, Problem, Store, Study, Watch};
+use mops_core::{Cancellation, Problem, Study, Watch, run::Store};
+use mops_language::Diagnostic;
 use rusqlite::ErrorCode;
 
 use super::best::best;

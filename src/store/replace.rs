@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use mops_core::Diagnostic;
+use mops_language::Diagnostic;
 use rusqlite::{Connection, OpenFlags};
 
 use super::database::{Database, is_of_machine, is_temporary};

@@ -3,8 +3,13 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use mops_core::file::StudyFile;
-use mops_core::{CatalogueStudy, Failure, Known, Missed, Problem, RowSlopes, RowValue, Study, Value};
+use mops_core::{
+    Failure, Problem, Study, Value,
+    catalogue::CatalogueStudy,
+    criterion::Missed,
+    run::{Known, RowSlopes, RowValue},
+};
+use mops_file::StudyFile;
 
 use super::database::{Database, PointRow};
 use super::{FILE, Identity, OpenError, Recorder, RunState, Start, bytes, row};
@@ -14,7 +19,7 @@ fn file(name: &str, settings: &[&str]) -> StudyFile {
     let catalogue = crate::catalogue();
     let Some(CatalogueStudy::Shipped(shipped)) = catalogue.study(name) else { panic!("{name} is shipped") };
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-    shipped.open(&catalogue, &settings).unwrap()
+    mops_file::read_shipped(&catalogue, shipped, &settings).unwrap()
 }
 
 #[test]
@@ -32,7 +37,12 @@ fn every_shipped_study_measures_as_itself_so_that_its_points_are_stored() {
 
 /// Returns a study built in Rust, with settings.
 fn built(settings: &[&str]) -> StudyFile {
-    use mops_core::{BuiltStudy, CriterionBuilder, Interface, Parameter, StudyBuilder, TunerBuilder, Unit, Variable};
+    use mops_core::{
+        Interface, Parameter, StudyBuilder, Variable,
+        catalogue::BuiltStudy,
+        study::{CriterionBuilder, TunerBuilder},
+    };
+    use mops_language::Unit;
     let draft = || {
         let model = Interface {
             signals: vec![Variable::new("x", "m", "")],
@@ -51,7 +61,7 @@ fn built(settings: &[&str]) -> StudyFile {
     };
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     let study = BuiltStudy::new("closure", "", draft);
-    mops_core::file::built(&crate::catalogue(), &study, &settings).unwrap()
+    mops_file::built(&crate::catalogue(), &study, &settings).unwrap()
 }
 
 #[test]

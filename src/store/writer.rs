@@ -4,7 +4,10 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use mops_core::{Evaluation, Halt, RowSlopes, RunState, Watch};
+use mops_core::{
+    Evaluation, Halt, Watch,
+    run::{RowSlopes, State as RunState},
+};
 
 use super::database::{Database, PointRow, is_temporary};
 use super::memory::{Memory, Message};

@@ -3,7 +3,11 @@
 
 use std::sync::Arc;
 
-use mops_core::{CachedPoint, Cancellation, Evaluation, Halt, Known, Problem, RowSlopes, Scenario, Store, Study};
+use mops_core::{
+    Cancellation, Evaluation, Halt, Problem, Study,
+    run::{CachedPoint, Known, RowSlopes, Store},
+    study::Scenario,
+};
 
 use crate::search::Options;
 
@@ -45,7 +49,7 @@ impl Copies {
         }
         let rows = made.rows().iter().map(|row| {
             let (part, job) = jobs[row.job];
-            let of = |of: &mops_core::Row| of.job == job && of.name == row.name;
+            let of = |of: &mops_core::study::Row| of.job == job && of.name == row.name;
             Some((part, study.rows().iter().position(of)?))
         });
         let rows = rows.collect::<Option<_>>()?;
@@ -85,7 +89,7 @@ impl Copies {
     /// Converts new values of a part from the indices of the problem to those of the study.
     fn to_study(&self, part: usize, learned: &Known) -> Option<Known> {
         let of_part = learned.jobs.iter().filter(|(job, _)| self.jobs[*job].0 == part);
-        let of = |(job, values): &(usize, mops_core::JobValues)| {
+        let of = |(job, values): &(usize, mops_core::run::JobValues)| {
             let values = values.as_ref().map_err(Clone::clone);
             let values = values.map(|values| values.iter().map(|(row, v)| (self.rows[*row].1, v.clone())).collect());
             (self.jobs[*job].1, values)

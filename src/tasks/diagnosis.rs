@@ -3,8 +3,9 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use mops_core::diagnosis::Diagnosis;
-use mops_core::{DiagnosisTask, Effect, Study, StudyError, Watch, suggestion};
+use mops_core::{Effect, Study, StudyError, Watch, study::DiagnosisTask};
+use mops_language::suggestion;
+use mops_outcome::diagnosis::Diagnosis;
 
 use crate::search::{Options, SolveError, Solved, evaluate_start};
 

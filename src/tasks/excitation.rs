@@ -1,7 +1,10 @@
 //! `task = "excitation"`: order of persistent excitation of the inputs, without a simulation.
 
-use mops_core::identification::{excitations, regressions};
-use mops_core::{ExcitationFindings, Study, Watch};
+use mops_core::{Study, Watch};
+use mops_outcome::{
+    ExcitationFindings,
+    identification::{excitations, regressions},
+};
 
 use crate::search::{Options, Solved, evaluate_start};
 

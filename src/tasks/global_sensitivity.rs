@@ -2,11 +2,15 @@
 
 use std::sync::Arc;
 
-use mops_core::statistics::{MOST_DIMENSIONS, elementary_effects, radial, trajectories, variance_shares};
 use mops_core::{
-    EffectReport, EffectsReport, Estimated, GlobalSensitivityReport, Problem, Row, SensitivityMethod, Study, Subject,
-    Watch, stream, uncertain_reports,
+    Problem, Study, Watch,
+    study::{Row, SensitivityMethod},
 };
+use mops_math::stream;
+use mops_outcome::robustness::{
+    EffectReport, EffectsReport, Estimated, GlobalSensitivityReport, Subject, uncertain_reports,
+};
+use mops_statistics::{MOST_DIMENSIONS, elementary_effects, radial, trajectories, variance_shares};
 
 use super::batches::{Stage, each};
 use super::copies::{Copies, evaluate_at};
@@ -105,7 +109,7 @@ fn effects(
     }
     if method == SensitivityMethod::Morris {
         let found = elementary_effects(points, values);
-        let one = |(report, e): (EffectReport, mops_core::statistics::ElementaryEffect)| EffectReport {
+        let one = |(report, e): (EffectReport, mops_statistics::ElementaryEffect)| EffectReport {
             mean: Some(e.mean),
             magnitude: Some(e.magnitude),
             deviation: Some(e.deviation),
@@ -115,7 +119,7 @@ fn effects(
     }
     let mut random = stream(study.seed(), &format!("bootstrap {index} {}", row.name));
     let found = variance_shares(values, LEVEL, REPLICATES, &mut random).unwrap_or_default();
-    let one = |(report, shares): (EffectReport, mops_core::statistics::VarianceShares)| EffectReport {
+    let one = |(report, shares): (EffectReport, mops_statistics::VarianceShares)| EffectReport {
         first: Some(Estimated { value: shares.first, interval: shares.first_interval }),
         total: Some(Estimated { value: shares.total, interval: shares.total_interval }),
         ..report

@@ -3,9 +3,11 @@
 use std::sync::Arc;
 
 use mops_core::{
-    Budget, JUMPS_WITHIN, JumpReport, JumpsReport, MovedKind, ON_JUMP, Pareto, Problem, Quiet, Run, Stop, Study, Tuner,
-    Watch,
+    Problem, Run, Stop, Study, Tuner, Watch,
+    run::{Budget, Quiet},
+    solver::Pareto,
 };
+use mops_outcome::{JUMPS_WITHIN, JumpReport, JumpsReport, MovedKind, ON_JUMP};
 
 use crate::numbers::{apart, percent, significant, with_unit};
 use crate::search::{Options, Solved};
@@ -46,7 +48,7 @@ pub(super) fn add(solved: &mut Solved, study: Study, options: &Options, watch: &
             outcome.pareto = Pareto::NotShown;
         }
         let cliff = found.cliff().map(|jump| sentence(jump, &found, problem.study().tuners()));
-        let mut end = cliff.into_iter().fold(end, mops_core::End::with_jump);
+        let mut end = cliff.into_iter().fold(end, mops_outcome::End::with_jump);
         end.words.extend(not_looked_at(&found));
         outcome.end = Some(end);
     }

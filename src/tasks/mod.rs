@@ -16,7 +16,7 @@ mod worst_case;
 
 use std::time::Instant;
 
-use mops_core::{Halt, Place, Stop, Study, Task, Watch};
+use mops_core::{Halt, Stop, Study, Task, Watch, study::Place};
 
 use crate::search::{Options, SolveError, Solved, evaluate_start, search};
 

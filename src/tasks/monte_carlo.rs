@@ -2,11 +2,15 @@
 
 use std::sync::Arc;
 
-use mops_core::statistics::{Sampling, Summary, draw, quantile, quantile_interval, share_interval};
 use mops_core::{
-    Demand, DistributionReport, Evaluation, MonteCarloReport, MonteCarloTask, Problem, QuantileReport, Row,
-    ShareReport, Study, Subject, Usage, Watch, stream, uncertain_reports,
+    Demand, Evaluation, Problem, Study, Usage, Watch,
+    study::{MonteCarloTask, Row},
 };
+use mops_math::stream;
+use mops_outcome::robustness::{
+    DistributionReport, MonteCarloReport, QuantileReport, ShareReport, Subject, uncertain_reports,
+};
+use mops_statistics::{Sampling, Summary, draw, quantile, quantile_interval, share_interval};
 
 use super::at;
 use super::batches::{Stage, each};

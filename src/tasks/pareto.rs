@@ -3,11 +3,13 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use mops_core::math;
 use mops_core::{
-    Budget, Certified, DerivativesReport, Design, End, FrontPoint, Outcome, Pareto, Problem, Quiet, Run, Stop, Study,
-    TradeOffs, Watch,
+    Problem, Run, Stop, Study, Watch,
+    run::{Budget, Quiet},
+    solver::Pareto,
 };
+use mops_math as math;
+use mops_outcome::{Certified, DerivativesReport, Design, End, FrontPoint, Outcome, TradeOffs};
 use mops_solvers::{Certificate, certificate, optimality};
 
 use crate::numbers::{counted, significant};

@@ -4,9 +4,15 @@ use std::iter;
 use std::sync::Arc;
 
 use mops_core::{
-    AddedReport, Budget, Ending, Evaluation, FEASIBLE, Halt, Oracle, Pareto, Patience, Problem, Record, RobustReport,
-    RobustTask, RoundReport, Run, RunState, Scenario, StartReport, Stop, Store, Study, Uncertain, Usage, Watch,
-    conclude, uncertain_reports,
+    Evaluation, Halt, Oracle, Problem, Run, Stop, Study, Usage, Watch,
+    evaluation::FEASIBLE,
+    run::{Budget, Patience, Record, State as RunState, Store},
+    solver::Pareto,
+    study::{RobustTask, Scenario, Uncertain},
+};
+use mops_outcome::{
+    Ending, StartReport, conclude,
+    robustness::{AddedReport, RobustReport, RoundReport, uncertain_reports},
 };
 
 use super::batches::Stage;
@@ -185,7 +191,7 @@ impl Rounds {
     /// added.
     fn search(&mut self, solved: &Solved, options: &Options, watch: &dyn Watch) -> bool {
         let effort = Effort { samples: self.task.samples, starts: self.task.starts };
-        let counts = |row: &mops_core::Row| row.usage != Usage::Monitor;
+        let counts = |row: &mops_core::study::Row| row.usage != Usage::Monitor;
         let region = Region::new(&self.study, &solved.best.tuners, counts, effort).keeping(options, &self.study);
         let what = format!("round {}: searching the worst cases", self.done.len() + 1);
         let (worst, simulations) = region.search(watch, Stage { what: &what, from: 0.0, to: 1.0 });

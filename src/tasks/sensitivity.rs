@@ -1,8 +1,11 @@
 //! `task = "sensitivity"`: local sensitivity (tuners and combinations of tuners that the data or the criteria determine), or
 //! global sensitivity to the uncertain parameters.
 
-use mops_core::identification::{Point, sensitivity_at};
-use mops_core::{Place, SensitivityMethod, Study, Watch};
+use mops_core::{
+    Study, Watch,
+    study::{Place, SensitivityMethod},
+};
+use mops_outcome::identification::{Point, sensitivity_at};
 
 use super::{at, global_sensitivity};
 use crate::search::{Options, SolveError, Solved};

@@ -1,6 +1,11 @@
 //! `task = "sweep"`: objective over one or two tuners.
 
-use mops_core::{Axis, Budget, Merit, Oracle, Problem, Run, Scale, Study, SweepAxis, SweepReport, Watch};
+use mops_core::{
+    Merit, Oracle, Problem, Run, Study, Watch,
+    run::Budget,
+    study::{Axis, Scale},
+};
+use mops_outcome::{SweepAxis, SweepReport};
 
 use super::at;
 use crate::numbers::significant;

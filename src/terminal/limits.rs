@@ -5,7 +5,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use mops_core::{Cancellation, Halt, Quantity, Unit};
+use mops_core::{Cancellation, Halt};
+use mops_language::{Quantity, Unit};
 
 use super::write::eprint_line;
 

@@ -5,7 +5,7 @@ use std::io::{IsTerminal, Write};
 use std::ops::Range;
 
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
-use mops_core::Diagnostic;
+use mops_language::Diagnostic;
 
 use crate::plain::plain;
 

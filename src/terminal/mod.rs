@@ -12,7 +12,7 @@ mod write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use mops_core::Diagnostic;
+use mops_language::Diagnostic;
 
 use crate::files::Overwrites;
 

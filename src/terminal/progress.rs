@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use mops_core::{Cancellation, CriterionReport, Evaluation, Halt, RunState, Study, Usage, Watch, criterion_reports};
+use mops_core::{Cancellation, Evaluation, Halt, Study, Usage, Watch, run::State as RunState};
+use mops_outcome::{CriterionReport, criterion_reports};
 
 use super::limits::{Limit, cancel_on_signal};
 use super::sparkline::sparkline;

@@ -1,6 +1,6 @@
 //! Sparkline: a curve in one line of text.
 
-use mops_core::math;
+use mops_math as math;
 
 /// Block characters, from low to high.
 const BLOCKS: [char; 8] =

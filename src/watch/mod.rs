@@ -12,7 +12,7 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use mops_core::{Evaluation, Halt, RunState, Study, Watch};
+use mops_core::{Evaluation, Halt, Study, Watch, run::State as RunState};
 
 use server::Server;
 use state::Live;

@@ -3,7 +3,8 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use mops_core::{Evaluation, Merit, Problem, RunState, Study, Usage, criterion_reports};
+use mops_core::{Evaluation, Merit, Problem, Study, Usage, run::State as RunState};
+use mops_outcome::criterion_reports;
 use serde_json::{Value, json};
 
 /// Largest number of points of the curve; every second one of more is dropped.

@@ -10,7 +10,7 @@
 
 use std::fmt::Write;
 
-use mops_core::math;
+use mops_math as math;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 

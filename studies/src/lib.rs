@@ -1,6 +1,6 @@
 //! Shipped studies.
 
-use mops_core::Shipped;
+use mops_core::catalogue::Shipped;
 
 /// Embeds the files of a study, by their names in its folder under `studies/`.
 macro_rules! study {

@@ -4,7 +4,7 @@
 mod device;
 
 use device::Device;
-use mops_core::math;
+use mops_math as math;
 
 /// Pendulum without tilt, with viscous friction; the study estimates its inertias.
 const DEVICE: Device = Device {

@@ -1,9 +1,9 @@
 //! A model given by a function, and the criterion that reads its values.
 
-use mops::core::{Job, Response};
 use mops::{
     Analysis, Case, Criterion, CriterionSpec, Failure, Interface, Model, Parameter, StudyError, Trace, Unit, Value,
     Variable,
+    core::{Job, Response},
 };
 
 /// Model with constant signals `fi = f(x)[i]`; without a value the simulation diverges.

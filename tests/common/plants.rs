@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
-use mops::Model;
-use mops::models::WithEffects;
-use mops::models::equations::EquationsOptions;
+use mops::{
+    Model,
+    models::{WithEffects, equations::EquationsOptions},
+};
 use mops_core::{
-    Between, Case, Effect, EffectParameter, Hold, InitialGrid, Input, Job, ModelOptions, Placement, Port, PortKind,
+    Case, Effect, Input, Job, ModelOptions,
+    case::Hold,
+    effect::{Between, EffectParameter, InitialGrid, Placement, Port, PortKind},
 };
 
 /// Horizon of the simulations, s.

@@ -1,11 +1,13 @@
 //! Standard errors, profiles and bootstrap replicates against closed forms of linear models and of an exponential decay.
 
-use mops::core::{Chosen, UncertaintyTask};
-use mops::{CriterionBuilder, TunerBuilder};
+use mops::{
+    CriterionBuilder, TunerBuilder,
+    core::study::{Chosen, UncertaintyTask},
+};
+use mops_math as math;
 use nalgebra::{DMatrix, DVector};
 
 use super::models::{Calibration, Channel, Curve, fit, lines, normalised, parameters, words};
-use mops_core::math;
 
 /// Samples of one record: derivatives with respect to the parameters, weights of squared residuals, and the standard deviation
 /// of the noise.

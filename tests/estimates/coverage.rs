@@ -1,12 +1,17 @@
 //! Coverage of 95 % intervals over simulated calibrations with the seeds 0, 1, 2, ...
 
-use mops::core::statistics::share_interval;
-use mops::core::{Chosen, Loss, UncertaintyTask};
-use mops::criteria::normalised_error::NormalisedError;
-use mops::{CriterionBuilder, TunerBuilder};
+use mops::{
+    CriterionBuilder, TunerBuilder,
+    core::{
+        criterion::Loss,
+        study::{Chosen, UncertaintyTask},
+    },
+    criteria::normalised_error::NormalisedError,
+    statistics::share_interval,
+};
+use mops_math as math;
 
 use super::models::{Calibration, Channel, Curve, fit, lines, normalised, parameters, words};
-use mops_core::math;
 
 /// Simulated calibrations of each kind.
 const CALIBRATIONS: u32 = 2000;

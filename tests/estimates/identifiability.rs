@@ -1,11 +1,13 @@
 //! Identifiability: directions are compared with the noise, not with the stiffest direction.
 
-use mops::core::{Chosen, UncertaintyTask};
-use mops::{Outcome, TunerBuilder};
+use mops::{
+    Outcome, TunerBuilder,
+    core::study::{Chosen, UncertaintyTask},
+};
+use mops_math as math;
 
 use super::closed_forms::{Samples, scatter};
 use super::models::{Calibration, Channel, Polynomials, normalised, parameters, words};
-use mops_core::math;
 
 /// `y = stiff (a + b) t + soft (a - b)`, with the noise 0.01 and 101 samples up to 1 s; `a = b = 0.5`.
 fn sum_and_difference(stiff: f64, soft: f64) -> Calibration {

@@ -1,10 +1,9 @@
 //! Tuners that are local to a selection or validation experiment are estimated there.
 
-use mops::core::Role;
-use mops::{CriterionBuilder, Outcome, TunerBuilder, Usage};
+use mops::{CriterionBuilder, Outcome, TunerBuilder, Usage, core::Role};
+use mops_math as math;
 
 use super::models::{Calibration, Channel, Curve, fit, normalised};
-use mops_core::math;
 
 /// `y = exp(-k t) + 0.3 exp(-s t)`; `k` is 0.5 in the calibration record `a`, 1.5 in `b`.
 fn records(role: Role, start: f64, criterion: fn(&str) -> CriterionBuilder) -> Calibration {

@@ -1,15 +1,18 @@
 //! Simulated experiments: models in closed form, noise of a fixed seed, and the study that calibrates them.
 
-use mops::core::{
-    ChannelBuilder, Job, Measured, ParameterReport, Response, Role, TasksBuilder, UncertaintyTask, WithTangents, stream,
-};
-use mops::criteria::fit::Fit;
-use mops::criteria::normalised_error::NormalisedError;
 use mops::{
     Analysis, CaseBuilder, CriterionBuilder, Failure, Interface, Model, ModelBuilder, Options, Outcome, Parameter,
     StudyBuilder, Task, Trace, TunerBuilder, Variable,
+    core::{
+        Job, Response, Role,
+        model::WithTangents,
+        study::{ChannelBuilder, Measured, TasksBuilder, UncertaintyTask},
+    },
+    criteria::{fit::Fit, normalised_error::NormalisedError},
+    math::stream,
+    outcome::ParameterReport,
 };
-use mops_core::math;
+use mops_math as math;
 use rand::Rng;
 
 /// The normalised error of a signal, as a criterion.

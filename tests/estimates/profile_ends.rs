@@ -1,12 +1,15 @@
 //! Ends of profile likelihoods that are flat up to a steep rise, compared with a fine grid.
 
-use mops::core::statistics::t_quantile;
-use mops::core::{Chosen, ProfileReport, UncertaintyTask};
-use mops::{Outcome, TunerBuilder};
+use mops::{
+    Outcome, TunerBuilder,
+    core::study::{Chosen, UncertaintyTask},
+    outcome::ProfileReport,
+    statistics::t_quantile,
+};
+use mops_math as math;
 use nalgebra::{DMatrix, DVector};
 
 use super::models::{Calibration, Channel, Curve, normalised, words};
-use mops_core::math;
 
 /// Number of samples, at times where the curve is exact.
 const SAMPLES: u32 = 161;

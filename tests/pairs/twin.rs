@@ -2,7 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use mops_core::{Input, Placement, Port, math};
+use mops_core::{
+    Input,
+    effect::{Placement, Port},
+};
+use mops_math as math;
 use mops_testbed::twins::{self, BODIES, Body, Command, Declared, Site};
 
 use super::Signals;

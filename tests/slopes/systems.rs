@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use mops::Model;
-use mops::models::equations::EquationsOptions;
+use mops::{Model, models::equations::EquationsOptions};
 use mops_core::{Input, ModelOptions};
 
 use super::plants::Setup;

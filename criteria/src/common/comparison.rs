@@ -1,6 +1,6 @@
 //! Comparison of a simulated signal with its measurement.
 
-use mops_core::{Analysis, Case, Channel};
+use mops_core::{Analysis, Case, case::Channel};
 
 use super::trace;
 

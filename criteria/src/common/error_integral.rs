@@ -1,6 +1,7 @@
 //! Integral criteria of the control error, which differ in the integrand only.
 
-use mops_core::{Analysis, Case, Criterion, Interface, Sense, StudyError, Unit, Value};
+use mops_core::{Analysis, Case, Criterion, Interface, Sense, StudyError, Value};
+use mops_language::Unit;
 
 use super::{NOT_NEGATIVE, Step, StepOptions};
 

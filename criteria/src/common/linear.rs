@@ -1,9 +1,8 @@
 //! Common parts of criteria of linear systems: channel, value type, criterion.
 
-use mops_core::linear::Loop;
-use mops_core::{
-    Analysis, Case, Criterion, Interface, Sense, StateSpace, StudyError, Unit, Value, Variable, suggestion,
-};
+use mops_core::{Analysis, Case, Criterion, Interface, Sense, StudyError, Value, Variable};
+use mops_language::{Unit, suggestion};
+use mops_linear::{Loop, StateSpace};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -196,7 +195,7 @@ pub fn capped(margin: f64, most: f64) -> Value {
 }
 
 /// Returns the poles of the system or of the closed loop.
-pub fn poles(system: &StateSpace, of: Of) -> Result<Vec<mops_core::linear::Complex>, String> {
+pub fn poles(system: &StateSpace, of: Of) -> Result<Vec<mops_linear::Complex>, String> {
     let poles = match of {
         Of::System => system.poles()?,
         Of::ClosedLoop => system.closed_loop_poles(1.0)?,

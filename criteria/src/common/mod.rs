@@ -8,7 +8,8 @@ mod step;
 #[cfg(test)]
 pub mod testing;
 
-use mops_core::{Analysis, Quantity, StudyError, Trace, Unit};
+use mops_core::{Analysis, StudyError, Trace};
+use mops_language::{Quantity, Unit};
 
 pub use comparison::{compare, compared_slopes};
 pub use error_integral::ErrorIntegral;

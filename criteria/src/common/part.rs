@@ -34,7 +34,7 @@ pub fn part(trace: &Trace, knots: &[f64], map: impl Fn(f64, f64) -> f64) -> Trac
 mod tests {
     use super::*;
     use crate::common::testing::{assert_near, sampled};
-    use mops_core::math;
+    use mops_math as math;
 
     #[test]
     fn a_part_has_the_values_and_the_extrema_of_the_whole() {

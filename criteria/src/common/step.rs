@@ -2,7 +2,11 @@
 
 use std::borrow::Cow;
 
-use mops_core::{Analysis, Interface, Mark, Quantity, Side, StudyError, Trace, Unit, Value};
+use mops_core::{
+    Analysis, Interface, StudyError, Trace, Value,
+    criterion::{Mark, Side},
+};
+use mops_language::{Quantity, Unit};
 
 use super::{optional, part, step_time, trace};
 

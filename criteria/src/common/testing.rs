@@ -1,11 +1,12 @@
 //! Closed forms as simulations, for the tests of all criteria.
 
-use mops_core::linear::TransferFunction;
-use mops_core::math;
 use mops_core::{
-    Analysis, AnalysisKind, Case, Channel, Criterion, CriterionSpec, Experiment, Interface, Quantity, Response, Role,
-    Trace, Value, Variable,
+    Analysis, AnalysisKind, Case, Criterion, CriterionSpec, Interface, Response, Role, Trace, Value, Variable,
+    case::{Channel, Experiment},
 };
+use mops_language::Quantity;
+use mops_linear::TransferFunction;
+use mops_math as math;
 
 /// Returns the signals of the model of all tests.
 pub fn signals() -> Vec<Variable> {

@@ -1,7 +1,8 @@
 //! Smooth random force at the balances of a plant, with white noise of the sensors: filter, likelihood and smoother along a
 //! linearised motion.
 
-use mops_core::{Dual, Scalar, math};
+use mops_language::{Dual, Scalar};
+use mops_math as math;
 
 use super::likelihood::{LN_TWO_PI, Likelihood};
 use super::output_error::matern_penalty;

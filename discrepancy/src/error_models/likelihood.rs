@@ -1,6 +1,6 @@
 //! Likelihood of independent innovations, with its gradient and the Fisher information.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 use nalgebra::{DMatrix, DVector};
 
 /// `ln(2 pi)`.

@@ -1,6 +1,7 @@
 //! Correlated error at the output of a channel, with white noise of the sensor.
 
-use mops_core::{Dual, Scalar, math};
+use mops_language::{Dual, Scalar};
+use mops_math as math;
 
 use super::likelihood::{LN_TWO_PI, Likelihood};
 use super::process::{Matern32, OrnsteinUhlenbeck, Process, Steps};

@@ -3,7 +3,7 @@
 //! Source: J. Hartikainen, S. Sarkka, Kalman filtering and smoothing solutions to temporal Gaussian process regression models, IEEE
 //! International Workshop on Machine Learning for Signal Processing (2010).
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 /// Stationary Gaussian process with mean 0 and `D` states, the first of which is its value.
 pub trait Process<S: Scalar, const D: usize> {
@@ -140,7 +140,7 @@ impl<S: Scalar> Process<S, 2> for Matern32<S> {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::math;
+    use mops_math as math;
 
     use super::*;
 

@@ -1,6 +1,6 @@
 //! Error models against an independent implementation, dense Gaussian densities and finite differences.
 
-use mops_core::math;
+use mops_math as math;
 use nalgebra::{DMatrix, DVector};
 
 use super::*;

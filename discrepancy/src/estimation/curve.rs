@@ -5,9 +5,11 @@
 
 use std::f64::consts::TAU;
 
-use mops_core::diagnosis::Dependence;
-use mops_core::{Port, Unit, math};
+use mops_core::effect::Port;
+use mops_language::Unit;
+use mops_math as math;
 use mops_models::Moment;
+use mops_outcome::diagnosis::Dependence;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 

@@ -1,6 +1,6 @@
 //! Error model of all records of a fit, with its hyperparameters.
 
-use mops_core::math;
+use mops_math as math;
 use nalgebra::{DMatrix, DVector};
 
 use super::scoring::{Maximum, Score, maximise};

@@ -1,6 +1,7 @@
 //! Parameters and initial states under an error model, and the evidence of the model.
 
-use mops_core::{Hold, Input, LeastSquares, Port, math};
+use mops_core::{Input, case::Hold, effect::Port, least_squares::LeastSquares};
+use mops_math as math;
 use mops_models::WithEffects;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

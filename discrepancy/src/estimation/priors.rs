@@ -2,7 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use mops_core::{Dimension, Job, ParameterKind, Port, math};
+use mops_core::{
+    Job,
+    effect::{Dimension, ParameterKind, Port},
+};
+use mops_math as math;
 
 use super::estimate::Prior;
 use crate::fit::{Fit, Global, Point, Sets};

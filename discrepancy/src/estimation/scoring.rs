@@ -1,7 +1,8 @@
 //! Maximum of a log-likelihood with bounds, by Fisher scoring.
 
+use mops_math as math;
+
 use crate::settings::settings;
-use mops_core::math;
 use nalgebra::{DMatrix, DVector};
 
 /// Log-likelihood at a point, with its gradient and the Fisher information.

@@ -1,8 +1,9 @@
 //! Search over parameters that no derivative determines, as samples jump: the size of steps, the width of a gap, the force at which
 //! a joint breaks away.
 
+use mops_math as math;
+
 use crate::settings::settings;
-use mops_core::math;
 
 use super::errors::Errors;
 use super::estimate::{Estimate, Estimation};

@@ -1,6 +1,6 @@
 //! Candidate effects by probability, and the alternatives of an effect that was found.
 
-use mops_core::diagnosis::{Ranked, Rival, Rule};
+use mops_outcome::diagnosis::{Ranked, Rival, Rule};
 
 use super::{Findings, first_of_each, parameters};
 use crate::estimation::Errors;

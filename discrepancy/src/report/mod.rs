@@ -8,11 +8,12 @@ mod removed;
 
 use std::collections::BTreeMap;
 
-use mops_core::diagnosis::{
+use mops_core::Role;
+use mops_math as math;
+use mops_outcome::diagnosis::{
     Alignment, Change, Dependence, Diagnosis, ForecastOf, Found, HeldBack, Noticeable, Step, StrengthValue,
     Unexplained, Verdict,
 };
-use mops_core::{Role, math};
 
 use self::records::Records;
 use crate::drawn::draw;

@@ -1,8 +1,8 @@
 //! The experiment that would separate two models that the data cannot distinguish: variations of the existing ones, compared by
 //! the distance of the predictions.
 
-use mops_core::math;
 use mops_core::{Case, Job};
+use mops_math as math;
 
 use crate::selection::FittedSet;
 use crate::settings::settings;

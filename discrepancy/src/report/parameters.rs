@@ -1,7 +1,7 @@
 //! Parameters of effects with their standard errors and intervals.
 
 use mops_core::Model;
-use mops_core::diagnosis::StrengthValue;
+use mops_outcome::diagnosis::StrengthValue;
 
 use crate::estimation::{ErrorModel, Estimate, FALL};
 use crate::fit::{Global, Sets};
@@ -84,7 +84,7 @@ pub fn of_candidate(subject: &Subject, added: &Added) -> Vec<StrengthValue> {
 
 fn described(added: &Added, variant: &Variant, index: usize) -> Vec<StrengthValue> {
     let parameters = &variant.model.interface().parameters;
-    let of = |(k, parameter): (usize, &mops_core::EffectParameter)| StrengthValue {
+    let of = |(k, parameter): (usize, &mops_core::effect::EffectParameter)| StrengthValue {
         name: parameter.name.to_owned(),
         value: added.strengths[k],
         unit: added.candidate.unit(parameter, &parameters[variant.first[index] + k].variable.unit),

@@ -1,9 +1,10 @@
 //! What a fitted model predicts for every record, and its errors.
 
-use super::parameters::interval;
 use mops_core::Role;
-use mops_core::diagnosis::{ExperimentError, ParameterMove, Prediction, WindowErrors};
-use mops_core::math;
+use mops_math as math;
+use mops_outcome::diagnosis::{ExperimentError, ParameterMove, Prediction, WindowErrors};
+
+use super::parameters::interval;
 use rayon::prelude::*;
 
 use crate::fit::{Fit, Point};

@@ -1,7 +1,7 @@
 //! Declared terms that the effects found replace, and their places: a term acts where an effect of the catalogue changes the outputs
 //! as it does.
 
-use mops_core::diagnosis::Removed;
+use mops_outcome::diagnosis::Removed;
 
 use crate::candidate::Candidate;
 use crate::fit::dot;

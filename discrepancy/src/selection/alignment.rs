@@ -4,8 +4,8 @@
 
 use std::sync::OnceLock;
 
-use mops_core::diagnosis::Alignment;
-use mops_core::{Hold, Input};
+use mops_core::{Input, case::Hold};
+use mops_outcome::diagnosis::Alignment;
 use rayon::prelude::*;
 
 use super::fitted_set::{Key, Start};

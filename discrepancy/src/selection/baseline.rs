@@ -1,7 +1,9 @@
 //! Baseline: the declared model, fitted to the calibration records by least squares.
 
-use mops_core::statistics::{Sampling, draw};
-use mops_core::{Role, math, stream};
+use mops_core::Role;
+use mops_math as math;
+use mops_math::stream;
+use mops_statistics::{Sampling, draw};
 use rayon::prelude::*;
 
 use super::fitted_set::{Start, estimation};

@@ -1,6 +1,9 @@
 //! Which candidates the records can tell at all, decided before any of them is fitted.
 
-use mops_core::{Characteristic, DeclaredTerm, Dimension, EffectParameter, InitialGrid, ParameterKind, Port, Variable};
+use mops_core::{
+    Variable,
+    effect::{Characteristic, DeclaredTerm, Dimension, EffectParameter, InitialGrid, ParameterKind, Port},
+};
 use mops_models::{Moment, WithEffects};
 use nalgebra::DMatrix;
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-use mops_core::math;
+use mops_math as math;
 use rayon::prelude::*;
 
 use crate::candidate::Candidate;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use mops_core::{Effect, StudyError, suggestion};
+use mops_core::{Effect, StudyError};
+use mops_language::suggestion;
 
 use super::baseline::baseline;
 use super::coverage::is_covered;

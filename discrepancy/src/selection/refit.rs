@@ -2,7 +2,8 @@
 
 use std::sync::OnceLock;
 
-use mops_core::{Role, math};
+use mops_core::Role;
+use mops_math as math;
 use rayon::prelude::*;
 
 use super::fitted_set::{FittedSet, Key, Start, evidence, start_at};

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use mops_core::diagnosis::Dependence;
 use mops_core::{Effect, Role, Study, StudyError};
+use mops_outcome::diagnosis::Dependence;
 
 use super::fitted_set::{FittedSet, Key, name};
 use super::forecast::{Forecasts, free_run};

@@ -1,6 +1,6 @@
 //! Screening: to first order, how much each candidate and each pair of candidates would explain.
 
-use mops_core::{InitialGrid, Scope};
+use mops_core::effect::{InitialGrid, Scope};
 use rayon::prelude::*;
 
 use super::fitted_set::FittedSet;

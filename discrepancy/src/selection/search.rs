@@ -2,7 +2,8 @@
 
 use std::cell::OnceCell;
 
-use mops_core::{EffectClass, math};
+use mops_core::effect::EffectClass;
+use mops_math as math;
 use rayon::prelude::*;
 
 use super::fitted_set::{FittedSet, Key, Start, evidence};

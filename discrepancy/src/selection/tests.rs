@@ -1,6 +1,7 @@
 //! Selections on data that the tests compute themselves.
 
-use mops_core::{Hold, Input, Role, Study, math};
+use mops_core::{Input, Role, Study, case::Hold};
+use mops_math as math;
 
 use super::baseline::baseline;
 use super::{Conclusion, Selection, compare, select};

@@ -1,6 +1,8 @@
 //! What is claimed: the first set that the evidence and a forecast support, by class and place, and what remains.
 
-use mops_core::{Role, math};
+use mops_core::Role;
+use mops_math as math;
+use mops_outcome::diagnosis::Dependence;
 
 use super::fitted_set::{FittedSet, Key, correlation, growth, largest, rms, surprise};
 use super::forecast::{Forecasts, fitted_together};
@@ -9,7 +11,6 @@ use crate::candidate::Candidate;
 use crate::estimation::ErrorModel;
 use crate::fit::dot;
 use crate::settings::settings;
-use mops_core::diagnosis::Dependence;
 
 /// Class of effects at a place.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,8 +1,8 @@
 //! Parameters absorb what is missing: the fit is fine, the forecast is not.
 
 use mops_core::Role;
-use mops_core::math;
 use mops_effects::effects;
+use mops_math as math;
 
 use crate::subject::Subject;
 use crate::testing::{Record, study, subject, white};

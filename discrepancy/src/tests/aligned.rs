@@ -1,7 +1,7 @@
 //! Inputs that act earlier than their time stamps, or move between their samples, are no effects.
 
-use mops_core::diagnosis::Alignment;
-use mops_core::{Hold, Input, Role};
+use mops_core::{Input, Role, case::Hold};
+use mops_outcome::diagnosis::Alignment;
 
 use crate::testing::{Record, catalogue, integrated, study, subject, white};
 use crate::{Diagnosis, Options, Verdict, diagnose};

@@ -1,7 +1,8 @@
 //! Where effects are tried, and at which values.
 
-use mops_core::{Dimension, EffectParameter, InitialGrid, ParameterKind, math};
+use mops_core::effect::{Dimension, EffectParameter, InitialGrid, ParameterKind};
 use mops_effects::effects;
+use mops_math as math;
 
 use crate::candidate::{Candidate, Sizes, candidates};
 use crate::meter::Meter;

@@ -1,11 +1,11 @@
 //! Residuals next to each other that are alike are not worth as much as many of their own.
 
 use mops_effects::effects;
+use mops_math as math;
 
 use crate::subject::Subject;
 use crate::testing::{Record, catalogue, integrated, study, subject, white};
 use crate::{Options, Verdict, diagnose};
-use mops_core::math;
 
 const CREEP: &str = r#"
 states     = { x = "m" }

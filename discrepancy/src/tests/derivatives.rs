@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use mops_core::math;
-use mops_core::{Effect, Hold, Input};
+use mops_core::{Effect, Input, case::Hold};
 use mops_effects::effects;
+use mops_math as math;
 
 use crate::meter::Meter;
 use crate::testing::{Record, integrated, screened, subject, white};

@@ -1,9 +1,10 @@
 //! What was found is drawn through the signal that the data show at its place without any formula.
 
+use mops_math as math;
+use mops_outcome::diagnosis::{Curve, Evidence};
+
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
-use mops_core::diagnosis::{Curve, Evidence};
-use mops_core::math;
 
 /// A block on a spring: `v' = -k x - d v`.
 const BLOCK: &str = r#"

@@ -1,8 +1,8 @@
 //! The wrong hold of an input hides an effect: what the command did between its samples looks like a force of its own.
 
-use mops_core::math;
-use mops_core::{Hold, Input};
+use mops_core::{Input, case::Hold};
 use mops_effects::effects;
+use mops_math as math;
 
 use crate::meter::Meter;
 use crate::testing::{Record, fitted, integrated, screened, subject, white};

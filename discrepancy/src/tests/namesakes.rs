@@ -2,9 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use mops_math as math;
+
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
-use mops_core::math;
 
 /// A block on a spring, of which the data have gusts: `v' = -k x - d v + g(t)`.
 const BLOCK: &str = r#"

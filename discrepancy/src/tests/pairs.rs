@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use mops_core::math;
 use mops_core::{Effect, Role, Study};
+use mops_math as math;
 
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Diagnosis, Options, diagnose};

@@ -1,6 +1,6 @@
 //! Play is looked for in what one shaft is ahead of the other, however far both turn.
 
-use mops_core::{Hold, Input, Port};
+use mops_core::{Input, case::Hold, effect::Port};
 
 use crate::meter::Meter;
 use crate::subject::Subject;

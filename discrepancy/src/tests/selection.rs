@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use mops_core::math;
-use mops_core::{Effect, Hold, Input, Role};
+use mops_core::{Effect, Input, Role, case::Hold};
+use mops_math as math;
 
 use crate::subject::Subject;
 use crate::testing::{Record, catalogue, integrated, study, subject, white};

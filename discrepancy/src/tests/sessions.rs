@@ -1,7 +1,7 @@
 //! Sessions drift: a long record runs out of phase where a parameter has moved a little, and a few periods do not.
 
 use mops_core::Role;
-use mops_core::math;
+use mops_math as math;
 
 use crate::testing::{Record, integrated, study, subject};
 use crate::{Options, diagnose};

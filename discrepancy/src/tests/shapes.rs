@@ -4,11 +4,11 @@
 use std::f64::consts::TAU;
 
 use mops_core::Input;
-use mops_core::math;
+use mops_math as math;
+use mops_outcome::diagnosis::StrengthValue;
 
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
-use mops_core::diagnosis::StrengthValue;
 
 /// A body that cools: `T' = -h (T - 20)`.
 const BODY: &str = r#"

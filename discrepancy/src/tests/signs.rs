@@ -1,8 +1,8 @@
 //! The sign: friction takes energy, whatever the data would like.
 
-use mops_core::math;
-use mops_core::{EffectClass, Hold, Input};
+use mops_core::{Input, case::Hold, effect::EffectClass};
 use mops_effects::effects;
+use mops_math as math;
 
 use crate::testing::{Record, integrated, study, subject, white};
 use crate::{Options, Verdict, diagnose};

@@ -1,6 +1,6 @@
 //! What a hidden state starts with is unknown, and no error of the model.
 
-use mops_core::{Hold, Input};
+use mops_core::{Input, case::Hold};
 
 use crate::testing::{Record, catalogue, integrated, study, subject, white};
 use crate::{Options, diagnose};

@@ -1,8 +1,8 @@
 //! Stairs have no slope: the size of steps is searched for, and a gain that makes up for a wrong size does not hide the right one.
 
-use mops_core::math;
-use mops_core::{Hold, Input};
+use mops_core::{Input, case::Hold};
 use mops_effects::effects;
+use mops_math as math;
 
 use crate::testing::{Record, integrated, study, subject, white};
 use crate::{Options, diagnose};

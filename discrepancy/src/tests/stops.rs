@@ -1,6 +1,6 @@
 //! Stiff stops: contact is short, and a soft one spread over the whole motion is where a fit from nothing ends.
 
-use mops_core::{Hold, Input};
+use mops_core::{Input, case::Hold};
 
 use crate::subject::Subject;
 use crate::testing::{Record, catalogue, integrated, study, subject, white};

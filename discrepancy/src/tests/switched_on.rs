@@ -1,6 +1,6 @@
 //! An actuator that was just switched on is not yet where its command is.
 
-use mops_core::{Hold, Input};
+use mops_core::{Input, case::Hold};
 
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};

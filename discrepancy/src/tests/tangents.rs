@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use mops_core::math;
-use mops_core::{Hold, InitialGrid, Input, Job, Model};
+use mops_core::{Input, Job, Model, case::Hold, effect::InitialGrid};
 use mops_effects::effects;
+use mops_math as math;
 
 use crate::base::pieces;
 use crate::candidate::candidates;
@@ -12,8 +12,7 @@ use crate::fit::dot;
 use crate::meter::Meter;
 use crate::testing::{Record, subject};
 use crate::trace_of::{View, sizes};
-use crate::variant::problem;
-use crate::variant::{Added, Variant};
+use crate::variant::{Added, Variant, problem};
 use crate::windows::cut;
 
 const PLANT: &str = r#"

@@ -1,7 +1,7 @@
 //! Strengths that the data tell nothing of.
 
-use mops_core::math;
-use mops_core::{Hold, Input};
+use mops_core::{Input, case::Hold};
+use mops_math as math;
 
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Diagnosis, Found, Options, diagnose};

@@ -1,7 +1,9 @@
 //! The model `quarter-car`.
 
-use mops::models::kernel::{PlantModel, Simulated};
-use mops::prelude::*;
+use mops::{
+    models::kernel::{PlantModel, Simulated},
+    prelude::*,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -3,8 +3,7 @@
 //! A wheel `m x'' = -k x - d x'` is hit by a pothole that gives it a speed of 1 m/s. Spring and damper shall let it settle soon
 //! and shake its load little.
 
-use mops::criteria::settling_time::SettlingTime;
-use mops::prelude::*;
+use mops::{criteria::settling_time::SettlingTime, prelude::*};
 
 /// Mass, kg.
 const MASS: f64 = 250.0;

@@ -1,6 +1,6 @@
 //! Registers: storage of numbers while a tape runs.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 /// Index of a register.
 pub type Register = u16;

@@ -1,7 +1,9 @@
 //! Tapes evaluated on bounds: the range of a guard over a part of a step.
 
-use mops_core::Scalar;
-use mops_core::enclosure::{Enclosure, Interval};
+use mops_language::{
+    Scalar,
+    enclosure::{Enclosure, Interval},
+};
 
 use super::bank::{Bank, Register};
 use super::program::{Instruction, Program};
@@ -34,7 +36,7 @@ impl Program {
                 }
                 I::Sin(o, a) => (o, r[at(a)].sin()),
                 I::Cos(o, a) => (o, r[at(a)].cos()),
-                I::Sqrt(o, a) => (o, r[at(a)].function(mops_core::expression::Function::Sqrt)),
+                I::Sqrt(o, a) => (o, r[at(a)].function(mops_language::expression::Function::Sqrt)),
                 I::Function(f, o, a) => (o, r[at(a)].function(f)),
                 I::Power(o, a, b) => (o, r[at(a)].power(r[at(b)])),
                 I::Atan2(o, a, b) => (o, r[at(a)].atan2(r[at(b)])),

@@ -1,7 +1,7 @@
 //! Functions of expressions in the graph; at a kink or a jump, a switch selects the branch.
 
 use mops_core::StudyError;
-use mops_core::expression::{Comparison, Form, Function, Node};
+use mops_language::expression::{Comparison, Form, Function, Node};
 
 use super::definition::{Text, under};
 use super::graph::{Id, Level, Op};

@@ -1,6 +1,7 @@
 //! Clocks of a user's model: sampled memory that changes at fixed instants.
 
-use mops_core::{Instant, Scalar};
+use mops_core::Instant;
+use mops_language::Scalar;
 
 use super::bank::Bank;
 use super::compiled::Clock;

@@ -1,7 +1,8 @@
 //! PID controllers of a model, as definitions, states and clocks.
 
-use mops_core::file::{Entries, Short};
-use mops_core::{Quantity, StudyError, Unit};
+use mops_core::StudyError;
+use mops_file::{Entries, Short};
+use mops_language::{Quantity, Unit};
 
 use super::definition::{path, under};
 use super::filters::{in_brackets, number_before_formulas};

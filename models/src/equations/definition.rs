@@ -5,9 +5,13 @@ use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::Arc;
 
-use mops_core::expression::{Equation, Form, Node, equation};
-use mops_core::linear::OWN;
-use mops_core::{Quantity, StudyError, Unit, suggestion};
+use mops_core::StudyError;
+use mops_language::{
+    Quantity, Unit,
+    expression::{Equation, Form, Node, equation},
+    suggestion,
+};
+use mops_linear::OWN;
 
 use super::key::{Index, Key, member};
 use super::options::{EquationsOptions, Formula};

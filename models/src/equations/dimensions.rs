@@ -3,9 +3,14 @@
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
-use mops_core::expression::units::{Conflict, Dimensions, Measure, Open, Quantities};
-use mops_core::expression::{Form, Node};
-use mops_core::{StudyError, Unit};
+use mops_core::StudyError;
+use mops_language::{
+    Unit,
+    expression::{
+        Form, Node,
+        units::{Conflict, Dimensions, Measure, Open, Quantities},
+    },
+};
 
 use super::definition::{Declared, Definition, Text, under};
 use super::key::member;

@@ -1,12 +1,14 @@
 //! Filters of clocks: transfer functions as difference equations of their memory.
 
-use mops_core::linear::{TransferFunction, exponential_m1};
-use mops_core::{Quantity, StudyError, Unit, math};
+use mops_core::StudyError;
+use mops_file::Short;
+use mops_language::{Quantity, Unit};
+use mops_linear::{TransferFunction, exponential_m1};
+use mops_math as math;
 use nalgebra::DMatrix;
 
 use super::definition::{path, under};
 use super::options::{Clock, Described, EquationsOptions, Filter, Formula, Method, Polynomials};
-use mops_core::file::Short;
 
 /// Returns the options with each filter replaced by memory and its next values.
 pub(super) fn expanded(mut options: EquationsOptions) -> Result<EquationsOptions, StudyError> {

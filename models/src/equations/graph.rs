@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use mops_core::expression::{Comparison, Function, functions};
-use mops_core::math;
+use mops_language::expression::{Comparison, Function, functions};
+use mops_math as math;
 
 /// Index of a node of the graph; nodes come after their operands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

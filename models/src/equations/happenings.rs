@@ -1,8 +1,10 @@
 //! Events of a user's model: arming, resets, and rest states.
 
-use mops_core::enclosure::Enclosure;
-use mops_core::plant::{Events, InputRates};
-use mops_core::{Dual, EventInstant, Instant, Plant, Scalar};
+use mops_core::{
+    Instant, Plant,
+    plant::{EventInstant, Events, InputRates},
+};
+use mops_language::{Dual, Scalar, enclosure::Enclosure};
 
 use super::bank::{Bank, Large};
 use super::bounds::{moved, signed};

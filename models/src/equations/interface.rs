@@ -1,7 +1,8 @@
 //! Interface of a model from text: parameters, initial states, and places of effects.
 
-use mops_core::linear::OWN;
-use mops_core::{Parameter, Port, StudyError, Unit, Variable, suggestion};
+use mops_core::{Parameter, StudyError, Variable, effect::Port};
+use mops_language::{Unit, suggestion};
+use mops_linear::OWN;
 
 use super::definition::{self, Definition, under};
 use super::graph::Op;

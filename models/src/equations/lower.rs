@@ -3,8 +3,12 @@
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
-use mops_core::expression::{Form, Node, Operator};
-use mops_core::{StudyError, Unit, suggestion};
+use mops_core::StudyError;
+use mops_language::{
+    Unit,
+    expression::{Form, Node, Operator},
+    suggestion,
+};
 
 use super::definition::{Declared, Definition, Text, under};
 use super::graph::{Graph, Id, Level, Op};

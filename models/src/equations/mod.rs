@@ -27,8 +27,15 @@ mod tape;
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
-use mops_core::data::{Files, Folder};
-use mops_core::{Cut, Failure, Interface, Model, ModelOptions, Plant, Port, Scalar, State, StudyError, Unit, Variable};
+use mops_core::{
+    Failure, Interface, Model, ModelOptions, Plant, StudyError, Variable,
+    effect::Port,
+    model::{Cut, State},
+};
+use mops_language::{
+    Scalar, Unit,
+    files::{Files, Folder},
+};
 
 use crate::kernel::{PlantModel, Simulated, Tolerance};
 use bank::{Bank, FEW, Large, Small};

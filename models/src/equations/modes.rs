@@ -1,6 +1,7 @@
 //! Modes of a model from text: the active branches and the stuck joints.
 
-use mops_core::{Failure, Instant, Plant, Scalar};
+use mops_core::{Failure, Instant, Plant};
+use mops_language::Scalar;
 
 use super::bank::Bank;
 use super::running::Running;

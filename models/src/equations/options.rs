@@ -1,7 +1,7 @@
 //! Options of `[models.NAME.equations]` in a study file.
 
-use mops_core::Quantity;
-use mops_core::file::{Entries, Short};
+use mops_file::{Entries, Short};
+use mops_language::Quantity;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};

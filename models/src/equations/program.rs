@@ -1,7 +1,9 @@
 //! Tape: a flat list of instructions on registers, run at every stage of every step.
 
-use mops_core::Scalar;
-use mops_core::expression::{Comparison, Function, functions};
+use mops_language::{
+    Scalar,
+    expression::{Comparison, Function, functions},
+};
 
 use super::bank::{Bank, Register};
 

@@ -2,11 +2,12 @@
 
 use std::cell::{RefCell, RefMut};
 
-use mops_core::enclosure::Enclosure;
-use mops_core::expression::Comparison;
-use mops_core::linear;
-use mops_core::plant::{Bounds, Breaks, Events, InputRates, Jacobian, Memory, Past, Span};
-use mops_core::{DIRECTIONS, Dual, Dual7, EventInstant, Failure, Instant, LeftOut, Plant, Scalar, Selected};
+use mops_core::{
+    Failure, Instant, Plant,
+    plant::{Bounds, Breaks, EventInstant, Events, InputRates, Jacobian, LeftOut, Memory, Past, Selected, Span},
+};
+use mops_language::{DIRECTIONS, Dual, Dual7, Scalar, enclosure::Enclosure, expression::Comparison};
+use mops_linear as linear;
 
 use super::bank::{Bank, Large, Register};
 use super::bounds::{self, moved, signed};

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use mops_core::expression::Form;
-use mops_core::{StudyError, suggestion};
+use mops_core::StudyError;
+use mops_language::{expression::Form, suggestion};
 
 use super::definition::{self, Definition, Text, under};
 use super::graph::{Block, Graph, Id, Op};

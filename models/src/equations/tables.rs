@@ -2,9 +2,13 @@
 
 use std::sync::Arc;
 
-use mops_core::data::{DataFile, Files, OutsideFolder};
-use mops_core::expression::{Comparison, Equation, Form, Function, Node, Operator, unknown_function};
-use mops_core::{Quantity, StudyError, Unit};
+use mops_core::StudyError;
+use mops_data::DataFile;
+use mops_language::{
+    Quantity, Unit,
+    expression::{Comparison, Equation, Form, Function, Node, Operator, unknown_function},
+    files::{Files, OutsideFolder},
+};
 
 use super::definition::{Definition, HELP, path, under};
 use super::options::{Between, EquationsOptions, Grid, Outside, Points, Table};

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use mops_core::expression::Function;
+use mops_language::expression::Function;
 
 use super::bank::Register;
 use super::graph::{Graph, Id, Op};

@@ -2,8 +2,8 @@
 
 mod large;
 
-use mops_core::math;
 use mops_core::{Analysis, Case, Failure, Input, Job, Model, Response, StudyError};
+use mops_math as math;
 
 use super::EquationsOptions;
 use crate::kernel::Simulated;
@@ -194,7 +194,7 @@ fn a_model_from_text_agrees_with_the_compiled_model_with_dry_friction() {
     let parameters: Vec<f64> = p.iter().map(|(_, v)| *v).chain([0.0, 0.0, 2.2, 1.78]).collect();
     let job = Job { case: &case, parameters: &parameters, signals: &[0, 2], horizon: 6.0 };
     let reference = compiled.analyse(&job).unwrap();
-    let sticks = |events: &[mops_core::Event]| events.iter().filter(|e| e.what.contains("sticks")).count();
+    let sticks = |events: &[mops_core::model::Event]| events.iter().filter(|e| e.what.contains("sticks")).count();
     assert!(sticks(&response.events) >= 3, "{:?}", response.events);
     assert_eq!(response.events.len(), reference.response().unwrap().events.len());
     for (mine, its) in response.events.iter().zip(&reference.response().unwrap().events) {
@@ -274,7 +274,7 @@ fn a_noisy_input_at_a_kink_costs_steps_in_proportion_to_its_samples() {
     // A tank that stays nearly empty, with an inflow that changes every second.
     let times: Vec<f64> = (0..200).map(f64::from).collect();
     let levels: Vec<f64> = (0..200).map(|k| f64::from(k * 7919 % 13) * 0.02).collect();
-    let inflow = Input::Sampled { times, values: levels, hold: mops_core::Hold::Zero };
+    let inflow = Input::Sampled { times, values: levels, hold: mops_core::case::Hold::Zero };
     let model = model(text!("tanks"));
     let given = [("kp", 19.5), ("a1", 1.12), ("a2", 0.468)];
     let response = respond(&model, &[("u", inflow)], &given, 200.0);
@@ -411,7 +411,7 @@ fn a_stiff_rod_by_the_stiff_method_takes_few_steps_to_the_same_result() {
 
 #[test]
 fn derivatives_at_an_operating_point_are_those_of_the_equations() {
-    use mops_core::OperatingPoint;
+    use mops_core::model::OperatingPoint;
     let model = model(&format!("{}friction.q = {{ coulomb = 0.3 }}", text!("servo")));
     let (j, b) = (2.0, 0.5);
     let point = OperatingPoint {
@@ -429,7 +429,11 @@ fn derivatives_at_an_operating_point_are_those_of_the_equations() {
 
 #[test]
 fn dry_friction_is_omitted_at_an_equilibrium_and_in_its_derivatives() {
-    use mops_core::{Case, Linearise, Linearised, OperatingPoint, Quantity};
+    use mops_core::{
+        Case,
+        model::{Linearise, Linearised, OperatingPoint},
+    };
+    use mops_language::Quantity;
     let text = "
         states = { ph = 'rad', w = 'rad/s' }
         inputs = { u = 'N m' }

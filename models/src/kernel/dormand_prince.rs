@@ -4,7 +4,8 @@
 //! II.5.2 (coefficients), section II.6 (dense output); E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd
 //! edition (1996), section IV.2 (largest eigenvalue from the last two stages, which belong to one time).
 
-use mops_core::{Plant, Scalar, Work};
+use mops_core::{Plant, model::Work};
+use mops_language::Scalar;
 
 use super::Driven;
 use super::integrable::{Integrable, WithInputs};

@@ -1,9 +1,14 @@
 //! Inputs during a simulation: smooth within a step, with jumps at breaks.
 
-use mops_core::band_limited::{piece, polynomial};
-use mops_core::enclosure::Enclosure;
-use mops_core::math;
-use mops_core::{Chirp, Hold, Input, Scalar};
+use mops_core::{
+    Input,
+    case::{
+        Chirp, Hold,
+        band_limited::{piece, polynomial},
+    },
+};
+use mops_language::{Scalar, enclosure::Enclosure};
+use mops_math as math;
 
 use super::next_of;
 

@@ -1,8 +1,10 @@
 //! Plant together with its inputs: the system that a simulation integrates.
 
-use mops_core::enclosure::Enclosure;
-use mops_core::plant::{EventInstant, Stretch};
-use mops_core::{Failure, Instant, Plant, Scalar};
+use mops_core::{
+    Failure, Instant, Plant,
+    plant::{EventInstant, Stretch},
+};
+use mops_language::{Scalar, enclosure::Enclosure};
 
 use super::dormand_prince::DormandPrince;
 use super::inputs::Inputs;

@@ -10,8 +10,9 @@
 //! Source: C. Kennedy, M. Carpenter, Applied Numerical Mathematics 44 (2003) 139-181, appendix C (coefficients); E. Hairer,
 //! G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996), section IV.8 (Newton's method, error).
 
-use mops_core::math;
-use mops_core::{Scalar, Work};
+use mops_core::model::Work;
+use mops_language::Scalar;
+use mops_math as math;
 
 use super::Driven;
 use super::banded::Banded;
@@ -378,7 +379,8 @@ pub(crate) fn groups(rows: &[Vec<usize>]) -> Vec<Vec<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::{Dual, Failure, Instant, Plant};
+    use mops_core::{Failure, Instant, Plant};
+    use mops_language::Dual;
 
     use super::super::{IntegrationMethod, Tolerance, integrate};
     use super::*;

@@ -33,9 +33,9 @@
 //! V. Kumar, G. Pappas, Accurate event detection for simulating hybrid systems, HSCC 2001, 204-217; J. Zhang, K. Johansson,
 //! J. Lygeros, S. Sastry, Zeno hybrid systems, Int. J. Robust Nonlinear Control 11 (2001) 435-451.
 
-use mops_core::enclosure::Enclosure;
-use mops_core::math;
-use mops_core::{Failure, Plant, Scalar};
+use mops_core::{Failure, Plant};
+use mops_language::{Scalar, enclosure::Enclosure};
+use mops_math as math;
 
 use super::integrable::Integrable;
 use super::step::Step;

@@ -4,7 +4,7 @@
 //! joint is stuck, `q''_i = 0` and `tau_i` is within its limit. The sign function is not smoothed: a stuck joint does
 //! not move at all.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 /// Contact state of a joint with dry friction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

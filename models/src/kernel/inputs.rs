@@ -2,9 +2,11 @@
 
 use std::cell::{RefCell, RefMut};
 
-use mops_core::enclosure::Enclosure;
-use mops_core::plant::{InputRates, Span};
-use mops_core::{Instant, Scalar};
+use mops_core::{
+    Instant,
+    plant::{InputRates, Span},
+};
+use mops_language::{Scalar, enclosure::Enclosure};
 
 use super::drive::Drive;
 use super::{is_due, next_of};

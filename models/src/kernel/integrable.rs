@@ -1,6 +1,7 @@
 //! Loops over the equations of a plant, compiled together with them.
 
-use mops_core::{Plant, Scalar};
+use mops_core::Plant;
+use mops_language::Scalar;
 
 use super::dormand_prince::DormandPrince;
 use super::inputs::Inputs;

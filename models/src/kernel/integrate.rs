@@ -1,6 +1,7 @@
 //! Integration over all steps, with breaks and events.
 
-use mops_core::{Failure, Plant, Scalar, Work};
+use mops_core::{Failure, Plant, model::Work};
+use mops_language::Scalar;
 
 use super::dormand_prince::DormandPrince;
 use super::esdirk::Esdirk;
@@ -276,7 +277,9 @@ fn all_finite<S: Scalar>(x: &[S]) -> bool {
 mod tests {
     use super::*;
     use mops_core::plant::{self, InputRates};
-    use mops_core::{Dual, EventInstant, Instant, math};
+    use mops_core::{Instant, plant::EventInstant};
+    use mops_language::Dual;
+    use mops_math as math;
 
     /// Harmonic oscillator `x'' = -x`.
     struct Oscillator;

@@ -1,6 +1,11 @@
 //! Model equations at one point with exact derivatives, for linearisation there.
 
-use mops_core::{DIRECTIONS, Dual, Dual7, Failure, Instant, LeftOut, Local, OperatingPoint, Plant, Scalar, Selected};
+use mops_core::{
+    Failure, Instant, Plant,
+    model::{Local, OperatingPoint},
+    plant::{LeftOut, Selected},
+};
+use mops_language::{DIRECTIONS, Dual, Dual7, Scalar};
 use nalgebra::DMatrix;
 
 use super::PlantModel;

@@ -1,9 +1,12 @@
 //! Mechanisms: joints coupled by a mass matrix, with bearing friction.
 
-use mops_core::plant::{Events, InputRates};
 use mops_core::{
-    EventInstant, Failure, Instant, Interface, LeftOut, Parameter, Plant, Port, Scalar, State, Unit, Variable,
+    Failure, Instant, Interface, Parameter, Plant, Variable,
+    effect::Port,
+    model::State,
+    plant::{EventInstant, Events, InputRates, LeftOut},
 };
+use mops_language::{Scalar, Unit};
 
 use super::elements::BearingFriction;
 use super::friction::{Contact, Moment, balance};

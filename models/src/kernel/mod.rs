@@ -5,7 +5,7 @@
 /// Otherwise `$N` is 0, which means any number. The compiler unrolls loops over a known number of states.
 macro_rules! by_size {
     ($states:expr, $S:ty, $N:ident => $body:expr) => {
-        match if <$S as mops_core::Scalar>::DIRECTIONS == 0 { $states } else { 0 } {
+        match if <$S as mops_language::Scalar>::DIRECTIONS == 0 { $states } else { 0 } {
             1 => {
                 const $N: usize = 1;
                 $body
@@ -58,9 +58,10 @@ mod step;
 mod step_size;
 mod weights;
 
-use mops_core::{Failure, Quantity, Scalar, StudyError, Unit, Work};
+use mops_core::{Failure, StudyError, model::Work};
+use mops_language::{Quantity, Scalar, Unit};
 
-pub use mops_core::{IntegrationMethod, Tolerance};
+pub use mops_core::plant::{IntegrationMethod, Tolerance};
 
 pub use driven::Driven;
 pub(crate) use driven::mobility;

@@ -1,7 +1,7 @@
 //! Past of a plant, along the steps.
 
-use mops_core::plant::Past;
-use mops_core::{Instant, Plant, Scalar, Trace};
+use mops_core::{Instant, Plant, Trace, plant::Past};
+use mops_language::Scalar;
 
 use super::weights::perturbed;
 use super::{Driven, Step};

@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
-use mops_core::linear::Clock;
 use mops_core::{
-    Analysis, Cut, Dual7, Failure, Input, Interface, Job, Local, Model, OperatingPoint, Plant, Ported, Scalar,
-    StudyError, Variable, WithTangents,
+    Analysis, Failure, Input, Interface, Job, Model, Plant, StudyError, Variable,
+    model::{Cut, Local, OperatingPoint, WithTangents},
+    plant::Ported,
 };
+use mops_language::{Dual7, Scalar};
+use mops_linear::Clock;
 
 use super::drive::Drive;
 use super::{Driven, Inputs, Recording, Tolerance, Wanted, local, record, tangents_of, wanted};
@@ -105,7 +107,8 @@ pub(crate) fn cut_at(
 /// Example: a pendulum with viscous friction, open at its joint:
 ///
 /// ```
-/// use mops_core::{Failure, Instant, Interface, Parameter, Plant, Scalar, Variable};
+/// use mops_core::{Failure, Instant, Interface, Parameter, Plant, Variable};
+/// use mops_language::Scalar;
 /// use mops_models::kernel::{PlantModel, Simulated, mechanism};
 ///
 /// /// `J theta'' = u - d sin(theta) - b theta' + w`, `w` a torque that effects add.
@@ -145,7 +148,7 @@ pub(crate) fn cut_at(
 /// }
 ///
 /// // A model like any other: `Simulated::new(Pendulum::new()).into()` is a `ModelBuilder`, which accepts effects.
-/// use mops_core::{Catalogue, EffectBuilder, ModelBuilder};
+/// use mops_core::{Catalogue, effect::EffectBuilder, study::ModelBuilder};
 /// let catalogue = Catalogue {
 ///     effects: mops_effects::effects(),
 ///     augment: Some(|model, effects| Ok(Box::new(mops_models::WithEffects::new(model, effects)?))),

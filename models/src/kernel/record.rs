@@ -1,9 +1,10 @@
 //! Traces of signals from the dense output of steps, with their tangents.
 
-use mops_core::enclosure::Enclosure;
 use mops_core::{
-    Analysis, Cancellation, DIRECTIONS, Dual, Dual7, Event, Failure, Job, Plant, Response, Scalar, Trace, WithTangents,
+    Analysis, Cancellation, Failure, Job, Plant, Response, Trace,
+    model::{Event, WithTangents},
 };
+use mops_language::{DIRECTIONS, Dual, Dual7, Scalar, enclosure::Enclosure};
 
 use super::integrable::Integrable;
 use super::weights::{PERTURBATION, SHARE, perturbed};

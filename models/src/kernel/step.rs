@@ -1,7 +1,9 @@
 //! Accepted step and its dense output.
 
-use mops_core::Scalar;
-use mops_core::enclosure::{Enclosure, Interval};
+use mops_language::{
+    Scalar,
+    enclosure::{Enclosure, Interval},
+};
 
 /// Accepted step from `start` to `start + taken`, with its dense output.
 pub struct Step<S> {

@@ -4,7 +4,8 @@
 //! II.4 (step size, first step); E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996),
 //! section IV.2 (PI control).
 
-use mops_core::{Scalar, math};
+use mops_language::Scalar;
+use mops_math as math;
 
 use super::Driven;
 use super::integrable::Integrable;

@@ -1,6 +1,7 @@
 //! Error weights: the size of each state, relative to its own scale.
 
-use mops_core::{Scalar, Tolerance};
+use mops_core::plant::Tolerance;
+use mops_language::Scalar;
 
 use super::Driven;
 use super::integrable::Integrable;

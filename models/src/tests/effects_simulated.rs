@@ -3,11 +3,13 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-use mops_core::math;
 use mops_core::{
-    Analysis, Between, Case, Effect, EffectParameter, Hold, Input, Job, Model, ModelOptions, Placement, Port, PortKind,
+    Analysis, Case, Effect, Input, Job, Model, ModelOptions,
+    case::Hold,
+    effect::{Between, EffectParameter, Placement, Port, PortKind},
 };
 use mops_effects::effects;
+use mops_math as math;
 
 use crate::equations::EquationsOptions;
 use crate::with_effects::WithEffects;

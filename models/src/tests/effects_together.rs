@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use mops_core::math;
-use mops_core::{Analysis, Case, Hold, Input, Job, Model, ModelOptions, Placement};
+use mops_core::{Analysis, Case, Input, Job, Model, ModelOptions, case::Hold, effect::Placement};
 use mops_effects::effects;
+use mops_math as math;
 
 use crate::equations::EquationsOptions;
 use crate::with_effects::WithEffects;

@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use mops_core::math;
 use mops_core::{Case, Model, ModelOptions, Response, Trace};
+use mops_math as math;
 
 use super::{check_tangents_by, respond};
 use crate::furuta_2_joint::{Furuta2JointOptions, Lumped, TwoBodies};
@@ -229,7 +229,7 @@ fn check_energy(rods: Rods, spring: f64, response: &Response) {
 /// Returns times and values of the turning points of a trace, from `from` on.
 fn turning_points(trace: &Trace, from: f64) -> Vec<(f64, f64)> {
     let pieces: Vec<_> = trace.pieces().into_iter().filter(|p| (p.value[1] - p.value[0]).abs() > 1e-12).collect();
-    let turns = |pair: &[mops_core::Piece]| {
+    let turns = |pair: &[mops_core::trace::Piece]| {
         let [before, after] = [&pair[0], &pair[1]].map(|p| p.value[1] > p.value[0]);
         (before != after && pair[0].time[1] > from).then_some((pair[0].time[1], pair[0].value[1]))
     };

@@ -1,7 +1,7 @@
 //! Upright pendulum under state feedback, compared with published figures.
 
-use mops_core::math;
-use mops_core::{Case, Model, ModelOptions, OperatingPoint, Response};
+use mops_core::{Case, Model, ModelOptions, Response, model::OperatingPoint};
+use mops_math as math;
 
 use super::{check_tangents_by, respond, values as values_of};
 use crate::furuta_2_joint::Furuta2JointOptions;

@@ -3,8 +3,9 @@
 
 use std::ops::Range;
 
-use mops_core::linear::Clock;
-use mops_core::{Cancellation, DIRECTIONS, Dual, Dual7, Failure, Instant, Job, Plant, Scalar};
+use mops_core::{Cancellation, Failure, Instant, Job, Plant};
+use mops_language::{DIRECTIONS, Dual, Dual7, Scalar};
+use mops_linear::Clock;
 use nalgebra::DMatrix;
 
 use super::WithEffects;
@@ -448,7 +449,7 @@ impl Linear<'_, '_> {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::math;
+    use mops_math as math;
 
     use super::*;
 

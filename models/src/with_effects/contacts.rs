@@ -3,7 +3,11 @@
 //! The rates of a plant are affine in its forces, `v' = a + B f`. The friction forces of stuck joints make their
 //! accelerations vanish, so no mass matrix is needed.
 
-use mops_core::{DryFriction, EventInstant, PlantScalar, Scalar};
+use mops_core::{
+    effect::DryFriction,
+    plant::{EventInstant, PlantScalar},
+};
+use mops_language::Scalar;
 use nalgebra::{DMatrix, DVector};
 
 use super::plant::{Affected, with_states};

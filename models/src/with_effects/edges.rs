@@ -1,7 +1,10 @@
 //! Edges of effects, at which their laws change, and hysteresis states: their guards, what happens there, and how they start.
 
-use mops_core::plant::Stretch;
-use mops_core::{EventInstant, Failure, Instant, PlantScalar, PortState};
+use mops_core::{
+    Failure, Instant,
+    effect::PortState,
+    plant::{EventInstant, PlantScalar, Stretch},
+};
 
 use super::Site;
 use super::plant::{Affected, PlacedEffect, fixed, with_states};

@@ -10,9 +10,13 @@ mod sensors;
 use std::sync::Arc;
 
 use mops_core::{
-    Analysis, Case, Dimension, Earlier, Failure, InitialGrid, Interface, Job, Model, Parameter, ParameterKind,
-    Placement, PlantScalar, Port, Ported, Scalar, State, StudyError, Unit, Variable, WithTangents,
+    Analysis, Case, Failure, Interface, Job, Model, Parameter, StudyError, Variable,
+    effect::{Dimension, InitialGrid, ParameterKind, Placement, Port},
+    model::{State, WithTangents},
+    plant::{PlantScalar, Ported},
+    trace::Earlier,
 };
+use mops_language::{Scalar, Unit};
 
 use crate::kernel::drive::Drive;
 use crate::kernel::{Driven, Inputs, Recording, Simulation, Tolerance, shown, tangents_of, wanted};

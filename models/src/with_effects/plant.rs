@@ -2,11 +2,13 @@
 
 use std::cell::RefCell;
 
-use mops_core::enclosure::Enclosure;
-use mops_core::plant::{Bounds, Breaks, Events, InputRates, Memory, Past, Span, Stretch};
 use mops_core::{
-    BoundEffect, EventInstant, Failure, Instant, MOST_LOST, Plant, PlantScalar, PortState, Scalar, linear,
+    Failure, Instant, Plant,
+    effect::{BoundEffect, MOST_LOST, PortState},
+    plant::{Bounds, Breaks, EventInstant, Events, InputRates, Memory, Past, PlantScalar, Span, Stretch},
 };
+use mops_language::{Scalar, enclosure::Enclosure};
+use mops_linear as linear;
 
 use super::contacts::{Contacts, solve};
 use super::{Place, Site};

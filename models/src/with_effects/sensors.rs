@@ -1,6 +1,6 @@
 //! Sensor effects with a delay: applied after the simulation, as no other quantity depends on them.
 
-use mops_core::{Earlier, PlantScalar};
+use mops_core::{plant::PlantScalar, trace::Earlier};
 
 use super::Site;
 use super::plant::Affected;

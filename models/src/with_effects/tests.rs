@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
-use mops_core::math;
 use mops_core::{
-    Case, Failure, Hold, Input, Instant, Interface, Job, Model, ModelOptions, OperatingPoint, Parameter, Placement,
-    Plant, Port, Scalar, Variable,
+    Case, Failure, Input, Instant, Interface, Job, Model, ModelOptions, Parameter, Plant, Variable,
+    case::Hold,
+    effect::{Placement, Port},
+    model::OperatingPoint,
 };
+use mops_language::Scalar;
+use mops_math as math;
 
 use mops_effects::effects;
 
@@ -309,7 +312,7 @@ fn pushed(
     model: &dyn Model,
     given: &[(&str, f64)],
     signals: &[&str],
-) -> (Vec<mops_core::Trace>, Vec<mops_core::Event>) {
+) -> (Vec<mops_core::Trace>, Vec<mops_core::model::Event>) {
     let times: Vec<f64> = (0..60).map(|k| f64::from(k) * 0.1).collect();
     let push = |&t: &f64| {
         if t < 2.0 {

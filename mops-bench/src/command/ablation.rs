@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 
-use mops::Diagnostic;
-use mops::discrepancy::Settings;
-use mops::terminal::{CommandError, Progress, print, table};
+use mops::{
+    Diagnostic,
+    discrepancy::Settings,
+    terminal::{CommandError, Progress, print, table},
+};
 
 use super::write;
 use crate::parallel::each;

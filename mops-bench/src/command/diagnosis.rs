@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use mops::core::suggestion;
-use mops::discrepancy::{Settings, use_settings};
-use mops::{Catalogue, Diagnostic};
+use mops::{
+    Catalogue, Diagnostic,
+    discrepancy::{Settings, use_settings},
+    language::suggestion,
+};
 use mops_testbed::Setting;
 
 use mops::terminal::{CommandError, Progress, print};

@@ -4,11 +4,15 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use mops::core::diagnosis::Dependence;
-use mops::discrepancy::estimation::{ErrorModel, Errors};
-use mops::discrepancy::selection::{Conclusion, Entry, Selection, SetFit, SetOfEffects, compare, select};
-use mops::terminal::{CommandError, print};
-use mops::{Catalogue, Diagnostic, Study};
+use mops::{
+    Catalogue, Diagnostic,
+    discrepancy::{
+        estimation::{ErrorModel, Errors},
+        selection::{Conclusion, Entry, Selection, SetFit, SetOfEffects, compare, select},
+    },
+    outcome::diagnosis::Dependence,
+    terminal::{CommandError, print},
+};
 
 /// Free curves that are printed for each fit.
 const CURVES: usize = 3;
@@ -26,7 +30,7 @@ pub(super) struct Arguments {
 
 /// Runs the command.
 pub(super) fn evidence(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    let study = Study::from_file(catalogue, &arguments.study)?;
+    let study = mops::read_study(catalogue, &arguments.study)?;
     let names = |set: &String| set.split('+').map(|name| name.trim().to_owned()).collect();
     let sets: Vec<Vec<String>> = arguments.sets.iter().map(names).collect();
     let compared =

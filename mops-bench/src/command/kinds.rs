@@ -1,10 +1,9 @@
 //! Table of the diagnosis by kind of case, over cases with and without a model error in the background. Rates are counts with
 //! their 95 % intervals in %.
 
+use mops::{core::Role, discrepancy::Verdict, terminal::table};
+
 use crate::diagnosis::{Answer, Kind, Rate, Row, Statement, brier};
-use mops::core::Role;
-use mops::discrepancy::Verdict;
-use mops::terminal::table;
 
 /// Stated probability from which a statement counts as certain. Printed probabilities are at most 0.95.
 const CERTAIN: f64 = 0.9;

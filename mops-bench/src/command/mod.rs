@@ -12,8 +12,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use mops::Catalogue;
-use mops::terminal::{CommandError, print};
+use mops::{
+    Catalogue,
+    terminal::{CommandError, print},
+};
 
 /// Benchmarks of mops: solvers on problems with known solutions, the diagnosis on simulated experiments.
 #[derive(Parser)]

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
-use mops::core::{SolverChoice, suggestion};
-use mops::{Catalogue, Diagnostic};
+use mops::{Catalogue, Diagnostic, core::catalogue::SolverChoice, language::suggestion};
 use mops_problems::{Answer, Slope};
 
 use mops::terminal::{CommandError, Progress, number, print, table};

@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
-use super::kinds::kinds;
-use crate::diagnosis::{Bin, Kind, Rate, Results, Row, brier, deciles, reliability, uniformity};
 use mops::terminal::table;
 use mops_testbed::Setting;
+
+use super::kinds::kinds;
+use crate::diagnosis::{Bin, Kind, Rate, Results, Row, brier, deciles, reliability, uniformity};
 
 /// Formats all tables.
 pub(super) fn all(results: &Results) -> String {

@@ -6,8 +6,7 @@ mod matching;
 
 use std::path::{Path, PathBuf};
 
-use mops::Unit;
-use mops::core::file::Files;
+use mops::{Unit, language::files::Files};
 
 use super::guarded;
 use super::tool::{Answer, Tools};

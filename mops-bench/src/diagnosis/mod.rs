@@ -11,8 +11,7 @@ mod statistics;
 mod table;
 mod tool;
 
-use mops::Catalogue;
-use mops::core::stream;
+use mops::{Catalogue, math::stream};
 use mops_testbed::Trial;
 use rand::seq::SliceRandom;
 

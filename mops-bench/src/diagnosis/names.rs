@@ -1,7 +1,6 @@
 //! Translation of names of the test bed to names of the catalogue.
 
-use mops::core::math;
-use mops::effects::effects;
+use mops::{effects::effects, math};
 use mops_testbed::TrueEffect;
 
 /// Returns the effects of the catalogue that correspond to an effect of the test bed.

@@ -1,7 +1,8 @@
 //! Page of the diagnosis benchmark: tables, and reliability plots of the stated probabilities.
 
-use super::statistics::{Bin, reliability};
 use mops::report::{Color, Curve, CurveStyle, Plot};
+
+use super::statistics::{Bin, reliability};
 
 /// Returns the page from the tables as text, and from pairs of stated probability and outcome by subject.
 pub(crate) fn page(tables: &str, stated: &[(&str, Vec<(f64, bool)>)]) -> String {

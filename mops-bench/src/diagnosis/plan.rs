@@ -1,6 +1,6 @@
 //! Plan of the simulated cases.
 
-use mops::core::math;
+use mops::math;
 use mops_testbed::{
     Draw, Effect, Missing, NOMINAL, Plant, Setting, Trial, disturbed, effects, generate, outside, plants,
 };

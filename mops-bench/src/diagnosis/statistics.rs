@@ -1,6 +1,6 @@
 //! Rates with confidence intervals, and the reliability of stated probabilities.
 
-use mops::core::math;
+use mops::math;
 
 /// Observed rate of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,8 +1,9 @@
 //! CSV tables of the cases, and of the estimated effect parameters with their true values.
 
+use mops::core::Role;
+
 use super::judge::Row;
 use super::tool::{Answer, Dependence, RecordError, spelt};
-use mops::core::Role;
 
 const HEADER: &[&str] = &[
     "case",

@@ -2,10 +2,14 @@
 
 use std::time::Instant;
 
-use mops::core::file::{self, Files};
-use mops::core::{Quiet, Role, math};
-use mops::discrepancy::{Diagnosis, ExperimentError, Found, Verdict, brute_force};
-use mops::{Catalogue, Options, Study, Watch, solve};
+use mops::{
+    Catalogue, Options, Study, Watch,
+    core::{Role, run::Quiet},
+    discrepancy::{Diagnosis, ExperimentError, Found, Verdict, brute_force},
+    file,
+    language::files::Files,
+    math, solve,
+};
 
 /// Common inputs of the tools.
 #[derive(Clone, Copy)]

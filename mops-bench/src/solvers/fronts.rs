@@ -1,7 +1,8 @@
 //! Pareto fronts over seeds: mean and standard deviation of hypervolume and distance for every problem.
 
+use mops::math;
+
 use super::results::{Results, Row};
-use mops::core::math;
 
 /// Results of a solver on a problem over all seeds.
 pub(crate) struct Spread {

@@ -12,8 +12,10 @@ mod timed;
 
 use std::time::Instant;
 
-use mops::core::{Evaluator, Merit, Shape, SolverChoice, Stop};
-use mops::{Catalogue, Watch};
+use mops::{
+    Catalogue, Watch,
+    core::{Merit, Shape, Stop, catalogue::SolverChoice, problem::Evaluator},
+};
 use mops_problems::{Posed, Slope, Truth, measure};
 
 use crate::parallel::each;

@@ -1,8 +1,9 @@
 //! Page of a solver benchmark: plots of profiles or hypervolumes, and the tables of the terminal.
 
+use mops::report::{Color, Curve, CurveStyle, ParallelAxis, Plot};
+
 use super::results::{Results, Row};
 use super::{ROUGH, Score, data_profile, performance_profile};
-use mops::report::{Color, Curve, CurveStyle, ParallelAxis, Plot};
 
 /// Number of different colours.
 const COLORS: usize = 6;

@@ -5,8 +5,10 @@
 //!
 //! Source: J. J. More, S. M. Wild, SIAM Journal on Optimization 20 (2009) 172-191, section 2.
 
-use mops::core::{FEASIBLE, Merit, SolverChoice};
-use mops::{Catalogue, SolverKind};
+use mops::{
+    Catalogue, SolverKind,
+    core::{Merit, catalogue::SolverChoice, evaluation::FEASIBLE},
+};
 
 use super::{Done, ROUGH};
 

@@ -157,7 +157,10 @@ impl Results {
             runs: rows.len(),
             judged: rows.iter().filter(|row| row.known.is_some()).count(),
             solved: rows.iter().filter(|row| row.solved).count(),
-            false_claims: rows.iter().filter(|row| row.converged && row.violation > mops::core::FEASIBLE).count(),
+            false_claims: rows
+                .iter()
+                .filter(|row| row.converged && row.violation > mops::core::evaluation::FEASIBLE)
+                .count(),
             median_rough: median(rows.iter().filter_map(|row| row.to_rough)),
             median_fine: median(rows.iter().filter_map(|row| row.to_fine)),
             seconds: rows.iter().map(|row| row.seconds).sum(),

@@ -1,9 +1,12 @@
 //! Suites of problems, which are formulas or studies.
 
-use super::control::Known;
-use mops::Catalogue;
-use mops::core::{Evaluator, Problem as Posing, Shape};
+use mops::{
+    Catalogue,
+    core::{Problem as Posing, Shape, problem::Evaluator},
+};
 use mops_problems::{Answer, Posed, Problem, Slope};
+
+use super::control::Known;
 
 /// Suite of problems.
 #[derive(Clone, Copy)]
@@ -128,7 +131,7 @@ impl Subject {
 /// # Panics
 /// If the study has a mistake.
 pub(super) fn posing(catalogue: &Catalogue, known: &Known, seed: u64) -> Posing {
-    let file = known.study.open(catalogue, &[]);
+    let file = mops::file::read_shipped(catalogue, &known.study, &[]);
     let mut study = file.unwrap_or_else(|why| panic!("{}: {why}", known.study.name)).study;
     study.set_seed(seed);
     Posing::new(std::sync::Arc::new(study))

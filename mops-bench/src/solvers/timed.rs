@@ -3,7 +3,10 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use mops::core::{Evaluation, Evaluator, Shape, Slopes};
+use mops::core::{
+    Evaluation, Shape,
+    problem::{Evaluator, Slopes},
+};
 
 /// Evaluator that measures the time spent in it; the rest of a run is the overhead of solver and engine.
 pub(super) struct Timed<'a, E> {

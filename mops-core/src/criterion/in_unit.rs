@@ -1,11 +1,12 @@
 //! Criterion in another unit.
 
+use mops_language::Unit;
+
 use super::{Criterion, Demand, Mark, Missed, Sense, Tangent, Value};
 use crate::case::Case;
+use crate::criterion::Samples;
 use crate::model::Analysis;
-use crate::samples::Samples;
-use crate::study_error::StudyError;
-use crate::unit::Unit;
+use crate::study::StudyError;
 
 /// Criterion whose values are in another unit than that of its kind.
 pub(crate) struct InUnit {

@@ -2,18 +2,22 @@
 
 mod demand;
 mod in_unit;
+mod loss;
+mod samples;
 mod window;
+
+pub use loss::Loss;
+pub use samples::Samples;
 
 use std::sync::Arc;
 
+use mops_language::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::case::Case;
 use crate::model::{Analysis, AnalysisKind, Interface};
-use crate::samples::Samples;
-use crate::study_error::StudyError;
-use crate::unit::Unit;
+use crate::study::StudyError;
 
 pub use demand::{Demand, Scaled};
 pub(crate) use in_unit::InUnit;
@@ -207,7 +211,7 @@ pub struct Tangent<'a> {
 }
 
 /// Smallest share by which the number of a missed criterion exceeds 1. The share is larger than the constraint tolerance
-/// [`crate::FEASIBLE`], so that a missed criterion never meets its demand.
+/// [`crate::evaluation::FEASIBLE`], so that a missed criterion never meets its demand.
 const LEAST_MISS: f64 = 1e-5;
 
 /// The value of a criterion.

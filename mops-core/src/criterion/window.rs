@@ -1,12 +1,12 @@
 //! Criterion of a part of a simulation.
 
+use mops_language::Unit;
+
 use super::{Criterion, Demand, Mark, Sense, Tangent, Value};
-use crate::case::Case;
-use crate::experiment::{Channel, Experiment};
+use crate::case::{Case, Channel, Experiment};
+use crate::criterion::Samples;
 use crate::model::{Analysis, Response};
-use crate::samples::Samples;
-use crate::study_error::StudyError;
-use crate::unit::Unit;
+use crate::study::StudyError;
 
 /// Criterion that reads a simulation from one time to another, as if it began at the first: all times count from there.
 pub(crate) struct Window {

@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn the_volume_is_that_of_the_union_of_boxes() {
-        let mut random = crate::stream(1, "hypervolume");
+        let mut random = mops_math::stream(1, "hypervolume");
         for m in 1..=5 {
             for count in [1, 2, 5, 9] {
                 for coarse in [4.0, 1e9] {

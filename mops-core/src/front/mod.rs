@@ -3,7 +3,7 @@
 //! Objectives are minimised and stored in one array, `m` per point. A point dominates another if it is worse in no
 //! objective and better in at least one.
 
-use crate::math;
+use mops_math as math;
 
 mod divide;
 mod hypervolume;
@@ -97,7 +97,7 @@ pub fn inverted_generational_distance(objectives: &[f64], m: usize, reference: &
 }
 
 /// Compares lexicographically: by the first objective, then the second, and so on.
-pub(crate) fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {
+pub fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {
     // Zeros of either sign are equal, consistent with the operator `<`.
     let order = |(a, b): (&f64, &f64)| a.partial_cmp(b).unwrap_or_else(|| a.total_cmp(b));
     a.iter().zip(b).map(order).find(|order| order.is_ne()).unwrap_or(std::cmp::Ordering::Equal)

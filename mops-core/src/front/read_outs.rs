@@ -33,7 +33,7 @@ pub fn knee(objectives: &[f64], m: usize) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math;
+    use mops_math as math;
 
     #[test]
     fn the_knee_of_a_hyperbola_is_its_corner() {

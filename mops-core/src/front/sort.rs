@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn ranks_are_those_of_the_definition() {
-        let mut random = crate::stream(1, "fronts");
+        let mut random = mops_math::stream(1, "fronts");
         let mut sorter = FrontSorter::default();
         for m in 1..=5 {
             for count in [0, 1, 2, 40, 200] {

@@ -23,12 +23,16 @@
 
 mod parts;
 mod ported;
+mod tolerance;
+
+pub use tolerance::{IntegrationMethod, Tolerance};
 
 pub use parts::{Bounds, Breaks, EventInstant, Events, InputRates, Jacobian, Memory, Past, Span, Stretch};
 pub use ported::{PlantScalar, Ported};
 
+use mops_language::Scalar;
+
 use crate::failure::Failure;
-use crate::scalar::Scalar;
 
 /// Time, states, inputs and forces at which a plant is evaluated.
 #[derive(Debug, Clone, Copy)]
@@ -39,7 +43,7 @@ pub struct Instant<'a, S> {
     pub x: &'a [S],
     /// The inputs as they reach the plant, in the order of [`crate::Interface::inputs`].
     pub u: &'a [S],
-    /// Additive terms of the right-hand sides, one for every [`crate::Port::Process`] in the order of
+    /// Additive terms of the right-hand sides, one for every [`crate::effect::Port::Process`] in the order of
     /// [`crate::Interface::ports`]; 0 in the nominal model.
     pub w: &'a [S],
 }

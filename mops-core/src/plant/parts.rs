@@ -1,9 +1,9 @@
 //! Parts of a plant that only some plants have.
 
+use mops_language::{Scalar, enclosure::Enclosure};
+use mops_linear::Clock;
+
 use super::Instant;
-use crate::enclosure::Enclosure;
-use crate::linear::Clock;
-use crate::scalar::Scalar;
 
 /// Rates of the inputs by their index, per s.
 pub type InputRates<'a> = &'a dyn Fn(usize) -> f64;

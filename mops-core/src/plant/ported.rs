@@ -1,10 +1,11 @@
 //! Models whose plant is open at its ports, so that effects can be added.
 
+use mops_language::{Dual7, Scalar};
+
 use super::Plant;
 use crate::effect::{BoundEffect, Effect};
 use crate::failure::Failure;
-use crate::scalar::{Dual7, Scalar};
-use crate::tolerance::Tolerance;
+use crate::plant::Tolerance;
 
 /// A model whose plant can be had, with its ports.
 pub trait Ported: Send + Sync {

@@ -1,9 +1,9 @@
 //! Settings of `task = "diagnosis"`, and their check.
 
 use super::{Study, Task};
-use crate::experiment::Role;
+use crate::case::Role;
 use crate::model::AnalysisKind;
-use crate::study_error::StudyError;
+use crate::study::StudyError;
 
 /// Maximum number of effects that a diagnosis adds.
 const MOST_EFFECTS: usize = 6;

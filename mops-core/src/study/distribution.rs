@@ -1,8 +1,8 @@
 //! Uncertain parameters: range and distribution.
 
-use crate::math;
-use crate::statistics::{normal_cdf, normal_quantile};
-use crate::unit::Unit;
+use mops_language::Unit;
+use mops_math as math;
+use mops_statistics::{normal_cdf, normal_quantile};
 
 /// An uncertain parameter of models, or an uncertain tuner.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,14 +1,13 @@
 //! Drafts: studies as written in a file or in Rust, not yet checked.
 
+use mops_language::{Quantity, Unit};
+
 use super::{Study, Task, TasksBuilder};
+use crate::case::{Input, ResponseData, Role};
 use crate::criterion::{CriterionSpec, Usage};
 use crate::evaluation::Objective;
-use crate::experiment::{ResponseData, Role};
-use crate::input::Input;
 use crate::model::Model;
-use crate::study_error::StudyError;
-use crate::tuner::Scale;
-use crate::unit::{Quantity, Unit};
+use crate::study::{Scale, StudyError};
 
 /// A study as written, not yet checked. [`StudyBuilder::build`] checks it.
 #[derive(Default)]

@@ -4,10 +4,18 @@ mod build;
 mod diagnosis;
 mod distribution;
 mod draft;
+mod error;
+mod moved;
 mod robustness;
 mod scenarios;
 mod tasks;
+mod tuner;
 mod uncertain;
+mod wildcard;
+
+pub use error::StudyError;
+pub use tuner::{Grid, Scale, Tuner};
+pub use wildcard::matches_pattern;
 
 use std::sync::Arc;
 
@@ -27,17 +35,14 @@ pub use tasks::{
 };
 pub use uncertain::{DistributionBuilder, UncertainBuilder};
 
+use mops_language::{Scalar, Unit};
+
 use crate::cancellation::Cancellation;
 use crate::case::Case;
-use crate::criterion::{Criterion, Usage, Value};
-use crate::criterion::{Demand, Scaled};
+use crate::criterion::{Criterion, Demand, Scaled, Usage, Value};
 use crate::evaluation::{FEASIBLE, Objective, Reading};
-use crate::failure::Failure;
+use crate::failure::{Failure, caught};
 use crate::model::{Analysis, Job, Model};
-use crate::panics::caught;
-use crate::scalar::Scalar;
-use crate::tuner::Tuner;
-use crate::unit::Unit;
 
 /// Task of a study.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -160,6 +165,11 @@ impl Study {
         &self.notes
     }
 
+    /// Adds notes for the user.
+    pub fn add_notes(&mut self, notes: impl IntoIterator<Item = String>) {
+        self.notes.extend(notes);
+    }
+
     /// Sets the seed of all random streams.
     pub fn set_seed(&mut self, seed: u64) {
         self.seed = seed;
@@ -275,7 +285,10 @@ pub struct Row {
 
 impl Row {
     /// Computes the value for one case; a panic of the criterion is an error.
-    pub(crate) fn value(&self, case: &Case, analysis: &Analysis, parameters: &[f64]) -> Result<Value, String> {
+    ///
+    /// # Errors
+    /// If the criterion is undefined for the analysis.
+    pub fn value(&self, case: &Case, analysis: &Analysis, parameters: &[f64]) -> Result<Value, String> {
         caught(|| self.criterion.value_with(case, analysis, parameters)).unwrap_or_else(Err)
     }
 

@@ -1,14 +1,14 @@
 //! Settings of the tasks over uncertain parameters and of the uncertainty of a calibration, and their checks.
 
+use mops_language::suggestion;
+use mops_statistics::Sampling;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::tasks::Place;
 use super::{Study, Task, Tasks};
-use crate::diagnostic::suggestion;
 use crate::evaluation::Objective;
-use crate::statistics::Sampling;
-use crate::study_error::StudyError;
+use crate::study::StudyError;
 
 /// Maximum number of samples.
 const MOST_SAMPLES: usize = 10_000_000;

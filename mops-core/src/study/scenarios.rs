@@ -4,7 +4,7 @@ use super::distribution::Uncertain;
 use super::{JobPlan, ParameterSource, Study};
 use crate::criterion::Usage;
 use crate::evaluation::Objective;
-use crate::tuner::{Grid, Scale, Tuner};
+use crate::study::{Grid, Scale, Tuner};
 
 impl Study {
     /// Returns the study over its uncertain parameters at a design. The uncertain parameters become the active tuners, in

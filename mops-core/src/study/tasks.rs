@@ -1,17 +1,16 @@
 //! Settings of the tasks other than design and calibration, and their checks.
 
+use mops_language::{Quantity, suggestion};
+
 use super::diagnosis::{self, DiagnosisTask};
 use super::distribution::Uncertain;
 use super::robustness::{self, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
 use super::uncertain::{self, UncertainBuilder};
 use super::{Row, Study, Task};
+use crate::case::Role;
 use crate::criterion::Usage;
-use crate::diagnostic::suggestion;
 use crate::evaluation::Objective;
-use crate::experiment::Role;
-use crate::study_error::StudyError;
-use crate::tuner::Grid;
-use crate::unit::Quantity;
+use crate::study::{Grid, StudyError};
 
 /// Point at which a task is performed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]

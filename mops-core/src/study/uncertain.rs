@@ -1,11 +1,11 @@
 //! Uncertain parameters as written in a study, and their checks.
 
+use mops_language::{Quantity, suggestion};
+use mops_math as math;
+
 use super::distribution::{Distribution, Uncertain};
 use super::{Study, ratio_of_temperatures};
-use crate::diagnostic::suggestion;
-use crate::math;
-use crate::study_error::StudyError;
-use crate::unit::Quantity;
+use crate::study::StudyError;
 
 /// An uncertain parameter, not yet checked.
 #[derive(Debug, Clone, Default)]

@@ -1,7 +1,7 @@
 //! BIPOP restarts: runs with ever larger populations alternate with runs with small populations and random step sizes.
 
-use mops_core::Stream;
-use mops_core::math;
+use mops_math as math;
+use mops_math::Stream;
 use rand::Rng;
 
 /// Settings of a run.

@@ -150,7 +150,7 @@ impl Bracket {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mops_core::math;
+    use mops_math as math;
 
     #[test]
     fn a_grid_is_searched_at_its_values() {

@@ -1,7 +1,7 @@
 //! Normal distribution of CMA-ES and its update from a ranked generation.
 
-use mops_core::Stream;
-use mops_core::math;
+use mops_math as math;
+use mops_math::Stream;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::strategy::Strategy;

@@ -6,7 +6,8 @@ mod distribution;
 mod strategy;
 mod termination;
 
-use mops_core::{Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
+use mops_core::{Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver, SolverOptions};
+use mops_math::Stream;
 use nalgebra::DMatrix;
 use rand::Rng;
 use schemars::JsonSchema;

@@ -1,6 +1,6 @@
 //! Weights and learning rates of CMA-ES.
 
-use mops_core::math;
+use mops_math as math;
 
 /// Constants that follow from the dimension `n` and the population size.
 ///

@@ -2,8 +2,9 @@
 
 use std::collections::VecDeque;
 
+use mops_math as math;
+
 use super::distribution::Distribution;
-use mops_core::math;
 
 /// Objective values of the generations of a run.
 #[derive(Debug, Clone)]

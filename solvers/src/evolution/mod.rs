@@ -6,7 +6,8 @@ mod mating;
 
 use std::cmp::Ordering;
 
-use mops_core::{Evaluation, FEASIBLE, Halt, Objective, Oracle, Progress, Shape, Solver, Stream};
+use mops_core::{Evaluation, Halt, Objective, Oracle, Progress, Shape, Solver, evaluation::FEASIBLE};
+use mops_math::Stream;
 
 use crate::start::latin_hypercube;
 use crate::variation::Variation;

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 use std::sync::Mutex;
 
 use argmin::core::{CostFunction, Error, Gradient};
-use mops_core::math;
 use mops_core::{Halt, Oracle};
+use mops_math as math;
 
 use crate::linearised_criteria::{LinearModel, LinearisedCriteria};
 

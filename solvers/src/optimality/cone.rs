@@ -1,6 +1,10 @@
 //! Directions along which no objective increases.
 
-use mops_core::{FEASIBLE, Linearisation, Objective, SMALL_OBJECTIVE, Shape};
+use mops_core::{
+    Objective, Shape,
+    evaluation::FEASIBLE,
+    solver::{Linearisation, SMALL_OBJECTIVE},
+};
 
 use super::{CURVATURE, IMPROVEMENT, MAX_CUT_VALUE, Model, NEGLIGIBLE, Step, TRIAL_STEP, steepest_step};
 use crate::active_set::dot;
@@ -272,7 +276,7 @@ mod tests {
     /// Directions of `count` objectives, evenly in the sector of angles from `from` to `to`.
     fn fan(count: usize, [from, to]: [f64; 2]) -> Vec<[f64; 2]> {
         let angle = |k: usize| from + (to - from) * k as f64 / (count - 1) as f64;
-        (0..count).map(|k| [mops_core::math::cos(angle(k)), mops_core::math::sin(angle(k))]).collect()
+        (0..count).map(|k| [mops_math::cos(angle(k)), mops_math::sin(angle(k))]).collect()
     }
 
     #[test]

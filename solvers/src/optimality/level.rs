@@ -1,6 +1,9 @@
 //! Level of the objective around a point.
 
-use mops_core::{Linearisation, SMALL_OBJECTIVE, Shape};
+use mops_core::{
+    Shape,
+    solver::{Linearisation, SMALL_OBJECTIVE},
+};
 
 use super::{CURVATURE, MAX_CUT_VALUE, Model, NEGLIGIBLE, Step, TRIAL_STEP, steepest_step};
 use crate::active_set::dot;

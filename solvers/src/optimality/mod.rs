@@ -3,7 +3,10 @@
 mod cone;
 mod level;
 
-use mops_core::{Evaluation, Linearisation, Optimality, Oracle, Pareto, Shape, Usage};
+use mops_core::{
+    Evaluation, Oracle, Shape, Usage,
+    solver::{Linearisation, Optimality, Pareto},
+};
 use nalgebra::DMatrix;
 
 use crate::epigraph::{Direction, Subproblem};
@@ -19,8 +22,8 @@ const CURVATURE: f64 = 1e-6;
 const IMPROVEMENT: f64 = 1e-3;
 
 /// Decrease within a trial step that is regarded as zero, of the objective or, in the test of Pareto optimality, of every criterion,
-/// relative to its value plus [`mops_core::SMALL_OBJECTIVE`]: the sentences on both tests state it.
-const NEGLIGIBLE: f64 = mops_core::NEGLIGIBLE_DECREASE;
+/// relative to its value plus [`mops_core::solver::SMALL_OBJECTIVE`]: the sentences on both tests state it.
+const NEGLIGIBLE: f64 = mops_core::solver::NEGLIGIBLE_DECREASE;
 
 /// Length of a trial step, in the unit box.
 const TRIAL_STEP: f64 = 1e-3;

@@ -1,6 +1,6 @@
 //! Progressive barrier: acceptance of points under constraints.
 
-use mops_core::{FEASIBLE, Merit};
+use mops_core::{Merit, evaluation::FEASIBLE};
 
 /// Violation up to which a constraint counts as satisfied. Far below the tolerance granted to the user, so that a point
 /// that exploits that tolerance is not the best feasible one.

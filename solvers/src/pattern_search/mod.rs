@@ -7,8 +7,9 @@ mod quadratic_models;
 mod sample_set;
 mod trust_region_subproblem;
 
-use mops_core::math;
-use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions, Stream};
+use mops_core::{Evaluation, Halt, Oracle, Progress, Shape, Solver, SolverOptions};
+use mops_math as math;
+use mops_math::Stream;
 use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut};
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -1,6 +1,6 @@
 //! Pattern of poll points around the best point.
 
-use mops_core::Stream;
+use mops_math::Stream;
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 

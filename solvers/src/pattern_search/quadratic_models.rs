@@ -1,11 +1,11 @@
 //! Quadratic models of the criteria through the points around the best one.
 
+use mops_math as math;
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
 
 use super::sample_set::SampleSet;
 use crate::active_set::dot;
 use crate::cholesky::with_cholesky;
-use mops_core::math;
 
 /// Cost of squared misfit, relative to squared curvature over the trust region.
 const RIDGE: f64 = 1e-4;

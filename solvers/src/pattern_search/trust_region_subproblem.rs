@@ -1,7 +1,7 @@
 //! Trust-region subproblem: minimisation of the penalised objective of the models.
 
-use mops_core::math;
 use mops_core::{Shape, Usage};
+use mops_math as math;
 use nalgebra::DMatrix;
 
 use super::barrier::{PredictedReduction, violation};

@@ -1,6 +1,6 @@
 //! State of the iteration: linearised criteria, Hessian, trust region and penalty.
 
-use mops_core::{Evaluation, Halt, Linearisation, Oracle, Shape};
+use mops_core::{Evaluation, Halt, Oracle, Shape, solver::Linearisation};
 
 use super::bundle::Bundle;
 use super::hessian::Hessian;

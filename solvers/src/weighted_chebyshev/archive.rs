@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use mops_core::{Evaluation, FEASIBLE, Shape};
+use mops_core::{Evaluation, Shape, evaluation::FEASIBLE};
 
 use super::scalarisation::Scalarisation;
 

@@ -6,8 +6,7 @@ mod reference_directions;
 mod scalarisation;
 mod subproblem;
 
-use mops_core::front::SAME;
-use mops_core::{Evaluation, Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions};
+use mops_core::{Evaluation, Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions, front::SAME};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

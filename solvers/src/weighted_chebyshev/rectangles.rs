@@ -1,7 +1,7 @@
 //! Search for two objectives: rectangles between neighbouring points of the front, the largest first.
 
-use mops_core::math;
-use mops_core::{FEASIBLE, Halt, Oracle};
+use mops_core::{Halt, Oracle, evaluation::FEASIBLE};
+use mops_math as math;
 
 use super::archive::Candidate;
 use super::insert;

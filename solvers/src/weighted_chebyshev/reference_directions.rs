@@ -1,9 +1,8 @@
 //! Search for three and more objectives: evenly spread reference directions from the ideal point, then those in the gaps of
 //! the front.
 
-use mops_core::front::SAME;
-use mops_core::math;
-use mops_core::{Halt, Oracle};
+use mops_core::{Halt, Oracle, front::SAME};
+use mops_math as math;
 
 use super::archive::Candidate;
 use super::insert;

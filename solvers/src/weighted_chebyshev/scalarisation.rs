@@ -1,6 +1,7 @@
 //! Scalarisation of the criteria in a subproblem, and the oracle through which a local solver evaluates it.
 
-use mops_core::{Evaluation, Halt, Linearisation, Merit, Objective, Oracle, Shape, Stream, Usage};
+use mops_core::{Evaluation, Halt, Merit, Objective, Oracle, Shape, Usage, solver::Linearisation};
+use mops_math::Stream;
 
 use super::archive::Archive;
 

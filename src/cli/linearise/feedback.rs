@@ -1,8 +1,8 @@
 //! Design of state feedback for `mops linearise`.
 
-use mops_core::linear::{Complex, Placement, eigenvalues, lqr, place};
-use mops_core::math::complex;
-use mops_core::{Diagnostic, StateSpace};
+use mops_language::Diagnostic;
+use mops_linear::{Complex, Placement, StateSpace, eigenvalues, lqr, place};
+use mops_math::complex;
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
 

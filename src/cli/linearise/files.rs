@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mops_core::StateSpace;
+use mops_linear::StateSpace;
 use serde_json::Value;
 
 use crate::cli::linear_plots;

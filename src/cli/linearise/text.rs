@@ -1,8 +1,10 @@
 //! Text of a linear system: operating point, matrices, poles, zeros and transfer functions.
 
-use mops_core::linear::{Complex, NEXT, TransferFunction, undecided};
-use mops_core::math::{self, complex};
-use mops_core::{Resting, StateSpace, Unit, Variable};
+use mops_core::{Variable, model::Resting};
+use mops_language::Unit;
+use mops_linear::{Complex, NEXT, StateSpace, TransferFunction, undecided};
+use mops_math as math;
+use mops_math::complex;
 use nalgebra::DMatrix;
 
 use super::WHERE;

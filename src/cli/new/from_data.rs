@@ -3,9 +3,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use mops_core::data::{DataFile, read_regular, unit_since_1970};
-use mops_core::math;
-use mops_core::{Diagnostic, Hold, Input, Unit, suggestion};
+use mops_core::{Input, case::Hold};
+use mops_data::{DataFile, unit_since_1970};
+use mops_language::{Diagnostic, Unit, files::read_regular, suggestion};
+use mops_math as math;
 
 use super::super::data;
 use crate::numbers::significant;

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use mops_core::{Catalogue, CatalogueStudy, Diagnostic, suggestion};
+use mops_core::{Catalogue, catalogue::CatalogueStudy};
+use mops_language::{Diagnostic, suggestion};
 
 use super::schema;
 use crate::files::Outputs;

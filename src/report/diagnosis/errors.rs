@@ -1,7 +1,7 @@
 //! Table of errors before and after, with bars in units of the noise level.
 
 use maud::{Markup, html};
-use mops_core::diagnosis::Diagnosis;
+use mops_outcome::diagnosis::Diagnosis;
 
 use super::super::page::scrolling;
 use crate::diagnosis::errors::lines;

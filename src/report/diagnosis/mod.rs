@@ -9,7 +9,7 @@ mod spectrum;
 mod tests;
 
 use maud::{Markup, html};
-use mops_core::diagnosis::{Diagnosis, Found, Verdict};
+use mops_outcome::diagnosis::{Diagnosis, Found, Verdict};
 
 use super::figures::Group;
 use super::page::{figures, rich, section};

@@ -1,7 +1,7 @@
 //! Evidence by place, and the unknown input at a place that would explain the residuals.
 
 use maud::{Markup, html};
-use mops_core::diagnosis::{Curve as Points, Diagnosis, Evidence};
+use mops_outcome::diagnosis::{Curve as Points, Diagnosis, Evidence};
 
 use super::super::figures::{Figure, Group};
 use super::super::page::{rich, scrolling};

@@ -1,7 +1,7 @@
 //! Tables of candidate effects, steps of the search, parameter shifts and detection limits.
 
 use maud::{Markup, html};
-use mops_core::diagnosis::{Diagnosis, Ranked};
+use mops_outcome::diagnosis::{Diagnosis, Ranked};
 
 use super::super::page::scrolling;
 use super::places::{bar, located};

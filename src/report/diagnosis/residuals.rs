@@ -1,7 +1,7 @@
 //! Residuals of the nominal and the recalibrated model: time series, spectrum, autocorrelation.
 
 use mops_core::Role;
-use mops_core::diagnosis::{Diagnosis, Prediction};
+use mops_outcome::diagnosis::{Diagnosis, Prediction};
 
 use super::super::figures::{Figure, Group};
 use super::super::plot::{Band, Color, Curve, CurveStyle, Level, Plot};

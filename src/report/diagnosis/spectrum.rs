@@ -1,6 +1,6 @@
 //! Spectrum and autocorrelation of a residual.
 
-use mops_core::math;
+use mops_math as math;
 
 /// Largest number of lags; also limited to a quarter of the samples.
 const MOST_LAGS: usize = 100;

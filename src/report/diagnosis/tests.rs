@@ -1,7 +1,10 @@
 //! Tests of the whole report, with made-up diagnoses.
 
-use mops_core::diagnosis::Diagnosis;
-use mops_core::{CaseBuilder, ChannelBuilder, Measured, StudyBuilder, Task, TunerBuilder};
+use mops_core::{
+    StudyBuilder, Task,
+    study::{CaseBuilder, ChannelBuilder, Measured, TunerBuilder},
+};
+use mops_outcome::diagnosis::Diagnosis;
 
 use super::super::Report;
 use super::super::tests::Lag;

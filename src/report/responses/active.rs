@@ -52,7 +52,7 @@ fn part<'p>(curves: impl Iterator<Item = &'p [(f64, f64)]>, also: impl Iterator<
 
 #[cfg(test)]
 mod tests {
-    use mops_core::math;
+    use mops_math as math;
 
     use super::part;
 

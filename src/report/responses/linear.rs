@@ -1,9 +1,10 @@
 //! Plots of a linear model: Bode plots in all cases, with margins and the Nyquist curve of a loop transfer function, and the
 //! movement of the poles with each tuner.
 
-use mops_core::linear::{Complex, Crossing, Loop, zeros};
-use mops_core::math::{self, complex};
-use mops_core::{Analysis, Failure, ResponseData, StateSpace, Variable};
+use mops_core::{Analysis, Failure, Variable, case::ResponseData};
+use mops_linear::{Complex, Crossing, Loop, StateSpace, zeros};
+use mops_math as math;
+use mops_math::complex;
 
 use super::super::bode::{FrequencyCurve, bode, unwrapped};
 use super::super::figures::Figure;

@@ -1,13 +1,12 @@
 //! Plots of one simulation: an experiment, or a case with the responses of a Pareto front.
 
-use mops_core::{Row, Variable};
+use mops_core::{Variable, study::Row};
 
 use super::super::comparison::over_time;
 use super::super::figures::{Figure, Group};
-use super::super::front;
 use super::super::plot::{Color, Curve, Plot};
 use super::super::uncertainty::{self, Around};
-use super::super::{Report, criteria};
+use super::super::{Report, criteria, front};
 use super::{Simulated, active, inputs};
 use crate::numbers::with_unit;
 

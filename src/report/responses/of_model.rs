@@ -1,6 +1,7 @@
 //! Plots of a model: each signal in all cases.
 
-use mops_core::{AnalysisKind, Case, CriterionReport, Row, Variable};
+use mops_core::{AnalysisKind, Case, Variable, study::Row};
+use mops_outcome::CriterionReport;
 
 use super::super::comparison::{bounds, over_time, trace};
 use super::super::figures::{Figure, Group};

@@ -1,8 +1,8 @@
 //! Distributions of the criteria: shares that meet the demands, quantiles, histograms, samples over parameters.
 
 use maud::{Markup, html};
-use mops_core::math;
-use mops_core::{DistributionReport, MonteCarloReport, ShareReport};
+use mops_math as math;
+use mops_outcome::robustness::{DistributionReport, MonteCarloReport, ShareReport};
 
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;
@@ -131,7 +131,7 @@ fn figures(found: &MonteCarloReport, criterion: &DistributionReport, index: usiz
 #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn histogram(criterion: &DistributionReport, sorted: &[f64]) -> Plot {
     let [low, high] = [sorted[0], sorted[sorted.len() - 1]];
-    let quartile = |p: f64| mops_core::statistics::quantile(sorted, p);
+    let quartile = |p: f64| mops_statistics::quantile(sorted, p);
     let width = 2.0 * (quartile(0.75) - quartile(0.25)) / math::cbrt(sorted.len() as f64);
     let count = if width > 0.0 { (((high - low) / width).ceil() as usize).clamp(5, BINS) } else { BINS };
     let mut bins = vec![0usize; count];

@@ -1,7 +1,8 @@
 //! Global sensitivity to the uncertain parameters: Morris and Sobol.
 
 use maud::{Markup, html};
-use mops_core::{EffectReport, EffectsReport, Estimated, GlobalSensitivityReport, SensitivityMethod};
+use mops_core::study::SensitivityMethod;
+use mops_outcome::robustness::{EffectReport, EffectsReport, Estimated, GlobalSensitivityReport};
 
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;

@@ -6,7 +6,7 @@ mod rounds;
 mod worst;
 
 use maud::{Markup, html};
-use mops_core::{Outcome, UncertainReport};
+use mops_outcome::{Outcome, robustness::UncertainReport};
 
 use super::Report;
 use super::figures::Group;

@@ -1,7 +1,7 @@
 //! Robust design against worst cases: rounds, bounds, added cases.
 
 use maud::{Markup, html};
-use mops_core::RobustReport;
+use mops_outcome::robustness::RobustReport;
 
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;
@@ -78,7 +78,10 @@ fn rounds(found: &RobustReport) -> Markup {
 
 #[allow(clippy::cast_precision_loss)]
 fn bounds(found: &RobustReport) -> Figure {
-    let curve = |name: &str, color: Color, style: CurveStyle, of: &dyn Fn(&mops_core::RoundReport) -> f64| Curve {
+    let curve = |name: &str,
+                 color: Color,
+                 style: CurveStyle,
+                 of: &dyn Fn(&mops_outcome::robustness::RoundReport) -> f64| Curve {
         name: name.into(),
         points: found.rounds.iter().enumerate().map(|(i, round)| ((i + 1) as f64, of(round))).collect(),
         color,

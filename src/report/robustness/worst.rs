@@ -3,15 +3,15 @@
 use std::sync::Arc;
 
 use maud::{Markup, html};
-use mops_core::{CoordinateReport, Problem, UncertainReport, WorstCaseReport, WorstReport};
+use mops_core::Problem;
+use mops_outcome::robustness::{CoordinateReport, UncertainReport, WorstCaseReport, WorstReport};
 
-use super::super::Report;
 use super::super::comparison::bounds;
 use super::super::figures::{Figure, Group};
 use super::super::page::scrolling;
 use super::super::plot::{Color, Curve, CurveStyle, Level, Plot};
-use super::super::sampling;
 use super::super::sensitivity::sentences;
+use super::super::{Report, sampling};
 use super::{Section, parameters};
 use crate::numbers::{labelled, number, significant};
 
@@ -85,7 +85,7 @@ fn responses(report: &Report<'_>, found: &WorstCaseReport) -> Vec<Figure> {
     let mut figures = Vec::new();
     for worst in found.criteria.iter().filter(|worst| !worst.at.is_empty()) {
         let of = &worst.of;
-        let here = |row: &&mops_core::Row| row.name == of.criterion && study.case_of(row).name == of.case;
+        let here = |row: &&mops_core::study::Row| row.name == of.criterion && study.case_of(row).name == of.case;
         let Some(row) = study.rows().iter().find(here) else { continue };
         let mut tuners = study.start();
         let analyses = [
@@ -132,7 +132,7 @@ fn responses(report: &Report<'_>, found: &WorstCaseReport) -> Vec<Figure> {
 /// Returns plots of a criterion along every parameter through its worst case, which is marked.
 fn slices(worst: &WorstReport) -> Vec<Figure> {
     let of = &worst.of;
-    let one = |(slice, at): (&mops_core::Slice, &CoordinateReport)| {
+    let one = |(slice, at): (&mops_outcome::robustness::Slice, &CoordinateReport)| {
         let points = slice.x.iter().copied().zip(slice.y.iter().copied()).collect();
         let mark = Curve {
             name: "worst case".into(),

@@ -1,8 +1,7 @@
 //! Linearised prediction bands of a calibrated model.
 
-use mops_core::BandReport;
-use mops_core::identification::Spread;
-use mops_core::math;
+use mops_math as math;
+use mops_outcome::{BandReport, identification::Spread};
 
 use super::Calibrated;
 

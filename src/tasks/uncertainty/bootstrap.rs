@@ -1,8 +1,10 @@
 //! Moving-block bootstrap of a calibration: residuals are resampled in blocks, and all tuners are estimated again.
 
-use mops_core::math;
-use mops_core::statistics::{Summary, moving_blocks, quantile};
-use mops_core::{BootstrapParameter, BootstrapReport, Loss, Role, Stream, Study, UncertaintyTask, Watch, stream};
+use mops_core::{Role, Study, Watch, criterion::Loss, study::UncertaintyTask};
+use mops_math as math;
+use mops_math::{Stream, stream};
+use mops_outcome::{BootstrapParameter, BootstrapReport};
+use mops_statistics::{Summary, moving_blocks, quantile};
 
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 

@@ -4,8 +4,11 @@ mod bands;
 mod bootstrap;
 mod profile;
 
-use mops_core::identification::Covariance;
-use mops_core::{Budget, Evaluation, Oracle, Problem, Quiet, Run, Solver, Study, UncertaintyReport, Watch};
+use mops_core::{
+    Evaluation, Oracle, Problem, Run, Solver, Study, Watch,
+    run::{Budget, Quiet},
+};
+use mops_outcome::{UncertaintyReport, identification::Covariance};
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 
 use profile::Profiles;

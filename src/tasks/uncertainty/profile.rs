@@ -1,9 +1,9 @@
 //! Profile likelihood: one parameter is fixed, all others are estimated again.
 
-use mops_core::identification::Spread;
-use mops_core::statistics::t_quantile;
-use mops_core::{Chosen, Evaluation, ProfileReport, Solver, SolverOptions, Tuner, Watch};
+use mops_core::{Evaluation, Solver, SolverOptions, Tuner, Watch, study::Chosen};
+use mops_outcome::{ProfileReport, identification::Spread};
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
+use mops_statistics::t_quantile;
 
 use super::{Calibrated, fixed_at, refit};
 use crate::tasks::batches::{Stage, each};

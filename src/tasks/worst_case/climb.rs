@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use mops_core::{
-    Budget, Demand, Evaluation, Oracle, Problem, Quiet, Run, Solver, SolverOptions, Store, Study, Usage, Watch,
+    Demand, Evaluation, Oracle, Problem, Run, Solver, SolverOptions, Study, Usage, Watch,
+    run::{Budget, Quiet, Store},
 };
-use mops_solvers::cma_es::CmaEsOptions;
-use mops_solvers::pattern_search::PatternSearchOptions;
-use mops_solvers::sqp::SqpOptions;
+use mops_solvers::{cma_es::CmaEsOptions, pattern_search::PatternSearchOptions, sqp::SqpOptions};
 
 use crate::tasks::copies::Copies;
 

@@ -3,9 +3,8 @@
 mod climb;
 mod search;
 
-use mops_core::{
-    CoordinateReport, Problem, Row, Slice, Stop, Study, Usage, Watch, WorstCaseReport, WorstReport, uncertain_reports,
-};
+use mops_core::{Problem, Stop, Study, Usage, Watch, study::Row};
+use mops_outcome::robustness::{CoordinateReport, Slice, WorstCaseReport, WorstReport, uncertain_reports};
 
 pub(super) use search::{Effort, Region, Worst};
 

@@ -5,11 +5,14 @@
 
 use std::sync::Arc;
 
-use mops_core::statistics::{Sampling, draw};
 use mops_core::{
-    CoordinateReport, Demand, Evaluation, FEASIBLE, FailedAt, Problem, Reading, Role, Row, Study, Subject, Usage,
-    Watch, WorstReport, stream,
+    Demand, Evaluation, Problem, Role, Study, Usage, Watch,
+    evaluation::{FEASIBLE, Reading},
+    study::Row,
 };
+use mops_math::stream;
+use mops_outcome::robustness::{CoordinateReport, FailedAt, Subject, WorstReport};
+use mops_statistics::{Sampling, draw};
 
 use super::climb::{End, Goal, local, whole};
 use crate::search::Options;

@@ -1,7 +1,7 @@
 //! Short names for arithmetic in the formulas of test problems.
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 /// Returns a constant.
 pub(crate) fn c<S: Scalar>(value: f64) -> S {

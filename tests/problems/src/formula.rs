@@ -1,6 +1,6 @@
 //! Functions of a problem, for plain and dual numbers.
 
-use mops_core::{Dual7, Scalar};
+use mops_language::{Dual7, Scalar};
 
 /// Function of a problem's variables, written once for every kind of number. For functions that carry data; functions
 /// without data are plain functions ([`Functions::of`]).
@@ -51,7 +51,7 @@ impl Functions {
     /// Creates the functions from a plain generic function, named twice: once for each kind of number.
     ///
     /// ```
-    /// use mops_core::Scalar;
+    /// use mops_language::Scalar;
     /// fn circle<S: Scalar>(x: &[S]) -> Vec<S> {
     ///     vec![x[0] * x[0] + x[1] * x[1]]
     /// }

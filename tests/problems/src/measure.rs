@@ -1,7 +1,12 @@
 //! Measurement of a solver on a problem.
 
-use mops_core::front::{hypervolume, inverted_generational_distance, non_dominated};
-use mops_core::{Budget, Evaluator, FEASIBLE, Merit, Oracle, Record, Run, Solver, Stop};
+use mops_core::{
+    Merit, Oracle, Run, Solver, Stop,
+    evaluation::FEASIBLE,
+    front::{hypervolume, inverted_generational_distance, non_dominated},
+    problem::Evaluator,
+    run::{Budget, Record},
+};
 
 use crate::problem::Answer;
 

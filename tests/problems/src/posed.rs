@@ -1,6 +1,10 @@
 //! Problem as seen by solvers: variables in the unit box, criteria as scaled values.
 
-use mops_core::{Evaluation, Evaluator, Merit, Objective, Shape, Slopes, Usage, stream};
+use mops_core::{
+    Evaluation, Merit, Objective, Shape, Usage,
+    problem::{Evaluator, Slopes},
+};
+use mops_math::stream;
 use rand::Rng;
 
 use crate::bounds::finite;
@@ -172,7 +176,8 @@ impl Evaluator for Posed<'_> {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::{Budget, Oracle, Run, Scalar};
+    use mops_core::{Oracle, Run, run::Budget};
+    use mops_language::Scalar;
 
     use super::*;
     use crate::Functions;
@@ -210,7 +215,7 @@ mod tests {
             run.linearise(&posed.start(), 1e-4).unwrap().unwrap()
         };
         let (exact, differences) = (slopes(Slope::Exact), slopes(Slope::Differences));
-        let all = |at: &mops_core::Linearisation| [at.rows.concat(), at.residuals.concat()].concat();
+        let all = |at: &mops_core::solver::Linearisation| [at.rows.concat(), at.residuals.concat()].concat();
         for (a, b) in all(&exact).into_iter().zip(all(&differences)) {
             assert!((a - b).abs() < 1e-6 * a.abs().max(1.0), "{a} {b}");
         }

@@ -1,6 +1,6 @@
 //! Estimates under error models, on data that the tests compute themselves.
 
-use mops_core::math;
+use mops_math as math;
 
 use super::*;
 use crate::base::{first_locals, pieces};

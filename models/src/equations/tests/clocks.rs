@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use mops_core::linear::{Complex, Loop};
-use mops_core::math::complex;
-use mops_core::{Linearise, Linearised, StateSpace};
+use mops_core::model::{Linearise, Linearised};
+use mops_linear::{Complex, Loop, StateSpace};
+use mops_math::complex;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::*;

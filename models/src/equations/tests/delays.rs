@@ -1,6 +1,6 @@
 //! Delays, compared with the polynomials of the method of steps and with closed forms of delayed inputs.
 
-use mops_core::math;
+use mops_math as math;
 
 use super::*;
 
@@ -177,7 +177,7 @@ fn a_jump_that_moves_leaves_the_tangents_of_others_at_its_time_alone() {
         "states = { x = '1' }\ninputs = { u = '1' }\nparameters = { T = 's' }\nder = { x = '(u + delay(u, T))/1 [s]' }";
     let times: Vec<f64> = (0..40).map(|k| 0.05 * f64::from(k)).collect();
     let values: Vec<f64> = (0..40).map(|k| f64::from(k * 7919 % 13) - 6.0).collect();
-    let input = [("u", Input::Sampled { times, values: values.clone(), hold: mops_core::Hold::Zero })];
+    let input = [("u", Input::Sampled { times, values: values.clone(), hold: mops_core::case::Hold::Zero })];
     // x depends on T through the integral of u from -T, where it is its first sample, to 1.02 s - T = 0.82 s.
     let tangent = tangents_at_end(&tight(text), &input, &[("T", 0.2)], "T", 1.02)[0];
     let exact = values[0] - values[16];

@@ -1,7 +1,8 @@
 //! Dry friction that is 0, always or for a while, has no effect.
 
+use mops_math as math;
+
 use super::*;
-use mops_core::math;
 
 fn joint(rate: &str, friction: &str) -> Equations {
     let text = format!(

@@ -2,8 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use mops_core::Hold;
-use mops_core::math;
+use mops_core::case::Hold;
+use mops_math as math;
 use proptest::prelude::*;
 
 use super::*;

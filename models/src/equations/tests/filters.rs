@@ -1,7 +1,7 @@
 //! Filters of clocks, compared with difference equations and with continuous systems.
 
-use mops_core::linear::Complex;
-use mops_core::math::complex;
+use mops_linear::Complex;
+use mops_math::complex;
 
 use super::*;
 
@@ -87,7 +87,7 @@ fn a_zero_order_hold_is_exact_for_stairs() {
     let stairs = || Input::Sampled {
         times: (0..20).map(|k| 0.1 * f64::from(k)).collect(),
         values: (0..20).map(|k| math::sin(1.7 * f64::from(k))).collect(),
-        hold: mops_core::Hold::Zero,
+        hold: mops_core::case::Hold::Zero,
     };
     let filter = "continuous = { numerator = [2, 3], denominator = [1, 0.8, 25] }, method = 'zero-order-hold'";
     let u = simulated(&sampled(filter, ""), &[], "u", 1.95, stairs());

@@ -1,7 +1,8 @@
 //! Long and deeply nested expressions.
 
+use mops_math as math;
+
 use super::{model, read, respond};
-use mops_core::math;
 
 /// Returns the model `x' = text`, from `x = 1` over 1 s, with a parameter `k`.
 fn of_one_state(text: &str) -> String {

@@ -1,6 +1,6 @@
 //! Random linear systems, compared with the matrix exponential.
 
-use mops_core::math;
+use mops_math as math;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 

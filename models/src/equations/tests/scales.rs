@@ -1,7 +1,8 @@
 //! Errors relative to the size of each state: the accuracy does not depend on units.
 
+use mops_math as math;
+
 use super::*;
-use mops_core::math;
 
 /// Decades of the size of the states relative to 1.
 const DECADES: [i32; 7] = [-12, -9, -6, -3, 0, 3, 6];

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use mops_core::data::Files;
+use mops_language::files::Files;
 
 use super::*;
 

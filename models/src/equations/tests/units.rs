@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use mops_core::{Unit, math};
+use mops_language::Unit;
+use mops_math as math;
 
 use super::*;
 

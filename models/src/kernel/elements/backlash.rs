@@ -1,6 +1,6 @@
 //! Backlash between a driving and a driven part.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 /// Backlash of width `gap`. The driven part `y` follows the driving part `u` at a distance of `gap/2` while it is
 /// pushed. It stays at rest while `u` crosses the gap. The driven part has no inertia of its own.

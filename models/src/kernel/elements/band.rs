@@ -1,6 +1,6 @@
 //! Region of a value relative to a band: the modes that saturation and dead zone share.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 /// Region of a value relative to a band.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

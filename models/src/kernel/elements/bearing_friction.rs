@@ -1,6 +1,7 @@
 //! Bearing friction.
 
-use mops_core::{Failure, Scalar};
+use mops_core::Failure;
+use mops_language::Scalar;
 
 use super::PiecewiseLinear;
 

@@ -2,8 +2,11 @@
 
 use std::collections::VecDeque;
 
-use mops_core::plant::{Memory, Past};
-use mops_core::{Instant, Plant, Scalar, Tolerance, Trace};
+use mops_core::{
+    Instant, Plant, Trace,
+    plant::{Memory, Past, Tolerance},
+};
+use mops_language::Scalar;
 
 use crate::kernel::{allowed, common, is_due};
 

@@ -1,6 +1,6 @@
 //! First-order lag.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 /// First-order lag `T y' = u - y`: the transfer function `1/(T s + 1)`, with its output as state.
 #[derive(Debug, Clone, Copy)]

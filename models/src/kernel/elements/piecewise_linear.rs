@@ -1,6 +1,7 @@
 //! Piecewise linear function given by a table.
 
-use mops_core::{Failure, Scalar};
+use mops_core::Failure;
+use mops_language::Scalar;
 
 /// Piecewise linear function through points `(x_k, y_k)`, extrapolated by the first and the last line segment.
 ///

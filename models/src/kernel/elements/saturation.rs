@@ -1,6 +1,6 @@
 //! Saturation of a signal.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 use super::band::{Band, Region};
 

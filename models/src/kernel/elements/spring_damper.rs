@@ -1,6 +1,6 @@
 //! Spring and damper in parallel.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 /// Spring and damper in parallel, with the torque `c (q - rest) + d q'` opposing the joint.
 ///

@@ -1,7 +1,11 @@
 //! Elements in small systems, compared with closed forms.
 
-use mops_core::plant::{Breaks, Events, InputRates, Memory, Past};
-use mops_core::{Dual, EventInstant, Instant, Plant, Scalar, Trace, math};
+use mops_core::{
+    Instant, Plant, Trace,
+    plant::{Breaks, EventInstant, Events, InputRates, Memory, Past},
+};
+use mops_language::{Dual, Scalar};
+use mops_math as math;
 
 use super::delay::Restart;
 use super::*;

@@ -1,7 +1,7 @@
 //! Stick-slip motion, compared with closed forms.
 
-use mops_core::math;
-use mops_core::{Dual, Scalar};
+use mops_language::{Dual, Scalar};
+use mops_math as math;
 
 use super::*;
 use crate::kernel::{Driven, Inputs, Sink, Step, Tolerance, integrate};

@@ -1,8 +1,9 @@
 //! Recorded signals, compared with the functions that define them.
 
+use mops_core::{Halt, Instant, Plant};
+use mops_math as math;
+
 use super::*;
-use mops_core::Halt;
-use mops_core::{Instant, Plant, math};
 
 /// State with this constant rate, 0 or that of the clock, so that steps are as long as possible. The signal is a
 /// function of time and state.

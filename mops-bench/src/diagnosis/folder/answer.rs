@@ -3,8 +3,10 @@
 use std::fmt::Write;
 use std::sync::Arc;
 
-use mops::core::Effect;
-use mops::discrepancy::{Diagnosis, ExperimentError, Prediction};
+use mops::{
+    core::Effect,
+    discrepancy::{Diagnosis, ExperimentError, Prediction},
+};
 use serde_json::{Map, Value, json};
 
 use super::super::tool::spelt;

@@ -1,16 +1,14 @@
 //! Cases, inputs and experiments.
 
+use mops_language::{Quantity, Unit, suggestion};
+
 use super::Models;
 use super::values::{check_horizon, converted, in_range, signal_names};
 use crate::cancellation::Cancellation;
-use crate::case::Case;
-use crate::diagnostic::suggestion;
-use crate::experiment::{Channel, Experiment, ResponseData};
-use crate::input::Input;
+use crate::case::{Case, Channel, Experiment, Input, ResponseData};
 use crate::model::{AnalysisKind, Parameter, Variable};
+use crate::study::StudyError;
 use crate::study::draft::{CaseBuilder, ChannelBuilder, Measured};
-use crate::study_error::StudyError;
-use crate::unit::{Quantity, Unit};
 
 pub(super) fn build_case(draft: &CaseBuilder, models: &Models, warnings: &mut Vec<String>) -> Result<Case, StudyError> {
     warnings.extend(draft.warnings.iter().cloned());

@@ -2,19 +2,16 @@
 
 use std::sync::Arc;
 
+use mops_language::{Quantity, Unit, suggestion};
+
 use super::Models;
 use super::jobs::job;
 use super::values::converted;
 use crate::case::Case;
-use crate::criterion::Demand;
-use crate::criterion::{Criterion, CriterionSpec, InUnit, Other, Sense, Usage};
-use crate::diagnostic::suggestion;
+use crate::criterion::{Criterion, CriterionSpec, Demand, InUnit, Other, Sense, Usage};
 use crate::model::AnalysisKind;
 use crate::study::draft::CriterionBuilder;
-use crate::study::{Row, Study};
-use crate::study_error::StudyError;
-use crate::unit::{Quantity, Unit};
-use crate::wildcard;
+use crate::study::{Row, Study, StudyError, matches_pattern};
 
 pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -> Result<(), StudyError> {
     let model = match &draft.model {
@@ -230,7 +227,7 @@ fn cases_of(study: &Study, draft: &CriterionBuilder, reads: AnalysisKind) -> Res
 /// Returns the cases with a name, or whose names match a pattern.
 fn named(study: &Study, name: &str) -> Result<Vec<usize>, StudyError> {
     let found: Vec<usize> =
-        (0..study.cases.len()).filter(|&case| wildcard::matches(name, &study.cases[case].name)).collect();
+        (0..study.cases.len()).filter(|&case| matches_pattern(name, &study.cases[case].name)).collect();
     if !found.is_empty() {
         return Ok(found);
     }

@@ -1,9 +1,9 @@
 //! Jobs (model-case pairs) and the sources of their parameters.
 
+use mops_language::Unit;
+
 use crate::model::{AnalysisKind, Interface};
-use crate::study::{JobPlan, ParameterSource, Study};
-use crate::study_error::StudyError;
-use crate::unit::Unit;
+use crate::study::{JobPlan, ParameterSource, Study, StudyError};
 
 /// Returns the job of a model in a case, created on first use and completed later. Adds the signals to those it computes.
 pub(super) fn job(study: &mut Study, model: usize, case: usize, wanted: &[String]) -> Result<usize, StudyError> {

@@ -10,15 +10,12 @@ mod values;
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use crate::case::Case;
-use crate::criterion::Usage;
+use crate::case::{Case, Role};
+use crate::criterion::{Loss, Usage};
 use crate::evaluation::Objective;
-use crate::experiment::Role;
-use crate::loss::Loss;
 use crate::model::{AnalysisKind, Interface, Model};
 use crate::study::draft::{CaseBuilder, CriterionBuilder, StudyBuilder};
-use crate::study::{JobPlan, Study, Task, Tasks, diagnosis, tasks};
-use crate::study_error::StudyError;
+use crate::study::{JobPlan, Study, StudyError, Task, Tasks, diagnosis, tasks};
 use cases::{assumed_units, build_case, outliers, with_sensors};
 use criteria::add_rows;
 use jobs::{complete, job};

@@ -1,9 +1,11 @@
 //! Dimensions of the expressions of tied tuners.
 
-use crate::expression::Expression;
-use crate::expression::units::{Conflict, Dimensions, Measure, Named};
-use crate::study_error::StudyError;
-use crate::tuner::Tuner;
+use mops_language::{
+    Expression,
+    expression::units::{Conflict, Dimensions, Measure, Named},
+};
+
+use crate::study::{StudyError, Tuner};
 
 /// Checks that an expression has the dimension of the tuner `name`, which it sets. Tuners that are `loose` have no unit,
 /// neither their own nor that of a parameter.

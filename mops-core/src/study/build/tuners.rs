@@ -1,19 +1,14 @@
 //! Tuners, their ties, and free initial states.
 
+use mops_language::{Expression, Quantity, Unit, suggestion};
+use mops_math as math;
+
 use super::Models;
 use super::values::{check_range, converted, names, parameter};
-use crate::case::Case;
-use crate::diagnostic::suggestion;
-use crate::experiment::{Channel, Experiment, Role};
-use crate::expression::Expression;
-use crate::math;
+use crate::case::{Case, Channel, Experiment, Role};
 use crate::model::Parameter;
 use crate::study::draft::{Free, TunerBuilder};
-use crate::study::ratio_of_temperatures;
-use crate::study_error::StudyError;
-use crate::tuner::{Grid, Scale, Tuner};
-use crate::unit::{Quantity, Unit};
-use crate::wildcard;
+use crate::study::{Grid, Scale, StudyError, Tuner, matches_pattern, ratio_of_temperatures};
 
 /// Adds the tuner, or one for every case.
 pub(super) fn build_tuner(
@@ -195,7 +190,7 @@ fn separate_in(draft: &TunerBuilder, cases: &[Case]) -> Result<Vec<usize>, Study
     let mut found = Vec::new();
     for pattern in &draft.separate_in {
         let matching: Vec<usize> =
-            (0..cases.len()).filter(|&case| wildcard::matches(pattern, &cases[case].name)).collect();
+            (0..cases.len()).filter(|&case| matches_pattern(pattern, &cases[case].name)).collect();
         if matching.is_empty() {
             let fact = format!("there is no case or experiment `{pattern}`");
             return Err(StudyError::new("per-case", fact)

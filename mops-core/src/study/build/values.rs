@@ -1,10 +1,10 @@
 //! Names, units and ranges of single values.
 
-use crate::diagnostic::suggestion;
+use mops_language::{Quantity, Unit, suggestion};
+
 use crate::model::{Parameter, Variable};
+use crate::study::StudyError;
 use crate::study::draft::CaseBuilder;
-use crate::study_error::StudyError;
-use crate::unit::{Quantity, Unit};
 
 pub(super) fn section(case: &CaseBuilder) -> &'static str {
     if case.measured.is_some() { "experiments" } else { "cases" }

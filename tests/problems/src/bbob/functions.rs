@@ -4,8 +4,8 @@
 
 use std::f64::consts::PI;
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 use super::Instance;
 use super::transform::{asymmetric, conditioned, oscillated, outside, rotated, rounded, share, shifted, sum, wavy};

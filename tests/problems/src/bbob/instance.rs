@@ -3,7 +3,7 @@
 //! Source: N. Hansen, S. Finck, R. Ros, A. Auger, Real-Parameter Black-Box Optimization Benchmarking 2009: Noiseless
 //! Functions Definitions, INRIA RR-6829 (2009), with the generators of the accompanying reference code (COCO).
 
-use mops_core::math;
+use mops_math as math;
 use std::f64::consts::PI;
 
 /// Square matrix, by rows.

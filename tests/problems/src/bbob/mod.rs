@@ -7,8 +7,9 @@ mod instance;
 mod published;
 mod transform;
 
-use mops_core::math;
-use mops_core::{Scalar, stream};
+use mops_language::Scalar;
+use mops_math as math;
+use mops_math::stream;
 use rand::Rng;
 
 use crate::{Formula, Functions, Problem, Suite};

@@ -1,7 +1,7 @@
 //! Transformations shared by the functions.
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 use super::instance::Matrix;
 

@@ -1,7 +1,7 @@
 //! `constrained-fronts`: two objectives with constraints.
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 use super::{best_of, evenly, problem, sampled};
 use crate::arithmetic::atan;

@@ -6,8 +6,8 @@ mod dtlz;
 mod wfg;
 mod zdt;
 
-use mops_core::Dual7;
 use mops_core::front::{hypervolume, non_dominated};
+use mops_language::Dual7;
 
 use crate::{Answer, Functions, Problem, Sense};
 
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn sampled_points_of_the_box_do_not_dominate_the_front() {
         use rand::Rng;
-        let mut random = mops_core::stream(1, "fronts");
+        let mut random = mops_math::stream(1, "fronts");
         for Suite { problems, .. } in [super::ZDT, super::DTLZ, super::WFG, super::CONSTRAINED] {
             for problem in problems() {
                 let Answer::Front { points, .. } = &problem.answer else { panic!() };

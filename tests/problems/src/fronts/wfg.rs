@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 use super::{Points, best_of, evenly, known, problem, sampled};
 use crate::{Problem, Suite};
@@ -269,7 +269,7 @@ fn disconnected_front(count: usize) -> Vec<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mops_core::math;
+    use mops_math as math;
 
     /// Power to which [`dependent`] raises a parameter.
     fn power(u: f64) -> f64 {

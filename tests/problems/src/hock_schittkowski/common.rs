@@ -1,6 +1,6 @@
 //! Problems that are also used as min-max problems: objective and inequalities.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 use crate::arithmetic::{cube, dot, fourth, sq, sum};
 

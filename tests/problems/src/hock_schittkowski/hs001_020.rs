@@ -1,6 +1,6 @@
 //! Problems 1 to 20: two variables.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 use super::{FREE, POSITIVE, hs, within};
 use crate::arithmetic::{c, cube, sq};

@@ -1,6 +1,6 @@
 //! Problems 21 to 40: two to four variables.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 use super::{FREE, POSITIVE, hs, within};
 use crate::arithmetic::{cube, dot, fourth, sq};

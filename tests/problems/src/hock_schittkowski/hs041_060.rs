@@ -1,7 +1,7 @@
 //! Problems 41 to 60: two to seven variables.
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 use super::common::hs43;
 use super::{POSITIVE, hs, within};

@@ -1,6 +1,6 @@
 //! Problems 61 to 69: three and four variables.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 use super::{POSITIVE, hs, within};
 use crate::arithmetic::{c, dot, normal, sq, sum};

@@ -1,6 +1,6 @@
 //! Problems 71 to 86: four and five variables.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 use super::{FREE, POSITIVE, hs, within};
 use crate::arithmetic::{c, cube, dot, fourth, sq, sum};

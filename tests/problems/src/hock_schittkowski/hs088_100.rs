@@ -1,7 +1,7 @@
 //! Problems 88 to 100: two to seven variables.
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 use super::common::hs100;
 use super::{POSITIVE, hs, within};

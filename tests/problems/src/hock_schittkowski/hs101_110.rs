@@ -1,7 +1,7 @@
 //! Problems 101 to 110: seven to ten variables.
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 use super::{POSITIVE, hs, within};
 use crate::arithmetic::{cube, sq, sum};

@@ -1,6 +1,6 @@
 //! Problems 111 to 119: ten to sixteen variables.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 use super::common::hs113;
 use super::hs071_086::colville;

@@ -1,7 +1,7 @@
 //! Curve-fitting problems: 25, 57, 70 and 105.
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 use super::{hs, within};
 use crate::arithmetic::{c, power, sq, sum};

@@ -1,7 +1,7 @@
 //! Curve fits in the maximum norm: the largest absolute residual counts.
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 use crate::arithmetic::{dot, sq, sum};
 use crate::formula::Functions;

@@ -2,7 +2,7 @@
 //!
 //! N.B.: with bounds as in the report; its program has x10 of HS114 in [140, 160], and no bounds in Dembo5.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 use crate::arithmetic::{penalised, sq};
 use crate::formula::Functions;

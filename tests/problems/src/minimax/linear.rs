@@ -1,7 +1,7 @@
 //! Min-max problems with linear constraints.
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 use super::penalties::{WONG2, WONG3};
 use crate::arithmetic::{dot, penalised, sinh, sq, sum};

@@ -1,6 +1,6 @@
 //! Constrained problems as exact penalty functions.
 
-use mops_core::Scalar;
+use mops_language::Scalar;
 
 use crate::arithmetic::{fourth, penalised};
 use crate::formula::Functions;

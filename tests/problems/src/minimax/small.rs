@@ -1,7 +1,7 @@
 //! Problems with few functions of few variables.
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 use crate::arithmetic::{c, cube, fourth, sq, sum};
 use crate::formula::Functions;

@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 use super::data::{BARD, KOWALIK, KOWALIK_AT, MEYER, OSBORNE_1, OSBORNE_2};
 use crate::arithmetic::{atan, c, cube, sq, sum};

@@ -4,8 +4,8 @@
 mod data;
 mod functions;
 
-use mops_core::Scalar;
-use mops_core::math;
+use mops_language::Scalar;
+use mops_math as math;
 
 use crate::{Answer, Formula, Functions, Problem, Suite};
 use functions::{residuals, start};

@@ -3,8 +3,7 @@
 use mops_math as math;
 
 use super::{Effect, Family, any_joint, joints};
-use crate::law::Spot;
-use crate::law::{Dry, Law};
+use crate::law::{Dry, Law, Spot};
 use crate::plant::{Place, Plant};
 
 /// Returns the joints without viscous friction in the baseline model.
