@@ -90,7 +90,7 @@ pub fn study() -> Result<Study, Box<dyn Error>> {
     let models = vec![("rig".into(), file::model(&catalogue, MODEL_RIG, &Data)?)];
     let draft = StudyBuilder {
         name: "furuta-swing-repaired".into(),
-        task: Task::Calibration,
+        task: Task::calibration(),
         tuners: vec![
             ("b".into(), TunerBuilder::new(0.001133, 0.0005, 0.01).log()),
             ("c".into(), TunerBuilder::new(0.0004, 0.0001, 0.001).log()),

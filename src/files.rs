@@ -8,11 +8,7 @@ use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use mops_data::as_text;
-
 pub(crate) use inputs::Inputs;
-
-use crate::plain::plain;
 
 /// Prefix of a file name during writing. The name is fixed, so that the next process replaces the remains of a killed one;
 /// only one process at a time writes in the folder of a run.
@@ -159,17 +155,6 @@ impl Drop for AtomicFile {
         // After a rename the temporary name no longer exists.
         let _ = fs::remove_file(&self.temporary);
     }
-}
-
-/// Writes the names of the columns of a CSV file; a spreadsheet takes none for a formula, and control characters are escaped.
-///
-/// # Errors
-/// If the file cannot be written.
-pub(crate) fn write_header<W: Write>(
-    writer: &mut csv::Writer<W>,
-    names: impl IntoIterator<Item = String>,
-) -> Result<(), csv::Error> {
-    writer.write_record(names.into_iter().map(|name| plain(&as_text(&name)).into_owned()))
 }
 
 /// Returns the temporary path of a file during writing.

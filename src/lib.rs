@@ -42,22 +42,14 @@
 
 #[cfg(feature = "cli")]
 mod cli;
-mod diagnosis;
 mod files;
-mod numbers;
-mod plain;
 pub mod prelude;
 #[cfg(feature = "report")]
 pub mod report;
-mod search;
-mod solve;
 #[cfg(feature = "store")]
 mod store;
-mod tasks;
 #[cfg(feature = "cli")]
 pub mod terminal;
-#[cfg(feature = "cli")]
-mod toml_text;
 #[cfg(feature = "watch")]
 mod watch;
 
@@ -66,6 +58,7 @@ mod watch;
 #[doc = include_str!("../docs/guide/7-in-rust.md")]
 mod guide {}
 
+pub use mops_content as content;
 pub use mops_core as core;
 pub use mops_core::{
     Analysis, Cancellation, Case, Catalogue, Criterion, CriterionOptions, CriterionSpec, Failure, Input, Instant,
@@ -91,8 +84,8 @@ pub use mops_outcome::Outcome;
 pub use mops_solvers as solvers;
 pub use mops_statistics as statistics;
 pub use mops_studies as studies;
-pub use search::{DEFAULT_EVALUATIONS, EvaluationStore, Options, SolveError, Solved, suits};
-pub use solve::solve;
+pub use mops_tasks as tasks;
+pub use mops_tasks::{DEFAULT_EVALUATIONS, EvaluationStore, Options, SolveError, Solved, solve, suits};
 
 /// Returns the built-in catalogue: models, criteria, solvers, effects and studies.
 pub fn catalogue() -> Catalogue {
@@ -100,6 +93,7 @@ pub fn catalogue() -> Catalogue {
         models: mops_models::kinds(),
         criteria: mops_criteria::kinds(),
         solvers: mops_solvers::kinds(),
+        tasks: mops_tasks::kinds(),
         effects: mops_effects::effects(),
         augment: Some(|model, effects| Ok(Box::new(mops_models::WithEffects::new(model, effects)?))),
         studies: mops_studies::shipped().into_iter().map(Into::into).collect(),

@@ -75,7 +75,7 @@ impl Criterion for Line {
 fn line(f: fn(&[f64]) -> Option<Vec<f64>>) -> Problem {
     let study = StudyBuilder {
         name: "line".into(),
-        task: mops::Task::Calibration,
+        task: mops::Task::calibration(),
         models: vec![("function".into(), Function::new(&["x0", "x1"], 2, f).into())],
         tuners: ["x0", "x1"].map(|name| (name.into(), TunerBuilder::new(-1.5, -2.0, 2.0))).into(),
         criteria: vec![("line".into(), CriterionBuilder::minimise(Line, 1.0))],

@@ -43,7 +43,7 @@ fn diagnosis_among(case: &Trial, catalogue: Catalogue, seed: u64) -> Diagnosis {
     study.set_seed(seed);
     let options = Options { effects: catalogue.effects, ..Options::default() };
     let solved = mops::solve(study, &options, &()).unwrap_or_else(|why| panic!("{}: {why}", case.name));
-    solved.outcome.found.diagnosis.expect("the task is a diagnosis")
+    solved.outcome.found.get::<Diagnosis>().cloned().expect("the task is a diagnosis")
 }
 
 /// Effects and places found.

@@ -9,8 +9,13 @@ use mops::file::digest;
 const PICTURES: [(&str, &str); 2] = [("design", "pid-design"), ("diagnosis", "furuta-discrepancy")];
 
 /// Files of the report template: layout, style, and the first part of a page.
-const TEMPLATE: [&str; 4] =
-    ["src/report/page.rs", "src/report/style.css", "src/report/charts.js", "src/report/verdict.rs"];
+const TEMPLATE: [&str; 5] = [
+    "src/report/page.rs",
+    "src/report/markup.rs",
+    "src/report/style.css",
+    "src/report/charts.js",
+    "crates/tasks/src/verdict.rs",
+];
 
 #[test]
 fn pictures_are_up_to_date_with_their_studies_and_the_report_template() {

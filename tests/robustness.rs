@@ -13,9 +13,10 @@ use mops::{
     Task, Trace, TunerBuilder, Usage, Variable,
     core::{
         Job, Response,
-        study::{
-            ChannelBuilder, Chosen, DistributionBuilder, Measured, MonteCarloTask, Place, RobustTask,
-            SensitivityMethod, SensitivityTask, TasksBuilder, UncertainBuilder, UncertaintyTask, WorstCaseTask,
+        study::{ChannelBuilder, DistributionBuilder, Measured, UncertainBuilder},
+        task::{
+            CalibrationTask, Chosen, DesignTask, MonteCarloTask, Place, RobustTask, SensitivityMethod, SensitivityTask,
+            UncertaintyTask, WorstCaseTask,
         },
     },
     criteria::normalised_error::NormalisedError,
@@ -40,6 +41,18 @@ fn normal(mean: f64, deviation: f64) -> UncertainBuilder {
 }
 
 /// Study of `f` with one tuner `t` and the uncertain parameters `x0`, `x1`.
+fn worst_case() -> Task {
+    WorstCaseTask { at: Place::Start, ..WorstCaseTask::default() }.into()
+}
+
+fn monte_carlo() -> Task {
+    MonteCarloTask { at: Place::Start, ..MonteCarloTask::default() }.into()
+}
+
+fn robust(robust: RobustTask) -> Task {
+    DesignTask { robust: Some(robust) }.into()
+}
+
 fn draft(
     task: Task,
     uncertain: [UncertainBuilder; 2],
@@ -60,12 +73,7 @@ fn draft(
         tuners: vec![("t".into(), TunerBuilder::new(1.5, -2.0, 2.0))],
         cases: vec![case],
         criteria,
-        tasks: TasksBuilder {
-            uncertain: vec![("x0".into(), x0), ("x1".into(), x1)],
-            worst_case: WorstCaseTask { at: Place::Start, ..WorstCaseTask::default() },
-            monte_carlo: MonteCarloTask { at: Place::Start, ..MonteCarloTask::default() },
-            ..TasksBuilder::default()
-        },
+        uncertain: vec![("x0".into(), x0), ("x1".into(), x1)],
         ..StudyBuilder::default()
     }
 }
@@ -79,11 +87,11 @@ const BOX: fn() -> [UncertainBuilder; 2] = || [between(-1.0, 1.0), between(-1.0,
 /// Cases that differ only in uncertain parameters are merged.
 #[test]
 fn cases_that_differ_only_in_uncertain_values_are_searched_once() {
-    let mut draft = draft(Task::WorstCase, BOX(), vec![end(0, 1.0, Usage::Minimise)], |p| Some(vec![p[1] + p[2]]));
+    let mut draft = draft(worst_case(), BOX(), vec![end(0, 1.0, Usage::Minimise)], |p| Some(vec![p[1] + p[2]]));
     let mut other = draft.cases[0].clone();
     (other.name, other.parameters) = ("other".into(), vec![("x0".into(), 0.9.into()), ("x1".into(), 0.9.into())]);
     draft.cases.push(other);
-    let found = solved(draft).found.worst_case.unwrap();
+    let found = solved(draft).found.get::<mops::tasks::uncertain::WorstCaseReport>().cloned().unwrap();
     assert_eq!(found.criteria.len(), 1);
     assert!((found.criteria[0].value - 2.0).abs() < 1e-9);
 }
@@ -105,8 +113,8 @@ fn worst_cases_agree_with_closed_forms() {
     ];
     let at_least = &mut criteria[3].1;
     (at_least.demand, at_least.good, at_least.bad) = (None, Some(4.0.into()), Some(2.0.into()));
-    let outcome = solved(draft(Task::WorstCase, BOX(), criteria, f));
-    let found = outcome.found.worst_case.unwrap();
+    let outcome = solved(draft(worst_case(), BOX(), criteria, f));
+    let found = outcome.found.get::<mops::tasks::uncertain::WorstCaseReport>().cloned().unwrap();
     assert!(!found.guaranteed && found.simulations > 100);
     // Value, scaled value, place. The lower maximum shifts the higher one by less than 1e-6.
     let exact = [
@@ -130,11 +138,14 @@ fn worst_cases_agree_with_closed_forms() {
 #[test]
 fn failures_in_the_box_are_reported_and_do_not_count_as_values() {
     let f = |p: &[f64]| if p[1] > 0.6 { None } else { Some(vec![p[1] + 2.0]) };
-    let outcome = solved(draft(Task::WorstCase, BOX(), vec![end(0, 1.0, Usage::Minimise)], f));
-    let worst = &outcome.found.worst_case.as_ref().unwrap().criteria[0];
+    let outcome = solved(draft(worst_case(), BOX(), vec![end(0, 1.0, Usage::Minimise)], f));
+    let worst = &outcome.found.get::<mops::tasks::uncertain::WorstCaseReport>().cloned().unwrap().criteria[0];
     assert!(worst.value <= 2.6 && worst.value > 2.59, "{worst:?}");
     assert!(worst.failed > 0 && worst.failure.as_ref().unwrap().at[0].value > 0.6);
-    assert!(outcome.found.worst_case.unwrap().words[0].contains("simulations in the box failed"));
+    assert!(
+        outcome.found.get::<mops::tasks::uncertain::WorstCaseReport>().cloned().unwrap().words[0]
+            .contains("simulations in the box failed")
+    );
 }
 
 /// The standard normal distribution function, by the series of its integral. Source: M. Abramowitz, I. A. Stegun, Handbook
@@ -157,9 +168,13 @@ fn samples_of_a_linear_criterion_are_distributed_as_its_closed_form() {
     let deviation = 1.04_f64.sqrt();
     let share = phi((4.0 - 3.0) / deviation);
     for (method, accurate) in [(Sampling::Random, 0.12), (Sampling::LatinHypercube, 0.02), (Sampling::Sobol, 0.01)] {
-        let mut draft = draft(Task::MonteCarlo, uncertain(), vec![end(0, 4.0, Usage::Minimise)], f);
-        draft.tasks.monte_carlo = MonteCarloTask { method, level: 0.999, ..draft.tasks.monte_carlo };
-        let found = solved(draft).found.monte_carlo.unwrap();
+        let draft = draft(
+            MonteCarloTask { at: Place::Start, method, level: 0.999, ..MonteCarloTask::default() }.into(),
+            uncertain(),
+            vec![end(0, 4.0, Usage::Minimise)],
+            f,
+        );
+        let found = solved(draft).found.get::<mops::tasks::uncertain::MonteCarloReport>().cloned().unwrap();
         let criterion = &found.criteria[0];
         assert!((criterion.mean - 3.0).abs() < accurate, "{method:?}: {}", criterion.mean);
         assert!((criterion.deviation - deviation).abs() < 0.08, "{method:?}: {}", criterion.deviation);
@@ -177,11 +192,12 @@ fn samples_of_a_linear_criterion_are_distributed_as_its_closed_form() {
 /// A tuner of 1.5 with a tolerance of 10 % is uniform between 1.35 and 1.65: a demand of 1.6 is met with probability 5/6.
 #[test]
 fn a_tolerance_is_a_range_around_the_design() {
-    let mut draft = draft(Task::MonteCarlo, BOX(), vec![end(0, 1.6, Usage::Minimise)], |p| Some(vec![p[0]]));
+    let mut draft = draft(monte_carlo(), BOX(), vec![end(0, 1.6, Usage::Minimise)], |p| Some(vec![p[0]]));
     let tolerance = UncertainBuilder { tolerance: Some(0.1), ..UncertainBuilder::default() };
-    draft.tasks.uncertain = vec![("t".into(), tolerance)];
-    draft.tasks.monte_carlo.method = Sampling::LatinHypercube;
-    let found = solved(draft).found.monte_carlo.unwrap();
+    draft.uncertain = vec![("t".into(), tolerance)];
+    draft.task =
+        MonteCarloTask { at: Place::Start, method: Sampling::LatinHypercube, ..MonteCarloTask::default() }.into();
+    let found = solved(draft).found.get::<mops::tasks::uncertain::MonteCarloReport>().cloned().unwrap();
     let criterion = &found.criteria[0];
     assert!((criterion.met.unwrap().share - 5.0 / 6.0).abs() < 2e-3, "{:?}", criterion.met);
     assert!(criterion.min > 1.35 && criterion.max < 1.65 && (criterion.of.nominal - 1.5).abs() < 1e-12);
@@ -191,8 +207,11 @@ fn a_tolerance_is_a_range_around_the_design() {
 #[test]
 fn samples_that_fail_do_not_meet_a_demand() {
     let f = |p: &[f64]| if p[1] > 0.6 { None } else { Some(vec![p[2]]) };
-    let found =
-        solved(draft(Task::MonteCarlo, BOX(), vec![end(0, 1.0, Usage::Minimise)], f)).found.monte_carlo.unwrap();
+    let found = solved(draft(monte_carlo(), BOX(), vec![end(0, 1.0, Usage::Minimise)], f))
+        .found
+        .get::<mops::tasks::uncertain::MonteCarloReport>()
+        .cloned()
+        .unwrap();
     assert!(found.failed.abs_diff(200) < 60, "{}", found.failed);
     assert_eq!(found.criteria[0].met.unwrap().count, 1000 - found.failed);
 }
@@ -201,11 +220,10 @@ fn samples_that_fail_do_not_meet_a_demand() {
 #[test]
 fn the_robust_design_of_a_symmetric_problem_is_the_centre_of_the_box() {
     let f = |p: &[f64]| Some(vec![math::powi(p[0] - p[1], 2) + 0.1 * math::powi(p[2], 2)]);
-    let mut draft = draft(Task::Design, BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
-    draft.tasks.robust = Some(RobustTask::default());
+    let draft = draft(robust(RobustTask::default()), BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
     let study = draft.build().unwrap();
     let solved = mops::solve(study.clone(), &Options::default(), &()).unwrap();
-    let found = solved.outcome.found.robust.as_ref().unwrap();
+    let found = solved.outcome.found.get::<mops::tasks::uncertain::RobustReport>().cloned().unwrap();
     assert!(found.settled && !found.guaranteed && found.rounds.len() >= 2, "{:?}", found.words);
     let t = solved.outcome.tuners[0].value;
     assert!(t.abs() < 2e-3, "{t}");
@@ -232,11 +250,10 @@ fn an_edge_that_each_design_moves_by_a_little_is_followed_in_large_steps() {
         let [t, x] = [p[0], p[1]];
         Some(vec![1.0 + 0.01 * t + if x >= 0.95 + 0.05 * t { 3.0 - x - 0.1 * t } else { 0.0 }])
     };
-    let mut draft = draft(Task::Design, BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
+    let mut draft = draft(robust(RobustTask::default()), BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
     draft.tuners = vec![("t".into(), TunerBuilder::new(-1.5, -2.0, 2.0))];
-    draft.tasks.robust = Some(RobustTask::default());
     let solved = mops::solve(draft.build().unwrap(), &Options::default(), &()).unwrap();
-    let found = solved.outcome.found.robust.as_ref().unwrap();
+    let found = solved.outcome.found.get::<mops::tasks::uncertain::RobustReport>().cloned().unwrap();
     let beyond: Vec<_> = found.rounds.iter().flat_map(|round| &round.added).filter(|a| a.scaled.is_none()).collect();
     assert!(!beyond.is_empty(), "{:?}", found.rounds);
     assert!(solved.outcome.tuners[0].value > 1.0 && found.settled, "{:?}", found.words);
@@ -246,11 +263,11 @@ fn an_edge_that_each_design_moves_by_a_little_is_followed_in_large_steps() {
 #[test]
 fn an_initial_guess_that_is_better_over_the_cases_found_is_said() {
     let f = |p: &[f64]| Some(vec![1.0 - 0.1 * p[0] + 4.0 * (p[0] + 2.0) * (p[1] - 0.5)]);
-    let mut draft = draft(Task::Design, BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
+    let mut draft =
+        draft(robust(RobustTask { rounds: 1, ..RobustTask::default() }), BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
     draft.tuners = vec![("t".into(), TunerBuilder::new(-2.0, -2.0, 2.0))];
-    draft.tasks.robust = Some(RobustTask { rounds: 1, ..RobustTask::default() });
     let outcome = solved(draft);
-    let robust = outcome.found.robust.as_ref().unwrap();
+    let robust = outcome.found.get::<mops::tasks::uncertain::RobustReport>().cloned().unwrap();
     assert!(!robust.settled && outcome.tuners[0].value > 1.9, "{:?} {:?}", outcome.tuners, robust.words);
     assert!(outcome.warnings.iter().any(|w| w.contains("the initial guess is better")), "{:?}", outcome.warnings);
 }
@@ -260,9 +277,13 @@ fn an_initial_guess_that_is_better_over_the_cases_found_is_said() {
 fn sensitivities_of_an_additive_criterion_follow_from_its_slopes() {
     let f = |p: &[f64]| Some(vec![p[1] + 2.0 * p[2]]);
     let with = |method, samples| {
-        let mut draft = draft(Task::Sensitivity, BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
-        draft.tasks.sensitivity = SensitivityTask { at: Place::Start, method, samples, ..SensitivityTask::default() };
-        solved(draft).found.global_sensitivity.unwrap()
+        let draft = draft(
+            SensitivityTask { at: Place::Start, method, samples, ..SensitivityTask::default() }.into(),
+            BOX(),
+            vec![end(0, 1.0, Usage::Minimise)],
+            f,
+        );
+        solved(draft).found.get::<mops::tasks::uncertain::GlobalSensitivityReport>().cloned().unwrap()
     };
     let morris = with(SensitivityMethod::Morris, None);
     for (effect, exact) in morris.criteria[0].effects.iter().zip([2.0, 4.0]) {
@@ -281,11 +302,10 @@ fn sensitivities_of_an_additive_criterion_follow_from_its_slopes() {
 #[test]
 fn thread_count_does_not_change_a_single_bit() {
     let f = |p: &[f64]| Some(vec![math::powi(p[0] - p[1], 2) + math::sin(3.0 * p[2])]);
-    for (task, robust) in [(Task::WorstCase, false), (Task::MonteCarlo, false), (Task::Design, true)] {
+    for task in [worst_case(), monte_carlo(), robust(RobustTask { rounds: 3, ..RobustTask::default() })] {
         let results: Vec<Json> = [1, 2, 3]
             .map(|jobs| {
-                let mut draft = draft(task, BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
-                draft.tasks.robust = robust.then(|| RobustTask { rounds: 3, ..RobustTask::default() });
+                let draft = draft(task.clone(), BOX(), vec![end(0, 1.0, Usage::Minimise)], f);
                 let options = Options { jobs: Some(jobs), ..Options::default() };
                 let mut outcome = mops::solve(draft.build().unwrap(), &options, &()).unwrap().outcome;
                 outcome.seconds = 0.0;
@@ -354,13 +374,12 @@ fn fitted_line(task: UncertaintyTask) -> Fitted {
     let measured = Measured { channels: vec![channel], ..Measured::default() };
     let draft = StudyBuilder {
         name: "line".into(),
-        task: Task::Calibration,
+        task: CalibrationTask { uncertainty: Some(task) }.into(),
         seed: 1,
         models: vec![("line".into(), Line(interface).into())],
         tuners: ["offset", "slope"].map(|name| (name.into(), TunerBuilder::new(1.0, -5.0, 5.0))).into(),
         cases: vec![CaseBuilder { name: "line".into(), measured: Some(measured), ..CaseBuilder::default() }],
         criteria: vec![("error".into(), error())],
-        tasks: TasksBuilder { uncertainty: Some(task), ..TasksBuilder::default() },
         ..StudyBuilder::default()
     };
     Fitted { outcome: solved(draft), estimates, variance, inverse, n }
@@ -376,7 +395,7 @@ const T39: f64 = 2.022_691;
 #[test]
 fn the_profile_of_a_linear_model_is_its_t_interval() {
     let fitted = fitted_line(UncertaintyTask { profile: Chosen::All, ..UncertaintyTask::default() });
-    let found = fitted.outcome.found.uncertainty.unwrap();
+    let found = fitted.outcome.found.get::<mops::tasks::calibration::UncertaintyReport>().cloned().unwrap();
     assert_eq!(found.profiles.len(), 2);
     for (k, profile) in found.profiles.iter().enumerate() {
         let half = T39 * (fitted.variance * fitted.inverse[k][k]).sqrt();
@@ -399,7 +418,8 @@ fn the_profile_of_a_linear_model_is_its_t_interval() {
 fn bootstrap_errors_of_a_linear_model_are_those_of_least_squares() {
     let task = UncertaintyTask { bootstrap: 200, block: Some(1), ..UncertaintyTask::default() };
     let fitted = fitted_line(task);
-    let found = fitted.outcome.found.uncertainty.unwrap().bootstrap.unwrap();
+    let found =
+        fitted.outcome.found.get::<mops::tasks::calibration::UncertaintyReport>().cloned().unwrap().bootstrap.unwrap();
     assert_eq!((found.replicates, found.failed), (200, 0));
     for (k, one) in found.parameters.iter().enumerate() {
         let exact = (fitted.variance * (fitted.n - 2.0) / fitted.n * fitted.inverse[k][k]).sqrt();
@@ -412,7 +432,7 @@ fn bootstrap_errors_of_a_linear_model_are_those_of_least_squares() {
 #[test]
 fn bands_of_a_linear_model_are_those_of_regression() {
     let fitted = fitted_line(UncertaintyTask { bands: true, ..UncertaintyTask::default() });
-    let band = &fitted.outcome.found.uncertainty.as_ref().unwrap().bands[0];
+    let band = &fitted.outcome.found.get::<mops::tasks::calibration::UncertaintyReport>().cloned().unwrap().bands[0];
     assert_eq!(band.times.len(), 41);
     for (i, &t) in band.times.iter().enumerate() {
         let [[a, b], [_, c]] = fitted.inverse;

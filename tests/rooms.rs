@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crates that are checked; `discrepancy` still has circular imports.
-const CRATES: [&str; 13] = [
+const CRATES: [&str; 15] = [
     "crates/math",
     "crates/language",
     "crates/data",
@@ -13,6 +13,8 @@ const CRATES: [&str; 13] = [
     "crates/statistics",
     "crates/file",
     "crates/outcome",
+    "crates/content",
+    "crates/tasks",
     "mops-core",
     "criteria",
     "effects",

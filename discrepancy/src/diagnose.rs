@@ -8,7 +8,7 @@ use mops_outcome::diagnosis::Diagnosis;
 use crate::meter::Meter;
 use crate::report::Findings;
 use crate::selection::{Forecasts, Search, align, decide, prepare, with_given};
-use crate::subject::Subject;
+use crate::subject::{Subject, task_of};
 
 /// Options of a diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,7 +45,7 @@ pub fn diagnose(
     let has_selection = subject.measurements.iter().any(|m| m.role == Role::Selection);
     let mut forecasts = Forecasts::new(has_selection);
     let begun = |refit, declared| {
-        let declared = with_given(refit, declared, &study.tasks().diagnosis.with)?;
+        let declared = with_given(refit, declared, &task_of(study).with)?;
         let mut search = Search::new(refit, declared, options.max_effects, options.level);
         if search.sets[0].under.is_empty() {
             return Err(lost());

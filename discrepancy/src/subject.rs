@@ -7,6 +7,7 @@ use mops_core::{
     Case, Effect, Job, Model, Role, Study, StudyError,
     effect::Port,
     study::{ParameterSource, Scale},
+    task::DiagnosisTask,
 };
 use mops_language::{Dual, Scalar};
 
@@ -87,6 +88,11 @@ fn tolerance(measurements: &[Measurement]) -> f64 {
     let of = |s: &Series| s.noise / s.values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     let finest = measurements.iter().flat_map(|m| &m.series).map(of).fold(f64::INFINITY, f64::min);
     (settings().step_error * finest).min(settings().loosest)
+}
+
+/// Returns the options of the diagnosis of a study.
+pub(crate) fn task_of(study: &Study) -> DiagnosisTask {
+    study.options::<DiagnosisTask>().cloned().unwrap_or_default()
 }
 
 impl Subject {

@@ -3,9 +3,10 @@
 use std::sync::{Arc, OnceLock};
 
 use mops_core::{
-    Case, Effect, Input, Model, ModelOptions, Role, Study, Task, Tuner,
+    Case, Effect, Input, Model, ModelOptions, Role, Study,
     case::{Channel, Experiment},
-    study::{Grid, JobPlan, ParameterSource, Scale, StudyParts},
+    study::{Grid, JobPlan, ParameterSource, Scale, StudyParts, Tuner},
+    task::DiagnosisTask,
 };
 use mops_effects::effects;
 use mops_language::Unit;
@@ -97,7 +98,7 @@ pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Recor
     }
     let study = Study::from_parts(StudyParts {
         name: "test".to_owned(),
-        task: Task::Diagnosis,
+        task: DiagnosisTask::default().into(),
         seed: 1,
         models: vec![("plant".to_owned(), Arc::clone(&model))],
         cases,

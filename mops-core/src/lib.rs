@@ -5,6 +5,7 @@
 //! | module | content |
 //! |---|---|
 //! | [`study`] | [`Study`]: models, cases, tuners and criteria that belong together, checked; its builder and its errors |
+//! | [`task`] | [`Task`]: what the study is solved or examined for, and the facts that the core needs of it |
 //! | [`model`] | [`Model`]: signals, parameters, states, inputs and the [`Analysis`] that criteria read |
 //! | [`plant`] | [`Plant`]: the equations of a model that simulates, and the order in which the simulation calls them |
 //! | [`effect`] | [`Effect`]: what a model may lack at one of its ports |
@@ -36,6 +37,7 @@ pub mod problem;
 pub mod run;
 pub mod solver;
 pub mod study;
+pub mod task;
 pub mod trace;
 
 pub use cancellation::{Cancellation, Halt};
@@ -50,5 +52,6 @@ pub use plant::{Instant, Plant};
 pub use problem::Problem;
 pub use run::{Run, Watch};
 pub use solver::{Oracle, Progress, Shape, Solver, Stop};
-pub use study::{Study, StudyBuilder, StudyError, Task, Tuner};
+pub use study::{Study, StudyBuilder, StudyError};
+pub use task::Task;
 pub use trace::Trace;

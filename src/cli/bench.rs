@@ -1,22 +1,22 @@
 //! `mops bench`: compares solvers on a study, over several seeds.
 
+use crate::report::Draw;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use maud::{PreEscaped, html};
-use mops_core::{Catalogue, Halt, Stop, Study, Task, Usage, solver::SMALL_OBJECTIVE};
+use mops_content::numbers::{number, significant};
+use mops_core::{Catalogue, Halt, Objective, Stop, Study, Usage, solver::SMALL_OBJECTIVE};
 use mops_language::Diagnostic;
+use mops_tasks::{DEFAULT_EVALUATIONS, Options, Solved, solve, suits};
 use serde::Serialize;
 
 use super::default_folder;
 use super::run::{refused, solver_named};
 use super::study::{StudyArguments, home, open, outputs};
 use crate::files::Outputs;
-use crate::numbers::{number, significant};
 use crate::report::{Color, Curve, Plot, page};
-use crate::search::{DEFAULT_EVALUATIONS, Options, Solved, suits};
-use crate::solve::solve;
 use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, eprint_line, print, print_json, table};
 
 /// Arguments of `mops bench`.
@@ -102,7 +102,7 @@ struct Bench {
 
 pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     let file = open(catalogue, &arguments.study)?;
-    if !matches!(file.study.task(), Task::Design | Task::Calibration) {
+    if !file.study.task().chooses_tuners() || file.study.objective() == Objective::Each {
         return Err(Diagnostic::new("solvers are compared on a design or a calibration, but the task is another one")
             .with_help("add --set study.task=\"design\", or use `mops run` with each solver")
             .into());

@@ -1,5 +1,9 @@
 //! `mops check`: reads a study and its data without running anything.
 
+use mops_content::section::Block;
+use mops_tasks::uncertain::lines_of_parameters;
+
+use super::blocks;
 use std::process::ExitCode;
 
 use clap::Args;
@@ -8,12 +12,11 @@ use mops_core::{
     case::{Channel, Experiment},
     study::{Grid, JobPlan, ParameterSource, Scale},
 };
-use mops_outcome::robustness::uncertain_reports;
+use mops_tasks::{suits, uncertain::uncertain_reports};
 
 use super::families::folded;
 use super::places::places;
 use super::study::{StudyArguments, open};
-use crate::search::suits;
 use crate::terminal::{CommandError, number, print, table};
 
 /// Arguments of `mops check`.
@@ -59,8 +62,9 @@ pub(super) fn check(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
         study.cases().iter().flat_map(|case| channels(study, case)).collect(),
     );
     text += &section(&["case", "fixed parameter", "value", "unit"], &[2], fixed(study));
-    if !study.tasks().uncertain.is_empty() {
-        text += &super::robustness::parameters(&uncertain_reports(&study.over_uncertain(&start)));
+    if !study.uncertain().is_empty() {
+        let reports = uncertain_reports(&study.over_uncertain(&start));
+        text += &blocks::text(&[Block::Table(lines_of_parameters(&reports))]);
     }
     let models = study.models().iter().map(|(name, model)| vec![name.clone(), places(model.interface())]);
     text += &section(&["model", "places for effects"], &[], models.filter(|row| !row[1].is_empty()).collect());

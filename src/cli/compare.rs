@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
+use mops_content::numbers::significant;
 use mops_core::{Catalogue, Problem};
 use mops_language::Diagnostic;
 use serde_json::{Value, json};
@@ -12,7 +13,6 @@ use serde_json::{Value, json};
 use super::past_run::PastRun;
 use super::run_files::of_any_run;
 use crate::files::{Inputs, Outputs};
-use crate::numbers::significant;
 use crate::report::{Responses, Rows, comparison_page};
 use crate::terminal::{CommandError, number, print, print_json, table};
 
@@ -65,9 +65,9 @@ pub(super) fn compare(catalogue: &Catalogue, arguments: &Arguments) -> Result<Ex
     if let Some(path) = &arguments.out {
         let mut inputs = Inputs::default();
         for run in &runs {
-            run.add_to(&mut inputs);
+            run.add_to(catalogue, &mut inputs);
             let what = format!("an output of the run in {}", run.folder.display());
-            of_any_run(&run.folder).iter().for_each(|path| inputs.add(path, &what));
+            of_any_run(catalogue, &run.folder).iter().for_each(|path| inputs.add(path, &what));
         }
         let (responses, missing_responses) = responses(catalogue, &runs, &results, &mut inputs);
         let names: Vec<(String, String)> = names.into_iter().enumerate().map(|(i, name)| (letter(i), name)).collect();

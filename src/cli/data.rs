@@ -4,15 +4,16 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use mops_content::{numbers::FileNames, sampling::thinned};
 use mops_data::{DataFile, unit_since_1970};
 use mops_discrepancy::noise_of;
 use mops_language::Diagnostic;
 use mops_outcome::identification::{excitation_report, spacing};
+use mops_tasks::excitation;
 
-use super::findings;
+use super::blocks;
 use crate::files::{Inputs, Outputs};
-use crate::numbers::FileNames;
-use crate::report::{Color, Curve, Plot, thinned};
+use crate::report::{Color, Curve, Draw, Plot};
 use crate::terminal::{CommandError, number, print, table};
 
 /// Arguments of `mops data`.
@@ -139,7 +140,8 @@ fn excitation(file: &DataFile, time: Option<&str>, name: &str, shown: &str) -> R
     let unit = column.unit.unwrap_or("");
     let report = excitation_report(column.values, None, [shown, name, unit], step, None);
     let reports = [report];
-    Ok(findings::excitation(&reports, &findings::words_of(&reports)))
+    let words = reports.iter().map(|report| report.words.clone()).collect();
+    Ok(blocks::text(&excitation::lines_of_inputs(&reports, words)))
 }
 
 /// Largest deviation of a sample from the line through the next two that noise explains, in standard deviations of the noise: with

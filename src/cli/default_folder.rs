@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use mops_content::numbers::file_name;
 use mops_core::Catalogue;
 use mops_language::Diagnostic;
 
 use super::past_run::PastRun;
 use super::study::Home;
-use crate::numbers::file_name;
 
 /// Returns the folder for a study of this name.
 ///

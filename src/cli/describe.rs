@@ -29,7 +29,7 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
     let criteria = catalogue.criteria.iter().map(|k| (k.name, k.schema));
     let solvers = catalogue.solvers.iter().map(|k| (k.name, k.schema));
     let mut kinds = models.chain(criteria).chain(solvers);
-    if let Some((table, schema)) = mops_file::tables().into_iter().find(|(table, _)| *table == name) {
+    if let Some((table, schema)) = mops_file::tables(catalogue).into_iter().find(|(table, _)| *table == name) {
         print(&mops_file::describe(&format!("[{table}] of a study file"), &schema))?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -48,7 +48,7 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         print(&page_of(study))?;
         return Ok(ExitCode::SUCCESS);
     }
-    let tables = mops_file::tables().into_iter().map(|(table, schema)| (format!("[{table}]"), schema));
+    let tables = mops_file::tables(catalogue).into_iter().map(|(table, schema)| (format!("[{table}]"), schema));
     let pages = keys_named(name, tables.chain(kinds.clone().map(|(kind, schema)| (kind.to_owned(), schema()))));
     if !pages.is_empty() {
         print(&pages)?;
@@ -59,7 +59,7 @@ pub(super) fn describe(catalogue: &Catalogue, arguments: &Arguments) -> Result<E
         .map(|(name, _)| name)
         .chain(catalogue.effects.iter().map(|effect| effect.name()))
         .chain(catalogue.studies.iter().map(CatalogueStudy::name))
-        .chain(mops_file::tables().into_iter().map(|(table, _)| table))
+        .chain(mops_file::tables(catalogue).into_iter().map(|(table, _)| table))
         .collect();
     let help = nearest(name, known.iter().copied()).map_or_else(
         || "`mops list` shows the kinds, effects and studies".to_owned(),

@@ -108,7 +108,9 @@ fn row(past: &PastRun) -> Vec<String> {
         Value::Null => String::new(),
         Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
         Value::String(text) => text.clone(),
-        Value::Number(value) if key == "seconds" => crate::numbers::significant(value.as_f64().unwrap_or(f64::NAN), 3),
+        Value::Number(value) if key == "seconds" => {
+            mops_content::numbers::significant(value.as_f64().unwrap_or(f64::NAN), 3)
+        }
         value => value.as_f64().map(number).unwrap_or_default(),
     };
     let keys =

@@ -1,22 +1,19 @@
 //! The command line of `mops`: commands, and the module of each.
 
 mod bench;
+mod blocks;
 mod check;
 mod compare;
 mod data;
 mod default_folder;
 mod describe;
-mod diagnose;
-mod diagnosis;
 mod effect;
 mod families;
-mod findings;
 mod history;
 mod linear_plots;
 mod linearise;
 mod list;
 mod new;
-mod pareto;
 mod past_run;
 mod pick;
 mod places;
@@ -25,19 +22,19 @@ mod reading;
 mod reference;
 mod report;
 mod resume;
-mod robustness;
 mod run;
 mod run_files;
 mod schema;
 mod simulate;
 mod study;
 mod tables;
+mod tasks;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use mops_core::{Catalogue, Task};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use mops_core::Catalogue;
 
 use crate::terminal::{CommandError, print, show_each_panic_once};
 
@@ -63,6 +60,13 @@ failed; 4 stopped by a signal, with the best point saved."
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    globals: Globals,
+}
+
+/// Options of every command.
+#[derive(Args)]
+struct Globals {
     /// Folder that contains studies, one subfolder with study.toml each; adds to the folders in MOPS_STUDIES.
     #[arg(long = "studies", value_name = "DIR", global = true, help_heading = "Global options")]
     studies: Vec<PathBuf>,
@@ -75,23 +79,10 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// Solve a study and write result.json, report.html, plots and evaluations.
+    #[command(display_order = 0)]
     Run(run::Arguments),
-    /// Compute the Pareto front (the non-dominated designs) of a design study.
-    Pareto(pareto::Arguments),
-    /// Estimate the tuners of a study from its experiments, whatever its task.
-    Calibrate(run::Arguments),
-    /// Compute sensitivities of the criteria to the tuners of a study, at its optimum.
-    Sensitivity(run::Arguments),
-    /// Vary one or two tuners of a study over a grid, as its table [sweep] says.
-    Sweep(run::Arguments),
-    /// Search the uncertain parameters of a study for the worst cases of its criteria.
-    WorstCase(run::Arguments),
-    /// Sample the uncertain parameters of a study: shares that meet the demands, distributions.
-    MonteCarlo(run::Arguments),
     /// Select the point of a Pareto front for new demands, and write a study that starts there.
     Pick(pick::Arguments),
-    /// Find the physical effect missing from a calibrated model, add it, and report the errors before and after.
-    Diagnose(diagnose::Arguments),
     /// Compare solvers on a study, over several seeds: successes, evaluations, time, profile.
     Bench(bench::Arguments),
     /// List the runs below a folder: study, date, worst scaled value, evaluations.
@@ -132,8 +123,14 @@ pub(crate) fn main(mut catalogue: Catalogue, [package, name]: [&'static str; 2],
     if has_own_code {
         program = program.version(format!("{version} (mops {})", env!("CARGO_PKG_VERSION")).leak() as &str);
     }
-    let arguments = Arguments::from_arg_matches(&program.clone().get_matches());
-    let Arguments { command, studies, readable } = arguments.unwrap_or_else(|error| error.exit());
+    program = tasks::add_commands(program, &catalogue);
+    let matches = program.clone().get_matches();
+    let of_task = tasks::parsed(&catalogue, &matches);
+    let Globals { studies, readable } = Globals::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let command = || match Arguments::from_arg_matches(&matches) {
+        Ok(arguments) => arguments.command,
+        Err(error) => error.exit(),
+    };
     if has_own_code {
         catalogue.program = match study::digest_of_program() {
             Ok(digest) => Some(digest),
@@ -144,7 +141,10 @@ pub(crate) fn main(mut catalogue: Catalogue, [package, name]: [&'static str; 2],
     let of_environment = std::env::var_os("MOPS_STUDIES").unwrap_or_default();
     let folders = std::env::split_paths(&of_environment).filter(|path| !path.as_os_str().is_empty()).chain(studies);
     match study::with_folders(catalogue, &folders.collect::<Vec<_>>()) {
-        Ok(catalogue) => perform(&catalogue, command, program),
+        Ok(catalogue) => match of_task {
+            Some(command) => command.perform(&catalogue).unwrap_or_else(|error| error.report()),
+            None => perform(&catalogue, command(), program),
+        },
         Err(mistake) => CommandError::from(mistake).report(),
     }
 }
@@ -152,14 +152,7 @@ pub(crate) fn main(mut catalogue: Catalogue, [package, name]: [&'static str; 2],
 fn perform(catalogue: &Catalogue, command: Command, mut program: clap::Command) -> ExitCode {
     let outcome = match command {
         Command::Run(arguments) => run::run(catalogue, &arguments),
-        Command::Pareto(arguments) => pareto::pareto(catalogue, &arguments),
-        Command::Calibrate(arguments) => run::run_as(catalogue, Task::Calibration, &arguments),
-        Command::Sensitivity(arguments) => run::run_as(catalogue, Task::Sensitivity, &arguments),
-        Command::Sweep(arguments) => run::run_as(catalogue, Task::Sweep, &arguments),
-        Command::WorstCase(arguments) => run::run_as(catalogue, Task::WorstCase, &arguments),
-        Command::MonteCarlo(arguments) => run::run_as(catalogue, Task::MonteCarlo, &arguments),
         Command::Pick(arguments) => pick::pick(catalogue, &arguments),
-        Command::Diagnose(arguments) => diagnose::diagnose(catalogue, &arguments),
         Command::Bench(arguments) => bench::bench(catalogue, &arguments),
         Command::History(arguments) => history::history(catalogue, &arguments),
         Command::Compare(arguments) => compare::compare(catalogue, &arguments),

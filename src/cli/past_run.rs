@@ -7,9 +7,9 @@ use std::time::UNIX_EPOCH;
 use mops_core::Catalogue;
 use mops_file::StudyFile;
 use mops_language::Diagnostic;
+use mops_tasks::room;
 use serde_json::Value;
 
-use super::run_files::DIAGNOSIS;
 use super::study::{read_at, without_settings};
 use crate::files::{self, Inputs};
 use crate::store::{self, RunRow, RunState};
@@ -60,11 +60,13 @@ impl PastRun {
     }
 
     /// Adds the files of the run that are read, and its study, to the inputs of a command.
-    pub fn add_to(&self, inputs: &mut Inputs) {
+    pub fn add_to(&self, catalogue: &Catalogue, inputs: &mut Inputs) {
         let shown = self.folder.display();
         inputs.add(&self.folder.join("result.json"), &format!("the result of the run in {shown}"));
         inputs.add(&store::file(&self.folder), &format!("the evaluations of the run in {shown}"));
-        inputs.add(&self.folder.join(DIAGNOSIS), &format!("the diagnosis in {shown}"));
+        for name in catalogue.tasks.iter().filter_map(|kind| room(kind).restored_from()) {
+            inputs.add(&self.folder.join(name), &format!("the findings in {shown}"));
+        }
         if let Some((run, _)) = &self.run {
             inputs.add(&run.home, &format!("the study of the run in {shown}"));
         }

@@ -7,7 +7,10 @@ use std::sync::Arc;
 
 use clap::Args;
 use mops_core::{Catalogue, Evaluation, Oracle, Problem, Run, Stop, Study, Usage, run::Budget};
-use mops_file::StudyFile;
+use mops_file::{
+    StudyFile, edit as toml_text,
+    edit::{TomlText, key, quoted},
+};
 use mops_language::{Diagnostic, suggestion};
 use mops_outcome::criterion_reports;
 use serde_json::Value;
@@ -18,7 +21,6 @@ use super::study::{Home, StudyArguments, inputs, open_as};
 use super::tables::met_text;
 use crate::files::{self, Outputs};
 use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
-use crate::toml_text::{self, TomlText, key, quoted};
 
 /// Options of `mops pick`.
 #[derive(Args)]

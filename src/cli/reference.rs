@@ -64,7 +64,7 @@ fn pages_of_kinds_show_the_catalogue() {
     check("models.md", &sections(catalogue.models.iter().map(|kind| (kind.name, (kind.schema)())), "Options"));
     check("criteria.md", &sections(catalogue.criteria.iter().map(|kind| (kind.name, (kind.schema)())), "Options"));
     check("solvers.md", &sections(catalogue.solvers.iter().map(|kind| (kind.name, (kind.schema)())), "Options"));
-    check("study-file.md", &sections(file::tables().into_iter(), "Keys"));
+    check("study-file.md", &sections(file::tables(&catalogue).into_iter(), "Keys"));
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn the_page_of_effects_shows_the_catalogue() {
 #[test]
 fn the_page_of_the_command_line_shows_the_help() {
     // Not the width of the terminal that runs the test.
-    let mut command = Arguments::command().term_width(100);
+    let mut command = super::tasks::add_commands(Arguments::command(), &catalogue()).term_width(100);
     command.build();
     let help = |command: &mut clap::Command| command.render_long_help().to_string();
     let mut page = format!("## mops\n\n```text\n{}```\n", help(&mut command));
@@ -190,7 +190,7 @@ fn text(schema: &Value) -> String {
 
 #[test]
 fn the_page_of_the_result_shows_its_schema() {
-    let root = mops_outcome::result_schema();
+    let root = mops_tasks::result_schema(&catalogue());
     let mut sections = Sections { root: &root, described: HashMap::new() };
     check("result-json.md", &sections.of(&Part { path: String::new(), schema: root.clone() }));
 }

@@ -4,17 +4,16 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_core::{Catalogue, Stop, Task};
+use mops_core::{Catalogue, Stop};
 use mops_language::{Diagnostic, suggestion};
+use mops_tasks::{Options, Solved, room_of};
 
 use super::past_run::PastRun;
 use super::resume;
-use super::run_files::{REPORT, check_outputs, read_diagnosis};
-use crate::files::{Inputs, Outputs};
+use super::run_files::{REPORT, check_outputs};
+use crate::files::{self, Inputs, Outputs};
 use crate::report::Report;
-use crate::search::{Options, Solved};
 use crate::store::{self, Identity, Recorder, RunRow, RunState};
-use crate::tasks::diagnosis;
 use crate::terminal::{CommandError, print};
 
 /// Arguments of `mops report`.
@@ -34,18 +33,18 @@ pub(super) fn report(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exi
     let folder = &arguments.folder;
     let past = PastRun::open(folder)?;
     let mut inputs = Inputs::default();
-    past.add_to(&mut inputs);
+    past.add_to(catalogue, &mut inputs);
     past.add_data_to(&mut inputs, &past.study(catalogue)?);
     let outputs = Outputs::besides(inputs);
     check_outputs(&outputs, folder, REPORT)?;
     let Restored { solved, text } = replay(catalogue, &past)?;
     let _lock = store::lock_folder(folder)?;
-    let Solved { outcome, problem, best, archive, front, .. } = &solved;
-    let report = Report { outcome, problem, best, archive, front, text: &text };
-    report.write_by(folder, &outputs).map_err(CommandError::cannot_write(folder))?;
-    let from = match outcome.found.diagnosis {
-        Some(_) => "the diagnosis".to_owned(),
-        None => format!("{} evaluations", outcome.evaluations),
+    let room = room_of(&catalogue.tasks, solved.outcome.task).expect("the file names a task of the catalogue");
+    Report::new(&solved, room, &text).write_by(folder, &outputs).map_err(CommandError::cannot_write(folder))?;
+    let from = if room.has_point() {
+        format!("{} evaluations", solved.outcome.evaluations)
+    } else {
+        format!("the {}", room.title().to_lowercase())
     };
     print(&format!("report.html and plots from {from} are in {}\n", folder.display()))?;
     Ok(ExitCode::SUCCESS)
@@ -61,14 +60,16 @@ fn replay(catalogue: &Catalogue, past: &PastRun) -> Result<Restored, CommandErro
             .with_help("it writes its report at the end; `mops run --watch` shows a run in progress")
             .into());
     }
-    if file.study.task() == Task::Diagnosis {
-        file.study.set_seed(run.seed);
+    let room = room_of(&catalogue.tasks, file.study.task().name()).expect("the file names a task of the catalogue");
+    if let Some(name) = room.restored_from() {
+        let mut study = file.study.clone();
+        study.set_seed(run.seed);
         let options = options(catalogue, &file.solver, run)?;
-        let mut solved = diagnosis::of(file.study.clone(), &options, read_diagnosis(folder)?);
+        let mut solved = room.restored(&study, &options, files::read(&folder.join(name)))?;
         (solved.outcome.stop, solved.outcome.seconds) = (stop(run.state), past.seconds().unwrap_or(0.0));
         return Ok(Restored { solved, text: file.source.text.clone() });
     }
-    if !resume::stores_points(&file.study) {
+    if !room.stores_points(&file.study) {
         let task = &run.task;
         return Err(Diagnostic::new(format!(
             "the run in {} is a {task}, which stores no evaluations",
@@ -77,7 +78,7 @@ fn replay(catalogue: &Catalogue, past: &PastRun) -> Result<Restored, CommandErro
         .with_help(format!("run it again: `{}`", run.command))
         .into());
     }
-    if ended_early(run) && resume::samples_uncertain(&file.study) {
+    if ended_early(run) && room.samples_uncertain(&file.study) {
         return Err(Diagnostic::new(format!(
             "the run in {} did not finish, and its findings are incomplete",
             folder.display()
@@ -153,6 +154,7 @@ fn options(
         solver,
         max_evaluations: run.max_evaluations,
         replayed,
+        tasks: catalogue.tasks.clone(),
         effects: catalogue.effects.clone(),
         ..Options::default()
     })

@@ -3,13 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use mops_core::{Stop, Study, Task, Watch, study::SensitivityMethod};
+use mops_core::{Stop, Study, Watch};
 use mops_file::StudyFile;
 use mops_language::Diagnostic;
+use mops_tasks::{EvaluationStore, Options, Room, SolveError, Solved, solve};
 
 use super::study::{Home, StudyArguments};
-use crate::search::{EvaluationStore, Options, SolveError, Solved, solves};
-use crate::solve::solve;
 use crate::store::{FinishedRun, Identity, OpenError, Recorder, RunRow, RunState, Start, row};
 use crate::terminal::CommandError;
 
@@ -50,40 +49,25 @@ impl From<OpenError> for CommandError {
     }
 }
 
-/// Returns true if the task of a study evaluates points that can be stored: a search, a sweep, or samples of uncertain
-/// parameters.
-pub(super) fn stores_points(study: &Study) -> bool {
-    solves(study) || study.task() == Task::Sweep || samples_uncertain(study)
-}
-
-/// Returns true if the task evaluates points at other values of the uncertain parameters.
-pub(super) fn samples_uncertain(study: &Study) -> bool {
-    match study.task() {
-        Task::Design => study.tasks().robust.is_some(),
-        Task::Sensitivity => study.tasks().sensitivity.method != SensitivityMethod::Local,
-        task => matches!(task, Task::WorstCase | Task::MonteCarlo),
-    }
-}
-
 /// Locks the folder of a new run and opens its database. A task that evaluates no points only adds a row to the table of runs.
 pub(super) fn open(
     (folder, start): (&Path, &Start),
     (file, study): (&StudyFile, &StudyArguments),
     home: &Home,
     options: &Options,
+    room: &dyn Room,
 ) -> Result<Recorder, CommandError> {
-    if !stores_points(&file.study) && *start != Start::Fresh {
+    if !room.stores_points(&file.study) && *start != Start::Fresh {
         return Err(Diagnostic::new("this task stores no evaluations that a later run could reuse")
             .with_help("remove --resume or --reuse; the same seed gives the same result")
             .into());
     }
     let identity = Identity::of(file, &file.study, options.solver.kind);
-    let task = serde_json::to_value(file.study.task()).expect("a task is a word");
     let run = RunRow {
         home: home.recorded(),
         settings: study.settings.clone(),
         name: file.study.name().to_owned(),
-        task: task.as_str().unwrap_or_default().to_owned(),
+        task: file.study.task().name().to_owned(),
         text: file.source.text.clone(),
         seed: file.study.seed(),
         solver: options.solver.kind.to_owned(),

@@ -1,29 +1,24 @@
 //! `mops run`: solves a study and writes the result.
 
+use mops_tasks::{Room, calibration, room_of};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use mops_core::{Catalogue, Stop, Study, StudyError, Task, Watch, catalogue::SolverChoice};
+use mops_content::numbers::counted;
+use mops_core::{Catalogue, Stop, Study, StudyError, Watch, catalogue::SolverChoice};
 use mops_file::StudyFile;
 use mops_language::{Diagnostic, suggestion};
+use mops_tasks::{DEFAULT_EVALUATIONS, Options, Solved, solves, suits};
 
-use super::run_files::{DISK_TIMEOUT, RunFiles, check_run};
-use super::study::{StudyArguments, home, open_as, outputs, without_settings};
-use super::{default_folder, diagnosis, findings, reading, resume, tables};
-use crate::numbers::counted;
-use crate::search::{DEFAULT_EVALUATIONS, Options, Solved, solves, suits};
+use super::run_files::{DISK_TIMEOUT, RunFiles, check_run, relative_path};
+use super::study::{Home, StudyArguments, home, open_as, outputs, without_settings};
+use super::{blocks, default_folder, reading, resume, tables};
 use crate::store::Start;
 use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, eprint_line, print, print_json};
 use crate::watch::{Both, Page};
-
-/// Setting made by `mops diagnose`.
-const DIAGNOSIS: &str = "study.task=\"diagnosis\"";
-
-/// Setting made by `mops pareto`.
-const PARETO: &str = "study.task=\"pareto\"";
 
 /// Options of every command that runs a study.
 #[derive(Args)]
@@ -89,53 +84,17 @@ pub(super) struct SolverOptions {
     max_evaluations: Option<u64>,
 }
 
-/// Work to be done with a study.
-pub(super) enum Search<'a> {
-    /// Task of the study, with the solver and the budget of the command line, if given.
-    Task(&'a SolverOptions),
-    /// A task other than that of the study.
-    Other(Task, &'a SolverOptions),
-    /// A diagnosis.
-    Diagnosis,
-    /// The Pareto front, with the given number of points, of the criteria in their worst case or in every case.
-    Pareto { solver_options: &'a SolverOptions, points: Option<u16>, per_case: bool },
-}
-
-impl Search<'_> {
-    /// Returns the settings that the command makes in the study.
-    fn settings(&self) -> Vec<String> {
-        match self {
-            Self::Task(_) => Vec::new(),
-            Self::Other(task, _) => {
-                let name = serde_json::to_value(task).expect("a task has a name");
-                vec![format!("study.task={name}")]
-            }
-            Self::Diagnosis => vec![DIAGNOSIS.to_owned()],
-            Self::Pareto { points, per_case, .. } => {
-                let points = points.map(|points| format!("pareto.points={points}"));
-                let per_case = per_case.then(|| "pareto.per-case=true".to_owned());
-                std::iter::once(PARETO.to_owned()).chain(points).chain(per_case).collect()
-            }
-        }
-    }
-
-    fn solver_options(&self) -> Option<&SolverOptions> {
-        match self {
-            Self::Task(solver_options) | Self::Other(_, solver_options) | Self::Pareto { solver_options, .. } => {
-                Some(solver_options)
-            }
-            Self::Diagnosis => None,
-        }
-    }
+/// What a command asks of a study.
+pub(super) struct Search<'a> {
+    /// Settings that the command makes in the study.
+    pub settings: &'a [String],
+    /// Solver and budget of the command line, if the command takes them.
+    pub solver_options: Option<&'a SolverOptions>,
 }
 
 pub(super) fn run(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    execute(catalogue, &arguments.common, &Search::Task(&arguments.solver_options))
-}
-
-/// Runs the study with another task than its own.
-pub(super) fn run_as(catalogue: &Catalogue, task: Task, arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    execute(catalogue, &arguments.common, &Search::Other(task, &arguments.solver_options))
+    let search = Search { settings: &[], solver_options: Some(&arguments.solver_options) };
+    execute(catalogue, &arguments.common, &search)
 }
 
 /// Returns the solver of the study if it has this name, or the one of the catalogue with its default options.
@@ -155,8 +114,10 @@ pub(super) fn execute(
     arguments: &CommonOptions,
     search: &Search<'_>,
 ) -> Result<ExitCode, CommandError> {
-    let mut file = open_as(catalogue, &arguments.study, &search.settings())?;
-    if arguments.export.is_some() && file.study.task() != Task::Diagnosis {
+    let mut file = open_as(catalogue, &arguments.study, search.settings)?;
+    let word = file.study.task().name();
+    let room = room_of(&catalogue.tasks, word).expect("the file names a task of the catalogue");
+    if arguments.export.is_some() && !room.can_export() {
         return Err(Diagnostic::new(
             "`--export` writes the repaired model of a diagnosis, but the task of this study is another one",
         )
@@ -166,8 +127,8 @@ pub(super) fn execute(
     if let Some(seed) = arguments.seed {
         file.study.set_seed(seed);
     }
-    let (chosen, limit) = search.solver_options().map_or((None, None), |e| (e.solver.as_deref(), e.max_evaluations));
-    let start = search.solver_options().map_or(Start::Fresh, |solver_options| solver_options.start.start());
+    let (chosen, limit) = search.solver_options.map_or((None, None), |e| (e.solver.as_deref(), e.max_evaluations));
+    let start = search.solver_options.map_or(Start::Fresh, |solver_options| solver_options.start.start());
     let solver = match chosen {
         None => file.solver.clone(),
         Some(name) => solver_named(catalogue, &file, name)?,
@@ -179,6 +140,7 @@ pub(super) fn execute(
         patience: None,
         replayed: None,
         jobs: arguments.jobs.map(usize::from),
+        tasks: catalogue.tasks.clone(),
         effects: catalogue.effects.clone(),
         keeping: None,
         cancellation: cancel_on_signal(
@@ -195,7 +157,7 @@ pub(super) fn execute(
         None => default_folder::of_study(catalogue, &home, file.study.name())?,
     };
     let outputs = outputs(&home, &file);
-    check_run(&outputs, &folder, file.study.task())?;
+    check_run(&outputs, &folder, room)?;
     let mut progress = Progress::new(talks, options.max_evaluations, &options.cancellation);
     if arguments.dashboard && !std::io::stderr().is_terminal() {
         eprint_line("note: --dashboard needs a terminal: progress is printed as lines");
@@ -208,11 +170,12 @@ pub(super) fn execute(
         }
     }
     let mut first_error = FirstError::default();
-    first_error.record(if talks { print(&introduction(&file.study, &options)) } else { Ok(()) });
-    let settings: Vec<String> = arguments.study.settings.iter().cloned().chain(search.settings()).collect();
+    first_error.record(if talks { print(&introduction(&file.study, room, &options)) } else { Ok(()) });
+    let settings: Vec<String> =
+        arguments.study.settings.iter().cloned().chain(search.settings.iter().cloned()).collect();
     // `mops report` needs the settings of the command, too.
     let asked = StudyArguments { study: arguments.study.study.clone(), settings: settings.clone() };
-    let recorder = resume::open((&folder, &start), (&file, &asked), &home, &options)?;
+    let recorder = resume::open((&folder, &start), (&file, &asked), &home, &options, room)?;
     if let Some(note) = recorder.note.as_ref().filter(|_| talks) {
         eprint_line(&format!("note: {note}"));
     }
@@ -232,20 +195,26 @@ pub(super) fn execute(
     solved.outcome.run = Some(id);
     let stopped_early = options.cancellation.requested();
     if let (Stop::TimeLimit, Some(limit)) = (solved.outcome.stop, arguments.limit.time_limit) {
-        let help = if resume::stores_points(&file.study) { "; --resume continues the run" } else { "" };
+        let help = if room.stores_points(&file.study) { "; --resume continues the run" } else { "" };
         let warning = format!("stopped at the time limit of {} s{help}", limit.as_secs_f64());
         solved.outcome.warnings.push(warning);
     }
     let cache_summary = resume::cache_summary(&start, known, &finished);
+    let locate = |path: &str| match &home {
+        Home::File(study) => relative_path(&folder, study, path),
+        Home::Shipped(_) | Home::Built(_) => path.to_owned(),
+    };
     let files = RunFiles {
         folder: &folder,
         outputs: &outputs,
         solved: &solved,
+        room,
         text: &file.source.text,
         plain: without_settings(&file.source.text, &settings),
         own: &arguments.study.settings,
         settings: &settings,
         home: &home,
+        locate: &locate,
         effects: &catalogue.effects,
         export: arguments.export.is_some(),
     };
@@ -260,7 +229,7 @@ pub(super) fn execute(
     if arguments.json {
         first_error.record(print_json(&solved.outcome));
     } else if talks {
-        first_error.record(print(&(result_text(&solved) + &cache_summary)));
+        first_error.record(print(&(result_text(&solved, room) + &cache_summary)));
     }
     if let Ok(Some(note)) = &in_place {
         eprint_line(&format!("warning: {note}"));
@@ -314,16 +283,17 @@ impl FirstError {
 }
 
 /// Formats a result as tables and sentences.
-fn result_text(solved: &Solved) -> String {
-    let tables = match &solved.outcome.found.diagnosis {
-        Some(found) => diagnosis::text(found, solved.outcome.seconds),
-        // No criteria exist without a verdict or for an analysis of inputs.
-        None if matches!(solved.outcome.task, Task::Diagnosis | Task::Excitation) => {
-            solved.outcome.warnings.iter().map(|warning| format!("warning: {warning}\n")).collect()
-        }
-        None => tables::outcome(&solved.outcome),
+fn result_text(solved: &Solved, room: &dyn Room) -> String {
+    let outcome = &solved.outcome;
+    let lines = room.lines(outcome);
+    let of_point = match (room.has_point(), lines.is_empty()) {
+        (true, _) => tables::outcome(outcome, room),
+        (false, false) => String::new(),
+        // No criteria exist without a verdict.
+        (false, true) => outcome.warnings.iter().map(|warning| format!("warning: {warning}\n")).collect(),
     };
-    tables + &findings::text(&solved.outcome)
+    let of_data = if room.has_point() { calibration::lines(outcome) } else { Vec::new() };
+    of_point + &blocks::text(&of_data) + &blocks::text(&lines)
 }
 
 /// Opens the live page of a run and prints its URL.
@@ -345,19 +315,11 @@ pub(super) fn refused(why: &StudyError, file: &StudyFile, solver: &str) -> Diagn
     }
 }
 
-fn introduction(study: &Study, options: &Options) -> String {
-    let active = study.tuners().iter().filter(|t| t.active).count();
-    if study.task() == Task::Diagnosis {
-        let experiments = study.cases().iter().filter_map(|case| case.experiment.as_ref());
-        let (count, channels) = experiments.fold((0, 0), |(n, m), e| (n + 1, m + e.channels.len()));
-        let model = &study.name();
-        return format!(
-            "{model}: {}, {} with {}; searching for missing effects\n",
-            counted(active, "tuner"),
-            counted(count, "experiment"),
-            counted(channels, "channel")
-        );
+fn introduction(study: &Study, room: &dyn Room, options: &Options) -> String {
+    if let Some(text) = room.introduction(study) {
+        return text + "\n";
     }
+    let active = study.tuners().iter().filter(|t| t.active).count();
     format!(
         "{}: {}, {} over {}, solver {}\n",
         study.name(),

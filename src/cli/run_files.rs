@@ -8,24 +8,20 @@ use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use mops_core::{Effect, Task, catalogue::Shipped};
-use mops_language::Diagnostic;
-use mops_outcome::{diagnosis::Diagnosis, robustness::MonteCarloReport};
+use mops_content::{numbers::counted, write_header};
+use mops_core::{Catalogue, Effect};
+use mops_tasks::{Origin, OutputFile, OutputNames, Room, Solved, room};
 
 use super::study::Home;
-use crate::diagnosis::{Original, predictions, repaired, source};
-use crate::files::{self, Outputs, write_header};
-use crate::numbers::counted;
+use crate::files::Outputs;
 use crate::report::Report;
-use crate::search::Solved;
 use crate::terminal::{CommandError, eprint_line};
-use crate::toml_text::settled;
 
 /// Time to wait for space on a full disk.
 pub(super) const DISK_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Outputs in the folder of every run.
-const RUN: Names = Names {
+const RUN: OutputNames = OutputNames {
     files: &[
         "result.json",
         "evaluations.csv",
@@ -39,45 +35,27 @@ const RUN: Names = Names {
 };
 
 /// Outputs of every report.
-pub(super) const REPORT: Names =
-    Names { files: &["report.html", "evaluations.lock"], folders: &[("plots", &["svg", "png"])] };
-
-/// Names of outputs that a command may write: files, and folders with the extensions of the files in them.
-#[derive(Clone, Copy)]
-pub(super) struct Names {
-    files: &'static [&'static str],
-    folders: &'static [(&'static str, &'static [&'static str])],
-}
-
-/// Further outputs of tasks.
-const OF_TASKS: [(Task, Names); 3] = [
-    (Task::MonteCarlo, Names { files: &["samples.csv"], folders: &[] }),
-    (Task::Pareto, Names { files: &["study.toml"], folders: &[] }),
-    (
-        Task::Diagnosis,
-        Names { files: &[DIAGNOSIS, "repaired.toml", "repaired.rs"], folders: &[("predictions", &["csv"])] },
-    ),
-];
+pub(super) const REPORT: OutputNames =
+    OutputNames { files: &["report.html", "evaluations.lock"], folders: &[("plots", &["svg", "png"])] };
 
 /// Checks before a run that none of its outputs would replace an input.
 ///
 /// # Errors
 /// If one would; the error names the input.
-pub(super) fn check_run(outputs: &Outputs, folder: &Path, task: Task) -> Result<(), CommandError> {
-    let of_task = OF_TASKS.into_iter().filter(|(other, _)| *other == task).map(|(_, names)| names);
-    [RUN, REPORT].into_iter().chain(of_task).try_for_each(|names| check_outputs(outputs, folder, names))
+pub(super) fn check_run(outputs: &Outputs, folder: &Path, room: &dyn Room) -> Result<(), CommandError> {
+    [RUN, REPORT, room.outputs()].into_iter().try_for_each(|names| check_outputs(outputs, folder, names))
 }
 
 /// Checks that no output of these names would replace an input.
 ///
 /// # Errors
 /// If one would; the error names the input.
-pub(super) fn check_outputs(outputs: &Outputs, folder: &Path, names: Names) -> Result<(), CommandError> {
+pub(super) fn check_outputs(outputs: &Outputs, folder: &Path, names: OutputNames) -> Result<(), CommandError> {
     paths(folder, names).try_for_each(|path| outputs.check(&path).map_err(CommandError::cannot_write(&path)))
 }
 
 /// Returns the paths of the outputs of these names: files, folders, and the files in them.
-fn paths(folder: &Path, names: Names) -> impl Iterator<Item = PathBuf> {
+fn paths(folder: &Path, names: OutputNames) -> impl Iterator<Item = PathBuf> {
     let files = names.files.iter().map(|name| folder.join(name));
     let folders = names.folders.iter().map(|(name, ends)| (folder.join(name), ends));
     let below = folders.flat_map(|(folder, ends)| {
@@ -90,8 +68,8 @@ fn paths(folder: &Path, names: Names) -> impl Iterator<Item = PathBuf> {
 }
 
 /// Returns the paths of all files that a run of any task may have written into a folder.
-pub(super) fn of_any_run(folder: &Path) -> Vec<PathBuf> {
-    let of_tasks = OF_TASKS.into_iter().map(|(_, names)| names);
+pub(super) fn of_any_run(catalogue: &Catalogue, folder: &Path) -> Vec<PathBuf> {
+    let of_tasks = catalogue.tasks.iter().map(|kind| room(kind).outputs());
     [RUN, REPORT].into_iter().chain(of_tasks).flat_map(|names| paths(folder, names)).collect()
 }
 
@@ -100,6 +78,7 @@ pub(super) struct RunFiles<'a> {
     pub folder: &'a Path,
     pub outputs: &'a Outputs,
     pub solved: &'a Solved,
+    pub room: &'a dyn Room,
     /// Text of the study with all settings.
     pub text: &'a str,
     /// Text of the study without settings.
@@ -109,6 +88,8 @@ pub(super) struct RunFiles<'a> {
     /// Settings of the command line, and those made by the command itself.
     pub settings: &'a [String],
     pub home: &'a Home,
+    /// Converts the path of a data file from relative to the study to relative to the folder of the run.
+    pub locate: &'a dyn Fn(&str) -> String,
     pub effects: &'a [Arc<dyn Effect>],
     /// True if the repaired model is also written as source code.
     pub export: bool,
@@ -141,12 +122,7 @@ impl RunFiles<'_> {
         let Self { folder, outputs, solved, .. } = *self;
         let evaluations = folder.join("evaluations.csv");
         write_evaluations(outputs, &evaluations, solved).map_err(CommandError::cannot_write(&evaluations))?;
-        if let Some(found) = &solved.outcome.found.monte_carlo {
-            let samples = folder.join("samples.csv");
-            write_samples(outputs, &samples, found).map_err(CommandError::cannot_write(&samples))?;
-        }
-        let Solved { outcome, problem, best, archive, front } = solved;
-        let missing = Report { outcome, problem, best, archive, front, text: self.text }
+        let missing = Report::new(solved, self.room, self.text)
             .write_by(folder, outputs)
             .map_err(CommandError::cannot_write(folder))?;
         if missing > 0 {
@@ -156,34 +132,36 @@ impl RunFiles<'_> {
                 folder.display()
             ));
         }
-        if let Some(diagnosis) = &outcome.found.diagnosis {
-            let (text, settings, study) = (self.plain, self.own, problem.study());
-            let original = Original { text, settings, study, effects: self.effects };
-            write_diagnosis((folder, outputs), diagnosis, &original, self.home, self.export)?;
+        for OutputFile { path, bytes } in self.room.files(&solved.into(), &self.origin()) {
+            let path = folder.join(path);
+            let parent = path.parent().unwrap_or(folder);
+            if parent != folder {
+                outputs.folder(parent).map_err(CommandError::cannot_write(parent))?;
+            }
+            outputs.write(&path, bytes).map_err(CommandError::cannot_write(&path))?;
         }
-        if outcome.task == Task::Pareto {
-            write_study((folder, outputs), self.plain, self.settings, self.home)?;
-        }
-        let written = match outcome.task {
-            Task::Pareto => Some("study.toml"),
-            Task::Diagnosis => Some("repaired.toml"),
-            _ => None,
-        };
-        Ok(written.map(|name| folder.join(name)).filter(|path| path.is_file()))
+        Ok(self.room.written_study().map(|name| folder.join(name)).filter(|path| path.is_file()))
     }
-}
 
-/// Writes one line per sample: uncertain parameters, criteria.
-fn write_samples(outputs: &Outputs, path: &Path, found: &MonteCarloReport) -> io::Result<()> {
-    outputs.write_csv(path, |writer| {
-        let parameters = found.parameters.iter().map(|p| format!("{}[{}]", p.name, p.unit));
-        let criteria = found.criteria.iter().map(|c| format!("{}/{}[{}]", c.of.case, c.of.criterion, c.of.unit));
-        write_header(writer, parameters.chain(criteria))?;
-        for (parameters, values) in &found.table {
-            writer.write_record(parameters.iter().chain(values).map(f64::to_string))?;
+    /// Returns where the study comes from.
+    fn origin(&self) -> Origin<'_> {
+        Origin {
+            text: match self.home {
+                Home::Built(_) => None,
+                Home::File(_) | Home::Shipped(_) => Some(self.plain),
+            },
+            own: self.own,
+            settings: self.settings,
+            shipped: match self.home {
+                Home::Shipped(shipped) => Some(shipped),
+                Home::File(_) | Home::Built(_) => None,
+            },
+            locate: self.locate,
+            folder: self.folder,
+            effects: self.effects,
+            is_exported: self.export,
         }
-        Ok(())
-    })
+    }
 }
 
 /// Writes one line per point: tuners, criteria, objective, violation.
@@ -199,102 +177,6 @@ fn write_evaluations(outputs: &Outputs, path: &Path, solved: &Solved) -> io::Res
         }
         Ok(())
     })
-}
-
-/// File with everything that a diagnosis found, from which `mops report` writes its page again.
-pub(super) const DIAGNOSIS: &str = "diagnosis.toml";
-
-/// Returns the text of [`DIAGNOSIS`]: TOML has numbers that are not finite, JSON has not.
-fn diagnosis_toml(diagnosis: &Diagnosis) -> String {
-    toml::to_string(diagnosis).expect("a diagnosis is a table")
-}
-
-/// Reads the diagnosis that a run left in its folder.
-///
-/// # Errors
-/// The run left none, or it cannot be read.
-pub(super) fn read_diagnosis(folder: &Path) -> Result<Diagnosis, Diagnostic> {
-    let path = folder.join(DIAGNOSIS);
-    let refused = |why: String| {
-        Diagnostic::new(format!("{} cannot be read: {why}", path.display()))
-            .with_help("a diagnosis that reached a verdict writes it; `mops diagnose` runs one")
-    };
-    let text = files::read(&path).map_err(|error| refused(error.to_string()))?;
-    let text = String::from_utf8(text).map_err(|error| refused(error.to_string()))?;
-    toml::from_str(&text).map_err(|error| refused(error.message().to_owned()))
-}
-
-/// Writes `predictions/<experiment>.csv`; if the model was changed, also `repaired.toml` and, with `export`, `repaired.rs`.
-fn write_diagnosis(
-    (folder, outputs): (&Path, &Outputs),
-    diagnosis: &Diagnosis,
-    original: &Original<'_>,
-    home: &Home,
-    export: bool,
-) -> Result<(), CommandError> {
-    write(outputs, &folder.join(DIAGNOSIS), diagnosis_toml(diagnosis).as_bytes())?;
-    let predicted = folder.join("predictions");
-    outputs.folder(&predicted).map_err(CommandError::cannot_write(&predicted))?;
-    for (name, table) in predictions(diagnosis) {
-        write(outputs, &predicted.join(format!("{name}.csv")), table.as_bytes())?;
-    }
-    if !diagnosis.changes_study() {
-        return Ok(());
-    }
-    let text = match home {
-        Home::File(study) => repaired(original, diagnosis, &|path| relative_path(folder, study, path)),
-        Home::Shipped(shipped) => {
-            copy_data((folder, outputs), shipped)?;
-            repaired(original, diagnosis, &str::to_owned)
-        }
-        // A study built in Rust has no text to be repaired.
-        Home::Built(_) => return Ok(()),
-    };
-    write(outputs, &folder.join("repaired.toml"), text.as_bytes())?;
-    if export {
-        write(
-            outputs,
-            &folder.join("repaired.rs"),
-            source(&text, diagnosis, &folder.display().to_string()).as_bytes(),
-        )?;
-    }
-    Ok(())
-}
-
-/// Writes `study.toml`, the study of a Pareto front with its settings, for `mops pick`.
-fn write_study(
-    (folder, outputs): (&Path, &Outputs),
-    text: &str,
-    settings: &[String],
-    home: &Home,
-) -> Result<(), CommandError> {
-    let text = match home {
-        Home::File(study) => settled(text, settings, &|path| relative_path(folder, study, path)),
-        Home::Shipped(shipped) => {
-            copy_data((folder, outputs), shipped)?;
-            settled(text, settings, &str::to_owned)
-        }
-        Home::Built(_) => return Ok(()),
-    };
-    write(outputs, &folder.join("study.toml"), text.into_text().as_bytes())
-}
-
-fn write(outputs: &Outputs, path: &Path, bytes: &[u8]) -> Result<(), CommandError> {
-    outputs.write(path, bytes).map_err(CommandError::cannot_write(path))
-}
-
-/// Copies the data of a shipped study into the folder of the repaired study, which reads them there.
-fn copy_data((folder, outputs): (&Path, &Outputs), shipped: &Shipped) -> Result<(), CommandError> {
-    let is_data = |name: &str| ["csv", "mat"].iter().any(|end| Path::new(name).extension().is_some_and(|e| e == *end));
-    for (name, bytes) in shipped.files.iter().filter(|(name, _)| is_data(name)) {
-        let path = folder.join(name);
-        let parent = path.parent().unwrap_or(folder);
-        if parent != folder {
-            outputs.folder(parent).map_err(CommandError::cannot_write(parent))?;
-        }
-        write(outputs, &path, bytes)?;
-    }
-    Ok(())
 }
 
 /// Converts the path of a data file from relative to the study to relative to `folder`.
@@ -323,59 +205,7 @@ fn relative(folder: &Path, file: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use mops_core::Catalogue;
-    use mops_outcome::diagnosis::Removed;
-
-    use super::super::study::{StudyArguments, home, open};
     use super::*;
-    use crate::diagnosis::made_up;
-
-    #[test]
-    fn a_diagnosis_is_read_back_as_it_was_written() {
-        let folder = tempfile::tempdir().unwrap();
-        for mut diagnosis in [made_up::coulomb(), made_up::nothing(), made_up::unexplained()] {
-            diagnosis.p_value = f64::NAN;
-            fs::write(folder.path().join(DIAGNOSIS), diagnosis_toml(&diagnosis)).unwrap();
-            let read = read_diagnosis(folder.path()).unwrap();
-            assert_eq!(format!("{read:?}"), format!("{diagnosis:?}"));
-        }
-        fs::write(folder.path().join(DIAGNOSIS), "verdict = 3").unwrap();
-        assert!(read_diagnosis(folder.path()).unwrap_err().message.contains("diagnosis.toml cannot be read"));
-    }
-
-    #[test]
-    fn the_repaired_study_of_a_shipped_study_can_be_run_in_its_folder() {
-        let catalogue = crate::catalogue();
-        let (folder, outputs) = (tempfile::tempdir().unwrap(), Outputs::default());
-        let arguments = |study: &str| StudyArguments { study: study.into(), settings: Vec::new() };
-        let removed = vec![Removed { term: "bp".into(), place: "joint:theta".into() }];
-        let mut diagnosis = made_up::coulomb();
-        diagnosis.found = Vec::new();
-        diagnosis.removed = removed;
-        let shipped = arguments("furuta-swing");
-        let file = open(&catalogue, &shipped).unwrap();
-        let (text, study, effects) = (file.source.text.as_str(), &file.study, catalogue.effects.as_slice());
-        let original = Original { text, settings: &[], study, effects };
-        let result =
-            write_diagnosis((folder.path(), &outputs), &diagnosis, &original, &home(&catalogue, &shipped), true);
-        assert!(result.is_ok());
-        for name in ["predictions/swing.csv", "predictions/push.csv", "repaired.rs", "data/upright.csv"] {
-            assert!(folder.path().join(name).is_file(), "{name}");
-        }
-        let again = open(&catalogue, &arguments(folder.path().join("repaired.toml").to_str().unwrap())).unwrap();
-        assert_eq!((again.study.cases().len(), again.study.tuners().len()), (2, file.study.tuners().len() - 1));
-        // The data of a study in a file are not copied.
-        let below = folder.path().join("below");
-        fs::create_dir(&below).unwrap();
-        let own = arguments(folder.path().join("repaired.toml").to_str().unwrap());
-        assert!(write_diagnosis((&below, &outputs), &diagnosis, &original, &home(&catalogue, &own), false).is_ok());
-        assert!(!below.join("data").exists() && !below.join("repaired.rs").exists());
-        // No run has its database there.
-        let again = arguments(below.join("repaired.toml").to_str().unwrap());
-        assert!(open(&catalogue, &again).is_err());
-        let reading = Catalogue { readable: vec![folder.path().to_owned()], ..catalogue };
-        assert!(open(&reading, &again).is_ok());
-    }
 
     #[test]
     fn data_paths_are_converted_to_the_folder_of_the_result() {

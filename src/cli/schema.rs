@@ -1,5 +1,6 @@
 //! `mops schema`: prints the JSON schema of study files or of results.
 
+use mops_tasks::result_schema;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
@@ -28,7 +29,7 @@ pub(super) enum File {
 pub(super) fn text(of: File, catalogue: &Catalogue) -> String {
     let schema = match of {
         File::Study => mops_file::study_schema(catalogue),
-        File::Result => mops_outcome::result_schema(),
+        File::Result => result_schema(catalogue),
     };
     serde_json::to_string_pretty(&schema).expect("a schema is JSON") + "\n"
 }

@@ -5,15 +5,19 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Args;
+use mops_content::{
+    numbers::{FileNames, counted},
+    sampling::points,
+    write_header,
+};
 use mops_core::{Analysis, Catalogue, Failure, Problem, Response, Study, Usage, study::JobPlan};
 use mops_language::{Diagnostic, Quantity, suggestion};
 
 use super::families::{folded, runs, spelled};
 use super::study::{StudyArguments, home, open, outputs};
 use super::tables::criteria;
-use crate::files::{Outputs, write_header};
-use crate::numbers::{FileNames, counted};
-use crate::report::{Color, Curve, Plot, points};
+use crate::files::Outputs;
+use crate::report::{Color, Curve, Draw, Plot};
 use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 
 /// Arguments of `mops simulate`.

@@ -9,12 +9,11 @@ use mops_core::{
     Catalogue,
     catalogue::{BuiltStudy, CatalogueStudy, Shipped, StudyFolder},
 };
-use mops_file::StudyFile;
+use mops_file::{StudyFile, edit::quoted};
 use mops_language::{Diagnostic, Source, suggestion};
 
 use super::reading;
 use crate::files::{Inputs, Outputs};
-use crate::toml_text::quoted;
 
 /// Study and settings that override it.
 #[derive(Args)]

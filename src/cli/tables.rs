@@ -1,9 +1,13 @@
 //! Tables of criteria and tuners on the terminal, and the summary of a run.
 
-use mops_core::{Stop, Task, Usage};
+use mops_content::numbers::counted;
+use mops_core::{Stop, Usage};
 use mops_outcome::{CriterionReport, Outcome};
+use mops_tasks::{
+    Room,
+    uncertain::{MonteCarloReport, WorstCaseReport},
+};
 
-use crate::numbers::counted;
 use crate::terminal::{number, table};
 
 /// Formats the criteria at the start values and at another point, side by side.
@@ -68,7 +72,7 @@ pub(super) fn met_text(criterion: &CriterionReport) -> &'static str {
 /// Formats the value of a criterion, with enough digits to distinguish it from a demand that it misses.
 fn value_text(criterion: &CriterionReport) -> String {
     let limit = criterion.demand.or(criterion.bad).filter(|_| criterion.met == Some(false));
-    crate::numbers::apart(criterion.value, limit, 6)
+    mops_content::numbers::apart(criterion.value, limit, 6)
 }
 
 /// Formats a table without some of its columns. Columns that contain only numbers are aligned to the right.
@@ -85,10 +89,10 @@ fn without(left_out: &[usize], header: &[&str], mut rows: Vec<Vec<String>>) -> S
 }
 
 /// Formats the outcome of a run: criteria, tuners, calibration errors, failures, warnings and a summary.
-pub(super) fn outcome(outcome: &Outcome) -> String {
+pub(super) fn outcome(outcome: &Outcome, room: &dyn Room) -> String {
     let solved = outcome.solver != "none";
     let best_name = if solved { "optimum" } else { "start" };
-    let summed = outcome.task == Task::Calibration;
+    let summed = !room.judges_demands();
     let mut text = String::new();
     if let Some(doubt) = outcome.end.as_ref().and_then(|end| end.doubt.as_ref()) {
         text += &format!("\n{doubt}\n");
@@ -182,17 +186,17 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
         }
         _ => "no point has a value; ".to_owned(),
     };
-    let demands = match (outcome.task, counts(&[Usage::Minimise], true)) {
-        (Task::Calibration, _) => String::new(),
+    let demands = match (summed, counts(&[Usage::Minimise], true)) {
+        (true, _) => String::new(),
         _ if counts(&[Usage::Minimise], false) == 0 => "nothing to minimise; ".to_owned(),
         (_, 0) if outcome.feasible => "all demands met; ".to_owned(),
         (_, 0) => "all other demands met; ".to_owned(),
         (_, 1) => "1 demand missed; ".to_owned(),
         (_, n) => format!("{n} demands missed; "),
     };
-    let reached = match outcome.task {
+    let reached = match summed {
         _ if counts(&[Usage::Minimise], false) == 0 => String::new(),
-        Task::Calibration => {
+        true => {
             format!("objective {} (start {}); ", number(outcome.objective), number(outcome.start.objective))
         }
         _ if !solved => format!("worst scaled value {}; ", number(outcome.worst_scaled)),
@@ -202,7 +206,7 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
         }
     };
     // The effect of uncertain parameters follows below.
-    let nominal = outcome.found.worst_case.is_some() || outcome.found.monte_carlo.is_some();
+    let nominal = outcome.found.get::<WorstCaseReport>().is_some() || outcome.found.get::<MonteCarloReport>().is_some();
     let nominal = if nominal { "without uncertainty: " } else { "" };
     let stop = if solved { stop } else { "start values only, no optimisation" };
     text += &format!(

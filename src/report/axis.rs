@@ -82,7 +82,7 @@ fn decades([low, high]: [f64; 2]) -> Vec<(f64, String)> {
             let at = f64::from(power) + math::log10(*step);
             if at >= low - 1e-9 && at <= high + 1e-9 {
                 let label = match power {
-                    -3..=3 => crate::numbers::significant(step * math::powi(10.0, power), 1),
+                    -3..=3 => mops_content::numbers::significant(step * math::powi(10.0, power), 1),
                     _ if *step == 1.0 => format!("10{}", superscript(power)),
                     _ => format!("{step}\u{b7}10{}", superscript(power)),
                 };
@@ -100,7 +100,7 @@ fn close(low: f64, high: f64) -> Vec<(f64, String)> {
     (0..=12)
         .map(|i| ((from / step - 1e-9).ceil() + f64::from(i)) * step)
         .filter(|&value| value <= to * (1.0 + 1e-9))
-        .map(|value| ((math::log10(value) - low) / (high - low), crate::numbers::significant(value, 4)))
+        .map(|value| ((math::log10(value) - low) / (high - low), mops_content::numbers::significant(value, 4)))
         .collect()
 }
 

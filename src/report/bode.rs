@@ -6,7 +6,7 @@ use mops_linear::{Complex, StateSpace, zeros};
 use mops_math as math;
 use mops_math::complex;
 
-use super::plot::{Curve, Plot};
+use mops_content::plot::{Curve, Plot};
 
 /// Response of a system with one input and one output at the frequencies of a plot.
 #[derive(Debug, Clone)]

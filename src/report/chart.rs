@@ -1,15 +1,20 @@
 //! Interactive plots of a page: data for the script `charts.js`, which draws them with uPlot in place of the SVG.
 
-use maud::{Markup, PreEscaped, html};
 use mops_core::criterion::Side;
+
+use super::Draw;
+use maud::{Markup, PreEscaped, html};
 use serde_json::{Value, json};
 
+use mops_content::{
+    plot::{Bound, Color, Curve, CurveStyle, Level, Plot},
+    sampling::thinned,
+};
+use mops_language::plain::escaped;
+
 use super::clip::{Point, simplified};
-use super::plot::{Bound, Color, Curve, CurveStyle, Level, Plot};
 use super::range::{drawable, x_range, y_range};
-use super::sampling::thinned;
 use super::svg::class;
-use crate::plain::escaped;
 
 /// Style sheet and scripts of pages with interactive plots. uPlot 1.6.32: <https://github.com/leeoniya/uPlot>, MIT licence.
 pub(crate) const STYLE: &str = include_str!("../../assets/uPlot.min.css");

@@ -1,10 +1,13 @@
 //! Plots of a signal at the initial guess and at the reported point, with measurements if there are any.
 
-use mops_core::{Analysis, Failure, Trace, Variable, case::Channel, criterion::Mark, study::Row};
+use mops_content::marks::bounds;
+use mops_core::{Analysis, Failure, Trace, Variable, case::Channel, study::Row};
 
-use super::plot::{Band, Bound, Color, Curve, CurveStyle, Plot};
-use super::sampling;
-use crate::numbers::{labelled, with_unit};
+use mops_content::{
+    numbers::{labelled, with_unit},
+    plot::{Band, Color, Curve, CurveStyle, Plot},
+    sampling,
+};
 
 /// Analyses at the initial guess and at the reported point.
 pub(super) struct Comparison {
@@ -96,20 +99,6 @@ impl Comparison {
             ..over_time(signal)
         })
     }
-}
-
-/// Returns the bounds of criteria on a signal: limits of demands, edges of bands.
-pub(super) fn bounds(signal: &str, rows: &[&Row], analysis: &Analysis) -> Vec<Bound> {
-    let marks = rows.iter().flat_map(|row| row.criterion.marks(&row.demand, analysis));
-    let of_signal = marks.filter(|mark| mark.signal == signal && mark.values.iter().all(|value| value.is_finite()));
-    let bound = |Mark { label, times, values, excluded, .. }| Bound {
-        name: label,
-        x: times,
-        y: values,
-        excluded,
-        applies_to: Vec::new(),
-    };
-    of_signal.map(bound).collect()
 }
 
 pub(super) fn trace<'a>(analysis: &'a Result<Analysis, Failure>, signal: &str) -> Option<&'a Trace> {

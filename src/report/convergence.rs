@@ -1,10 +1,12 @@
 //! Convergence: objective and constraint violation of the best point over the evaluations.
 
-use mops_core::{Merit, Objective, Study, Task, Usage, evaluation::FEASIBLE, run::Record};
+use mops_core::{Merit, Objective, Study, Usage, evaluation::FEASIBLE, run::Record};
 
-use super::figures::{Figure, Group};
-use super::plot::{Color, Curve, CurveStyle, Level, Plot};
-use crate::numbers::counted;
+use mops_content::{
+    figures::{Figure, Group},
+    numbers::counted,
+    plot::{Color, Curve, CurveStyle, Level, Plot},
+};
 
 /// Returns the plots of objective and violation over the evaluations.
 pub(super) fn group(study: &Study, archive: &[Record]) -> Group {
@@ -72,7 +74,7 @@ fn objective(study: &Study, archive: &[Record], best: &[(usize, Merit)]) -> Plot
     ];
     // A worst scaled value of 1 is the demand only without weights.
     let weighted = study.rows().iter().any(|row| row.usage == Usage::Minimise && row.weight != 1.0);
-    let demanded = study.task() == Task::Design && study.objective() == Objective::Max && !weighted;
+    let demanded = study.task().chooses_tuners() && study.objective() == Objective::Max && !weighted;
     let levels = if demanded { vec![Level { name: "demand".into(), value: 1.0 }] } else { Vec::new() };
     Plot {
         title: "Objective at the best point".into(),

@@ -1,12 +1,12 @@
 //! Table of criteria, with bars that mark the demand.
 
 use maud::{Markup, html};
-use mops_core::{Task, Usage};
+use mops_content::numbers::{apart, number, significant, with_unit};
+use mops_core::Usage;
 use mops_outcome::CriterionReport;
 
 use super::Report;
-use super::page::scrolling;
-use crate::numbers::{apart, number, significant, with_unit};
+use super::markup::{parts, scrolling};
 
 /// Returns the demand of a criterion, with its unit; `None` without a demand.
 pub(super) fn demand(criterion: &CriterionReport) -> Option<String> {
@@ -27,7 +27,7 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
     let models = report.problem.study().models().len() > 1;
     let cases = report.problem.study().cases().len() > 1;
     // Without a solver there is only one point. The sum of a calibration has no demand.
-    let (two, demands) = (outcome.solver != "none", outcome.task != Task::Calibration);
+    let (two, demands) = (outcome.solver != "none", report.room.judges_demands());
     let shape = report.problem.shape();
     let rows = outcome.criteria.iter().zip(&outcome.start.criteria).zip(&shape.rows);
     let rows_and_head = html! {
@@ -69,16 +69,7 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
     };
     html! {
         p {
-            @if outcome.task == Task::Calibration {
-                "The objective is the sum of the scaled values (value / demand) of the calibration data: "
-                strong { (number(outcome.objective)) }
-                @if two { ", at the initial guess " (number(outcome.start.objective)) } ". "
-            } @else {
-                "Scaled value = value / demand: 0 is ideal, at most 1 means the demand is met. "
-            }
-            @if outcome.task == Task::Design {
-                "The objective is the largest weighted scaled value among the minimised criteria."
-            }
+            (parts(&report.room.about_criteria(outcome)))
         }
         (scrolling("Criteria", rows_and_head))
     }

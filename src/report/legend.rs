@@ -2,8 +2,9 @@
 
 use std::collections::HashSet;
 
+use mops_content::plot::{Color, CurveStyle, Plot};
+
 use super::clip::{Frame, Point};
-use super::plot::{Color, CurveStyle, Plot};
 use super::scene::{ADVANCE, Anchor, Mark, SIZE, Scene};
 
 impl Scene {

@@ -1,11 +1,11 @@
 //! Criteria by case: a table of scaled values, shaded by the distance from the demand.
 
 use maud::{Markup, html};
+use mops_content::numbers::{significant, with_unit};
 use mops_core::Usage;
 use mops_outcome::{CriterionReport, Outcome};
 
-use super::page::scrolling;
-use crate::numbers::{significant, with_unit};
+use super::markup::scrolling;
 
 /// Returns the table: a row for every case, a column for every criterion, and the worst of each. `None` for fewer than two
 /// cases with demands.

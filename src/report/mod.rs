@@ -2,62 +2,51 @@
 
 mod axis;
 mod bode;
-mod calibration;
 mod chart;
 mod clip;
 mod comparison;
-mod contour;
 mod convergence;
 mod criteria;
-mod diagnosis;
-mod excitation;
-mod figures;
 mod front;
-mod jumps;
 mod legend;
+mod markup;
 mod matrix;
 mod nyquist;
 mod page;
 mod parallel_axes;
-mod plot;
 mod plot_files;
 mod png;
 mod range;
 mod responses;
-mod robustness;
-mod sampling;
 mod scene;
-mod sensitivity;
 mod side_by_side;
-mod slopes;
 mod space;
 mod surface;
 mod svg;
-mod sweep;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_of_diagnosis;
 mod tuners;
-mod uncertainty;
-mod verdict;
 
 use std::io;
 use std::path::Path;
 
-use mops_core::{Evaluation, Problem, Stop, Task, run::Record};
+use mops_content::numbers::FileNames;
+use mops_core::{Evaluation, Problem, run::Record};
 use mops_outcome::Outcome;
+use mops_tasks::{Room, Solution, Solved, calibration};
 
 use crate::files::Outputs;
-use crate::numbers::FileNames;
 
 pub(crate) use bode::{FrequencyCurve, bode};
 pub(crate) use chart::{SCRIPTS, STYLE as CHART_STYLE};
+pub use mops_content::plot::{Band, Color, Curve, CurveStyle, Level, ParallelAxis, Plot, Surface, ZAxis};
 pub(crate) use nyquist::nyquist;
 pub use page::page;
-pub use plot::{Band, Color, Curve, CurveStyle, Level, ParallelAxis, Plot, Surface, ZAxis};
 use plot_files::PlotFiles;
 pub(crate) use responses::live;
-pub(crate) use sampling::{points, thinned};
-pub(crate) use sensitivity::combination;
+use scene::Scene;
 pub(crate) use side_by_side::{Responses, Rows, comparison_page};
 
 /// Style sheet of all pages.
@@ -75,8 +64,24 @@ pub struct Report<'a> {
     pub archive: &'a [Record],
     /// Points of the Pareto front, in the order of the result; empty for other tasks.
     pub front: &'a [Evaluation],
+    /// What performed the task.
+    pub room: &'a dyn Room,
     /// Text of the study file, with its settings.
     pub text: &'a str,
+}
+
+impl<'a> Report<'a> {
+    /// Creates the report of a solved study; `text` is that of its file, with its settings.
+    pub fn new(solved: &'a Solved, room: &'a dyn Room, text: &'a str) -> Self {
+        let Solution { outcome, problem, best, archive, front } = solved.into();
+        Self { outcome, problem, best, archive, front, room, text }
+    }
+
+    /// Returns the result with what it rests on.
+    fn solution(&self) -> Solution<'_> {
+        let Self { outcome, problem, best, archive, front, .. } = *self;
+        Solution { outcome, problem, best, archive, front }
+    }
 }
 
 impl Report<'_> {
@@ -93,36 +98,20 @@ impl Report<'_> {
     pub(crate) fn write_by(&self, folder: &Path, outputs: &Outputs) -> io::Result<usize> {
         let plots = folder.join("plots");
         outputs.folder(&plots)?;
+        let of = self.solution();
         let (responses, omitted) = responses::groups(self);
-        let convergence = self.searched().then(|| convergence::group(self.problem.study(), self.archive));
-        let front = front::group(self);
-        let sweep = self.outcome.found.sweep.as_ref().map(|sweep| sweep::group(sweep, self.best_name()));
-        let inputs = match &self.outcome.found.excitation {
-            Some(found) => Some(&found.inputs),
-            None => self.outcome.calibration.as_ref().map(|calibration| &calibration.excitation),
-        };
-        let excitation = inputs.filter(|inputs| !inputs.is_empty()).map(|inputs| excitation::group(inputs));
-        let diagnosis = self.outcome.found.diagnosis.as_ref().map(diagnosis::Plots::of);
-        let robustness = robustness::sections(self);
-        let uncertainty = self.outcome.found.uncertainty.as_ref().map(uncertainty::group);
-        let sections = page::Plots {
+        let convergence =
+            self.room.has_convergence(&of).then(|| convergence::group(self.problem.study(), self.archive));
+        let content = page::Content {
+            findings: self.room.findings(&of),
+            details: self.room.details(&of),
             responses,
             omitted,
             convergence,
-            front,
-            sweep,
-            excitation,
-            diagnosis,
-            robustness,
-            uncertainty,
+            calibration: calibration::sections(self.outcome),
         };
-        let findings =
-            [&sections.convergence, &sections.front, &sections.sweep, &sections.excitation, &sections.uncertainty];
-        let groups = sections.responses.iter().chain(findings.into_iter().flatten());
-        let groups = groups.chain(sections.robustness.iter().map(|section| &section.group));
-        let groups = groups.chain(sections.diagnosis.iter().flat_map(diagnosis::Plots::groups));
         let mut names = FileNames::default();
-        let figures = groups.flat_map(|group| &group.figures).filter(|figure| figure.on_request.is_none());
+        let figures = content.groups().flat_map(|group| &group.figures).filter(|figure| figure.on_request.is_none());
         let figures = figures.flat_map(|figure| &figure.plots);
         let all: Vec<(String, &Plot)> = figures.map(|(name, plot)| (names.unique(name), plot)).collect();
         let earlier = PlotFiles::of(&plots, outputs);
@@ -137,29 +126,35 @@ impl Report<'_> {
             outputs.write(&plots.join(format!("{name}.png")), plot.png()?)?;
         }
         earlier.remove_others(all.iter().take(all.len() - missing).map(|(name, _)| name.as_str()))?;
-        outputs.write(&folder.join("report.html"), page::of(self, &sections).into_string())?;
+        outputs.write(&folder.join("report.html"), page::of(self, &content).into_string())?;
         Ok(missing)
-    }
-
-    /// Returns true if the result is that of a single search, so that its convergence can be plotted.
-    fn searched(&self) -> bool {
-        match self.outcome.task {
-            // Each round of a design against worst cases has its own objective.
-            Task::Design | Task::Calibration | Task::Pareto => self.outcome.found.robust.is_none(),
-            Task::Sensitivity => self.archive.len() > 1,
-            Task::Excitation | Task::Sweep | Task::Diagnosis => false,
-            Task::WorstCase | Task::MonteCarlo => self.archive.len() > 1,
-        }
     }
 
     /// Returns the name of the reported point: `optimum` only if the solver converged to a feasible point.
     fn best_name(&self) -> &'static str {
-        if self.outcome.solver == "none" {
-            "initial guess"
-        } else if self.outcome.stop == Stop::Converged && self.outcome.feasible {
-            "optimum"
-        } else {
-            "best point"
-        }
+        self.solution().best_name()
+    }
+}
+
+/// Drawing of a plot.
+pub trait Draw {
+    /// Returns the plot as an SVG document, which can be embedded in a page. Every element also has a class (`result`,
+    /// `start`, ...), so that the style sheet of a page can change its colours.
+    fn svg(&self) -> String;
+
+    /// Returns the plot as a PNG file, with two pixels per unit of the SVG.
+    ///
+    /// # Errors
+    /// If a mark cannot be drawn.
+    fn png(&self) -> io::Result<Vec<u8>>;
+}
+
+impl Draw for Plot {
+    fn svg(&self) -> String {
+        svg::document(&Scene::of(self), &self.title, &self.description())
+    }
+
+    fn png(&self) -> io::Result<Vec<u8>> {
+        png::document(&Scene::of(self))
     }
 }

@@ -1,11 +1,11 @@
 //! Nyquist plot of a loop transfer function.
 
+use mops_content::plot::{Color, Curve, CurveStyle, Plot};
 use mops_linear::Complex;
 use mops_math as math;
 use mops_math::complex;
 
 use super::bode::FrequencyCurve;
-use super::plot::{Color, Curve, CurveStyle, Plot};
 
 /// Returns the plot of a response at increasing frequencies, in the neighbourhood of -1, and of the static gain if that is
 /// moderate. With the maximum sensitivity Ms it has the circle of radius 1/Ms about -1, which the curve touches.
@@ -29,7 +29,7 @@ pub(crate) fn nyquist(response: &FrequencyCurve, peak: Option<f64>, name: &str) 
         curve("-1", vec![(-1.0, 0.0)], CurveStyle::Crosses, Color::Demand),
     ];
     if let Some(peak) = peak.filter(|peak| peak.is_finite()) {
-        let name = format!("Ms = {}", crate::numbers::significant(peak, 3));
+        let name = format!("Ms = {}", mops_content::numbers::significant(peak, 3));
         curves.insert(1, curve(&name, circle(-1.0, 1.0 / peak), CurveStyle::Line, Color::Measured));
     }
     Plot {

@@ -2,30 +2,36 @@
 //! tables interactive.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use mops_core::Task;
-use mops_outcome::CalibrationReport;
-
-use super::figures::{Figure, Group};
-use super::verdict::{self, Tone};
-use super::{
-    Report, calibration, chart, criteria, diagnosis, excitation, front, jumps, matrix, robustness, sensitivity, slopes,
-    tuners, uncertainty,
+use mops_content::{
+    figures::Group,
+    numbers::significant,
+    section::{Block, Section, Tone, Verdict},
+    table::{Cell, Table, numbers, text as column},
 };
-use crate::numbers::significant;
-use crate::plain::plain;
+use mops_language::plain::plain;
+use mops_outcome::FailureReport;
+use mops_tasks::verdict;
 
-/// Plots of the page, by section.
-pub(super) struct Plots {
+use super::markup::{self, figures, rich, section};
+use super::{Report, chart, criteria, matrix, tuners};
+
+/// Content of the page by section.
+pub(super) struct Content {
+    pub(super) findings: Vec<Section>,
+    pub(super) details: Vec<Section>,
     pub(super) responses: Vec<Group>,
     /// Sentence on omitted responses.
     pub(super) omitted: Option<String>,
     pub(super) convergence: Option<Group>,
-    pub(super) front: Option<Group>,
-    pub(super) sweep: Option<Group>,
-    pub(super) excitation: Option<Group>,
-    pub(super) diagnosis: Option<diagnosis::Plots>,
-    pub(super) robustness: Vec<robustness::Section>,
-    pub(super) uncertainty: Option<Group>,
+    pub(super) calibration: Vec<Section>,
+}
+
+impl Content {
+    /// Returns all groups of plots, in the order of their file names.
+    pub(super) fn groups(&self) -> impl Iterator<Item = &Group> {
+        let sections = self.findings.iter().chain(&self.details).chain(&self.calibration);
+        self.responses.iter().chain(&self.convergence).chain(sections.flat_map(Section::groups))
+    }
 }
 
 /// Script that makes tables sortable.
@@ -64,64 +70,31 @@ pub(super) fn document(title: &str, body: Markup) -> Markup {
 }
 
 /// Returns the page of a report.
-pub(super) fn of(report: &Report<'_>, plots: &Plots) -> Markup {
-    let outcome = report.outcome;
-    let warnings = verdict::warnings(report);
+pub(super) fn of(report: &Report<'_>, content: &Content) -> Markup {
+    let (outcome, of, room) = (report.outcome, &report.solution(), report.room);
+    let warnings = verdict::warnings(of);
+    let has_points = content.findings.iter().flat_map(|section| &section.blocks);
+    let has_points = has_points.into_iter().any(|block| matches!(block, Block::Table(table) if table.are_points));
     let body = html! {
         (header(report))
         main {
             @if !warnings.is_empty() {
                 (section("Warnings", html! { ul class="warnings" { @for text in &warnings { li { (rich(text)) } } } }))
             }
-            @if let (Some(found), Some(plots)) = (report.outcome.found.diagnosis.as_ref(), &plots.diagnosis) {
-                (diagnosis::sections(found, plots))
-            }
-            @for one in &plots.robustness {
-                (section(one.title, html! { (one.content) (figures(&one.group)) }))
-            }
-            @if let (Some(found), Some(group)) = (&outcome.found.trade_offs, &plots.front) {
-                (section("Front", html! { (figures(group)) (front::table(report, found)) }))
-            }
-            @if let Some(group) = &plots.sweep { (section("Sweep", figures(group))) }
-            @if let Some(found) = &outcome.found.sensitivity {
-                (section(sensitivity::title(found), sensitivity::section(found)))
-            }
-            @if let Some(found) = &outcome.found.excitation {
-                (section("Excitation", html! {
-                    (excitation::section(found))
-                    @if let Some(group) = &plots.excitation { (figures(group)) }
-                }))
-            }
+            @for one in &content.findings { (markup::of(one)) }
             @if let Some(table) = matrix::section(outcome) { (section("Criteria by case", table)) }
             @if !outcome.criteria.is_empty() { (section("Criteria", criteria::table(report))) }
-            @if !outcome.tuners.is_empty() && report.outcome.found.diagnosis.as_ref().is_none() { (section("Tuners", tuners::table(report))) }
-            @if let Some(found) = &outcome.found.slopes {
-                @let one_case = report.problem.study().cases().len() == 1;
-                (section("Sensitivities", slopes::section(found, report.best_name(), one_case)))
-            }
-            @if let Some(found) = &outcome.found.jumps {
-                (section("Jumps near the design", jumps::section(found)))
-            }
-            @if !plots.responses.is_empty() {
+            @if !outcome.tuners.is_empty() && room.has_point() { (section("Tuners", tuners::table(report))) }
+            @for one in &content.details { (markup::of(one)) }
+            @if !content.responses.is_empty() {
                 (section("Responses", html! {
-                    @if let Some(text) = &plots.omitted { p { (text) } }
-                    @for group in &plots.responses { (figures(group)) }
+                    @if let Some(text) = &content.omitted { p { (text) } }
+                    @for group in &content.responses { (figures(group)) }
                 }))
             }
-            @if let Some(group) = &plots.convergence { (section("Convergence", figures(group))) }
-            @if let Some(results) = &outcome.calibration {
-                (section("Calibration", calibration::section(results)))
-                @if let Some(found) = &outcome.found.uncertainty {
-                    (section(uncertainty::TITLE, html! {
-                        (uncertainty::section(found))
-                        @if let Some(group) = &plots.uncertainty { (figures(group)) }
-                    }))
-                }
-                @if results.sensitivity.is_some() || !results.excitation.is_empty() {
-                    (section(sensitivity::IDENTIFIABILITY, identifiability(results, plots)))
-                }
-            }
-            @if !outcome.failures.is_empty() { (section("Failures", calibration::failures(&outcome.failures))) }
+            @if let Some(group) = &content.convergence { (section("Convergence", figures(group))) }
+            @for one in &content.calibration { (markup::of(one)) }
+            @if !outcome.failures.is_empty() { (section("Failures", failures(&outcome.failures))) }
             (section("Study", html! {
                 details {
                     summary { "Study file with its settings" }
@@ -130,38 +103,27 @@ pub(super) fn of(report: &Report<'_>, plots: &Plots) -> Markup {
             }))
         }
         footer { "Written by mops " (outcome.mops) ". All numbers are in result.json, the plots in the folder plots." }
-        @if plots.front.is_some() { @for text in front::SCRIPTS { script { (PreEscaped(text)) } } }
+        @if has_points { @for text in SCRIPTS { script { (PreEscaped(text)) } } }
     };
-    document(&format!("{}: {}", outcome.study, task(outcome.task)), body)
+    document(&format!("{}: {}", outcome.study, room.title()), body)
 }
 
-/// Returns the identifiability of the tuners of a calibration, and the excitation of its inputs.
-fn identifiability(results: &CalibrationReport, plots: &Plots) -> Markup {
-    html! {
-        @if let Some(found) = &results.sensitivity { (sensitivity::section(found)) }
-        h3 { "Inputs" }
-        @if results.excitation.is_empty() {
-            p { "No experiment is driven by an input: all information comes from the initial states." }
-        } @else {
-            (excitation::inputs(&results.excitation))
-            @if let Some(group) = &plots.excitation { (figures(group)) }
-        }
-    }
-}
+/// Scripts that rotate a front over three criteria, and that select a point in all plots and in the table.
+const SCRIPTS: [&str; 2] = [include_str!("space.js"), include_str!("front.js")];
 
-/// Wraps a table for horizontal scrolling on narrow screens.
-pub(super) fn scrolling(name: &str, table: Markup) -> Markup {
-    html! { div class="wide" role="region" tabindex="0" aria-label=(name) { (table) } }
-}
-
-pub(super) fn section(title: &str, content: Markup) -> Markup {
-    let id = title.to_lowercase().replace(' ', "-");
-    html! { section aria-labelledby=(id) { h2 id=(id) { (title) } (content) } }
+/// Returns the table of failed simulations.
+fn failures(failures: &[FailureReport]) -> Markup {
+    let columns = [column("case"), column("model"), column("failure"), numbers("count")];
+    let rows = failures.iter().map(|failure| {
+        let FailureReport { case, model, failure, count, .. } = failure;
+        [case, model, failure, &count.to_string()].map(|text| Cell::from(text.as_str())).to_vec()
+    });
+    markup::blocks(&[Block::Table(Table::new("Failures", columns).rows(rows))])
 }
 
 fn header(report: &Report<'_>) -> Markup {
-    let outcome = report.outcome;
-    let (tone, sentence) = verdict::verdict(report);
+    let (outcome, of, room) = (report.outcome, report.solution(), report.room);
+    let Verdict { tone, text } = verdict::verdict(&of, room);
     let class = match tone {
         Tone::Good => "verdict good",
         Tone::Mixed => "verdict mixed",
@@ -169,13 +131,12 @@ fn header(report: &Report<'_>) -> Markup {
     };
     html! {
         header {
-            p class="task" { (task(outcome.task)) }
+            p class="task" { (room.title()) }
             h1 { (outcome.study) }
-            p class=(class) { (rich(&sentence)) }
+            p class=(class) { (rich(&text)) }
             dl {
-                @if let Some(found) = report.outcome.found.diagnosis.as_ref() {
-                    @for (name, value) in diagnosis::facts(found) { (fact(&name, &value)) }
-                } @else {
+                @for (name, value) in room.facts(outcome) { (fact(&name, &value)) }
+                @if room.has_point() {
                     (fact("Solver", &verdict::solver(outcome)))
                     (fact("Evaluations", &outcome.evaluations.to_string()))
                     @if let Some(reused) = outcome.reused { (fact("Reused evaluations", &reused.to_string())) }
@@ -184,9 +145,9 @@ fn header(report: &Report<'_>) -> Markup {
                 (fact("Time", &format!("{} s", significant(outcome.seconds, 3))))
                 (fact("Seed", &outcome.seed.to_string()))
             }
-            @if report.outcome.found.diagnosis.as_ref().is_none() { dl class="long" {
-                (fact("Stopped", verdict::stop(outcome)))
-                @if outcome.task == Task::Design && outcome.feasible { (fact("Pareto", verdict::pareto(outcome.pareto))) }
+            @if room.has_point() { dl class="long" {
+                (fact("Stopped", verdict::stop(outcome, room)))
+                @if room.has_optimality() && outcome.feasible { (fact("Pareto", verdict::pareto(outcome.pareto))) }
                 @if let Some(words) = verdict::end(outcome) { (fact("Optimum", &words)) }
             } }
         }
@@ -195,50 +156,4 @@ fn header(report: &Report<'_>) -> Markup {
 
 fn fact(name: &str, value: &str) -> Markup {
     html! { div { dt { (name) } dd { (value) } } }
-}
-
-fn task(task: Task) -> &'static str {
-    match task {
-        Task::Design => "Design",
-        Task::Pareto => "Pareto front",
-        Task::Calibration => "Calibration",
-        Task::Excitation => "Excitation",
-        Task::Sensitivity => "Sensitivity",
-        Task::Sweep => "Sweep",
-        Task::Diagnosis => "Diagnosis",
-        Task::WorstCase => "Worst case",
-        Task::MonteCarlo => "Monte Carlo",
-    }
-}
-
-pub(super) fn figures(group: &Group) -> Markup {
-    html! {
-        @if !group.title.is_empty() { h3 { (rich(&group.title)) } }
-        @for sentence in &group.about { p { (rich(sentence)) } }
-        @if !group.figures.is_empty() {
-            div class=(if group.full_width { "figures full" } else { "figures" }) {
-                @for one in &group.figures { (figure(one)) }
-            }
-        }
-    }
-}
-
-fn figure(figure: &Figure) -> Markup {
-    html! {
-        figure data-signal=[&figure.on_request] hidden[figure.on_request.is_some()] {
-            @for (_, plot) in &figure.plots { (chart::markup(plot)) }
-            @if !figure.caption.is_empty() {
-                figcaption { @for (i, line) in figure.caption.iter().enumerate() { @if i > 0 { "; " } (rich(line)) } }
-            }
-        }
-    }
-}
-
-/// Returns a text as markup; names between backticks become code.
-pub(super) fn rich(text: &str) -> Markup {
-    let parts: Vec<&str> = text.split('`').collect();
-    if parts.len().is_multiple_of(2) {
-        return html! { (text) };
-    }
-    html! { @for (i, part) in parts.iter().enumerate() { @if i % 2 == 1 { code { (part) } } @else { (part) } } }
 }

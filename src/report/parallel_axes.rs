@@ -1,8 +1,9 @@
 //! Parallel coordinates: a vertical axis for every quantity, with its name and its end values.
 
+use mops_content::plot::{Color, ParallelAxis};
+
 use super::axis::Axis;
 use super::clip::Frame;
-use super::plot::{Color, ParallelAxis};
 use super::scene::{ADVANCE, Anchor, Mark, SIZE, Scene};
 
 impl Scene {

@@ -6,8 +6,9 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use mops_content::numbers::file_name;
+
 use crate::files::{self, Outputs};
-use crate::numbers::file_name;
 
 /// File that lists the plots of a folder, one name without extension per line.
 const LIST: &str = ".pictures";

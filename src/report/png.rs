@@ -3,13 +3,13 @@
 use std::io;
 use std::sync::Once;
 
+use mops_content::plot::Color;
 use mops_math as math;
 use plotters::backend::{BitMapBackend, DrawingBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontStyle, FontTransform, IntoFont, RGBColor, TextStyle, WHITE, register_font};
 
 use super::clip::{Point, distance};
-use super::plot::Color;
 use super::scene::{Anchor, Mark, SIZE, Scene};
 use super::svg::rgb;
 

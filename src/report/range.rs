@@ -2,7 +2,7 @@
 
 use mops_math as math;
 
-use super::plot::Plot;
+use mops_content::plot::Plot;
 
 /// Returns a value, or its decimal logarithm if `log`; `None` if it cannot be drawn.
 pub(super) fn drawable(value: f64, log: bool) -> Option<f64> {
@@ -65,8 +65,8 @@ pub(super) fn equal(x: [f64; 2], y: [f64; 2], shape: f64) -> [[f64; 2]; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::plot::{Curve, Level};
     use super::*;
+    use mops_content::plot::{Curve, Level};
 
     #[test]
     fn equal_axes_contain_both_ranges() {

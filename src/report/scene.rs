@@ -1,10 +1,10 @@
 //! Layout of a plot: lines, dots, rectangles and texts with their coordinates, for SVG and PNG alike.
 
+use mops_content::plot::{Bound, Color, CurveStyle, Plot};
 use mops_core::criterion::Side;
 
 use super::axis::Axis;
 use super::clip::{Frame, Point, visible};
-use super::plot::{Bound, Color, CurveStyle, Plot, Surface};
 use super::range::{equal, x_range, y_range};
 use super::space::{Point3, View};
 use super::surface::SCALE_WIDTH;
@@ -89,11 +89,11 @@ impl Scene {
         }
         let mut scene = Self::default();
         let x_range = match &plot.surface {
-            Some(surface) => Surface::range(&surface.x, plot.log_x),
+            Some(surface) => super::surface::range(&surface.x, plot.log_x),
             None => x_range(plot),
         };
         let y_range = match &plot.surface {
-            Some(surface) => Surface::range(&surface.y, plot.log_y),
+            Some(surface) => super::surface::range(&surface.y, plot.log_y),
             None => y_range(plot),
         };
         let shown = [x_range.unwrap_or([0.0, 1.0]), y_range.unwrap_or([0.0, 1.0])];

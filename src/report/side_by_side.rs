@@ -1,12 +1,16 @@
 //! Page of a comparison: tables and responses of several runs.
 
 use maud::{Markup, html};
+use mops_content::{
+    numbers::labelled,
+    plot::{Color, Curve, Plot},
+    sampling,
+};
 use mops_core::{Analysis, Problem};
 
-use super::page::{document, scrolling, section};
-use super::plot::{Color, Curve, Plot};
-use super::{chart, sampling};
-use crate::numbers::labelled;
+use super::chart;
+use super::markup::{scrolling, section};
+use super::page::document;
 
 /// Run with responses to plot.
 pub(crate) struct Responses {

@@ -1,10 +1,10 @@
 //! Three-dimensional plots: points in a box in parallel projection, which a page can rotate.
 
+use mops_content::plot::{Color, Plot};
 use mops_math as math;
 
 use super::axis::Axis;
 use super::clip::Point;
-use super::plot::{Color, Plot};
 use super::range::{drawable, range_of};
 use super::scene::{ADVANCE, Anchor, Mark, SIZE, Scene};
 

@@ -1,9 +1,12 @@
 //! Surface plots: values as colours, with contour lines and a colour scale.
 
+use mops_content::{
+    contour::{along, contour},
+    plot::{Color, Surface},
+};
+
 use super::axis::Axis;
-use super::clip::{Frame, Point};
-use super::contour::contour;
-use super::plot::{Color, Surface};
+use super::clip::Frame;
 use super::range::{drawable, range_of};
 use super::scene::{Anchor, Mark, Scene};
 
@@ -44,26 +47,24 @@ fn viridis(height: f64) -> [u8; 3] {
     std::array::from_fn(|k| (VIRIDIS[i][k] + s * (VIRIDIS[i + 1][k] - VIRIDIS[i][k])).round() as u8)
 }
 
-impl Surface {
-    /// Returns the range of a coordinate, or of its logarithm.
-    pub(super) fn range(values: &[f64], log: bool) -> Option<[f64; 2]> {
-        range_of(values.iter().filter_map(|&v| drawable(v, log)))
-    }
+/// Returns the range of a coordinate, or of its logarithm.
+pub(super) fn range(values: &[f64], log: bool) -> Option<[f64; 2]> {
+    range_of(values.iter().filter_map(|&v| drawable(v, log)))
+}
 
-    /// Returns the range of the colour scale: of the values, or of their logarithms.
-    fn heights(&self) -> Option<[f64; 2]> {
-        let mut all: Vec<f64> = self.values.iter().flatten().filter_map(|&v| drawable(v, self.log)).collect();
-        all.sort_by(f64::total_cmp);
-        let high = all.get(((all.len() as f64 * HIGHEST) as usize).min(all.len().saturating_sub(1)))?;
-        let high = if self.log { high.min(all[0] + DECADES) } else { *high };
-        range_of([all[0], high].into_iter())
-    }
+/// Returns the range of the colour scale: of the values, or of their logarithms.
+fn heights(surface: &Surface) -> Option<[f64; 2]> {
+    let mut all: Vec<f64> = surface.values.iter().flatten().filter_map(|&v| drawable(v, surface.log)).collect();
+    all.sort_by(f64::total_cmp);
+    let high = all.get(((all.len() as f64 * HIGHEST) as usize).min(all.len().saturating_sub(1)))?;
+    let high = if surface.log { high.min(all[0] + DECADES) } else { *high };
+    range_of([all[0], high].into_iter())
 }
 
 impl Scene {
     /// Draws the surface into the frame, and its colour scale to the right.
     pub(super) fn surface(&mut self, surface: &Surface, x: &Axis, y: &Axis, frame: Frame) {
-        let Some([low, high]) = surface.heights() else { return };
+        let Some([low, high]) = heights(surface) else { return };
         let Frame { from: [left, top], to: [right, bottom] } = frame;
         let height = |value: f64| drawable(value, surface.log).map(|v| ((v - low) / (high - low)).clamp(0.0, 1.0));
         let band = |value: f64| height(value).map(|h| ((h * COLORS as f64) as usize).min(COLORS - 1));
@@ -118,23 +119,11 @@ impl Scene {
     }
 }
 
-/// Interpolates between grid points, at a fractional index.
-fn along(places: &[f64], index: f64) -> f64 {
-    let i = (index as usize).min(places.len().saturating_sub(2));
-    places[i] + (index - i as f64) * (places[i + 1] - places[i])
-}
-
-/// Returns the contour line at a level, as points over x and y with gaps between the segments.
-pub(super) fn border(surface: &Surface, heights: &[Vec<f64>], level: f64) -> Vec<(f64, f64)> {
-    let gap = (f64::NAN, f64::NAN);
-    let place = |p: Point| (along(&surface.x, p[0]), along(&surface.y, p[1]));
-    contour(heights, level).into_iter().flat_map(|[a, b]| [place(a), place(b), gap]).collect()
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::plot::Plot;
+    use super::super::Draw;
     use super::*;
+    use mops_content::plot::Plot;
 
     fn surface(values: Vec<Vec<f64>>) -> Plot {
         let axis = |n: usize| (0..n).map(|i| i as f64).collect();
@@ -148,7 +137,7 @@ mod tests {
         values[9][9] = 1e9;
         values[0][0] = f64::NAN;
         let plot = surface(values);
-        let [low, high] = plot.surface.as_ref().unwrap().heights().unwrap();
+        let [low, high] = heights(plot.surface.as_ref().unwrap()).unwrap();
         assert!(low == 0.0 && high < 82.0, "{low} {high}");
         let svg = plot.svg();
         assert!(!svg.contains("NaN") && svg.contains("#440154") | svg.contains("crispEdges"));

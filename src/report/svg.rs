@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 
 use maud::{Markup, html};
+use mops_content::plot::Color;
+use mops_language::plain::plain;
 
 use super::clip::Point;
-use super::plot::Color;
 use super::scene::{Anchor, Mark, SIZE, Scene};
 use super::space::View;
-use crate::plain::plain;
 
 /// Returns the document, with a title and a description for screen readers.
 pub(super) fn document(scene: &Scene, title: &str, description: &str) -> String {

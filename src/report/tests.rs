@@ -1,7 +1,14 @@
 //! Tests of the whole report of a small study: a first-order lag with a step and an experiment.
 
+use mops_tasks::design::Design;
+
+use super::Draw;
 use std::sync::Arc;
 
+use mops_content::{
+    numbers,
+    plot::{Curve, CurveStyle, Plot, ZAxis},
+};
 use mops_core::{
     Analysis, Case, Criterion, CriterionSpec, Evaluation, Failure, Interface, Job, Model, Oracle, Parameter, Problem,
     Response, Role, Run, Stop, StudyBuilder, StudyError, Trace, Usage, Value, Variable,
@@ -11,11 +18,10 @@ use mops_core::{
 };
 use mops_language::Unit;
 use mops_math as math;
-use mops_outcome::{CalibrationReport, CriterionSlopes, Ending, Outcome, SlopesReport, conclude, criterion_reports};
+use mops_outcome::{CalibrationReport, Ending, Outcome, conclude, criterion_reports};
+use mops_tasks::design::{CriterionSlopes, SlopesReport};
 
-use super::plot::{Curve, CurveStyle, Plot, ZAxis};
 use super::{Level, Report};
-use crate::numbers;
 
 /// First-order lag `T y' + y = 1`, `y(0) = 0`; not defined for `T` above 10 s.
 pub(super) struct Lag(Interface);
@@ -128,7 +134,7 @@ fn page_of(
     text: &str,
 ) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
-    let report = Report { outcome, problem, best, archive, front: &[], text };
+    let report = Report { outcome, problem, best, archive, front: &[], room: &Design, text };
     report.write(folder.path()).unwrap();
     let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     (folder, page)
@@ -223,13 +229,13 @@ fn cases_and_sensitivities_are_shown_as_shaded_tables() {
     let slope = |key: &str, slope| CriterionSlopes { key: key.into(), slopes: vec![slope], sides: None };
     let kink = CriterionSlopes { sides: Some(vec![Some([-3.0, 7.0])]), ..slope("step/1/peak", 2.0) };
     let criteria = vec![slope("nominal & more/end", 25.0), slope("step/1/end", f64::NAN), kink];
-    outcome.found.slopes = Some(SlopesReport { tuners: vec!["T".into()], criteria });
+    outcome.found.add(SlopesReport { tuners: vec!["T".into()], criteria });
     let (_folder, page) = page_of(&problem, &best, &outcome, &archive, "");
     // Both cases at 1 - exp(-5/2) = 0.9179 for a demand of 0.5.
     assert_eq!(page.matches("data-value=\"1.83").count(), 2 + 2 + 2, "two cells, their worsts, and the worst of all");
     assert!(page.contains("Criteria by case") && page.contains("number shade mixed above"));
     assert!(page.contains(">+0.25</td>") && page.contains("--share:45%"), "a hundredth of the derivative");
-    assert!(page.contains("\u{2191} +0.07<br>\u{2193} +0.03</td>"), "both sides of a kink");
+    assert!(page.contains("<div>\u{2191} +0.07</div><div>\u{2193} +0.03</div></td>"), "both sides of a kink");
     assert!(page.contains(">n/a</td>"), "an unknown derivative is shown as n/a");
 }
 

@@ -1,11 +1,11 @@
 //! Table of tuners, with their positions within the bounds.
 
 use maud::{Markup, html};
-use mops_core::{Tuner, study::Scale};
+use mops_content::numbers::number;
+use mops_core::study::{Scale, Tuner};
 
 use super::Report;
-use super::page::scrolling;
-use crate::numbers::number;
+use super::markup::scrolling;
 
 /// Returns the table of all tuners, with their positions within the bounds.
 pub(super) fn table(report: &Report<'_>) -> Markup {

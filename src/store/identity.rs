@@ -59,7 +59,7 @@ impl Identity {
             program: file.program.clone(),
             tuners: study.tuners().iter().map(|tuner| tuner.name.clone()).collect(),
             rows: study.rows().iter().map(|row| format!("{} [{}]", study.key(row), row.unit)).collect(),
-            uncertain: study.tasks().uncertain.iter().map(|u| format!("{}[{}]", u.name, u.unit)).collect(),
+            uncertain: study.uncertain().iter().map(|u| format!("{}[{}]", u.name, u.unit)).collect(),
             solver: solver.to_owned(),
             seed: study.seed(),
         }

@@ -7,7 +7,7 @@ use std::ops::Range;
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use mops_language::Diagnostic;
 
-use crate::plain::plain;
+use mops_language::plain::plain;
 
 /// Number of characters of a line shown on either side of an error.
 const AROUND: usize = 200;

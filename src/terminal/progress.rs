@@ -8,13 +8,13 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mops_core::{Cancellation, Evaluation, Halt, Study, Usage, Watch, run::State as RunState};
+use mops_language::plain::plain;
 use mops_outcome::{CriterionReport, criterion_reports};
 
 use super::limits::{Limit, cancel_on_signal};
 use super::sparkline::sparkline;
 use super::table::number;
 use super::write::eprint_line;
-use crate::plain::plain;
 
 /// Progress bar on standard error with the best objective so far; forwards stop requests to the run.
 pub struct Progress {

@@ -4,7 +4,7 @@ use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, presets};
 
 /// Formats a number to six significant digits, without trailing zeros.
 pub fn number(value: f64) -> String {
-    crate::numbers::significant(value, 6)
+    mops_content::numbers::significant(value, 6)
 }
 
 /// Formats a table: a header, then rows; the columns whose indices are in `numeric` are aligned to the right.

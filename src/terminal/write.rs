@@ -3,8 +3,9 @@
 
 use std::io::{self, ErrorKind, Write};
 
+use mops_language::plain::{escaped, plain};
+
 use super::CommandError;
-use crate::plain::{escaped, plain};
 
 /// Writes a text to standard output, with control characters escaped. A closed pipe is not an error.
 ///

@@ -202,7 +202,7 @@ impl Live {
 
     fn tuners(&self, best: &Evaluation) -> Vec<Value> {
         let tuners = self.problem.study().tuners().iter().zip(&best.tuners);
-        let json_of = |(tuner, value): (&mops_core::Tuner, &f64)| {
+        let json_of = |(tuner, value): (&mops_core::study::Tuner, &f64)| {
             json!({
                 "name": tuner.name, "value": value, "unit": tuner.unit.to_string(), "active": tuner.active,
                 "position": tuner.active.then(|| tuner.position_of(*value)),

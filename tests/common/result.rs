@@ -7,7 +7,7 @@ use serde_json::Value;
 
 /// Schema of `result.json`, which allows no key that it does not describe.
 static SCHEMA: LazyLock<Validator> = LazyLock::new(|| {
-    let mut schema = mops::outcome::result_schema();
+    let mut schema = mops::tasks::result_schema(&mops::catalogue());
     close(&mut schema);
     jsonschema::validator_for(&schema).unwrap()
 });

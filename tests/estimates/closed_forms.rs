@@ -2,7 +2,7 @@
 
 use mops::{
     CriterionBuilder, TunerBuilder,
-    core::study::{Chosen, UncertaintyTask},
+    core::task::{Chosen, UncertaintyTask},
 };
 use mops_math as math;
 use nalgebra::{DMatrix, DVector};
@@ -186,7 +186,7 @@ fn profiles_of_linear_models_equal_their_intervals_for_any_counts_and_weights() 
     for Lines { what, mut calibration, .. } in neighbours() {
         calibration.uncertainty = Some(UncertaintyTask { profile: Chosen::All, ..UncertaintyTask::default() });
         let outcome = calibration.run(1);
-        let profiles = &outcome.found.uncertainty.as_ref().unwrap().profiles;
+        let profiles = &outcome.found.get::<mops::tasks::calibration::UncertaintyReport>().unwrap().profiles;
         for (profile, parameter) in profiles.iter().zip(parameters(&outcome)) {
             let half = 0.5 * (parameter.interval95[1] - parameter.interval95[0]);
             let linear = profile.linear_interval.iter().zip(parameter.interval95);
@@ -244,7 +244,7 @@ fn a_shared_rate_has_the_error_of_the_estimator_and_a_note_on_equal_weights() {
 fn bootstrap_errors_equal_standard_errors_for_records_of_different_length() {
     let task = UncertaintyTask { bootstrap: 300, block: Some(1), ..UncertaintyTask::default() };
     let outcome = decays([300, 12], false, Some(task)).run(0);
-    let found = outcome.found.uncertainty.as_ref().unwrap().bootstrap.as_ref().unwrap();
+    let found = outcome.found.get::<mops::tasks::calibration::UncertaintyReport>().unwrap().bootstrap.as_ref().unwrap();
     for (one, parameter) in found.parameters.iter().zip(parameters(&outcome)) {
         // 300 replicates determine a standard error to 4 %.
         assert!((one.std_error / parameter.std_error - 1.0).abs() < 0.15, "{one:?} {parameter:?}");

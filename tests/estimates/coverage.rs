@@ -4,7 +4,7 @@ use mops::{
     CriterionBuilder, TunerBuilder,
     core::{
         criterion::Loss,
-        study::{Chosen, UncertaintyTask},
+        task::{Chosen, UncertaintyTask},
     },
     criteria::normalised_error::NormalisedError,
     statistics::share_interval,
@@ -198,7 +198,8 @@ fn bootstrap_intervals_beside_outliers_cover_the_truth() {
         let mut hits = [0; 3];
         for seed in 0..count {
             let outcome = calibration.run(u64::from(seed));
-            let found = outcome.found.uncertainty.unwrap().bootstrap.unwrap();
+            let found =
+                outcome.found.get::<mops::tasks::calibration::UncertaintyReport>().cloned().unwrap().bootstrap.unwrap();
             for (((name, truth), hits), one) in DECAY.iter().zip(&mut hits).zip(&found.parameters) {
                 assert!(one.parameter.ends_with(name), "{}", one.parameter);
                 let [low, high] = one.interval;

@@ -2,7 +2,7 @@
 
 use mops::{
     Outcome, TunerBuilder,
-    core::study::{Chosen, UncertaintyTask},
+    core::task::{Chosen, UncertaintyTask},
 };
 use mops_math as math;
 
@@ -64,7 +64,7 @@ fn a_direction_below_the_noise_is_not_determined_and_has_no_interval() {
                 "{parameter:?}"
             );
         }
-        let profiles = &outcome.found.uncertainty.as_ref().unwrap().profiles;
+        let profiles = &outcome.found.get::<mops::tasks::calibration::UncertaintyReport>().unwrap().profiles;
         assert!(profiles.iter().flat_map(|profile| profile.linear_interval).all(|end| end.is_nan()), "{profiles:?}");
         assert_eq!(profiles[0].ends, ["bound", "bound"], "{profiles:?}");
     }

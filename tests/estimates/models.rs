@@ -2,11 +2,12 @@
 
 use mops::{
     Analysis, CaseBuilder, CriterionBuilder, Failure, Interface, Model, ModelBuilder, Options, Outcome, Parameter,
-    StudyBuilder, Task, Trace, TunerBuilder, Variable,
+    StudyBuilder, Trace, TunerBuilder, Variable,
     core::{
         Job, Response, Role,
         model::WithTangents,
-        study::{ChannelBuilder, Measured, TasksBuilder, UncertaintyTask},
+        study::{ChannelBuilder, Measured},
+        task::{CalibrationTask, UncertaintyTask},
     },
     criteria::{fit::Fit, normalised_error::NormalisedError},
     math::stream,
@@ -242,13 +243,12 @@ impl Calibration {
         }
         let draft = StudyBuilder {
             name: "calibration".into(),
-            task: Task::Calibration,
+            task: CalibrationTask { uncertainty: self.uncertainty.clone() }.into(),
             seed: 1,
             models: vec![("model".into(), (self.model)())],
             tuners: self.tuners.iter().map(|(name, tuner)| ((*name).to_owned(), tuner.clone())).collect(),
             cases,
             criteria: (self.criteria)().into_iter().map(|(name, criterion)| (name.to_owned(), criterion)).collect(),
-            tasks: TasksBuilder { uncertainty: self.uncertainty.clone(), ..TasksBuilder::default() },
             ..StudyBuilder::default()
         };
         let options = Options { jobs: Some(1), ..Options::default() };

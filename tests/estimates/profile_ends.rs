@@ -2,9 +2,9 @@
 
 use mops::{
     Outcome, TunerBuilder,
-    core::study::{Chosen, UncertaintyTask},
-    outcome::ProfileReport,
+    core::task::{Chosen, UncertaintyTask},
     statistics::t_quantile,
+    tasks::calibration::ProfileReport,
 };
 use mops_math as math;
 use nalgebra::{DMatrix, DVector};
@@ -30,7 +30,7 @@ fn calibration(model: Curve2, channel: Channel, tuners: Vec<(&'static str, Tuner
 struct Curve2(&'static [&'static str], fn(&[f64], f64) -> f64);
 
 fn profile(outcome: &Outcome) -> &ProfileReport {
-    &outcome.found.uncertainty.as_ref().unwrap().profiles[0]
+    &outcome.found.get::<mops::tasks::calibration::UncertaintyReport>().unwrap().profiles[0]
 }
 
 /// Returns the range of grid values within the limit, given the smallest sum of squares for each.

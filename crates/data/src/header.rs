@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use mops_language::{Diagnostic, Source, Unit};
 
-use super::csv::{cells, first_line, is_value, number, refuse_long_quotes, separator};
+use super::cells::{cells, first_line, is_value, number, refuse_long_quotes, separator};
 use super::formulas::from_text;
 use super::stamps::Form;
 

@@ -1,6 +1,7 @@
 //! Measured data: readers that convert a file to named columns of numbers.
 
 mod calendar;
+mod cells;
 mod csv;
 mod encoding;
 mod formulas;
@@ -214,7 +215,7 @@ impl DataFile {
         }
         let before = &self.source.text[self.before.clone()];
         let mut lines = before.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#')).peekable();
-        if let Some(first) = lines.peek().map(|line| csv::shortened(line)) {
+        if let Some(first) = lines.peek().map(|line| cells::shortened(line)) {
             remarks.push(match lines.count() {
                 1 => format!("1 line before the header skipped (`{first}`)"),
                 count => format!("{count} lines before the header skipped (from `{first}` on)"),

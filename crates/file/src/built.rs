@@ -4,25 +4,26 @@ use std::sync::Arc;
 
 use mops_core::{
     case::Case,
-    catalogue::{BuiltStudy, Catalogue},
+    catalogue::{BuiltStudy, Catalogue, schema_of},
     criterion::Demand,
     evaluation::Objective,
     failure::caught,
-    study::{Study, StudyBuilder, Task},
+    study::{Study, StudyBuilder},
 };
 use mops_language::{Diagnostic, Quantity, suggestion};
 use schemars::JsonSchema;
+use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::tree::{Node, Text};
-use super::{StudyFile, content, digest, read_solver, tasks};
+use super::{StudyFile, content, digest, read_solver, schema, tasks, uncertain};
 
 /// What settings may replace in `[study]`.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct StudySettings {
     /// Task.
-    task: Option<Task>,
+    task: Option<String>,
     /// Combination of the scaled values: `max` or `sum`.
     objective: Option<Objective>,
     /// Seed of all random numbers.
@@ -54,23 +55,28 @@ pub fn built(catalogue: &Catalogue, study: &BuiltStudy, settings: &[String]) -> 
 
 fn read(catalogue: &Catalogue, built: &BuiltStudy, text: &Arc<Text>) -> Result<StudyFile, Diagnostic> {
     let root = text.parse()?;
-    root.check_keys(&[&["study", "tuners", "solver"][..], &tasks::TABLES[..]].concat())
+    root.check_keys(&[&["study", "tuners", "solver"][..], &tasks::tables(catalogue)[..]].concat())
         .map_err(|mistake| mistake.with_help("change everything else in the source code of the study"))?;
     let mut draft = caught(|| built.draft()).map_err(|why| {
         Diagnostic::new(format!("the function that builds the study `{}` {why}", built.name()))
             .with_help("correct the function; the panic message on standard error shows the line")
     })?;
     draft.name = built.name().to_owned();
+    let mut word = None;
     if let Some(node) = root.child("study") {
-        let settings: StudySettings = node.read()?;
-        draft.task = settings.task.unwrap_or(draft.task);
+        let mut schema = schema_of::<StudySettings>().to_value();
+        schema::add_words(&mut schema, catalogue);
+        let schema = schema.try_into().expect("it is a schema");
+        let settings = node.read_with(&schema, StudySettings::deserialize)?;
+        word = settings.task;
         draft.objective = settings.objective.or(draft.objective);
         draft.seed = settings.seed.unwrap_or(draft.seed);
     }
     for (name, node) in root.table("tuners")? {
         set_tuner(&mut draft, &name, &node)?;
     }
-    tasks::read(&root, catalogue, &mut draft.tasks)?;
+    uncertain::read(&root, &mut draft)?;
+    tasks::read(&root, catalogue, word.as_deref(), &mut draft)?;
     let (solver, max_evaluations) = read_solver(catalogue, &root)?;
     let study = draft.build().map_err(|mistake| {
         let located = root.locate(&mistake);

@@ -6,7 +6,7 @@ use std::io;
 use serde_json::Value;
 use toml::de::DeValue;
 
-use super::Files;
+use mops_language::files::Files;
 
 /// Returns a value of the file, settings included.
 pub(super) fn of(value: &DeValue<'_>) -> Value {

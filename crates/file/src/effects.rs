@@ -1,10 +1,9 @@
 //! Effects of a model in a study file: `[models.NAME.effects]`.
 
 use mops_core::{catalogue::Catalogue, effect::EffectBuilder, model::Model};
-use mops_language::Diagnostic;
+use mops_language::{Diagnostic, entries::Entries};
 
-use super::entries::Entries;
-use super::kind;
+use super::reading::kind;
 use super::sections::EffectSection;
 use super::tree::Node;
 

@@ -10,13 +10,15 @@ use mops_core::{
     case::{Hold, Input},
     study::{CaseBuilder, ChannelBuilder, Free, Measured, matches_pattern},
 };
-use mops_data::{Column, DataFile, Origin, Reference, SOURCES, is_beyond_seconds, source_of, unit_since_1970};
-use mops_language::{Diagnostic, Quantity, Unit, files::OutsideFolder};
+use mops_data::{DataFile, Origin, Reference, SOURCES, is_beyond_seconds, source_of, unit_since_1970};
+use mops_language::{Diagnostic, Quantity, Unit, entries::Short, files::OutsideFolder};
 
-use super::entries::Short;
+use super::columns::{column_at, entry, unit_of_header};
+use super::frequency;
+use super::reading::{at_key, read_seconds, read_unit};
 use super::sections::{ChannelTable, ExperimentSection, InputTable, RecordedInput};
 use super::tree::Node;
-use super::{Files, UNIT_HELP, at_key, frequency, read_seconds, read_unit};
+use mops_language::files::Files;
 
 /// Reads an experiment and its data: several experiments from several files, or if it is divided into windows.
 pub(super) fn read(name: &str, node: &Node<'_>, files: &dyn Files) -> Result<Vec<CaseBuilder>, Diagnostic> {
@@ -226,10 +228,6 @@ pub(super) fn recorded(
     }
     let (input, unit, _) = table.sampled(place, column, shift, table.rows.clone())?;
     Ok((input, unit))
-}
-
-pub(super) fn entry<'t>(node: &Node<'t>, table: &str, key: &str) -> Node<'t> {
-    node.child(table).and_then(|table| table.child(key)).expect("it was just read")
 }
 
 /// Data files that an experiment has opened.
@@ -844,28 +842,4 @@ impl Table {
 /// Returns the quantity of a channel with the unit of its column if it has none, as for `offset`.
 fn in_unit_of_column(quantity: &Quantity, unit: Option<&Unit>) -> Quantity {
     Quantity { unit: quantity.unit.clone().or(unit.cloned()), ..quantity.clone() }
-}
-
-/// Returns a column; an error for a missing one has the location in the study.
-pub(super) fn column_at<'f>(place: &Node<'_>, file: &'f DataFile, name: &str) -> Result<Column<'f>, Diagnostic> {
-    file.column(name).map_err(|error| {
-        let located = place.diagnostic(error.message);
-        Diagnostic { help: error.help, ..located }
-    })
-}
-
-/// Returns the unit of a column from the header of the file; `key` overrides it in the study.
-pub(super) fn unit_of_header(
-    place: &Node<'_>,
-    file: &DataFile,
-    column: &str,
-    unit: &str,
-    key: &str,
-) -> Result<Unit, Diagnostic> {
-    Unit::parse(unit).map_err(|_| {
-        let name = &file.source.name;
-        place
-            .diagnostic(format!("unknown unit `{unit}` of `{column}` in the header of {name}"))
-            .with_help(format!("set {key} = \"...\" here; {UNIT_HELP}"))
-    })
 }

@@ -8,8 +8,8 @@ use mops_data::DataFile;
 use mops_language::{Diagnostic, Unit};
 use mops_math as math;
 
-use super::experiment::{column_at, entry, unit_of_header};
-use super::read_unit;
+use super::columns::{column_at, entry, unit_of_header};
+use super::reading::read_unit;
 use super::sections::{ExperimentSection, ResponseTable};
 use super::tree::Node;
 

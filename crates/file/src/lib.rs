@@ -2,35 +2,39 @@
 //! ([`mops_core::StudyBuilder::build`]) checks the contents; its errors are mapped back to their positions.
 
 mod built;
+mod columns;
 mod content;
+pub mod edit;
 mod effects;
-mod entries;
 mod experiment;
 mod frequency;
+mod input_sections;
 mod inputs;
+mod keys;
 mod manual;
 mod models;
 mod parts;
-mod robustness;
+mod reading;
 mod schema;
 mod sections;
 mod shape;
 mod syntax;
 mod tasks;
 mod tree;
+mod uncertain;
 
 use std::path::Path;
 use std::sync::Arc;
 
 pub use built::built;
 pub use content::digest;
-pub use entries::{Entries, Short};
 pub use manual::{Entry, about, describe, entries, places_of};
 use mops_language::files::Files;
 pub use parts::{cases, criterion, experiments, model};
 pub use schema::{study_schema, tables};
+use serde::Deserialize;
 
-use experiment::entry;
+use columns::entry;
 use inputs::Reader;
 use mops_core::case::Input;
 use mops_core::catalogue::Shipped;
@@ -40,9 +44,10 @@ use mops_core::model::{AnalysisKind, Interface};
 use mops_core::study::StudyError;
 use mops_core::study::{CaseBuilder, CriterionBuilder, ModelBuilder, Study, StudyBuilder, TunerBuilder};
 use mops_language::Expression;
+use mops_language::Quantity;
 use mops_language::files::read_regular;
-use mops_language::{Diagnostic, Source, suggestion};
-use mops_language::{Quantity, Unit};
+use mops_language::{Diagnostic, Source};
+use reading::{kind, read_seconds, read_unit};
 use sections::{CaseOptions, CriterionCommon, PerCase, SensorSection, SolverCommon, StudySection, TunerSection};
 use tree::{Node, Text};
 
@@ -130,12 +135,13 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
     let root = text.parse()?;
     let files = &content::Listed::new(files);
     let tables = ["study", "models", "tuners", "cases", "experiments", "sensors", "criteria", "solver"];
-    root.check_keys(&[&tables[..], &tasks::TABLES[..]].concat())?;
-    let study: StudySection = root.required("study", "add [study] with name = \"...\"")?.read()?;
+    root.check_keys(&[&tables[..], &tasks::tables(catalogue)[..]].concat())?;
+    let section = schema::study_section(catalogue);
+    let study = root.required("study", "add [study] with name = \"...\"")?;
+    let study = study.read_with(&section, StudySection::deserialize)?;
 
     let mut draft = StudyBuilder {
         name: study.name,
-        task: study.task,
         objective: study.objective,
         seed: study.seed.unwrap_or(1),
         ..StudyBuilder::default()
@@ -166,10 +172,11 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
     for (name, node) in root.table("criteria")? {
         draft.criteria.push((name, read_criterion(catalogue, &node)?));
     }
-    tasks::read(&root, catalogue, &mut draft.tasks)?;
+    uncertain::read(&root, &mut draft)?;
+    tasks::read(&root, catalogue, study.task.as_deref(), &mut draft)?;
     let (solver, max_evaluations) = read_solver(catalogue, &root)?;
     let mut study = draft.build().map_err(|mistake| root.locate(&mistake))?;
-    let unused = tasks::unused(&root, study.task());
+    let unused = tasks::unused(&root, catalogue, study.task());
     study.add_notes(unused);
     let content = content::of(root.value());
     let data = files.digests();
@@ -182,46 +189,6 @@ fn read_text(catalogue: &Catalogue, text: &Arc<Text>, files: &dyn Files) -> Resu
         data,
         program: catalogue.program.clone(),
         text: Arc::clone(text),
-    })
-}
-
-/// Returns the only key of a table that is not a common one, as a kind of the catalogue.
-fn kind<'t, 'k, K>(
-    node: &Node<'t>,
-    common: &[&'static str],
-    known: &'k [K],
-    name_of: impl Fn(&K) -> &'static str,
-    what: &str,
-) -> Result<(&'k K, Node<'t>), Diagnostic> {
-    let mut found = None;
-    for (key, value) in node.entries()? {
-        if common.contains(&key.as_str()) {
-            continue;
-        }
-        let Some(kind) = known.iter().find(|k| name_of(k) == key) else {
-            let names: Vec<&str> = known.iter().map(&name_of).chain(common.iter().copied()).collect();
-            let help = suggestion(&key, names.iter().copied());
-            return Err(value
-                .key_diagnostic(format!("`{key}` is neither a kind of {what} nor an option"))
-                .with_help(help));
-        };
-        if found.is_some() {
-            let article = if what.starts_with('e') { "an" } else { "a" };
-            return Err(value
-                .key_diagnostic(format!("{article} {what} has one kind, but two are given"))
-                .with_help("remove one of them"));
-        }
-        found = Some((kind, value));
-    }
-    found.ok_or_else(|| {
-        let names: Vec<&str> = known.iter().map(name_of).collect();
-        // Long lists have their own page.
-        let help = if names.len() > 40 {
-            "`mops list` shows the kinds".to_owned()
-        } else {
-            format!("use one of: {}", names.join(", "))
-        };
-        node.key_diagnostic(format!("the {what} has no kind")).with_help(help)
     })
 }
 
@@ -249,19 +216,6 @@ fn read_tuner(node: &Node<'_>) -> Result<TunerBuilder, Diagnostic> {
         },
         starts: section.starts.0,
     })
-}
-
-/// Help on units.
-const UNIT_HELP: &str =
-    "units are s, ms, min, Hz, m, kg, rad, deg, N, V, A and the like, and products such as \"kg m2\" or \"N m s/rad\"";
-
-fn read_unit(node: &Node<'_>, key: &str, text: &str) -> Result<Unit, Diagnostic> {
-    Unit::parse(text).map_err(|why| at_key(node, key, why).with_help(UNIT_HELP))
-}
-
-/// Returns an error in the value under a key, or in the value itself if there is no such key.
-fn at_key(node: &Node<'_>, key: &str, why: String) -> Diagnostic {
-    node.child(key).as_ref().unwrap_or(node).diagnostic(why)
 }
 
 /// Largest number of cases of a grid.
@@ -321,17 +275,6 @@ fn read_cases(
         cases = cases.iter().flat_map(|case| values.iter().map(|value| with(case, value))).collect();
     }
     Ok(cases)
-}
-
-fn read_seconds(node: &Node<'_>, key: &str, quantity: Option<&Quantity>) -> Result<Option<f64>, Diagnostic> {
-    let second = Unit::known("s");
-    let Some(quantity) = quantity else { return Ok(None) };
-    let seconds =
-        quantity.to(&second).map_err(|why| at_key(node, key, why).with_help("a number without a unit is in s"))?;
-    if seconds.is_nan() {
-        return Err(at_key(node, key, format!("`{key}` is not a number")).with_help("give a time"));
-    }
-    Ok(Some(seconds))
 }
 
 fn read_criterion(catalogue: &Catalogue, node: &Node<'_>) -> Result<CriterionBuilder, Diagnostic> {

@@ -3,7 +3,7 @@
 use schemars::Schema;
 use serde_json::Value;
 
-use super::schema::{Keys, keys_of};
+use super::keys::{Keys, keys_of};
 
 /// Key of a schema, for its manual page.
 pub struct Entry {

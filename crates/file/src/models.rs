@@ -7,9 +7,11 @@ use mops_core::{
 };
 use mops_language::{Diagnostic, suggestion};
 
+use super::effects;
+use super::reading::kind;
 use super::sections::{ModelCommon, OneOrMore};
 use super::tree::Node;
-use super::{Files, effects, kind};
+use mops_language::files::Files;
 
 /// Reads a model of a study, whose models are `all`.
 pub(super) fn read<'t>(

@@ -3,22 +3,18 @@
 use std::sync::Arc;
 
 use mops_core::{
-    catalogue::{Catalogue, schema_of},
+    catalogue::{Catalogue, TaskKind, schema_of},
     effect::Effect,
 };
-use mops_language::Quantity;
+use mops_language::{Quantity, entries::Entries};
 use schemars::Schema;
 use serde_json::{Map, Value, json};
 
-use super::entries::Entries;
-use super::robustness::{
-    MonteCarloSection, RobustSection, UncertainSection, UncertainTable, UncertaintySection, WorstCaseSection,
-};
 use super::sections::{
     CaseOptions, CriterionCommon, EffectSection, ExperimentSection, ModelCommon, SensorSection, SolverCommon,
     StudySection, TunerSection,
 };
-use super::tasks::{DiagnosisSection, ExcitationSection, ParetoSection, SensitivitySection, SweepSection};
+use super::uncertain::{self, UncertainSection, UncertainTable};
 
 /// Returns the schema of a complete study file, for editors.
 pub fn study_schema(catalogue: &Catalogue) -> Value {
@@ -31,14 +27,14 @@ pub fn study_schema(catalogue: &Catalogue) -> Value {
     let value = |schema: Schema| schema.to_value();
     let mut case = value(schema_of::<CaseOptions>());
     case["additionalProperties"] = value(schema_of::<Quantity>());
-    json!({
+    let mut tables = json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "mops study",
         "type": "object",
         "additionalProperties": false,
         "required": ["study", "models"],
         "properties": {
-            "study": value(schema_of::<StudySection>()),
+            "study": study_section(catalogue).to_value(),
             "models": named(one_kind(with_effects(value(schema_of::<ModelCommon>()), catalogue), models, true)),
             "tuners": value(schema_of::<Entries<TunerSection>>()),
             "cases": named(case),
@@ -46,18 +42,27 @@ pub fn study_schema(catalogue: &Catalogue) -> Value {
             "sensors": value(schema_of::<Entries<SensorSection>>()),
             "criteria": named(one_kind(value(schema_of::<CriterionCommon>()), criteria, true)),
             "solver": one_kind(value(schema_of::<SolverCommon>()), solvers, false),
-            "excitation": value(schema_of::<ExcitationSection>()),
-            "sensitivity": value(schema_of::<SensitivitySection>()),
-            "sweep": value(schema_of::<SweepSection>()),
-            "pareto": value(schema_of::<ParetoSection>()),
-            "diagnosis": value(schema_of::<DiagnosisSection>()),
             "uncertain": value(schema_of::<UncertainTable>()),
-            "worst-case": value(schema_of::<WorstCaseSection>()),
-            "robust": value(schema_of::<RobustSection>()),
-            "monte-carlo": value(schema_of::<MonteCarloSection>()),
-            "uncertainty": value(schema_of::<UncertaintySection>()),
         },
-    })
+    });
+    let properties = tables["properties"].as_object_mut().expect("it was just made");
+    properties.extend(catalogue.tasks.iter().map(|kind| (kind.table.to_owned(), (kind.schema)().to_value())));
+    tables
+}
+
+/// Returns the schema of `[study]` with the tasks of a catalogue.
+pub(super) fn study_section(catalogue: &Catalogue) -> Schema {
+    let mut schema = schema_of::<StudySection>().to_value();
+    add_words(&mut schema, catalogue);
+    schema.try_into().expect("it is a schema")
+}
+
+/// Adds the words of the tasks to the schema of `[study]`.
+pub(super) fn add_words(schema: &mut Value, catalogue: &Catalogue) {
+    let word = |kind: &TaskKind| json!({ "const": kind.name, "type": "string", "description": kind.about });
+    let about = schema["properties"]["task"]["description"].take();
+    let words: Vec<Value> = catalogue.tasks.iter().map(word).collect();
+    schema["properties"]["task"] = json!({ "description": about, "oneOf": words });
 }
 
 /// Returns the schema of a model with the effects of the catalogue, by name.
@@ -97,62 +102,10 @@ fn one_kind(mut common: Value, kinds: Map<String, Value>, must_be: bool) -> Valu
     common
 }
 
-/// Keys that a table may contain.
-pub(super) enum Keys<'s> {
-    /// Arbitrary keys, all with one schema.
-    Any(&'s Value),
-    /// Listed keys.
-    Known(Vec<(&'s String, &'s Value)>),
-}
-
-impl<'s> Keys<'s> {
-    pub fn get(&self, key: &str) -> Option<&'s Value> {
-        match self {
-            Self::Any(schema) => Some(schema),
-            Self::Known(known) => known.iter().find(|(name, _)| *name == key).map(|(_, schema)| *schema),
-        }
-    }
-
-    pub fn names(&self) -> Vec<&'s str> {
-        match self {
-            Self::Any(_) => Vec::new(),
-            Self::Known(known) => known.iter().map(|(name, _)| name.as_str()).collect(),
-        }
-    }
-}
-
-/// Returns the keys that a schema allows; `None` if it allows no table, or anything.
-pub(super) fn keys_of(schema: &Value) -> Option<Keys<'_>> {
-    if let Some(Value::Object(any)) = schema.get("additionalProperties").filter(|s| s.is_object()) {
-        let _ = any;
-        return Some(Keys::Any(&schema["additionalProperties"]));
-    }
-    let mut known: Vec<(&String, &Value)> = Vec::new();
-    if let Some(properties) = schema.get("properties").and_then(Value::as_object) {
-        known.extend(properties);
-    }
-    for choice in ["anyOf", "oneOf", "allOf"] {
-        for alternative in schema.get(choice).and_then(Value::as_array).into_iter().flatten() {
-            match keys_of(alternative) {
-                Some(Keys::Any(schema)) => return Some(Keys::Any(schema)),
-                Some(Keys::Known(more)) => known.extend(more),
-                None => {}
-            }
-        }
-    }
-    let closed = schema.get("additionalProperties") == Some(&Value::Bool(false));
-    (closed || !known.is_empty()).then_some(Keys::Known(known))
-}
-
-/// Returns the documentation of a key, as the end of a sentence.
-pub(super) fn documentation(schema: &Value, key: &str) -> Option<String> {
-    keys_of(schema)?.get(key)?.get("description")?.as_str().map(super::shape::on_one_line)
-}
-
 /// Returns the tables of a study file: name and schema of each.
-pub fn tables() -> Vec<(&'static str, Schema)> {
-    vec![
-        ("study", schema_of::<StudySection>()),
+pub fn tables(catalogue: &Catalogue) -> Vec<(&'static str, Schema)> {
+    let mut tables = vec![
+        ("study", study_section(catalogue)),
         ("models", schema_of::<ModelCommon>()),
         ("tuners", schema_of::<TunerSection>()),
         ("cases", schema_of::<CaseOptions>()),
@@ -160,15 +113,8 @@ pub fn tables() -> Vec<(&'static str, Schema)> {
         ("sensors", schema_of::<SensorSection>()),
         ("criteria", schema_of::<CriterionCommon>()),
         ("solver", schema_of::<SolverCommon>()),
-        ("excitation", schema_of::<ExcitationSection>()),
-        ("sensitivity", schema_of::<SensitivitySection>()),
-        ("sweep", schema_of::<SweepSection>()),
-        ("pareto", schema_of::<ParetoSection>()),
-        ("diagnosis", schema_of::<DiagnosisSection>()),
-        ("uncertain", schema_of::<UncertainSection>()),
-        ("worst-case", schema_of::<WorstCaseSection>()),
-        ("robust", schema_of::<RobustSection>()),
-        ("monte-carlo", schema_of::<MonteCarloSection>()),
-        ("uncertainty", schema_of::<UncertaintySection>()),
-    ]
+        (uncertain::TABLE, schema_of::<UncertainSection>()),
+    ];
+    tables.extend(catalogue.tasks.iter().map(|kind| (kind.table, (kind.schema)())));
+    tables
 }

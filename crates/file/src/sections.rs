@@ -7,15 +7,17 @@ use mops_core::{
     criterion::Usage,
     evaluation::Objective,
     model::Linearise,
-    study::{Scale, Task},
+    study::Scale,
 };
-use mops_language::Quantity;
+use mops_language::{
+    Quantity,
+    entries::{Entries, Short},
+};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, IntoDeserializer, MapAccess, Visitor};
 
-use super::entries::{Entries, Short};
-use super::inputs::InputEntry;
+use super::input_sections::InputEntry;
 
 /// General settings of the study.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
@@ -23,10 +25,8 @@ use super::inputs::InputEntry;
 pub(super) struct StudySection {
     /// Name used in reports.
     pub name: String,
-    /// Task: `design` (default), `calibration`, `diagnosis`, `excitation`, `monte-carlo`, `pareto`, `sensitivity`, `sweep`
-    /// or `worst-case`.
-    #[serde(default)]
-    pub task: Task,
+    /// Task; default `design`.
+    pub task: Option<String>,
     /// Combination of the scaled values: `max` (default of a design), `sum` (default of a calibration) or `each` (default of
     /// `pareto`).
     pub objective: Option<Objective>,

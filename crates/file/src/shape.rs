@@ -4,7 +4,7 @@ use mops_language::{Diagnostic, suggestion};
 use serde_json::Value;
 use toml::de::{DeInteger, DeValue};
 
-use super::schema::{Keys, keys_of};
+use super::keys::{Keys, keys_of, on_one_line};
 use super::tree::Node;
 
 /// A key, and its documentation.
@@ -120,14 +120,8 @@ fn wrong_type(node: &Node<'_>, alternatives: &[&Value], key: Key<'_>) -> Diagnos
     let mut wanted: Vec<&str> = alternatives.iter().flat_map(|schema| types(schema)).map(in_words).collect();
     wanted.dedup();
     let found = match node.value() {
-        DeValue::String(_) => "a string",
         DeValue::Float(_) if wanted == ["an integer"] => "a number with a decimal point or an exponent",
-        DeValue::Integer(_) | DeValue::Float(_) => "a number",
-        DeValue::Boolean(true) => "`true`",
-        DeValue::Boolean(false) => "`false`",
-        DeValue::Datetime(_) => "a date",
-        DeValue::Array(_) => "a list",
-        DeValue::Table(_) => "a table",
+        _ => node.in_words(),
     };
     let fact = format!("expected {}, found {found}", wanted.join(" or "));
     let keys: Vec<&str> = alternatives.iter().filter_map(|schema| keys_of(schema)).flat_map(|k| k.names()).collect();
@@ -156,19 +150,6 @@ fn help(key: Key<'_>) -> String {
     match key.about {
         Some(about) => format!("`{}`: {}", key.name, on_one_line(about)),
         None => "`mops describe` explains each key".to_owned(),
-    }
-}
-
-/// Returns a documentation as the end of a sentence.
-pub(super) fn on_one_line(about: &str) -> String {
-    let about = about.replace('\n', " ");
-    let about = about.trim_end_matches('.');
-    let mut letters = about.chars();
-    match (letters.next(), letters.next()) {
-        (Some(first), Some(second)) if !second.is_uppercase() => {
-            first.to_lowercase().chain(about.chars().skip(1)).collect()
-        }
-        _ => about.to_owned(),
     }
 }
 

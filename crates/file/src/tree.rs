@@ -4,19 +4,12 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use mops_core::{
-    catalogue::{schema_of, schema_once},
-    study::StudyError,
-};
-use mops_language::{Diagnostic, Quantity, Source, suggestion};
-use schemars::{JsonSchema, Schema};
-use serde::de::DeserializeOwned;
-use serde_json::json;
+use mops_core::study::StudyError;
+use mops_language::{Diagnostic, Source, suggestion};
 use toml::Spanned;
-use toml::de::{DeTable, DeValue, ValueDeserializer};
+use toml::de::{DeTable, DeValue};
 
-use super::schema::documentation;
-use super::{UNIT_HELP, shape, syntax};
+use super::syntax;
 
 /// Text of a study. Every setting of the command line is appended as a separate line, so that errors in settings have a
 /// position too. `parts` are parsed one by one, each padded so that positions refer to the complete text.
@@ -100,9 +93,9 @@ fn merge<'t>(into: &mut DeTable<'t>, from: DeTable<'t>) {
 /// A value of the text, with the position of its key.
 #[derive(Clone)]
 pub(super) struct Node<'t> {
-    source: &'t Arc<Source>,
+    pub source: &'t Arc<Source>,
     key: Range<usize>,
-    value: Cow<'t, Spanned<DeValue<'t>>>,
+    pub value: Cow<'t, Spanned<DeValue<'t>>>,
 }
 
 impl<'t> Node<'t> {
@@ -143,10 +136,25 @@ impl<'t> Node<'t> {
         &self.source.text[self.value.span()]
     }
 
+    /// Returns the type of the value in words.
+    pub fn in_words(&self) -> &'static str {
+        match self.value.get_ref() {
+            DeValue::String(_) => "a string",
+            DeValue::Integer(_) | DeValue::Float(_) => "a number",
+            DeValue::Boolean(true) => "`true`",
+            DeValue::Boolean(false) => "`false`",
+            DeValue::Datetime(_) => "a date",
+            DeValue::Array(_) => "a list",
+            DeValue::Table(_) => "a table",
+        }
+    }
+
     fn as_table(&self) -> Result<&DeTable<'t>, Diagnostic> {
         match self.value.get_ref().as_table() {
             Some(table) => Ok(table),
-            None => Err(shape::check(self, &json!({ "type": "object" })).expect_err("it is no table")),
+            None => Err(self
+                .diagnostic(format!("expected a table, found {}", self.in_words()))
+                .with_help(format!("write {} = {{ name = value }}", self.key_text()))),
         }
     }
 
@@ -213,48 +221,6 @@ impl<'t> Node<'t> {
         table.remove(without);
         let value = Spanned::new(with.value.span(), DeValue::Table(table));
         Ok(Node { source: with.source, key: with.key.clone(), value: Cow::Owned(value) })
-    }
-
-    /// Reads the value as a `T`; unknown keys and wrong types are rejected at their position.
-    pub fn read<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, Diagnostic> {
-        self.read_with(&schema_once(schema_of::<T>), T::deserialize)
-    }
-
-    /// Reads the value with a reader and its schema.
-    pub fn read_with<T>(
-        &self,
-        schema: &Schema,
-        reader: impl FnOnce(ValueDeserializer<'t>) -> Result<T, toml::de::Error>,
-    ) -> Result<T, Diagnostic> {
-        shape::check(self, schema.as_value())?;
-        reader(ValueDeserializer::from(self.value.as_ref().clone())).map_err(|error| self.type_error(schema, &error))
-    }
-
-    /// Returns the error of a reader for a value of the right shape, such as a quantity with an unknown unit.
-    fn type_error(&self, schema: &Schema, error: &toml::de::Error) -> Diagnostic {
-        let span = error.span().unwrap_or_else(|| self.value.span());
-        let message = error.message().trim_end().replace('\n', "; ");
-        let message = match message.split_once(", expected ") {
-            Some((_, expected)) => format!("expected {expected}, found {}", &self.source.text[span.clone()]),
-            None => message,
-        };
-        let key = self.key_around(&span).and_then(|key| documentation(schema.as_value(), &key).map(|d| (key, d)));
-        let written = self.source.text[span.clone()].trim_matches(['"', '\'']);
-        let is_unit = written.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c))
-            && Quantity::parse(written).is_err_and(|why| why == message);
-        let help = match key {
-            _ if is_unit => UNIT_HELP.to_owned(),
-            Some((key, about)) => format!("`{key}`: {about}"),
-            None => "`mops describe` explains each key".to_owned(),
-        };
-        Diagnostic::new(message).with_help(help).at(self.source, span)
-    }
-
-    /// Returns the key of this table whose value contains the position.
-    fn key_around(&self, place: &Range<usize>) -> Option<String> {
-        let table = self.value.get_ref().as_table()?;
-        let around = |value: &Spanned<DeValue<'_>>| value.span().start <= place.start && place.end <= value.span().end;
-        table.iter().find(|(_, value)| around(value)).map(|(key, _)| key.get_ref().to_string())
     }
 
     /// Returns an error with its location: the value under its last key, or the last existing key.

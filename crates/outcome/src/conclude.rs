@@ -12,7 +12,8 @@ use mops_core::{
     problem::Problem,
     run::{Budget, Run},
     solver::{Oracle, Pareto, Stop},
-    study::{Study, Task},
+    study::Study,
+    task::{CalibrationTask, SensitivityTask},
 };
 use mops_math as math;
 
@@ -75,10 +76,10 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
     let best = whole(problem, best, ended_early);
     warnings.extend(bound_warnings(&study, problem, &best));
 
-    let calibration =
-        (study.task() == Task::Calibration || study.cases().iter().any(|c| c.experiment.is_some())).then(|| {
+    let calibration = (study.task().is::<CalibrationTask>() || study.cases().iter().any(|c| c.experiment.is_some()))
+        .then(|| {
             let point = if ending.stop == Stop::Interrupted { Point::Elsewhere } else { Point::Minimum };
-            let local = identification::local(problem, &best.tuners, point, study.tasks().sensitivity.zero);
+            let local = identification::local(problem, &best.tuners, point, sensitivity_zero(&study));
             let experiments = experiments(problem, &best, &unknown);
             let mut sensitivity = local.as_ref().map(|local| identification::report_of(problem, &best.tuners, local));
             let shows_noise = |found: &&mut SensitivityReport| found.of == "residuals" && point == Point::Minimum;
@@ -89,7 +90,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
                 parameters: standard_errors(problem, &best, local.as_ref()),
                 experiments,
                 sensitivity,
-                excitation: identification::excitations(&study, &study.tasks().excitation.question),
+                excitation: identification::excitations(&study),
             }
         });
     if problem.is_cancelled() {
@@ -121,7 +122,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         format: 1,
         mops: env!("CARGO_PKG_VERSION"),
         study: study.name().to_owned(),
-        task: study.task(),
+        task: study.task().name(),
         seed: study.seed(),
         solver: solver.kind.to_owned(),
         methods: Vec::new(),
@@ -147,6 +148,11 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         warnings,
     };
     (outcome, best)
+}
+
+/// Returns the share of the largest singular value that counts as zero, if the study gives one.
+fn sensitivity_zero(study: &Study) -> Option<f64> {
+    study.options::<SensitivityTask>().and_then(|task| task.zero)
 }
 
 /// Returns the evaluation in every case. A cancelled run keeps the available evaluation if no more can be simulated.

@@ -1,26 +1,32 @@
 //! From a run to its result: conclusions, identification, and the content of `result.json`.
+//!
+//! | module | content |
+//! |---|---|
+//! | [`Outcome`], [`conclude`](conclude()) | the result of a run |
+//! | [`Findings`] | what tasks add to it |
+//! | [`End`] | what is known of the reported point |
+//! | [`identification`] | sensitivities, covariance of estimates, noise of residuals, excitation, regressions |
+//! | [`diagnosis`] | result of a diagnosis |
 
 mod conclude;
-mod derivatives;
 pub mod diagnosis;
 mod end;
+mod findings;
 pub mod identification;
-mod jumps;
 mod outcome;
-pub mod robustness;
-mod slopes;
-mod trade_offs;
-mod uncertainty;
 
 pub use conclude::{Ending, conclude};
-pub use derivatives::{Beyond, Contradiction, DerivativesReport};
 pub use end::End;
-pub use jumps::{AwayReport, JumpReport, JumpsReport, MovedKind, ON_JUMP, WITHIN as JUMPS_WITHIN};
+pub use findings::{BlockKind, Finding, Findings};
 pub use outcome::{
-    CalibrationReport, ChannelReport, CriterionReport, Design, ExcitationFindings, ExperimentReport, FailureReport,
-    Findings, Outcome, ParameterReport, StartReport, SweepAxis, SweepReport, TunerReport, criterion_reports,
-    result_schema,
+    CalibrationReport, ChannelReport, CriterionReport, Design, ExperimentReport, FailureReport, Outcome,
+    ParameterReport, StartReport, TunerReport, criterion_reports, design, result_schema,
 };
-pub use slopes::{CriterionSlopes, SlopesReport};
-pub use trade_offs::{Certified, Exchange, FrontCriterion, FrontPoint, TradeOffs};
-pub use uncertainty::{BandReport, BootstrapParameter, BootstrapReport, ProfileReport, UncertaintyReport};
+#[doc(hidden)]
+pub use serde_json::Value;
+
+/// Returns a block of `result.json`, for [`finding!`].
+#[doc(hidden)]
+pub fn to_value<T: serde::Serialize>(of: &T) -> Value {
+    serde_json::to_value(of).expect("a finding is JSON")
+}

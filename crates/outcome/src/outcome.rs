@@ -8,7 +8,7 @@ use mops_core::{
     evaluation::{Evaluation, Objective},
     problem::{FrontObjective, Problem},
     solver::{Pareto, Stop},
-    study::{Study, Task},
+    study::Study,
 };
 use schemars::generate::SchemaSettings;
 use schemars::transform::RecursiveTransform;
@@ -16,10 +16,8 @@ use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::diagnosis::Diagnosis;
-use crate::identification::{ExcitationReport, RegressionReport, SensitivityReport, Whiteness};
-use crate::robustness::{GlobalSensitivityReport, MonteCarloReport, RobustReport, WorstCaseReport};
-use crate::{DerivativesReport, End, JumpsReport, SlopesReport, TradeOffs, UncertaintyReport};
+use crate::identification::{ExcitationReport, SensitivityReport, Whiteness};
+use crate::{BlockKind, End, Findings};
 
 /// The result of a run.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -32,7 +30,7 @@ pub struct Outcome {
     /// Name of the study.
     pub study: String,
     /// Task of the study.
-    pub task: Task,
+    pub task: &'static str,
     /// Seed of all random streams.
     pub seed: u64,
     /// Kind of the solver.
@@ -78,100 +76,14 @@ pub struct Outcome {
     /// Estimates and errors of a calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationReport>,
-    /// Results of tasks other than design and calibration, one block each.
+    /// Findings of the task, one block each.
     #[serde(flatten)]
+    #[schemars(skip)]
     pub found: Findings,
     /// Failures during the run.
     pub failures: Vec<FailureReport>,
     /// Warnings.
     pub warnings: Vec<String>,
-}
-
-/// Results of tasks other than design and calibration.
-#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
-pub struct Findings {
-    /// Order of persistent excitation of the inputs.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub excitation: Option<ExcitationFindings>,
-    /// Identifiability of the tuners from the data or the criteria.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sensitivity: Option<SensitivityReport>,
-    /// Derivatives of a design's criteria with respect to the tuners at the reported point.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub slopes: Option<SlopesReport>,
-    /// Derivatives at the reported point, compared with differences; null if there are none.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub derivatives: Option<DerivativesReport>,
-    /// Jumps of the criteria near a design.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub jumps: Option<JumpsReport>,
-    /// Objective over one or two tuners.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sweep: Option<SweepReport>,
-    /// Trade-offs along the Pareto front.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub trade_offs: Option<TradeOffs>,
-    /// Missing effects of the model.
-    #[serde(serialize_with = "crate::diagnosis::serialize", skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<crate::diagnosis::Block>")]
-    pub diagnosis: Option<Diagnosis>,
-    /// Worst cases over a box of uncertain parameters.
-    #[serde(rename = "worst-case", skip_serializing_if = "Option::is_none")]
-    pub worst_case: Option<WorstCaseReport>,
-    /// Distributions of the criteria.
-    #[serde(rename = "monte-carlo", skip_serializing_if = "Option::is_none")]
-    pub monte_carlo: Option<MonteCarloReport>,
-    /// Iterations of a design against worst cases.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub robust: Option<RobustReport>,
-    /// Profiles, bootstrap and bands for the estimates of a calibration.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub uncertainty: Option<UncertaintyReport>,
-    /// Global sensitivity of the criteria to the uncertain parameters.
-    #[serde(rename = "global-sensitivity", skip_serializing_if = "Option::is_none")]
-    pub global_sensitivity: Option<GlobalSensitivityReport>,
-}
-
-/// Order of persistent excitation of the inputs, and regressions on them.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct ExcitationFindings {
-    /// All inputs of all cases.
-    pub inputs: Vec<ExcitationReport>,
-    /// Estimated FIR and ARX models.
-    pub regressions: Vec<RegressionReport>,
-}
-
-/// Objective over one or two tuners.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct SweepReport {
-    /// Findings as sentences; names are in backticks.
-    pub words: Vec<String>,
-    /// Tuner along x.
-    pub x: SweepAxis,
-    /// Tuner along y, if there is one.
-    pub y: Option<SweepAxis>,
-    /// Objective: one row per value of y (a single one without y), with one number per value of x; null if a simulation
-    /// failed.
-    pub objective: Vec<Vec<f64>>,
-    /// Largest constraint violation, in scaled values, in the same layout.
-    pub violation: Vec<Vec<f64>>,
-    /// Value of x, value of y (null without y) and objective at the best point of the sweep.
-    pub best: [f64; 3],
-    /// Value of x, value of y (null without y) and objective at the centre of the sweep.
-    pub centre: [f64; 3],
-}
-
-/// A swept tuner.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct SweepAxis {
-    /// Name.
-    pub tuner: String,
-    /// Unit of the values.
-    pub unit: String,
-    /// True if the values are evenly spaced in the logarithm.
-    pub log: bool,
-    /// Values of the tuner.
-    pub values: Vec<f64>,
 }
 
 /// Tuner values in a result.
@@ -414,8 +326,8 @@ pub(crate) fn worst_scaled(study: &Study, at: &Evaluation) -> f64 {
         .unwrap_or(0.0)
 }
 
-/// Returns the tuners and criteria at a point of a Pareto front.
-pub(crate) fn design(problem: &Problem, at: &Evaluation) -> Design {
+/// Returns the tuners and criteria at a point, with the objectives of a Pareto front if there is one.
+pub fn design(problem: &Problem, at: &Evaluation) -> Design {
     let study = problem.study();
     let objectives = if problem.shape().objective == Objective::Each { problem.objectives() } else { Vec::new() };
     let worst = |objective: &FrontObjective| json!(objective.worst(study, at).map(|(_, reading)| reading.value));
@@ -432,11 +344,18 @@ pub(crate) fn design(problem: &Problem, at: &Evaluation) -> Design {
     }
 }
 
-/// Returns the JSON schema of `result.json`.
-pub fn result_schema() -> Value {
+/// Returns the JSON schema of `result.json`, in which tasks may add blocks.
+pub fn result_schema(blocks: &[BlockKind]) -> Value {
     let mut settings = SchemaSettings::draft07().for_serialize();
     settings.transforms.push(Box::new(RecursiveTransform(numbers_may_be_null)));
-    let mut schema = settings.into_generator().into_root_schema_for::<Outcome>().to_value();
+    let mut generator = settings.into_generator();
+    let added: Vec<(&BlockKind, Value)> =
+        blocks.iter().map(|kind| (kind, (kind.schema)(&mut generator).to_value())).collect();
+    let mut schema = generator.into_root_schema_for::<Outcome>().to_value();
+    for (kind, block) in added {
+        // Keys beside a reference are ignored in this draft.
+        schema["properties"][kind.key] = json!({ "description": kind.about, "allOf": [block] });
+    }
     schema["title"] = json!("mops result");
     schema
 }

@@ -14,7 +14,7 @@ use crate::base;
 use crate::estimation::{ErrorModel, Errors, Estimate};
 use crate::fit::Sets;
 use crate::meter::Meter;
-use crate::subject::Subject;
+use crate::subject::{Subject, task_of};
 
 /// Set of effects, fitted to the calibration records.
 #[derive(Debug, Clone)]
@@ -93,7 +93,8 @@ pub fn compare(study: &Study, effects: &[Arc<dyn Effect>], sets: &[Vec<String>])
 /// # Errors
 /// The study is no diagnosis, or the declared model cannot be simulated.
 pub fn select(study: &Study, effects: &[Arc<dyn Effect>]) -> Result<Selection, StudyError> {
-    let tried = |effect: &&Arc<dyn Effect>| study.tasks().diagnosis.tries(effect.name());
+    let task = task_of(study);
+    let tried = |effect: &&Arc<dyn Effect>| task.tries(effect.name());
     let effects: Vec<Arc<dyn Effect>> = effects.iter().filter(tried).cloned().collect();
     with_search(study, &effects, |search| {
         search.begin();
@@ -128,7 +129,7 @@ fn with_search(
     let simulations = Meter::new(&());
     let failed = || StudyError::here("the model cannot be simulated near its initial guesses");
     let (refit, declared) = prepare(&subject, effects, &simulations).ok_or_else(failed)?;
-    let task = &study.tasks().diagnosis;
+    let task = &task_of(study);
     let mut search = Search::new(&refit, declared, task.max_effects, task.level);
     fit(&mut search)?;
     let mut forecasts = Forecasts::new(subject.measurements.iter().any(|m| m.role == Role::Selection));

@@ -1,6 +1,6 @@
 //! Selections on data that the tests compute themselves.
 
-use mops_core::{Input, Role, Study, case::Hold};
+use mops_core::{Input, Role, Study, case::Hold, task::DiagnosisTask};
 use mops_math as math;
 
 use super::baseline::baseline;
@@ -190,7 +190,7 @@ fn given_effects_are_in_every_set_and_the_search_adds_others() {
     let subject = recorded(both, 0.0, &BOTH, &[0.2, 5.0, 0.4, 0.1]);
     let diagnosed = |with: &str| {
         let mut parts = study(&subject).into_parts();
-        parts.tasks.diagnosis.with = vec![with.to_owned()];
+        parts.task = DiagnosisTask { with: vec![with.to_owned()], ..DiagnosisTask::default() }.into();
         diagnose(&Study::from_parts(parts), &catalogue(&TRIED), &Options { max_effects: 2, level: 0.05 }, &())
     };
     let found = diagnosed("cubic-stiffness@joint:x").expect("it simulates").found;

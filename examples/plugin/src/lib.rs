@@ -1,10 +1,11 @@
-//! mops with a model, a criterion, a solver, an effect and two studies of its own.
+//! mops with a model, a criterion, a solver, an effect, a task and two studies of its own.
 
 pub mod eddy_brake;
 pub mod quarter_car;
 pub mod ride_comfort;
 pub mod shrinking_box;
 pub mod suspension;
+pub mod tolerances;
 
 use mops::prelude::*;
 
@@ -15,6 +16,7 @@ pub fn catalogue() -> Catalogue {
         .with_criterion(CriterionKind::of::<ride_comfort::RideComfort>())
         .with_solver(SolverKind::of::<shrinking_box::ShrinkingBoxOptions>())
         .with_effect(mops::effects::effect::<eddy_brake::EddyBrake>())
+        .with_task(mops::tasks::kind::<tolerances::TolerancesTask>(tolerances::Tolerances))
         .with_study(BuiltStudy::new("suspension", "Spring and damper of a wheel, built in Rust", suspension::study))
         .with_study(Shipped {
             name: "quarter-car",

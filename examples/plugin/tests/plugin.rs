@@ -104,3 +104,24 @@ fn folders_of_studies_are_known_by_name() {
     assert_eq!(nowhere.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&nowhere.stderr).contains("nowhere"));
 }
+
+/// The finding is in the block of the task; each limit is where the demand is just met.
+#[test]
+fn a_task_is_run_by_its_own_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let shown = text(&["tolerances", "suspension", "--max-evaluations", "200", "--out", out]);
+    assert!(shown.contains("tuner") && shown.contains("design"), "{shown}");
+    let result: Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("result.json")).unwrap()).unwrap();
+    assert_eq!(result["task"], "tolerances");
+    for tuner in result["tolerances"]["tuners"].as_array().unwrap() {
+        let ends = tuner["range"].as_array().unwrap();
+        let [from, to] = [0, 1].map(|i| ends[i].as_f64().unwrap());
+        assert!((from..=to).contains(&tuner["value"].as_f64().unwrap()), "{tuner}");
+    }
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains(">Tolerances</h2>"));
+    assert!(text(&["schema", "study"]).contains("\"tolerances\""));
+    assert!(text(&["describe", "tolerances"]).contains("halvings"));
+}

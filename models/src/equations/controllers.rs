@@ -1,8 +1,10 @@
 //! PID controllers of a model, as definitions, states and clocks.
 
 use mops_core::StudyError;
-use mops_file::{Entries, Short};
-use mops_language::{Quantity, Unit};
+use mops_language::{
+    Quantity, Unit,
+    entries::{Entries, Short},
+};
 
 use super::definition::{path, under};
 use super::filters::{in_brackets, number_before_formulas};

@@ -1,8 +1,7 @@
 //! Filters of clocks: transfer functions as difference equations of their memory.
 
 use mops_core::StudyError;
-use mops_file::Short;
-use mops_language::{Quantity, Unit};
+use mops_language::{Quantity, Unit, entries::Short};
 use mops_linear::{TransferFunction, exponential_m1};
 use mops_math as math;
 use nalgebra::DMatrix;

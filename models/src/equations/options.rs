@@ -1,7 +1,9 @@
 //! Options of `[models.NAME.equations]` in a study file.
 
-use mops_file::{Entries, Short};
-use mops_language::Quantity;
+use mops_language::{
+    Quantity,
+    entries::{Entries, Short},
+};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};

@@ -1,6 +1,6 @@
 //! Page of the diagnosis benchmark: tables, and reliability plots of the stated probabilities.
 
-use mops::report::{Color, Curve, CurveStyle, Plot};
+use mops::report::{Color, Curve, CurveStyle, Draw, Plot};
 
 use super::statistics::{Bin, reliability};
 

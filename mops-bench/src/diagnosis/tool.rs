@@ -56,7 +56,10 @@ impl Tools<'_> {
         let options = Options { effects: self.catalogue.effects.clone(), jobs: Some(1), ..Options::default() };
         let started = Instant::now();
         let solved = solve(study, &options, &Quiet(self.watch)).map_err(|why| why.to_string())?;
-        Ok((solved.outcome.found.diagnosis.expect("that was the task"), started.elapsed().as_secs_f64()))
+        Ok((
+            solved.outcome.found.get::<Diagnosis>().cloned().expect("that was the task"),
+            started.elapsed().as_secs_f64(),
+        ))
     }
 }
 

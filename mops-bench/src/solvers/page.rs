@@ -1,6 +1,6 @@
 //! Page of a solver benchmark: plots of profiles or hypervolumes, and the tables of the terminal.
 
-use mops::report::{Color, Curve, CurveStyle, ParallelAxis, Plot};
+use mops::report::{Color, Curve, CurveStyle, Draw, ParallelAxis, Plot};
 
 use super::results::{Results, Row};
 use super::{ROUGH, Score, data_profile, performance_profile};
@@ -27,7 +27,7 @@ pub(crate) fn page(tables: &str, all: &[(String, &Results)]) -> String {
     };
     let plots: Vec<Option<Plot>> = if of_fronts { vec![volumes(all)] } else { profiles() };
     let title = format!("Benchmark of solvers: {suite}");
-    let pictures: Vec<String> = plots.iter().flatten().map(Plot::svg).collect();
+    let pictures: Vec<String> = plots.iter().flatten().map(Draw::svg).collect();
     let heading = if of_fronts { "Hypervolume" } else { "Profiles" };
     crate::page::page(&title, heading, &pictures, tables, "results.json")
 }

@@ -4,6 +4,7 @@ mod study;
 
 pub use study::{BuiltStudy, CatalogueStudy, Shipped, StudyFolder};
 
+use std::any::Any;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -22,6 +23,7 @@ use crate::effect::{Effect, Placement};
 use crate::model::Model;
 use crate::solver::Solver;
 use crate::study::StudyError;
+use crate::task::{Task, TaskOptions};
 
 /// Function that adds effects to a model with ports. It is injected because core does not contain the simulation.
 pub type Augment = fn(Arc<dyn Model>, Vec<Placement>) -> Result<Box<dyn Model>, StudyError>;
@@ -162,6 +164,43 @@ impl SolverChoice {
     }
 }
 
+/// A kind of task.
+#[derive(Clone)]
+pub struct TaskKind {
+    /// Word in study files.
+    pub name: &'static str,
+    /// Table of study files with its options.
+    pub table: &'static str,
+    /// Purpose, in a sentence.
+    pub about: &'static str,
+    /// Example of the table, for a message that it is missing.
+    pub example: &'static str,
+    /// Returns the schema of the options, with their documentation.
+    pub schema: fn() -> Schema,
+    /// Reads options.
+    pub read: Reader<Task>,
+    /// Returns the task of a study without the table; `None` if it needs one.
+    pub absent: fn() -> Option<Task>,
+    /// What performs the task and shows its result, of a type that the core does not know.
+    pub room: Arc<dyn Any + Send + Sync>,
+}
+
+impl TaskKind {
+    /// Creates the kind with options `O`, performed by `room`.
+    pub fn of<O: TaskOptions>(room: Arc<dyn Any + Send + Sync>) -> Self {
+        Self {
+            name: O::NAME,
+            table: O::TABLE,
+            about: O::ABOUT,
+            example: O::EXAMPLE,
+            schema: schema_of::<O>,
+            read: |value| O::deserialize(value).map(Task::from),
+            absent: || O::absent().map(Task::from),
+            room,
+        }
+    }
+}
+
 /// All kinds and studies that a study file or a command can name.
 #[derive(Clone, Default)]
 pub struct Catalogue {
@@ -171,6 +210,8 @@ pub struct Catalogue {
     pub criteria: Vec<CriterionKind>,
     /// Solvers; the first is the default.
     pub solvers: Vec<SolverKind>,
+    /// Tasks; the first is the default.
+    pub tasks: Vec<TaskKind>,
     /// Candidate effects that a model may lack.
     pub effects: Vec<Arc<dyn Effect>>,
     /// Function that adds effects to a model; without it no study can name an effect.
@@ -214,6 +255,13 @@ impl Catalogue {
     #[must_use]
     pub fn with_solver(mut self, kind: SolverKind) -> Self {
         self.solvers.push(kind);
+        self
+    }
+
+    /// Adds a kind of task.
+    #[must_use]
+    pub fn with_task(mut self, kind: TaskKind) -> Self {
+        self.tasks.push(kind);
         self
     }
 

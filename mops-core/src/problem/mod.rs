@@ -23,7 +23,8 @@ use crate::failure::{Failure, caught};
 use crate::model::{Analysis, Job};
 use crate::run::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes as KnownSlopes, RowValue, entry};
 use crate::solver::Shape;
-use crate::study::{Row, Scale, Study, Task, Tuner};
+use crate::study::{Row, Scale, Study, Tuner};
+use crate::task::ParetoTask;
 
 /// The optimisation problem of a study: active tuners as coordinates of the unit box, criteria as rows of scaled values.
 #[derive(Clone)]
@@ -520,7 +521,7 @@ fn groups(objectives: &[FrontObjective]) -> Vec<usize> {
 fn shape(study: &Study, active: &[usize], usage: impl Fn(&Row, &Study) -> Usage) -> Shape {
     let rows: Vec<(Usage, f64)> = study.rows.iter().map(|row| (usage(row, study), row.weight)).collect();
     let spacing = active.iter().map(|&i| study.tuners[i].spacing()).collect();
-    let points = if study.task == Task::Pareto { study.tasks.pareto.points } else { 0 };
+    let points = study.task.options::<ParetoTask>().map_or(0, |pareto| pareto.points);
     let groups = match study.objective {
         Objective::Each => groups(&FrontObjective::of_study(study, &rows)),
         Objective::Max | Objective::Sum => Vec::new(),

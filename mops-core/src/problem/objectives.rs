@@ -3,6 +3,7 @@
 use crate::criterion::Usage;
 use crate::evaluation::{Evaluation, Reading};
 use crate::study::Study;
+use crate::task::ParetoTask;
 
 /// Objective of a Pareto front.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,9 +19,10 @@ impl FrontObjective {
     pub(crate) fn of_study(study: &Study, usages: &[(Usage, f64)]) -> Vec<Self> {
         let minimised: Vec<usize> = (0..usages.len()).filter(|&row| usages[row].0 == Usage::Minimise).collect();
         let name = |row: usize| study.rows[row].name.as_str();
+        let is_per_case = study.options::<ParetoTask>().is_some_and(|pareto| pareto.per_case);
         let mut objectives: Vec<Self> = Vec::new();
         for &row in &minimised {
-            if study.tasks.pareto.per_case {
+            if is_per_case {
                 let is_unique = minimised.iter().filter(|&&other| name(other) == name(row)).count() == 1;
                 let label = if is_unique { name(row).to_owned() } else { study.key(&study.rows[row]) };
                 objectives.push(Self { label, rows: vec![row] });

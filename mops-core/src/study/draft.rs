@@ -2,20 +2,25 @@
 
 use mops_language::{Quantity, Unit};
 
-use super::{Study, Task, TasksBuilder};
+use super::{Study, UncertainBuilder};
 use crate::case::{Input, ResponseData, Role};
 use crate::criterion::{CriterionSpec, Usage};
 use crate::evaluation::Objective;
 use crate::model::Model;
 use crate::study::{Scale, StudyError};
+use crate::task::Task;
 
 /// A study as written, not yet checked. [`StudyBuilder::build`] checks it.
 #[derive(Default)]
 pub struct StudyBuilder {
     /// Name.
     pub name: String,
-    /// Task.
+    /// Task, with its options.
     pub task: Task,
+    /// Options of tasks that the study does not perform.
+    pub options: Vec<Task>,
+    /// Uncertain parameters, by name.
+    pub uncertain: Vec<(String, UncertainBuilder)>,
     /// Combination of the scaled values into the objective; `None` for the default of the task.
     pub objective: Option<Objective>,
     /// Seed of all random streams.
@@ -30,8 +35,6 @@ pub struct StudyBuilder {
     pub sensors: Vec<(String, Quantity)>,
     /// Criteria, by name.
     pub criteria: Vec<(String, CriterionBuilder)>,
-    /// Settings of the tasks other than design and calibration.
-    pub tasks: TasksBuilder,
 }
 
 impl StudyBuilder {

@@ -1,14 +1,11 @@
 //! Studies: models, cases, tuners and criteria that belong together. A [`Study`] is valid once built.
 
 mod build;
-mod diagnosis;
 mod distribution;
 mod draft;
 mod error;
 mod moved;
-mod robustness;
 mod scenarios;
-mod tasks;
 mod tuner;
 mod uncertain;
 mod wildcard;
@@ -19,20 +16,11 @@ pub use wildcard::matches_pattern;
 
 use std::sync::Arc;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-pub use diagnosis::DiagnosisTask;
 pub use distribution::{Distribution, Uncertain};
 pub use draft::{
     CaseBuilder, ChannelBuilder, CriterionBuilder, Free, Measured, ModelBuilder, StudyBuilder, TunerBuilder,
 };
-pub use robustness::{Chosen, MonteCarloTask, RobustTask, SensitivityMethod, UncertaintyTask, WorstCaseTask};
 pub use scenarios::Scenario;
-pub use tasks::{
-    Axis, AxisBuilder, ExcitationBuilder, ExcitationQuestion, ExcitationTask, ParetoTask, Place, RegressionBuilder,
-    RegressionTask, SensitivityTask, SweepBuilder, SweepTask, Tasks, TasksBuilder,
-};
 pub use uncertain::{DistributionBuilder, UncertainBuilder};
 
 use mops_language::{Scalar, Unit};
@@ -43,31 +31,7 @@ use crate::criterion::{Criterion, Demand, Scaled, Usage, Value};
 use crate::evaluation::{FEASIBLE, Objective, Reading};
 use crate::failure::{Failure, caught};
 use crate::model::{Analysis, Job, Model};
-
-/// Task of a study.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Task {
-    /// Choose the tuners that minimise the worst scaled criterion.
-    #[default]
-    Design,
-    /// Estimate the tuners from measurements.
-    Calibration,
-    /// Report the order of persistent excitation of the inputs.
-    Excitation,
-    /// Report which tuners, or which combinations of them, the criteria or the data determine.
-    Sensitivity,
-    /// Compute the objective over one or two tuners.
-    Sweep,
-    /// Find the physical effect that the model lacks.
-    Diagnosis,
-    /// Find the largest scaled value of every criterion over a box of uncertain parameters.
-    WorstCase,
-    /// Report the distributions of the criteria under uncertain parameters.
-    MonteCarlo,
-    /// Find the Pareto front (non-dominated designs) and the trade-offs between criteria.
-    Pareto,
-}
+use crate::task::{DesignTask, Place, Task, TaskSpec};
 
 /// A study with all names, sizes, bounds and units checked. Built by [`StudyBuilder::build`] or read from a file; what may be
 /// changed afterwards has a method.
@@ -75,6 +39,8 @@ pub enum Task {
 pub struct Study {
     pub(crate) name: String,
     pub(crate) task: Task,
+    pub(crate) options: Vec<Task>,
+    pub(crate) uncertain: Vec<Uncertain>,
     pub(crate) objective: Objective,
     pub(crate) seed: u64,
     pub(crate) models: Vec<(String, Arc<dyn Model>)>,
@@ -84,7 +50,6 @@ pub struct Study {
     pub(crate) tuners: Vec<Tuner>,
     pub(crate) rows: Vec<Row>,
     pub(crate) jobs: Vec<JobPlan>,
-    pub(crate) tasks: Tasks,
     pub(crate) warnings: Vec<String>,
     pub(crate) notes: Vec<String>,
 }
@@ -97,8 +62,18 @@ impl Study {
     }
 
     /// Returns the task.
-    pub fn task(&self) -> Task {
-        self.task
+    pub fn task(&self) -> &Task {
+        &self.task
+    }
+
+    /// Returns the options of a kind of task, if the study gives any; the study may perform another task.
+    pub fn options<T: TaskSpec>(&self) -> Option<&T> {
+        std::iter::once(&self.task).chain(&self.options).find_map(|task| task.options())
+    }
+
+    /// Returns the uncertain parameters.
+    pub fn uncertain(&self) -> &[Uncertain] {
+        &self.uncertain
     }
 
     /// Returns the combination of the scaled values into the objective.
@@ -136,23 +111,10 @@ impl Study {
         &self.jobs
     }
 
-    /// Returns the settings of the tasks other than design and calibration.
-    pub fn tasks(&self) -> &Tasks {
-        &self.tasks
-    }
-
     /// Returns true if the task rests on a design for the given cases, although the study has the table of a design against worst cases.
     pub fn leaves_worst_cases_out(&self) -> bool {
-        let tasks = &self.tasks;
-        let at = match self.task {
-            Task::Pareto => Place::Optimum,
-            Task::Sweep => tasks.sweep.as_ref().map_or(Place::Start, |sweep| sweep.at),
-            Task::Sensitivity => tasks.sensitivity.at,
-            Task::WorstCase => tasks.worst_case.at,
-            Task::MonteCarlo => tasks.monte_carlo.at,
-            Task::Design | Task::Calibration | Task::Excitation | Task::Diagnosis => Place::Start,
-        };
-        tasks.robust.is_some() && at == Place::Optimum
+        let is_robust = self.options::<DesignTask>().is_some_and(|design| design.robust.is_some());
+        is_robust && !self.task.is::<DesignTask>() && self.task.at() == Some(Place::Optimum)
     }
 
     /// Returns the warnings shown before a run, such as a suspicious first sample.
@@ -218,6 +180,8 @@ impl Study {
         let StudyParts {
             name,
             task,
+            options,
+            uncertain,
             objective,
             seed,
             models,
@@ -226,19 +190,62 @@ impl Study {
             tuners,
             rows,
             jobs,
-            tasks,
             warnings,
             notes,
         } = parts;
-        Self { name, task, objective, seed, models, fixed, cases, tuners, rows, jobs, tasks, warnings, notes }
+        Self {
+            name,
+            task,
+            options,
+            uncertain,
+            objective,
+            seed,
+            models,
+            fixed,
+            cases,
+            tuners,
+            rows,
+            jobs,
+            warnings,
+            notes,
+        }
     }
 
     /// Returns the parts, to change what has no method, for tests.
     #[doc(hidden)]
     pub fn into_parts(self) -> StudyParts {
-        let Self { name, task, objective, seed, models, fixed, cases, tuners, rows, jobs, tasks, warnings, notes } =
-            self;
-        StudyParts { name, task, objective, seed, models, fixed, cases, tuners, rows, jobs, tasks, warnings, notes }
+        let Self {
+            name,
+            task,
+            options,
+            uncertain,
+            objective,
+            seed,
+            models,
+            fixed,
+            cases,
+            tuners,
+            rows,
+            jobs,
+            warnings,
+            notes,
+        } = self;
+        StudyParts {
+            name,
+            task,
+            options,
+            uncertain,
+            objective,
+            seed,
+            models,
+            fixed,
+            cases,
+            tuners,
+            rows,
+            jobs,
+            warnings,
+            notes,
+        }
     }
 }
 
@@ -249,6 +256,8 @@ impl Study {
 pub struct StudyParts {
     pub name: String,
     pub task: Task,
+    pub options: Vec<Task>,
+    pub uncertain: Vec<Uncertain>,
     pub objective: Objective,
     pub seed: u64,
     pub models: Vec<(String, Arc<dyn Model>)>,
@@ -257,7 +266,6 @@ pub struct StudyParts {
     pub tuners: Vec<Tuner>,
     pub rows: Vec<Row>,
     pub jobs: Vec<JobPlan>,
-    pub tasks: Tasks,
     pub warnings: Vec<String>,
     pub notes: Vec<String>,
 }

@@ -16,7 +16,7 @@ impl Study {
             (tuner.start, tuner.active, tuner.tie) = (value, false, None);
         }
         let first = study.tuners.len();
-        for uncertain in &self.tasks.uncertain {
+        for uncertain in &self.uncertain {
             let settled = uncertain.at(tuners);
             study.tuners.push(Tuner {
                 name: settled.name.clone(),
@@ -32,7 +32,7 @@ impl Study {
                 guessed: [false; 2],
             });
         }
-        study.tasks.uncertain = self.tasks.uncertain.iter().map(|uncertain| uncertain.at(tuners)).collect();
+        study.uncertain = self.uncertain.iter().map(|uncertain| uncertain.at(tuners)).collect();
         for job in &mut study.jobs {
             for (index, uncertain, factor) in self.touched(job) {
                 job.parameters[index] = ParameterSource::Tuner { tuner: first + uncertain, factor };
@@ -48,8 +48,8 @@ impl Study {
     fn touched(&self, job: &JobPlan) -> Vec<(usize, usize, f64)> {
         let parameters = &self.models[job.model].1.interface().parameters;
         let found = |(index, p): (usize, &crate::model::Parameter)| {
-            let uncertain = self.tasks.uncertain.iter().position(|u| u.name == p.variable.name)?;
-            let factor = self.tasks.uncertain[uncertain].unit.factor_to(&p.variable.unit).unwrap_or(1.0);
+            let uncertain = self.uncertain.iter().position(|u| u.name == p.variable.name)?;
+            let factor = self.uncertain[uncertain].unit.factor_to(&p.variable.unit).unwrap_or(1.0);
             Some((index, uncertain, factor))
         };
         parameters.iter().enumerate().filter_map(found).collect()
@@ -59,7 +59,7 @@ impl Study {
     fn nominal(&self, uncertain: &Uncertain, tuners: &[f64]) -> f64 {
         let first = self.jobs.iter().find_map(|job| {
             let (index, _, factor) =
-                self.touched(job).into_iter().find(|t| self.tasks.uncertain[t.1].name == uncertain.name)?;
+                self.touched(job).into_iter().find(|t| self.uncertain[t.1].name == uncertain.name)?;
             Some(self.parameters(job, tuners)[index] / factor)
         });
         first.unwrap_or_else(|| uncertain.quantile(0.5)).clamp(uncertain.bounds[0], uncertain.bounds[1])
@@ -111,7 +111,7 @@ impl Study {
                 let mut plan = JobPlan { case, ..job.clone() };
                 for (parameter, uncertain, factor) in self.touched(job) {
                     let value = scenario.values[uncertain] * factor;
-                    plan.parameters[parameter] = match self.tasks.uncertain[uncertain].tuner {
+                    plan.parameters[parameter] = match self.uncertain[uncertain].tuner {
                         Some(tuner) => ParameterSource::Tuner { tuner, factor: value },
                         None => ParameterSource::Constant(value),
                     };

@@ -1,13 +1,14 @@
 //! Output files of `mops linearise`: linearised.json and plots.
 
+use crate::report::Draw;
 use std::path::Path;
 
+use mops_content::numbers::FileNames;
 use mops_linear::StateSpace;
 use serde_json::Value;
 
 use crate::cli::linear_plots;
 use crate::files::Outputs;
-use crate::numbers::FileNames;
 use crate::terminal::CommandError;
 
 /// Writes the files; returns a summary with notes on missing plots.

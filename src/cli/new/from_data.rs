@@ -3,16 +3,15 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use mops_content::numbers::significant;
 use mops_core::{Input, case::Hold};
 use mops_data::{DataFile, unit_since_1970};
-use mops_language::{Diagnostic, Unit, files::read_regular, suggestion};
+use mops_file::edit::{key, number, quoted};
+use mops_language::{Diagnostic, Unit, files::read_regular, plain::line, suggestion};
 use mops_math as math;
 
 use super::super::data;
-use crate::numbers::significant;
-use crate::plain::line;
 use crate::terminal::CommandError;
-use crate::toml_text::{key, number, quoted};
 
 /// Columns that the user has chosen.
 pub(super) struct Chosen<'a> {

@@ -7,11 +7,10 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use mops_core::{Catalogue, catalogue::CatalogueStudy};
-use mops_language::{Diagnostic, suggestion};
+use mops_language::{Diagnostic, plain::acts, suggestion};
 
 use super::schema;
 use crate::files::Outputs;
-use crate::plain::acts;
 use crate::terminal::{CommandError, print};
 
 /// Arguments of `mops new`.

@@ -1,6 +1,6 @@
 //! Part of the time in which a response moves.
 
-use super::super::figures::Group;
+use mops_content::figures::Group;
 
 /// Share of the range of a curve within which the curve counts as at rest.
 const AT_REST: f64 = 0.02;

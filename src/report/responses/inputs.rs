@@ -2,7 +2,7 @@
 
 use mops_core::{Case, Input, Variable};
 
-use super::super::sampling::thinned;
+use mops_content::sampling::thinned;
 
 /// Number of points of a smooth input.
 const GRID: u32 = 1000;

@@ -1,18 +1,20 @@
 //! Plots of a linear model: Bode plots in all cases, with margins and the Nyquist curve of a loop transfer function, and the
 //! movement of the poles with each tuner.
 
+use mops_content::{
+    figures::Figure,
+    numbers::significant,
+    plot::{Color, Curve, CurveStyle, Level, Plot},
+};
 use mops_core::{Analysis, Failure, Variable, case::ResponseData};
 use mops_linear::{Complex, Crossing, Loop, StateSpace, zeros};
 use mops_math as math;
 use mops_math::complex;
 
 use super::super::bode::{FrequencyCurve, bode, unwrapped};
-use super::super::figures::Figure;
 use super::super::nyquist::nyquist;
-use super::super::plot::{Color, Curve, CurveStyle, Level, Plot};
 use super::Simulated;
 use super::of_model::Cases;
-use crate::numbers::significant;
 
 /// Largest number of tuners with a plot of the poles.
 const MOST_TUNERS: usize = 6;

@@ -1,12 +1,16 @@
 //! Responses of one point for the live page of a run.
 
+use mops_content::{
+    figures::{Figure, Group},
+    marks::bounds,
+    plot::{Bound, Color, Curve, CurveStyle, Plot},
+    sampling,
+};
 use mops_core::{Problem, study::Row};
 use serde_json::Value;
 
-use super::super::comparison::{bounds, over_time, trace};
-use super::super::figures::{Figure, Group};
-use super::super::plot::{Bound, Color, Curve, CurveStyle, Plot};
-use super::super::{chart, sampling};
+use super::super::chart;
+use super::super::comparison::{over_time, trace};
 use super::active;
 
 /// Largest number of simulations shown during a run.

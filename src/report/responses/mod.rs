@@ -12,10 +12,10 @@ use rayon::prelude::*;
 
 pub(crate) use live::live;
 
+use mops_content::{figures::Group, numbers::counted};
+
 use super::Report;
 use super::comparison::Comparison;
-use super::figures::Group;
-use crate::numbers::counted;
 
 /// Largest number of simulations with plots; beyond it, those with the largest scaled values are shown.
 const MOST_JOBS: usize = 30;

@@ -1,14 +1,16 @@
 //! Plots of one simulation: an experiment, or a case with the responses of a Pareto front.
 
+use mops_content::{
+    figures::{Figure, Group},
+    numbers::with_unit,
+    plot::{Color, Curve, Plot},
+};
 use mops_core::{Variable, study::Row};
+use mops_tasks::calibration::{self, Around, UncertaintyReport};
 
 use super::super::comparison::over_time;
-use super::super::figures::{Figure, Group};
-use super::super::plot::{Color, Curve, Plot};
-use super::super::uncertainty::{self, Around};
 use super::super::{Report, criteria, front};
 use super::{Simulated, active, inputs};
-use crate::numbers::with_unit;
 
 /// Returns the plots of a simulation.
 pub(super) fn group(report: &Report<'_>, Simulated { job, both }: &Simulated) -> Group {
@@ -44,8 +46,8 @@ pub(super) fn group(report: &Report<'_>, Simulated { job, both }: &Simulated) ->
         if let Some(signal) = signals.iter().find(|s| s.name == channel.signal) {
             let mut fit = both.fit(channel, signal, &case.name);
             let bands = |around: Around| {
-                let found = report.outcome.found.uncertainty.as_ref();
-                found.map_or_else(Vec::new, |found| uncertainty::bands(found, &case.name, &signal.name, around))
+                let found = report.outcome.found.get::<UncertaintyReport>();
+                found.map_or_else(Vec::new, |found| calibration::bands(found, &case.name, &signal.name, around))
             };
             fit.curves.extend(bands(Around::Prediction));
             let mut plots = vec![(format!("fit-{place}-{}", signal.name), fit)];

@@ -1,14 +1,18 @@
 //! Plots of a model: each signal in all cases.
 
+use mops_content::{
+    figures::{Figure, Group},
+    marks::bounds,
+    numbers::{counted, with_unit},
+    plot::{Bound, Color, Curve, CurveStyle, Plot},
+    sampling,
+};
 use mops_core::{AnalysisKind, Case, Variable, study::Row};
 use mops_outcome::CriterionReport;
 
-use super::super::comparison::{bounds, over_time, trace};
-use super::super::figures::{Figure, Group};
-use super::super::plot::{Bound, Color, Curve, CurveStyle, Plot};
-use super::super::{Report, criteria, sampling};
+use super::super::comparison::{over_time, trace};
+use super::super::{Report, criteria};
 use super::{Simulated, active, inputs, linear, worst};
-use crate::numbers::{counted, with_unit};
 
 /// Number of cases with a colour of their own: those with the largest scaled values.
 const COLOURED: usize = 6;
@@ -225,7 +229,7 @@ fn caption<'c>(of_cases: impl Iterator<Item = &'c CriterionReport> + Clone) -> O
         // Without a demand, no case is the worst.
         let values = || of_cases.clone().map(|criterion| criterion.value).filter(|value| value.is_finite());
         let [low, high] = [values().reduce(f64::min)?, values().reduce(f64::max)?];
-        let [low, high] = [crate::numbers::number(low), with_unit(high, &worst.unit)];
+        let [low, high] = [mops_content::numbers::number(low), with_unit(high, &worst.unit)];
         return Some(format!("`{}`: {low} to {high} in {}", worst.name, counted(count, "case")));
     }
     let mut text = format!("`{}`: {}", worst.name, with_unit(worst.value, &worst.unit));

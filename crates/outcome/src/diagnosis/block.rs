@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 
 use mops_core::case::Role;
 use schemars::JsonSchema;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 use serde_json::{Map, Value, json};
+
+use crate::Finding;
 
 use super::{
     Alignment, Dependence, Diagnosis, Evidence, ExperimentError, ForecastOf, Found, HeldBack, Noticeable,
@@ -15,7 +17,7 @@ use super::{
 /// Result of a diagnosis.
 #[derive(Serialize, JsonSchema)]
 #[schemars(rename = "Diagnosis")]
-pub(crate) struct Block {
+pub struct Block {
     /// Verdict on the model.
     verdict: Verdict,
     /// Probability of the verdict; null if it cannot be stated.
@@ -350,7 +352,13 @@ fn noise(diagnosis: &Diagnosis) -> Value {
     noise
 }
 
-/// Serialises the block of `result.json`; the derived form of [`Diagnosis`] has more, and is read back.
-pub(crate) fn serialize<S: Serializer>(diagnosis: &Option<Diagnosis>, serializer: S) -> Result<S::Ok, S::Error> {
-    diagnosis.as_ref().map(Block::of).serialize(serializer)
+impl Finding for Diagnosis {
+    const KEY: &'static str = "diagnosis";
+    const ABOUT: &'static str = "Missing effects of the model.";
+    type Block = Block;
+
+    // The derived form of a diagnosis has more, and is read back.
+    fn block(&self) -> Value {
+        json!(Block::of(self))
+    }
 }

@@ -6,8 +6,6 @@ use mops_math as math;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use block::{Block, serialize};
-
 use mops_core::case::{Hold, Role};
 
 /// Verdict on the model.

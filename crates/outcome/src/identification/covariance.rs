@@ -1,6 +1,6 @@
 //! Covariance of estimates, and its effect on predictions.
 
-use mops_core::problem::Problem;
+use mops_core::{problem::Problem, task::SensitivityTask};
 use nalgebra::DMatrix;
 
 use super::local::{Point, local};
@@ -35,7 +35,8 @@ impl Covariance {
     /// Computes the covariance at the estimates; `None` without measurements, if a simulation fails, or if no residual
     /// shows the noise.
     pub fn at(problem: &Problem, tuners: &[f64]) -> Option<Self> {
-        local(problem, tuners, Point::Minimum, problem.study().tasks().sensitivity.zero)?.covariance
+        let zero = problem.study().options::<SensitivityTask>().and_then(|task| task.zero);
+        local(problem, tuners, Point::Minimum, zero)?.covariance
     }
 
     /// Computes the covariance from the noise of the residuals, their Jacobian in the tuners' own units, and the

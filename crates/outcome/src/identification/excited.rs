@@ -2,7 +2,8 @@
 
 use mops_core::{
     case::{Case, Input},
-    study::{ExcitationQuestion, Study, Tuner},
+    study::{Study, Tuner},
+    task::ExcitationTask,
 };
 
 use super::excitation;
@@ -11,7 +12,10 @@ use super::report::ExcitationReport;
 use super::words::{MANY, counted, distinct, percent};
 
 /// Returns the excitation reports on the inputs of every case.
-pub fn excitations(study: &Study, question: &ExcitationQuestion) -> Vec<ExcitationReport> {
+pub fn excitations(study: &Study) -> Vec<ExcitationReport> {
+    let question =
+        study.options::<ExcitationTask>().map(|task| task.question(study).expect("checked when the study was built"));
+    let question = &question.unwrap_or_default();
     let mut reports = Vec::new();
     for (index, case) in study.cases().iter().enumerate() {
         let horizon = case.horizon.or_else(|| study.models().iter().find_map(|(_, m)| m.interface().horizon));

@@ -1,6 +1,9 @@
 //! FIR and ARX models of a study's experiments, by least squares and recursively.
 
-use mops_core::study::{RegressionTask, Study};
+use mops_core::{
+    study::Study,
+    task::{self, ExcitationTask},
+};
 use nalgebra::DVector;
 
 use super::excited::spacing;
@@ -13,10 +16,12 @@ const UNKNOWN: f64 = 1e8;
 
 /// Returns the regression models of a study, each on its experiment.
 pub fn regressions(study: &Study) -> Vec<RegressionReport> {
-    study.tasks().excitation.regressions.iter().map(|task| fitted(study, task)).collect()
+    let Some(task) = study.options::<ExcitationTask>() else { return Vec::new() };
+    let models = task.models(study).expect("checked when the study was built");
+    models.iter().map(|model| fitted(study, model)).collect()
 }
 
-fn fitted(study: &Study, task: &RegressionTask) -> RegressionReport {
+fn fitted(study: &Study, task: &task::Regression) -> RegressionReport {
     let case = &study.cases()[task.case];
     let channel = case.experiment.as_ref().and_then(|e| e.channel(&task.output)).expect("checked when it was built");
     let input = case.input(&task.input).expect("checked when it was built");

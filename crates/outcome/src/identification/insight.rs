@@ -4,13 +4,13 @@ use mops_core::{evaluation::Evaluation, problem::Problem, solver::SMALL_OBJECTIV
 use mops_math as math;
 use nalgebra::DMatrix;
 
+use super::NEGLIGIBLE;
 use super::blind::{BlindDirection, Limit};
 use super::local::{Local, Point, counting, local};
 use super::report::{DirectionReport, RelativeReport, SensitivityReport, TunerSensitivity};
 use super::sensitivity::{Coordinate, Eigen};
 use super::sentences::sentences;
 use super::words::listed;
-use crate::derivatives::NEGLIGIBLE;
 
 /// Relative standard error up to which an estimate counts as determined.
 const TRUSTED: f64 = 0.1;

@@ -9,12 +9,12 @@ use mops_core::{
 };
 use nalgebra::{DMatrix, DVector};
 
+use super::NEGLIGIBLE;
 use super::alike::{Alike, alike};
 use super::covariance::Covariance;
 use super::noise::{Noise, Spread};
 use super::records::{Record, records};
 use super::sensitivity::{Coordinate, DIFFERENCES, Sensitivity, TANGENTS};
-use crate::derivatives::NEGLIGIBLE;
 
 /// Kind of point at which sensitivities are evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -39,3 +39,6 @@ pub use report::{
 };
 pub use sensitivity::{Coordinate, DIFFERENCES, Sensitivity, TANGENTS};
 pub use whiteness::{Whiteness, whiteness, whiteness_words};
+
+/// Change of a scaled value over the whole range of a tuner, relative to the value, that is negligible.
+pub const NEGLIGIBLE: f64 = 1e-3;

@@ -147,3 +147,5 @@ pub struct RegressionReport {
     /// Fit `100 (1 - |e| / |y - mean y|)` of the one-step-ahead prediction.
     pub fit_percent: f64,
 }
+
+crate::finding!(SensitivityReport, "sensitivity", "Identifiability of the tuners from the data or the criteria.");

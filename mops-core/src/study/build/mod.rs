@@ -12,10 +12,9 @@ use std::sync::Arc;
 
 use crate::case::{Case, Role};
 use crate::criterion::{Loss, Usage};
-use crate::evaluation::Objective;
 use crate::model::{AnalysisKind, Interface, Model};
 use crate::study::draft::{CaseBuilder, CriterionBuilder, StudyBuilder};
-use crate::study::{JobPlan, Study, StudyError, Task, Tasks, diagnosis, tasks};
+use crate::study::{JobPlan, Study, StudyError, uncertain};
 use cases::{assumed_units, build_case, outliers, with_sensors};
 use criteria::add_rows;
 use jobs::{complete, job};
@@ -73,15 +72,8 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
         }
     }
 
-    let objective = draft.objective.unwrap_or(match draft.task {
-        Task::Design => Objective::Max,
-        Task::Calibration | Task::Diagnosis => Objective::Sum,
-        Task::Pareto => Objective::Each,
-        // Default objective of the study that these tasks examine.
-        Task::Excitation | Task::Sensitivity | Task::Sweep | Task::WorstCase | Task::MonteCarlo => {
-            if cases.iter().any(|case| case.experiment.is_some()) { Objective::Sum } else { Objective::Max }
-        }
-    });
+    let is_measured = cases.iter().any(|case| case.experiment.is_some());
+    let objective = draft.objective.unwrap_or_else(|| draft.task.objective(is_measured));
     let mut notes = assumed_units(&drafts, &models);
     for (name, model) in &models {
         notes.extend(model.notes().into_iter().map(|note| format!("`{name}`: {note}")));
@@ -89,6 +81,8 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
     let mut study = Study {
         name: draft.name,
         task: draft.task,
+        options: draft.options,
+        uncertain: Vec::new(),
         objective,
         seed: draft.seed,
         models,
@@ -97,7 +91,6 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
         tuners,
         rows: Vec::new(),
         jobs: Vec::new(),
-        tasks: Tasks::default(),
         notes,
         warnings,
     };
@@ -107,10 +100,8 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
         add_rows(&mut study, &name, criterion).map_err(|m| m.within(&name).within("criteria"))?;
     }
     study.rows.sort_by_key(|row| order.iter().position(|name| *name == row.name));
-    if study.task == Task::Diagnosis {
-        for (model, case, measured) in diagnosis::measured(&study) {
-            job(&mut study, model, case, &measured)?;
-        }
+    for (model, case, signals) in study.task.signals(&study) {
+        job(&mut study, model, case, &signals)?;
     }
     for index in 0..study.jobs.len() {
         let JobPlan { model, case, .. } = study.jobs[index];
@@ -120,7 +111,7 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
         (job.horizon, job.parameters) = completed;
     }
     // Without a criterion, every model is simulated in every case, where it can be.
-    if without && !matches!(study.task, Task::Excitation | Task::Diagnosis) {
+    if without && study.task.needs_criteria() {
         study
             .warnings
             .push("the study has no criterion: it can be simulated and linearised, but not solved".to_owned());
@@ -135,28 +126,21 @@ pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
     refuse_forgotten_inputs(&study, &drafts)?;
     let cold = temperatures_of_nothing(&study);
     study.warnings.extend(cold);
-    let solved = matches!(study.task, Task::Design | Task::Calibration);
-    if solved && study.rows.iter().all(|row| row.usage == Usage::Monitor) {
+    let chooses = study.task.chooses_tuners();
+    if chooses && study.rows.iter().all(|row| row.usage == Usage::Monitor) {
         let fact =
             "nothing to minimise: every criterion has usage monitor, so that the tuners keep their initial guess";
         study.warnings.push(fact.to_owned());
     }
-    if solved || study.task == Task::Pareto {
+    if chooses {
         refuse_validation_alone(&study)?;
     }
     study.rows.sort_by_key(|row| study.jobs[row.job].case);
-    study.tasks = tasks::build(draft.tasks, &study)?;
-    let is_sure = match study.task {
-        Task::Design => study.tasks.robust.is_none(),
-        Task::Pareto | Task::Calibration | Task::Sweep => true,
-        _ => false,
-    };
-    if is_sure && !study.tasks.uncertain.is_empty() {
-        let fact = match study.task {
-            Task::Design => "the design ignores [uncertain]: add [robust] for a design against worst cases",
-            _ => "this task ignores [uncertain]",
-        };
-        study.notes.push(fact.to_owned());
+    study.uncertain = uncertain::check(draft.uncertain, &study)?;
+    study.task.check(&study, true)?;
+    study.options.iter().try_for_each(|options| options.check(&study, false))?;
+    if let Some(note) = study.task.ignores_uncertain().filter(|_| !study.uncertain.is_empty()) {
+        study.notes.push(note.to_owned());
     }
     Ok(study)
 }
