@@ -64,8 +64,7 @@ pub use mops_core::{
     Analysis, Cancellation, Case, Catalogue, Criterion, CriterionOptions, CriterionSpec, Failure, Input, Instant,
     Interface, Model, ModelOptions, Objective, Parameter, Plant, Study, StudyBuilder, StudyError, Task, Trace, Usage,
     Value, Variable, Watch,
-    catalogue::{BuiltStudy, CriterionKind, ModelKind, Shipped, SolverKind},
-    effect::EffectBuilder,
+    catalogue::{BuiltStudy, CriterionKind, EffectBuilder, ModelKind, Shipped, SolverKind},
     study::{CaseBuilder, CriterionBuilder, ModelBuilder, TunerBuilder},
 };
 pub use mops_criteria as criteria;

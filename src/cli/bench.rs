@@ -22,10 +22,10 @@ use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, eprint_li
 /// Arguments of `mops bench`.
 #[derive(Args)]
 #[command(after_help = "\
-Every solver runs from the start values of the study, once per seed, with the same budget. A run succeeds if it comes within
+Every solver runs from the start values of the study, once per seed, with the same budget. A run succeeds if it comes within \
 the tolerance of the best known value: the smallest objective of all runs, or --known.
 
-Written to the output folder: runs.csv (one line per run), profile.svg and profile.png (share of successful runs over the
+Written to the output folder: runs.csv (one line per run), profile.svg and profile.png (share of successful runs over the \
 number of evaluations), bench.html (both).
 
 Examples:

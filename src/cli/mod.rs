@@ -54,7 +54,7 @@ Start with:
   mops new my-loop               write a commented study template
   mops describe settling-time    show the definition and the options of a kind
 
-Exit status: 0 done; 1 done, but a constraint is violated; 2 error in the study, its data or the command line; 3 the run
+Exit status: 0 done; 1 done, but a constraint is violated; 2 error in the study, its data or the command line; 3 the run \
 failed; 4 stopped by a signal, with the best point saved."
 )]
 struct Arguments {

@@ -25,8 +25,8 @@ use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 /// Options of `mops pick`.
 #[derive(Args)]
 #[command(after_help = "\
-Other demands stay as in the study. The selected point has the smallest worst scaled value under the new demands. From
-there the min-max problem with these demands is solved in a few hundred simulations, and a study that starts at the solution
+Other demands stay as in the study. The selected point has the smallest worst scaled value under the new demands. From \
+there the min-max problem with these demands is solved in a few hundred simulations, and a study that starts at the solution \
 is written to picked.toml.
 
 Examples:

@@ -286,8 +286,10 @@ impl FirstError {
 fn result_text(solved: &Solved, room: &dyn Room) -> String {
     let outcome = &solved.outcome;
     let lines = room.lines(outcome);
+    let study = solved.problem.study();
+    let is_nominal = room.samples_uncertain(study) && !study.task().chooses_tuners();
     let of_point = match (room.has_point(), lines.is_empty()) {
-        (true, _) => tables::outcome(outcome, room),
+        (true, _) => tables::outcome(outcome, room, is_nominal),
         (false, false) => String::new(),
         // No criteria exist without a verdict.
         (false, true) => outcome.warnings.iter().map(|warning| format!("warning: {warning}\n")).collect(),

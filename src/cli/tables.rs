@@ -3,10 +3,7 @@
 use mops_content::numbers::counted;
 use mops_core::{Stop, Usage};
 use mops_outcome::{CriterionReport, Outcome};
-use mops_tasks::{
-    Room,
-    uncertain::{MonteCarloReport, WorstCaseReport},
-};
+use mops_tasks::Room;
 
 use crate::terminal::{number, table};
 
@@ -88,8 +85,8 @@ fn without(left_out: &[usize], header: &[&str], mut rows: Vec<Vec<String>>) -> S
     table(&header, &numeric, rows)
 }
 
-/// Formats the outcome of a run: criteria, tuners, calibration errors, failures, warnings and a summary.
-pub(super) fn outcome(outcome: &Outcome, room: &dyn Room) -> String {
+/// Formats the outcome of a run, `is_nominal` if what follows is at other values of uncertain parameters: criteria, tuners, calibration errors, failures, warnings and a summary.
+pub(super) fn outcome(outcome: &Outcome, room: &dyn Room, is_nominal: bool) -> String {
     let solved = outcome.solver != "none";
     let best_name = if solved { "optimum" } else { "start" };
     let summed = !room.judges_demands();
@@ -206,8 +203,7 @@ pub(super) fn outcome(outcome: &Outcome, room: &dyn Room) -> String {
         }
     };
     // The effect of uncertain parameters follows below.
-    let nominal = outcome.found.get::<WorstCaseReport>().is_some() || outcome.found.get::<MonteCarloReport>().is_some();
-    let nominal = if nominal { "without uncertainty: " } else { "" };
+    let nominal = if is_nominal { "without uncertainty: " } else { "" };
     let stop = if solved { stop } else { "start values only, no optimisation" };
     text += &format!(
         "\n{nominal}{constraints}{demands}{reached}{stop}; {}, {}, {:.2} s\n",

@@ -23,15 +23,19 @@ fn commands(catalogue: &Catalogue) -> impl Iterator<Item = (&'static str, TaskCo
 }
 
 /// Adds the commands of the tasks to a program, after its first command.
-pub(super) fn add_commands(mut program: Command, catalogue: &Catalogue) -> Command {
+pub(super) fn add_commands(program: Command, catalogue: &Catalogue) -> Command {
+    let count = commands(catalogue).count();
+    let mut places = (0..1).chain(count + 1..);
+    let mut program = program.mut_subcommands(|command| command.display_order(places.next().unwrap_or(usize::MAX)));
     for (i, (_, command)) in commands(catalogue).enumerate() {
-        let mut added = Command::new(command.name).about(command.about).display_order(i + 1);
-        if !command.after_help.is_empty() {
-            added = added.after_help(command.after_help);
-        }
-        added = CommonOptions::augment_args(added);
+        let mut added = CommonOptions::augment_args(Command::new(command.name));
         if command.has_solver {
             added = SolverOptions::augment_args(added);
+        }
+        // Not what the groups of options are about.
+        added = added.about(command.about).long_about(command.about).display_order(i + 1);
+        if !command.after_help.is_empty() {
+            added = added.after_help(command.after_help);
         }
         for option in command.options {
             let arg = clap::Arg::new(option.name).long(option.name).help(option.about);

@@ -89,5 +89,5 @@
     row.addEventListener("keydown", onKey);
   }
 
-  document.querySelector(".hint").hidden = false;
+  for (const hint of document.querySelectorAll(".hint")) hint.hidden = false;
 })();

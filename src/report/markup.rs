@@ -9,7 +9,16 @@ use super::chart;
 
 /// Returns a section of a page.
 pub(super) fn of(part: &Section) -> Markup {
-    section(&part.title, blocks(&part.blocks))
+    let has_box = part
+        .groups()
+        .flat_map(|group| &group.figures)
+        .flat_map(|figure| &figure.plots)
+        .any(|(_, plot)| plot.z_axis.is_some());
+    let content = html! {
+        (blocks(&part.blocks))
+        @if has_box { p class="hint" hidden { "Drag the box, or press Shift and an arrow key, to rotate it." } }
+    };
+    section(&part.title, content)
 }
 
 /// Returns a section with a title.
@@ -32,7 +41,7 @@ fn block(block: &Block) -> Markup {
             html! { p { @for (i, line) in lines.iter().enumerate() { @if i > 0 { br; } (rich(line)) } } }
         }
         Block::Table(table) => html! {
-            @if table.are_points { (hint(table)) }
+            @if table.are_points { (hint()) }
             (scrolling(&table.name, self::table(table)))
         },
         Block::Plots(group) => figures(group),
@@ -42,11 +51,11 @@ fn block(block: &Block) -> Markup {
 }
 
 /// Returns how the points of a front are selected; shown by the script that does it.
-fn hint(_table: &Table) -> Markup {
+fn hint() -> Markup {
     html! {
         p class="hint" hidden {
             "Hover over a point or use the arrow keys; click or press Enter to select it, Escape to deselect. Click a column header "
-            "to sort. A box of three criteria is rotated by dragging it, or by Shift and an arrow key."
+            "to sort."
         }
     }
 }

@@ -1,6 +1,9 @@
 //! Effects of a model in a study file: `[models.NAME.effects]`.
 
-use mops_core::{catalogue::Catalogue, effect::EffectBuilder, model::Model};
+use mops_core::{
+    catalogue::{Catalogue, EffectBuilder},
+    model::Model,
+};
 use mops_language::{Diagnostic, entries::Entries};
 
 use super::reading::kind;

@@ -36,7 +36,7 @@ pub(super) fn read(
     for kind in &catalogue.tasks {
         let Some(node) = root.child(kind.table) else { continue };
         let task = node.read_with(&schema_once(kind.schema), kind.read)?;
-        task.check_names(catalogue).map_err(|mistake| root.locate(&mistake))?;
+        task.check_effects(&catalogue.effects).map_err(|mistake| root.locate(&mistake))?;
         known.retain(|other| other.name() != kind.name);
         known.push(task);
     }

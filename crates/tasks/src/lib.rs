@@ -31,6 +31,7 @@ pub mod prelude;
 mod room;
 mod search;
 pub mod sensitivity;
+mod slopes;
 mod solve;
 pub mod sweep;
 #[cfg(test)]

@@ -147,7 +147,7 @@ pub trait Room: Send + Sync {
 pub struct TaskCommand {
     /// Name.
     pub name: &'static str,
-    /// What it does, in a sentence.
+    /// What it does, without a full stop.
     pub about: &'static str,
     /// Explanation and examples; may be empty.
     pub after_help: &'static str,
@@ -164,7 +164,7 @@ pub struct CommandOption {
     pub name: &'static str,
     /// Name of its value; `None` for an option without a value, which sets the key to true.
     pub value: Option<&'static str>,
-    /// What it does, in a sentence.
+    /// What it does, without a full stop.
     pub about: &'static str,
     /// Key of the study.
     pub key: &'static str,

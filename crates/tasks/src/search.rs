@@ -13,7 +13,8 @@ use mops_core::{
 };
 use mops_outcome::{End, Ending, Outcome, conclude};
 
-use crate::{Beyond, Contradiction, DerivativesReport, design::SlopesReport};
+use crate::slopes::SlopesReport;
+use crate::{Beyond, Contradiction, DerivativesReport};
 
 use mops_content::numbers::{counted, significant};
 

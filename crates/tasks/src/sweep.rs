@@ -74,7 +74,7 @@ impl Room for Sweep {
     fn command(&self) -> Option<TaskCommand> {
         Some(TaskCommand {
             name: "sweep",
-            about: "Vary one or two tuners of a study over a grid, as its table [sweep] says.",
+            about: "Vary one or two tuners of a study over a grid, as its table [sweep] says",
             after_help: "",
             has_solver: true,
             options: &[],

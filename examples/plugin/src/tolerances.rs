@@ -129,7 +129,7 @@ impl Room for Tolerances {
     fn command(&self) -> Option<TaskCommand> {
         Some(TaskCommand {
             name: "tolerances",
-            about: "Compute how far each tuner of a study can move until a demand is missed.",
+            about: "Compute how far each tuner of a study can move until a demand is missed",
             after_help: "",
             has_solver: true,
             options: &[],

@@ -148,7 +148,7 @@ pub(crate) fn cut_at(
 /// }
 ///
 /// // A model like any other: `Simulated::new(Pendulum::new()).into()` is a `ModelBuilder`, which accepts effects.
-/// use mops_core::{Catalogue, effect::EffectBuilder, study::ModelBuilder};
+/// use mops_core::{Catalogue, catalogue::EffectBuilder, study::ModelBuilder};
 /// let catalogue = Catalogue {
 ///     effects: mops_effects::effects(),
 ///     augment: Some(|model, effects| Ok(Box::new(mops_models::WithEffects::new(model, effects)?))),

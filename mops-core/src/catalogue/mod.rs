@@ -1,7 +1,9 @@
 //! Catalogue of all kinds of models, criteria and solvers that a study file can name, and of the shipped studies.
 
+mod effects;
 mod study;
 
+pub use effects::EffectBuilder;
 pub use study::{BuiltStudy, CatalogueStudy, Shipped, StudyFolder};
 
 use std::any::Any;
@@ -20,10 +22,10 @@ use toml::de::ValueDeserializer;
 
 use crate::criterion::CriterionSpec;
 use crate::effect::{Effect, Placement};
+use crate::error::StudyError;
 use crate::model::Model;
 use crate::solver::Solver;
-use crate::study::StudyError;
-use crate::task::{Task, TaskOptions};
+use crate::study::task::{Task, TaskOptions};
 
 /// Function that adds effects to a model with ports. It is injected because core does not contain the simulation.
 pub type Augment = fn(Arc<dyn Model>, Vec<Placement>) -> Result<Box<dyn Model>, StudyError>;

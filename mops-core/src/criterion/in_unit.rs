@@ -5,8 +5,8 @@ use mops_language::Unit;
 use super::{Criterion, Demand, Mark, Missed, Sense, Tangent, Value};
 use crate::case::Case;
 use crate::criterion::Samples;
+use crate::error::StudyError;
 use crate::model::Analysis;
-use crate::study::StudyError;
 
 /// Criterion whose values are in another unit than that of its kind.
 pub(crate) struct InUnit {

@@ -16,8 +16,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::case::Case;
+use crate::error::StudyError;
 use crate::model::{Analysis, AnalysisKind, Interface};
-use crate::study::StudyError;
 
 pub use demand::{Demand, Scaled};
 pub(crate) use in_unit::InUnit;

@@ -5,8 +5,8 @@ use mops_language::Unit;
 use super::{Criterion, Demand, Mark, Sense, Tangent, Value};
 use crate::case::{Case, Channel, Experiment};
 use crate::criterion::Samples;
+use crate::error::StudyError;
 use crate::model::{Analysis, Response};
-use crate::study::StudyError;
 
 /// Criterion that reads a simulation from one time to another, as if it began at the first: all times count from there.
 pub(crate) struct Window {

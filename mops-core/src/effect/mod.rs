@@ -2,11 +2,10 @@
 //! which the effect vanishes.
 
 mod between;
-mod placement;
+mod place;
 mod port;
 
 pub use between::Between;
-pub use placement::EffectBuilder;
 pub use port::Port;
 
 use std::sync::Arc;

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
+use crate::error::StudyError;
 use crate::failure::Failure;
 use crate::model::{
     Analysis, AnalysisKind, Event, Interface, Job, Model, Parameter, Response, Variable, WithTangents, Work,
 };
-use crate::study::StudyError;
 
 /// Models that are simulated side by side. The signal `y` of the model `loop` is `loop_y`; characters that cannot be part of a name
 /// in a formula become `_`. Parameters and initial values of the same name are one, and so are inputs that the case gives.

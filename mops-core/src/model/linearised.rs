@@ -10,10 +10,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::roughness::Point;
 use crate::case::Case;
+use crate::error::StudyError;
 use crate::failure::Failure;
 use crate::model::{Analysis, AnalysisKind, Cut, Interface, Job, Local, Model, OperatingPoint, Variable};
 use crate::plant::Selected;
-use crate::study::StudyError;
 
 /// Options of a linearisation: operating point, inputs and outputs.
 #[derive(Debug, Clone, Default)]

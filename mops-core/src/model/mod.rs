@@ -16,9 +16,9 @@ use serde::Serialize;
 
 use crate::case::Case;
 use crate::effect::{Placement, Port};
+use crate::error::StudyError;
 use crate::failure::Failure;
 use crate::plant::{Ported, Selected};
-use crate::study::StudyError;
 use crate::trace::Trace;
 
 /// A named quantity of a model: a signal it offers, a parameter it takes, or an input that drives it.
@@ -121,6 +121,11 @@ pub struct Interface {
 }
 
 impl Interface {
+    /// Returns the ports that effects act at; a joint represents the equation of its speed.
+    pub fn places(&self) -> impl Iterator<Item = &Port> {
+        self.ports.iter().filter(|port| port.kind(&self.ports).is_some())
+    }
+
     /// Returns the signal of this name.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
-use crate::study::StudyError;
+use crate::error::StudyError;
 
 /// Accuracy and limits of a simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]

@@ -1,8 +1,8 @@
 //! Problems that a run evaluates: the problem of a study, or one with a known solution.
 
 use crate::evaluation::Evaluation;
+use crate::problem::{CachedGradients, CachedPoint, Known, RowSlopes};
 use crate::problem::{Problem, Slopes};
-use crate::run::{CachedGradients, CachedPoint, Known, RowSlopes};
 use crate::solver::Shape;
 
 /// Rows of scaled values over the unit box, as a pure function: equal points give equal bits on every thread.

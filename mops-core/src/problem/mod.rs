@@ -1,10 +1,13 @@
 //! The weighted min-max problem of a study over the unit box.
 
 mod evaluator;
+mod known;
 mod objectives;
 mod prediction;
 
 pub use evaluator::Evaluator;
+use known::entry;
+pub use known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes, RowValue, Store};
 pub use objectives::FrontObjective;
 pub use prediction::SignalSlopes;
 
@@ -21,10 +24,9 @@ use crate::criterion::{Demand, Loss, Tangent, Usage, Value};
 use crate::evaluation::{Evaluation, Merit, Objective, Reading};
 use crate::failure::{Failure, caught};
 use crate::model::{Analysis, Job};
-use crate::run::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes as KnownSlopes, RowValue, entry};
 use crate::solver::Shape;
+use crate::study::task::ParetoTask;
 use crate::study::{Row, Scale, Study, Tuner};
-use crate::task::ParetoTask;
 
 /// The optimisation problem of a study: active tuners as coordinates of the unit box, criteria as rows of scaled values.
 #[derive(Clone)]
@@ -54,7 +56,7 @@ pub struct Slopes {
 }
 
 /// A row, by index, with its value and its derivative along every coordinate.
-type RowSlopes = (usize, Value, Vec<Value>);
+type RowTangent = (usize, Value, Vec<Value>);
 
 impl Problem {
     /// Creates the problem of the study itself: tuners of the study and of its calibration cases. The other cases are
@@ -349,7 +351,7 @@ impl Problem {
         &self,
         at: &Evaluation,
         reach: f64,
-        known: Option<Option<KnownSlopes>>,
+        known: Option<Option<RowSlopes>>,
     ) -> CachedGradients<Slopes> {
         if self.shape.residuals > 0 {
             return CachedGradients { slopes: self.slopes(at, reach), learned: None };
@@ -357,7 +359,7 @@ impl Problem {
         let known = known.filter(|known| known.as_ref().is_none_or(|rows| self.suffice(rows)));
         let simulated = || {
             let rows = self.row_slopes(at, reach)?;
-            Some(rows.into_iter().map(|(row, _, slopes)| (row, slopes)).collect::<KnownSlopes>())
+            Some(rows.into_iter().map(|(row, _, slopes)| (row, slopes)).collect::<RowSlopes>())
         };
         let (rows, new) = known.map_or_else(|| (simulated(), true), |known| (known, false));
         // Derivatives that were cut off are not cached.
@@ -366,7 +368,7 @@ impl Problem {
     }
 
     /// Returns true if cached derivatives contain everything that this problem needs.
-    fn suffice(&self, known: &KnownSlopes) -> bool {
+    fn suffice(&self, known: &RowSlopes) -> bool {
         let n = self.active.len();
         self.shape.rows.iter().enumerate().all(|(index, (usage, _))| match entry(known, index) {
             _ if *usage == Usage::Monitor => true,
@@ -376,17 +378,18 @@ impl Problem {
     }
 
     /// Returns the derivatives of the rows that count along every coordinate, in the units of their criteria.
-    fn row_slopes(&self, at: &Evaluation, reach: f64) -> Option<Vec<RowSlopes>> {
+    fn row_slopes(&self, at: &Evaluation, reach: f64) -> Option<Vec<RowTangent>> {
         if self.shape.spacing.iter().any(|&spacing| spacing > 0.0) || at.scaled.is_none() {
             return None;
         }
         let moves = self.tuner_slopes(&at.tuners);
-        let of_jobs: Vec<Option<Vec<RowSlopes>>> = self
+        let of_jobs: Vec<Option<Vec<RowTangent>>> = self
             .counting
             .par_iter()
             .map(|&job| caught(|| self.job_slopes(job, &at.tuners, &moves, reach)).ok()?)
             .collect();
-        let mut rows: Vec<RowSlopes> = of_jobs.into_iter().collect::<Option<Vec<_>>>()?.into_iter().flatten().collect();
+        let mut rows: Vec<RowTangent> =
+            of_jobs.into_iter().collect::<Option<Vec<_>>>()?.into_iter().flatten().collect();
         if self.shape.residuals == 0 {
             rows.iter_mut().flat_map(|(_, _, along)| along).for_each(|slope| slope.residuals.clear());
         }
@@ -394,7 +397,7 @@ impl Problem {
     }
 
     /// Returns the derivatives of the scaled values and of the weighted residuals, with the residuals of the rows as `values`.
-    fn scaled_slopes(&self, at: &Evaluation, of_rows: KnownSlopes, values: Vec<Vec<f64>>) -> Option<Slopes> {
+    fn scaled_slopes(&self, at: &Evaluation, of_rows: RowSlopes, values: Vec<Vec<f64>>) -> Option<Slopes> {
         let (count, n) = (self.study.rows.len(), self.active.len());
         let mut rows = vec![vec![0.0; n]; count];
         let mut residuals = vec![vec![Vec::new(); count]; n];
@@ -421,7 +424,7 @@ impl Problem {
     }
 
     /// Returns the derivatives of the counting rows of one job along every coordinate.
-    fn job_slopes(&self, job: usize, tuners: &[f64], moves: &[Vec<f64>], reach: f64) -> Option<Vec<RowSlopes>> {
+    fn job_slopes(&self, job: usize, tuners: &[f64], moves: &[Vec<f64>], reach: f64) -> Option<Vec<RowTangent>> {
         let study = &self.study;
         let plan = &study.jobs[job];
         let case = &study.cases[plan.case];

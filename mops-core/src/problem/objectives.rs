@@ -3,7 +3,7 @@
 use crate::criterion::Usage;
 use crate::evaluation::{Evaluation, Reading};
 use crate::study::Study;
-use crate::task::ParetoTask;
+use crate::study::task::ParetoTask;
 
 /// Objective of a Pareto front.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,9 +1,6 @@
 //! Runs: a [`Run`] owns the budget, the cache, the archive and the random streams, and keeps the best point.
 
-mod known;
-
-pub(crate) use known::entry;
-pub use known::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes, RowValue, Store};
+pub use crate::problem::{CachedGradients, CachedPoint, JobValues, Known, RowSlopes, RowValue, Store};
 
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};

@@ -7,8 +7,8 @@ use crate::case::{Input, ResponseData, Role};
 use crate::criterion::{CriterionSpec, Usage};
 use crate::evaluation::Objective;
 use crate::model::Model;
+use crate::study::task::Task;
 use crate::study::{Scale, StudyError};
-use crate::task::Task;
 
 /// A study as written, not yet checked. [`StudyBuilder::build`] checks it.
 #[derive(Default)]

@@ -3,14 +3,14 @@
 mod build;
 mod distribution;
 mod draft;
-mod error;
 mod moved;
 mod scenarios;
+pub mod task;
 mod tuner;
 mod uncertain;
 mod wildcard;
 
-pub use error::StudyError;
+pub use crate::error::StudyError;
 pub use tuner::{Grid, Scale, Tuner};
 pub use wildcard::matches_pattern;
 
@@ -31,7 +31,7 @@ use crate::criterion::{Criterion, Demand, Scaled, Usage, Value};
 use crate::evaluation::{FEASIBLE, Objective, Reading};
 use crate::failure::{Failure, caught};
 use crate::model::{Analysis, Job, Model};
-use crate::task::{DesignTask, Place, Task, TaskSpec};
+use crate::study::task::{DesignTask, Place, Task, TaskSpec};
 
 /// A study with all names, sizes, bounds and units checked. Built by [`StudyBuilder::build`] or read from a file; what may be
 /// changed afterwards has a method.

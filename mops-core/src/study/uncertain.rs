@@ -5,7 +5,7 @@ use mops_math as math;
 
 use super::distribution::{Distribution, Uncertain};
 use super::{Study, ratio_of_temperatures};
-use crate::study::StudyError;
+use crate::error::StudyError;
 
 /// An uncertain parameter, not yet checked.
 #[derive(Debug, Clone, Default)]

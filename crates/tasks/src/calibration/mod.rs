@@ -33,7 +33,7 @@ impl Room for Calibration {
     fn command(&self) -> Option<TaskCommand> {
         Some(TaskCommand {
             name: "calibrate",
-            about: "Estimate the tuners of a study from its experiments, whatever its task.",
+            about: "Estimate the tuners of a study from its experiments, whatever its task",
             after_help: "",
             has_solver: true,
             options: &[],

@@ -5,7 +5,6 @@ mod look;
 mod robust;
 mod rounds;
 mod section;
-mod slopes;
 
 use mops_content::numbers::counted;
 use mops_content::section::{Block, Part, Section, Tone, Verdict};
@@ -20,8 +19,8 @@ use crate::search::{Extras, Options, SolveError, Solved, search_for};
 use crate::uncertain::RobustReport;
 use crate::verdict::{changed, missed, used_as};
 
+pub use crate::slopes::{CriterionSlopes, SlopesReport};
 pub use look::{AwayReport, JumpReport, JumpsReport, MovedKind, ON_JUMP, WITHIN as JUMPS_WITHIN};
-pub use slopes::{CriterionSlopes, SlopesReport};
 
 /// Returns true if a design is made against worst cases.
 fn is_robust(study: &Study) -> bool {

@@ -47,7 +47,7 @@ impl Room for Search {
     fn command(&self) -> Option<TaskCommand> {
         Some(TaskCommand {
             name: "diagnose",
-            about: "Find the physical effect missing from a calibrated model, add it, and report the errors before and after.",
+            about: "Find the physical effect missing from a calibrated model, add it, and report the errors before and after",
             after_help: "",
             has_solver: false,
             options: &[],

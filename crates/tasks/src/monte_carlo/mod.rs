@@ -38,7 +38,7 @@ impl Room for MonteCarlo {
     fn command(&self) -> Option<TaskCommand> {
         Some(TaskCommand {
             name: "monte-carlo",
-            about: "Sample the uncertain parameters of a study: shares that meet the demands, distributions.",
+            about: "Sample the uncertain parameters of a study: shares that meet the demands, distributions",
             after_help: "",
             has_solver: true,
             options: &[],

@@ -30,12 +30,12 @@ use crate::search::{Extras, Limits, Options, SolveError, Solved, contradiction, 
 
 /// Explanation and examples of the command.
 const HELP: &str = "\
-Each criterion with usage minimise is an objective, with the value of its worst case, which has the largest weighted scaled
-value (with --per-case: an objective in every case). The result is the Pareto front: 30 evenly spread non-dominated designs,
+Each criterion with usage minimise is an objective, with the value of its worst case, which has the largest weighted scaled \
+value (with --per-case: an objective in every case). The result is the Pareto front: 30 evenly spread non-dominated designs, \
 each the solution of an optimisation problem (default solver: weighted-chebyshev).
 
-result.json lists the points as `front`, sorted by the first criterion, and `trade_offs`: the knee, the point nearest to the
-demands, the exchange rates between criteria, and whether each point is certified as Pareto-optimal. report.html plots them;
+result.json lists the points as `front`, sorted by the first criterion, and `trade_offs`: the knee, the point nearest to the \
+demands, the exchange rates between criteria, and whether each point is certified as Pareto-optimal. report.html plots them; \
 select a point with the pointer or the arrow keys.
 
 Examples:
@@ -59,7 +59,7 @@ impl Room for Front {
     fn command(&self) -> Option<TaskCommand> {
         Some(TaskCommand {
             name: "pareto",
-            about: "Compute the Pareto front (the non-dominated designs) of a design study.",
+            about: "Compute the Pareto front (the non-dominated designs) of a design study",
             after_help: HELP,
             has_solver: true,
             options: &[

@@ -33,7 +33,7 @@ impl Room for Sensitivity {
     fn command(&self) -> Option<TaskCommand> {
         Some(TaskCommand {
             name: "sensitivity",
-            about: "Compute sensitivities of the criteria to the tuners of a study, at its optimum.",
+            about: "Compute sensitivities of the criteria to the tuners of a study, at its optimum",
             after_help: "",
             has_solver: true,
             options: &[],

@@ -44,7 +44,7 @@ impl Room for WorstCase {
     fn command(&self) -> Option<TaskCommand> {
         Some(TaskCommand {
             name: "worst-case",
-            about: "Search the uncertain parameters of a study for the worst cases of its criteria.",
+            about: "Search the uncertain parameters of a study for the worst cases of its criteria",
             after_help: "",
             has_solver: true,
             options: &[],

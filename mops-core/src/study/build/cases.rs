@@ -6,8 +6,8 @@ use super::Models;
 use super::values::{check_horizon, converted, in_range, signal_names};
 use crate::cancellation::Cancellation;
 use crate::case::{Case, Channel, Experiment, Input, ResponseData};
+use crate::error::StudyError;
 use crate::model::{AnalysisKind, Parameter, Variable};
-use crate::study::StudyError;
 use crate::study::draft::{CaseBuilder, ChannelBuilder, Measured};
 
 pub(super) fn build_case(draft: &CaseBuilder, models: &Models, warnings: &mut Vec<String>) -> Result<Case, StudyError> {

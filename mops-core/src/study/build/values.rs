@@ -2,8 +2,8 @@
 
 use mops_language::{Quantity, Unit, suggestion};
 
+use crate::error::StudyError;
 use crate::model::{Parameter, Variable};
-use crate::study::StudyError;
 use crate::study::draft::CaseBuilder;
 
 pub(super) fn section(case: &CaseBuilder) -> &'static str {

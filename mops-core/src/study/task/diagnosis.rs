@@ -1,12 +1,14 @@
 //! `task = "diagnosis"`: the physical effect that a calibrated model lacks.
 
+use std::sync::Arc;
+
 use mops_language::suggestion;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Place, TaskOptions, TaskSpec};
 use crate::case::Role;
-use crate::catalogue::Catalogue;
+use crate::effect::Effect;
 use crate::evaluation::Objective;
 use crate::model::AnalysisKind;
 use crate::study::{Study, StudyError};
@@ -132,8 +134,8 @@ impl TaskSpec for DiagnosisTask {
         Ok(())
     }
 
-    fn check_names(&self, catalogue: &Catalogue) -> Result<(), StudyError> {
-        let known = || catalogue.effects.iter().map(|effect| effect.name());
+    fn check_effects(&self, effects: &[Arc<dyn Effect>]) -> Result<(), StudyError> {
+        let known = || effects.iter().map(|effect| effect.name());
         for (key, names) in [("effects", self.effects.as_deref().unwrap_or_default()), ("without", &self.without)] {
             if let Some(name) = names.iter().find(|name| !known().any(|effect| effect == **name)) {
                 return Err(StudyError::new(name, format!("there is no effect `{name}`"))

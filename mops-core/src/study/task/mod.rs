@@ -20,7 +20,7 @@ use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize, Serializer};
 
-use crate::catalogue::Catalogue;
+use crate::effect::Effect;
 use crate::evaluation::Objective;
 use crate::study::{Study, StudyError};
 
@@ -86,11 +86,11 @@ pub trait TaskSpec: Any + fmt::Debug + Send + Sync {
     /// The first error; it names the key, within the table of the task.
     fn check(&self, study: &Study, is_performed: bool) -> Result<(), StudyError>;
 
-    /// Checks names of the catalogue in the options.
+    /// Checks names of effects in the options; `effects` are those of the catalogue.
     ///
     /// # Errors
     /// The first unknown name.
-    fn check_names(&self, _catalogue: &Catalogue) -> Result<(), StudyError> {
+    fn check_effects(&self, _effects: &[Arc<dyn Effect>]) -> Result<(), StudyError> {
         Ok(())
     }
 }

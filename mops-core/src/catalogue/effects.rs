@@ -6,8 +6,9 @@ use mops_language::suggestion;
 
 use crate::catalogue::Catalogue;
 use crate::effect::{Between, Placement, Port};
+use crate::error::StudyError;
 use crate::model::{Interface, Model};
-use crate::study::{ModelBuilder, StudyError};
+use crate::study::ModelBuilder;
 
 /// An effect at a place of a model, as written in a study and not yet checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,7 +45,8 @@ impl EffectBuilder {
             StudyError::new(&self.kind, format!("there is no effect `{}`", self.kind))
                 .with_help(suggestion(&self.kind, catalogue.effects.iter().map(|effect| effect.name())))
         })?;
-        let port = |key: &str, text: &str| Port::named(text, model).map_err(|m| m.within(key).within(&self.kind));
+        let port =
+            |key: &str, text: &str| Port::named(text, &model.ports).map_err(|m| m.within(key).within(&self.kind));
         let companion = self.companion.as_deref().map(|text| port("companion", text)).transpose()?;
         let between = companion.as_ref().filter(|_| effect.second_port().is_none()).and_then(|_| Between::of(effect));
         let effect = between.unwrap_or_else(|| Arc::clone(effect));
@@ -79,53 +81,9 @@ impl Catalogue {
     }
 }
 
-impl Interface {
-    /// Returns the ports that effects act at; a joint represents the equation of its speed.
-    pub fn places(&self) -> impl Iterator<Item = &Port> {
-        self.ports.iter().filter(|port| port.kind(&self.ports).is_some())
-    }
-}
-
-impl Port {
-    /// Returns the port of a model with this name, such as `joint:phi`, `process:level`, `actuator:u`, `sensor:theta`.
-    ///
-    /// # Errors
-    /// Returns an error if the model has no such port.
-    pub fn named(text: &str, model: &Interface) -> Result<Self, StudyError> {
-        if let Some(port) = model.ports.iter().find(|port| port.to_string() == text) {
-            return Ok(port.clone());
-        }
-        if model.ports.is_empty() {
-            return Err(StudyError::here("this model has no places for effects: its equations are not accessible")
-                .with_help("remove `effects`, or write the model as equations (`mops describe equations`)"));
-        }
-        let names: Vec<String> = model.places().map(ToString::to_string).collect();
-        // A kind alone, or a name alone, is a near match.
-        let meant: Vec<&str> = names.iter().filter(|n| n.split(':').any(|part| part == text)).map(|n| &**n).collect();
-        let help = if meant.is_empty() {
-            suggestion(text, names.iter().map(String::as_str))
-        } else {
-            format!("such as {}", meant.join(", "))
-        };
-        Err(StudyError::here(format!("the model has no place `{text}`")).with_help(help))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_place_is_found_by_its_kind_and_name() {
-        let port = Port::Actuator { input: "u".into() };
-        let model =
-            Interface { ports: vec![port.clone(), Port::Sensor { output: "theta".into() }], ..Interface::default() };
-        assert_eq!(Port::named("actuator:u", &model), Ok(port));
-        let wrong = |text: &str| Port::named(text, &model).unwrap_err().help.unwrap();
-        assert_eq!(wrong("sensor:thta"), "did you mean `sensor:theta`?");
-        assert_eq!(wrong("theta"), "such as sensor:theta");
-        assert!(Port::named("joint:phi", &Interface::default()).unwrap_err().message.contains("no places"));
-    }
 
     #[test]
     fn an_unknown_effect_is_a_mistake_at_its_kind() {
