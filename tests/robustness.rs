@@ -521,6 +521,97 @@ fn samples_are_written_to_the_folder_of_the_result() {
     assert!(folder.path().join("out/plots/histogram-nominal-overshoot.svg").exists());
 }
 
+/// Study whose signal has no value for a negative `k`; `rest` is what the task needs.
+fn rooted(task: &str, k: &str, rest: &str) -> String {
+    format!(
+        r#"
+study.name = "rooted"
+study.task = "{task}"
+cases.one = {{ a = 1.0, x0 = 1.0, horizon = "1 s"{k} }}
+{rest}
+
+[models.m.equations]
+states = {{ x = "m" }}
+parameters = {{ a = "1/s", k = "1" }}
+der = {{ x = "-a*x" }}
+outputs = {{ y = "x*sqrt(k)" }}
+"#
+    )
+}
+
+/// Returns the class and the text of the verdict in the report of a study.
+fn verdict_of(study: &str) -> (String, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, out] = ["study.toml", "out"].map(|name| folder.path().join(name));
+    std::fs::write(&file, study).unwrap();
+    let output = cargo_bin_cmd!("mops").arg("run").arg(&file).arg("--out").arg(&out).output().unwrap();
+    let page = std::fs::read_to_string(out.join("report.html"));
+    let page = page.unwrap_or_else(|_| panic!("{study}{}", String::from_utf8_lossy(&output.stderr)));
+    let (_, rest) = page.split_once("<p class=\"verdict ").unwrap();
+    let (class, rest) = rest.split_once("\">").unwrap();
+    (class.to_owned(), rest.split_once("</p>").unwrap().0.replace("<code>", "`").replace("</code>", "`"))
+}
+
+#[test]
+fn findings_without_values_are_no_good_result() {
+    let monitored = "criteria.c = { final-value = { signal = \"y\" }, usage = \"monitor\" }\n";
+    let demanded = "criteria.c = { final-value = { signal = \"y\" }, demand = \"2 m\" }\n";
+    let tuner = "tuners.a = { start = 1, min = 0.5, max = 2 }\n";
+    let over = |range: &str| format!("{monitored}{tuner}uncertain.k = {{ {range} }}\n");
+    let all = over("min = -2, max = -1");
+    let some = over("min = -1, max = 1");
+    let sweep = |range: &str| {
+        format!(
+            "{demanded}tuners.k = {{ start = 1, min = -2, max = 2 }}\nsweep = {{ at = \"start\", x = {{ tuner = \"k\", {range} }} }}"
+        )
+    };
+    let k = ", k = 1.0";
+    for (task, k, rest, class, part) in [
+        ("sweep", "", sweep("min = -2, max = -1, points = 5"), "bad", "No point of the sweep could be simulated."),
+        ("sweep", "", sweep("min = 1, max = 2, points = 5"), "good", "The best point of the sweep is `k` = 1 "),
+        (
+            "monte-carlo",
+            k,
+            format!("{all}monte-carlo.at = \"start\""),
+            "bad",
+            "No criterion has a value at any of 1000 samples.",
+        ),
+        ("monte-carlo", k, format!("{some}monte-carlo.at = \"start\""), "mixed", " samples have no value."),
+        (
+            "sensitivity",
+            k,
+            format!("{all}sensitivity = {{ at = \"start\", method = \"sobol\" }}"),
+            "bad",
+            "at too few of 512 samples",
+        ),
+        (
+            "sensitivity",
+            k,
+            format!("{all}sensitivity = {{ at = \"start\", method = \"morris\" }}"),
+            "bad",
+            "at too few of 20 samples",
+        ),
+        (
+            "worst-case",
+            k,
+            format!("{all}worst-case.at = \"start\""),
+            "bad",
+            "No criterion has a value anywhere in the box.",
+        ),
+        ("worst-case", k, format!("{some}worst-case.at = \"start\""), "mixed", "Worst case of `c` in case `one`"),
+        (
+            "worst-case",
+            k,
+            format!("{}worst-case.at = \"start\"", over("min = 1, max = 2")),
+            "good",
+            "Worst case of `c` in case `one`",
+        ),
+    ] {
+        let found = verdict_of(&rooted(task, k, &rest));
+        assert!(found.0 == class && found.1.contains(part), "{task}: {found:?}");
+    }
+}
+
 /// The study has no data.
 struct NoFiles;
 

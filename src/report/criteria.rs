@@ -23,12 +23,12 @@ pub(super) fn demand(criterion: &CriterionReport) -> Option<String> {
 
 /// Returns the table of all criteria in all cases, at the initial guess and at the reported point.
 pub(super) fn table(report: &Report<'_>) -> Markup {
-    let (outcome, best) = (report.outcome, report.best_name());
-    let models = report.problem.study().models().len() > 1;
-    let cases = report.problem.study().cases().len() > 1;
+    let (outcome, best) = (report.solution.outcome, report.best_name());
+    let models = report.solution.problem.study().models().len() > 1;
+    let cases = report.solution.problem.study().cases().len() > 1;
     // Without a solver there is only one point. The sum of a calibration has no demand.
     let (two, demands) = (outcome.solver != "none", report.room.judges_demands());
-    let shape = report.problem.shape();
+    let shape = report.solution.problem.shape();
     let rows = outcome.criteria.iter().zip(&outcome.start.criteria).zip(&shape.rows);
     let rows_and_head = html! {
         table {

@@ -15,10 +15,10 @@ const COLUMNS: f64 = 150.0;
 
 /// Returns the analysis of a job at every point of the front; empty beyond [`MOST_RESPONSES`].
 pub(super) fn analyses(report: &Report<'_>, job: usize) -> Vec<Option<Analysis>> {
-    if report.front.len() * report.problem.study().jobs().len() > MOST_RESPONSES {
+    if report.solution.front.len() * report.solution.problem.study().jobs().len() > MOST_RESPONSES {
         return Vec::new();
     }
-    report.front.iter().map(|at| report.problem.analyse_all(job, &at.tuners, None).ok()).collect()
+    report.solution.front.iter().map(|at| report.solution.problem.analyse_all(job, &at.tuners, None).ok()).collect()
 }
 
 /// Returns a signal at every point of the front, as thin curves.

@@ -33,8 +33,6 @@ use std::io;
 use std::path::Path;
 
 use mops_content::numbers::FileNames;
-use mops_core::{Evaluation, Problem, run::Record};
-use mops_outcome::Outcome;
 use mops_tasks::{Room, Solution, Solved, calibration};
 
 use crate::files::Outputs;
@@ -54,16 +52,8 @@ pub(crate) const STYLE: &str = include_str!("style.css");
 
 /// Content of a report.
 pub struct Report<'a> {
-    /// Result of the run.
-    pub outcome: &'a Outcome,
-    /// Solved problem.
-    pub problem: &'a Problem,
-    /// Evaluation at the reported point.
-    pub best: &'a Evaluation,
-    /// All points in the order of evaluation; the first is the initial guess.
-    pub archive: &'a [Record],
-    /// Points of the Pareto front, in the order of the result; empty for other tasks.
-    pub front: &'a [Evaluation],
+    /// Result of the run, with what it rests on.
+    pub solution: Solution<'a>,
     /// What performed the task.
     pub room: &'a dyn Room,
     /// Text of the study file, with its settings.
@@ -73,14 +63,7 @@ pub struct Report<'a> {
 impl<'a> Report<'a> {
     /// Creates the report of a solved study; `text` is that of its file, with its settings.
     pub fn new(solved: &'a Solved, room: &'a dyn Room, text: &'a str) -> Self {
-        let Solution { outcome, problem, best, archive, front } = solved.into();
-        Self { outcome, problem, best, archive, front, room, text }
-    }
-
-    /// Returns the result with what it rests on.
-    fn solution(&self) -> Solution<'_> {
-        let Self { outcome, problem, best, archive, front, .. } = *self;
-        Solution { outcome, problem, best, archive, front }
+        Self { solution: solved.into(), room, text }
     }
 }
 
@@ -98,17 +81,16 @@ impl Report<'_> {
     pub(crate) fn write_by(&self, folder: &Path, outputs: &Outputs) -> io::Result<usize> {
         let plots = folder.join("plots");
         outputs.folder(&plots)?;
-        let of = self.solution();
+        let of = &self.solution;
         let (responses, omitted) = responses::groups(self);
-        let convergence =
-            self.room.has_convergence(&of).then(|| convergence::group(self.problem.study(), self.archive));
+        let convergence = self.room.has_convergence(of).then(|| convergence::group(of.problem.study(), of.archive));
         let content = page::Content {
-            findings: self.room.findings(&of),
-            details: self.room.details(&of),
+            findings: self.room.findings(of),
+            details: self.room.details(of),
             responses,
             omitted,
             convergence,
-            calibration: calibration::sections(self.outcome),
+            calibration: calibration::sections(of.outcome),
         };
         let mut names = FileNames::default();
         let figures = content.groups().flat_map(|group| &group.figures).filter(|figure| figure.on_request.is_none());
@@ -118,7 +100,7 @@ impl Report<'_> {
         earlier.note(all.iter().map(|(name, _)| name.as_str()))?;
         let mut missing = 0;
         for (i, (name, plot)) in all.iter().enumerate() {
-            if self.problem.is_cancelled() {
+            if of.problem.is_cancelled() {
                 missing = all.len() - i;
                 break;
             }
@@ -132,7 +114,7 @@ impl Report<'_> {
 
     /// Returns the name of the reported point: `optimum` only if the solver converged to a feasible point.
     fn best_name(&self) -> &'static str {
-        self.solution().best_name()
+        self.solution.best_name()
     }
 }
 

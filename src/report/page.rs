@@ -71,7 +71,7 @@ pub(super) fn document(title: &str, body: Markup) -> Markup {
 
 /// Returns the page of a report.
 pub(super) fn of(report: &Report<'_>, content: &Content) -> Markup {
-    let (outcome, of, room) = (report.outcome, &report.solution(), report.room);
+    let (outcome, of, room) = (report.solution.outcome, &report.solution, report.room);
     let warnings = verdict::warnings(of);
     let has_points = content.findings.iter().flat_map(|section| &section.blocks);
     let has_points = has_points.into_iter().any(|block| matches!(block, Block::Table(table) if table.are_points));
@@ -122,7 +122,7 @@ fn failures(failures: &[FailureReport]) -> Markup {
 }
 
 fn header(report: &Report<'_>) -> Markup {
-    let (outcome, of, room) = (report.outcome, report.solution(), report.room);
+    let (outcome, of, room) = (report.solution.outcome, report.solution, report.room);
     let Verdict { tone, text } = verdict::verdict(&of, room);
     let class = match tone {
         Tone::Good => "verdict good",

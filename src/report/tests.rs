@@ -1,6 +1,6 @@
 //! Tests of the whole report of a small study: a first-order lag with a step and an experiment.
 
-use mops_tasks::design::Design;
+use mops_tasks::{Solution, design::Design};
 
 use super::Draw;
 use std::sync::Arc;
@@ -134,7 +134,8 @@ fn page_of(
     text: &str,
 ) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
-    let report = Report { outcome, problem, best, archive, front: &[], room: &Design, text };
+    let solution = Solution { outcome, problem, best, archive, front: &[] };
+    let report = Report { solution, room: &Design, text };
     report.write(folder.path()).unwrap();
     let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     (folder, page)

@@ -9,8 +9,8 @@ use super::markup::scrolling;
 
 /// Returns the table of all tuners, with their positions within the bounds.
 pub(super) fn table(report: &Report<'_>) -> Markup {
-    let study = report.problem.study();
-    let two = report.outcome.solver != "none";
+    let study = report.solution.problem.study();
+    let two = report.solution.outcome.solver != "none";
     let log = study.tuners().iter().any(|t| t.scale == Scale::Log);
     let rows_and_head = html! {
         table {
@@ -27,7 +27,7 @@ pub(super) fn table(report: &Report<'_>) -> Markup {
                 }
             }
             tbody {
-                @for (now, tuner) in report.outcome.tuners.iter().zip(study.tuners()) {
+                @for (now, tuner) in report.solution.outcome.tuners.iter().zip(study.tuners()) {
                     tr {
                         th scope="row" { (now.name) }
                         @if two { td class="number" { (number(now.start)) } }

@@ -87,8 +87,11 @@ impl Room for Sweep {
 
     fn verdict(&self, of: &Solution<'_>) -> Judgement {
         let found = of.outcome.found.get::<SweepReport>();
-        Judgement::OfPoint(match found.into_iter().flat_map(|sweep| &sweep.words).next() {
-            Some(words) => Verdict::new(Tone::Good, words),
+        Judgement::OfPoint(match found.and_then(|sweep| Some((sweep, sweep.words.first()?))) {
+            Some((sweep, words)) => {
+                let has_value = sweep.best[2].is_finite();
+                Verdict::new(if has_value { Tone::Good } else { Tone::Bad }, words)
+            }
             None => Verdict::new(Tone::Bad, "No sweep: the run was interrupted."),
         })
     }

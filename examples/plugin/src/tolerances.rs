@@ -32,10 +32,6 @@ impl TaskOptions for TolerancesTask {
 }
 
 impl TaskSpec for TolerancesTask {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
     fn at(&self) -> Option<Place> {
         Some(self.at)
     }

@@ -53,7 +53,7 @@ pub(super) fn figures(cases: &Cases<'_>, outputs: &[&Variable]) -> Vec<Figure> {
             figures.push(Figure { plots, caption: cases.caption(&output.name), ..Figure::default() });
         }
     }
-    let tuners = cases.report.problem.study().tuners().len();
+    let tuners = cases.report.solution.problem.study().tuners().len();
     let mut failures = 0;
     let moving = (0..tuners).filter_map(|tuner| poles(cases, tuner, &mut failures)).take(MOST_TUNERS);
     figures.extend(
@@ -68,7 +68,7 @@ fn of(analysis: &Result<Analysis, Failure>) -> Option<&StateSpace> {
 
 /// Returns true if the system is the loop transfer function of cut loops.
 fn is_cut(cases: &Cases<'_>) -> bool {
-    let study = cases.report.problem.study();
+    let study = cases.report.solution.problem.study();
     study.models()[study.jobs()[cases.ones[0].job].model].1.interface().is_cut
 }
 
@@ -82,7 +82,7 @@ fn is_loop(cases: &Cases<'_>, one: &Simulated, channel: &StateSpace) -> bool {
     if is_cut(cases) {
         return true;
     }
-    let rows = cases.report.problem.study().rows();
+    let rows = cases.report.solution.problem.study().rows();
     let ends = [channel.inputs[0].clone(), channel.outputs[0].clone()];
     let mut of_case = rows.iter().filter(|row| row.job == one.job);
     of_case.any(|row| row.criterion.feedback_channel().as_ref() == Some(&ends))
@@ -236,7 +236,7 @@ fn nyquist_curve(cases: &Cases<'_>, (input, output): (usize, usize), name: &str)
 /// Returns the poles of the first case while a tuner moves from its lower to its upper bound, with the name of the tuner. For
 /// a loop transfer function, the poles are those of the closed loop. `None` if the tuner is fixed or moves no pole.
 fn poles(cases: &Cases<'_>, tuner: usize, failures: &mut u32) -> Option<(String, Plot)> {
-    let (problem, one) = (&cases.report.problem, cases.ones[0]);
+    let (problem, one) = (&cases.report.solution.problem, cases.ones[0]);
     let moved = &problem.study().tuners()[tuner];
     if !moved.active || moved.tie.is_some() || moved.bounds.iter().any(|bound| !bound.is_finite()) {
         return None;
@@ -253,7 +253,7 @@ fn poles(cases: &Cases<'_>, tuner: usize, failures: &mut u32) -> Option<(String,
         if *failures == MOST_FAILURES || problem.is_cancelled() {
             return None;
         }
-        let mut tuners = cases.report.best.tuners.clone();
+        let mut tuners = cases.report.solution.best.tuners.clone();
         tuners[tuner] = moved.value_at(position);
         problem.study().apply_ties(&mut tuners);
         let analysis = problem.analyse_all(one.job, &tuners, None);

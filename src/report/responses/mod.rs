@@ -29,21 +29,22 @@ struct Simulated {
 /// Returns the groups of plots, for at most [`MOST_JOBS`] simulations, and a sentence if some are omitted. Each experiment has
 /// a group, and each model a group with all cases. With a Pareto front, each case has a group with the responses of the front.
 pub(super) fn groups(report: &Report<'_>) -> (Vec<Group>, Option<String>) {
-    let study = report.problem.study();
+    let study = report.solution.problem.study();
     let all = study.jobs().len();
     let jobs = shown(report);
     let omitted = (jobs.len() < all).then(|| {
         format!("The {MOST_JOBS} of {} with the largest scaled values are shown.", counted(all, "simulation"))
     });
-    let analyse =
-        |job: usize, tuners: &[f64]| -> Result<Analysis, Failure> { report.problem.analyse_all(job, tuners, None) };
+    let analyse = |job: usize, tuners: &[f64]| -> Result<Analysis, Failure> {
+        report.solution.problem.analyse_all(job, tuners, None)
+    };
     let simulated: Vec<Simulated> = jobs
         .into_par_iter()
         .map(|job| Simulated {
             job,
             both: Comparison {
                 start: analyse(job, &study.start()),
-                best: analyse(job, &report.best.tuners),
+                best: analyse(job, &report.solution.best.tuners),
                 best_name: report.best_name(),
             },
         })
@@ -52,7 +53,7 @@ pub(super) fn groups(report: &Report<'_>) -> (Vec<Group>, Option<String>) {
     let alone = |one: &&Simulated| {
         let plan = &study.jobs()[one.job];
         let over_time = study.models()[plan.model].1.interface().analysis != AnalysisKind::Linear;
-        over_time && (!report.front.is_empty() || study.cases()[plan.case].experiment.is_some())
+        over_time && (!report.solution.front.is_empty() || study.cases()[plan.case].experiment.is_some())
     };
     let mut groups: Vec<Group> = simulated.iter().filter(alone).map(|one| of_case::group(report, one)).collect();
     for model in 0..study.models().len() {
@@ -67,7 +68,7 @@ pub(super) fn groups(report: &Report<'_>) -> (Vec<Group>, Option<String>) {
 
 /// Returns the jobs with plots, in the order of the study.
 fn shown(report: &Report<'_>) -> Vec<usize> {
-    let mut jobs: Vec<usize> = (0..report.problem.study().jobs().len()).collect();
+    let mut jobs: Vec<usize> = (0..report.solution.problem.study().jobs().len()).collect();
     if jobs.len() > MOST_JOBS {
         let worst = worst(report);
         jobs.sort_by(|&a, &b| worst[b].total_cmp(&worst[a]));
@@ -79,9 +80,9 @@ fn shown(report: &Report<'_>) -> Vec<usize> {
 
 /// Returns the largest scaled value of every job at the reported point; infinity if a criterion has no value.
 fn worst(report: &Report<'_>) -> Vec<f64> {
-    let study = report.problem.study();
+    let study = report.solution.problem.study();
     let mut worst = vec![f64::NEG_INFINITY; study.jobs().len()];
-    for (row, reading) in study.rows().iter().zip(&report.best.readings) {
+    for (row, reading) in study.rows().iter().zip(&report.solution.best.readings) {
         let scaled = reading.map_or(f64::INFINITY, |reading| reading.scaled);
         // N.B.: `max` ignores NaN.
         worst[row.job] = worst[row.job].max(scaled);

@@ -14,7 +14,7 @@ use super::{Simulated, active, inputs};
 
 /// Returns the plots of a simulation.
 pub(super) fn group(report: &Report<'_>, Simulated { job, both }: &Simulated) -> Group {
-    let study = report.problem.study();
+    let study = report.solution.problem.study();
     let plan = &study.jobs()[*job];
     let (case, (model_name, model)) = (&study.cases()[plan.case], &study.models()[plan.model]);
     let mut title = match &case.experiment {
@@ -28,7 +28,7 @@ pub(super) fn group(report: &Report<'_>, Simulated { job, both }: &Simulated) ->
     } else {
         case.name.clone()
     };
-    let full_width = report.front.is_empty();
+    let full_width = report.solution.front.is_empty();
     let mut group = Group { title, about: both.failures(), figures: Vec::new(), full_width };
     if both.start.is_err() && both.best.is_err() && case.experiment.is_none() {
         return group;
@@ -46,7 +46,7 @@ pub(super) fn group(report: &Report<'_>, Simulated { job, both }: &Simulated) ->
         if let Some(signal) = signals.iter().find(|s| s.name == channel.signal) {
             let mut fit = both.fit(channel, signal, &case.name);
             let bands = |around: Around| {
-                let found = report.outcome.found.get::<UncertaintyReport>();
+                let found = report.solution.outcome.found.get::<UncertaintyReport>();
                 found.map_or_else(Vec::new, |found| calibration::bands(found, &case.name, &signal.name, around))
             };
             fit.curves.extend(bands(Around::Prediction));
@@ -80,7 +80,7 @@ pub(super) fn group(report: &Report<'_>, Simulated { job, both }: &Simulated) ->
 
 /// Returns the caption of a criterion: value and demand.
 fn caption(report: &Report<'_>, index: usize, row: &Row) -> String {
-    let criterion = &report.outcome.criteria[index];
+    let criterion = &report.solution.outcome.criteria[index];
     let mut text = format!("`{}`: {}", row.name, with_unit(criterion.value, &criterion.unit));
     if let Some(demand) = criteria::demand(criterion) {
         text.push_str(&format!(" (demand {demand})"));

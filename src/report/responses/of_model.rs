@@ -34,7 +34,7 @@ pub(super) struct Cases<'a> {
 
 /// Returns the plots of a model.
 pub(super) fn group(report: &Report<'_>, model: usize, ones: &[&Simulated]) -> Group {
-    let study = report.problem.study();
+    let study = report.solution.problem.study();
     let (name, built) = &study.models()[model];
     let cases = Cases { report, model, ones, colors: colors(report, ones) };
     let title = if study.models().len() > 1 { format!("Model `{name}`") } else { String::new() };
@@ -101,7 +101,7 @@ fn colors(report: &Report<'_>, ones: &[&Simulated]) -> Vec<Color> {
 
 impl Cases<'_> {
     pub(super) fn case(&self, one: &Simulated) -> &Case {
-        let study = self.report.problem.study();
+        let study = self.report.solution.problem.study();
         &study.cases()[study.jobs()[one.job].case]
     }
 
@@ -111,7 +111,7 @@ impl Cases<'_> {
 
     /// Returns the start of the names of plot files: the case if there is only one, and the model if there are several.
     pub(super) fn place(&self) -> String {
-        let models = self.report.problem.study().models();
+        let models = self.report.solution.problem.study().models();
         let case = if let [one] = self.ones { format!("{}-", self.name(one)) } else { String::new() };
         if models.len() > 1 { format!("{case}{}-", models[self.model].0) } else { case }
     }
@@ -159,7 +159,7 @@ impl Cases<'_> {
 
     /// Returns the bounds of a signal, each once, with the cases that it applies to.
     fn bounds(&self, signal: &str) -> Vec<Bound> {
-        let study = self.report.problem.study();
+        let study = self.report.solution.problem.study();
         let mut drawn: Vec<Bound> = Vec::new();
         for one in self.ones {
             let rows: Vec<&Row> = study.rows().iter().filter(|row| row.job == one.job).collect();
@@ -184,7 +184,7 @@ impl Cases<'_> {
 
     /// Returns the plot of an input in all cases.
     fn input(&self, input: &Variable) -> Plot {
-        let jobs = self.report.problem.study().jobs();
+        let jobs = self.report.solution.problem.study().jobs();
         let curve = |(index, one): (usize, &&Simulated)| Curve {
             variant: String::new(),
             ..self.curve(index, inputs::points(self.case(one), &input.name, jobs[one.job].horizon), false)
@@ -198,9 +198,9 @@ impl Cases<'_> {
 
     /// Returns the values of the criteria that read a signal: the worst of all cases.
     pub(super) fn caption(&self, signal: &str) -> Vec<String> {
-        let study = self.report.problem.study();
+        let study = self.report.solution.problem.study();
         let here = |row: &Row| self.ones.iter().any(|one| one.job == row.job);
-        let rows = study.rows().iter().zip(&self.report.outcome.criteria).filter(|(row, _)| here(row));
+        let rows = study.rows().iter().zip(&self.report.solution.outcome.criteria).filter(|(row, _)| here(row));
         let rows: Vec<(&Row, &CriterionReport)> =
             rows.filter(|(row, _)| row.criterion.signals().iter().any(|s| s == signal)).collect();
         let mut names: Vec<&str> = Vec::new();

@@ -11,7 +11,7 @@ use mops_statistics::{Sampling, Summary, draw, quantile, quantile_interval, shar
 use crate::uncertain::{DistributionReport, MonteCarloReport, QuantileReport, ShareReport, Subject, uncertain_reports};
 
 use mops_content::{
-    numbers::significant,
+    numbers::{counted, significant},
     section::{Block, Section, Tone, Verdict},
     write_header,
 };
@@ -54,11 +54,16 @@ impl Room for MonteCarlo {
         let Some((found, words)) = found.and_then(|found| Some((found, found.words.first()?))) else {
             return Judgement::OfPoint(interrupted());
         };
+        if found.criteria.iter().all(|of| of.failed == found.samples) {
+            let text = format!("No criterion has a value at any of {}.", counted(found.samples, "sample"));
+            return Judgement::OfFindings(Verdict::new(Tone::Bad, text));
+        }
         let is_missed = match &found.all {
             Some(all) => all.count < all.of,
             None => found.criteria.iter().flat_map(|of| &of.met).any(|met| met.count < met.of),
         };
-        Judgement::OfFindings(Verdict::new(if is_missed { Tone::Mixed } else { Tone::Good }, words))
+        let is_whole = !is_missed && found.criteria.iter().all(|of| of.failed == 0);
+        Judgement::OfFindings(Verdict::new(if is_whole { Tone::Good } else { Tone::Mixed }, words))
     }
 
     fn findings(&self, of: &Solution<'_>) -> Vec<Section> {
@@ -225,12 +230,15 @@ fn words(
         let DistributionReport { of, mean, deviation, met, failed, .. } = found;
         let unit = if of.unit == "1" { String::new() } else { format!(" {}", of.unit) };
         let demand = met.as_ref().map_or_else(String::new, |met| format!(" Its demand is met in {}.", estimate(met)));
-        let failed =
-            if *failed > 0 { format!(" {failed} samples have no value and count as missed.") } else { String::new() };
+        let place = format!("`{}` in case `{}`", of.criterion, of.case);
+        if *failed == samples {
+            words.push(format!("{place} has no value at any of {}.", counted(samples, "sample")));
+            continue;
+        }
+        let counted_as = if met.is_some() { " and count as missed" } else { "" };
+        let failed = if *failed > 0 { format!(" {failed} samples have no value{counted_as}.") } else { String::new() };
         words.push(format!(
-            "`{}` in case `{}` has the mean {}{unit} and the standard deviation {}{unit}.{demand}{failed}",
-            of.criterion,
-            of.case,
+            "{place} has the mean {}{unit} and the standard deviation {}{unit}.{demand}{failed}",
             significant(*mean, 4),
             significant(*deviation, 3)
         ));

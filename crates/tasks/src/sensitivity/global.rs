@@ -130,11 +130,15 @@ fn words(report: &GlobalSensitivityReport, random: bool, asked: usize) -> Vec<St
     let mut words = Vec::new();
     for found in &report.criteria {
         let place = format!("`{}` in case `{}`", found.of.criterion, found.of.case);
+        if found.effects.is_empty() {
+            words.push(format!("{place} has a value at too few of {asked} samples for sensitivities."));
+            continue;
+        }
         let size = |e: &EffectReport| e.magnitude.or(e.total.map(|t| t.value)).unwrap_or(0.0);
         let mut sorted: Vec<&EffectReport> = found.effects.iter().collect();
         sorted.sort_by(|a, b| size(b).total_cmp(&size(a)));
         let Some(strongest) = sorted.first().filter(|e| size(e) > 0.0) else {
-            words.push(format!("{place} does not depend on the uncertain parameters, or has too few values."));
+            words.push(format!("{place} does not depend on the uncertain parameters."));
             continue;
         };
         let unit = if found.of.unit == "1" { String::new() } else { format!(" {}", found.of.unit) };

@@ -45,8 +45,16 @@ impl Room for Sensitivity {
     }
 
     fn verdict(&self, of: &Solution<'_>) -> Judgement {
-        if let Some(words) = of.outcome.found.get::<GlobalSensitivityReport>().and_then(|found| found.words.first()) {
-            return Judgement::OfFindings(Verdict::new(Tone::Good, words));
+        let global = of.outcome.found.get::<GlobalSensitivityReport>();
+        if let Some((found, words)) = global.and_then(|found| Some((found, found.words.first()?))) {
+            let tone = if found.criteria.iter().all(|criterion| criterion.effects.is_empty()) {
+                Tone::Bad
+            } else if found.failed > 0 {
+                Tone::Mixed
+            } else {
+                Tone::Good
+            };
+            return Judgement::OfFindings(Verdict::new(tone, words));
         }
         let Some(found) = of.outcome.found.get::<SensitivityReport>() else {
             return Judgement::OfPoint(Verdict::new(Tone::Bad, "The sensitivities could not be computed."));

@@ -82,7 +82,11 @@ fn verdict(found: &WorstCaseReport) -> Verdict {
     if found.criteria.is_empty() {
         return Verdict::new(Tone::Bad, found.words.join(" "));
     }
+    if found.criteria.iter().all(|c| c.at.is_empty()) {
+        return Verdict::new(Tone::Bad, "No criterion has a value anywhere in the box.");
+    }
     let demanded = found.criteria.iter().filter(|c| c.of.demand.is_some());
+    let is_demanded = demanded.clone().next().is_some();
     let are_met = demanded.clone().all(|c| c.met) && found.criteria.iter().all(|c| c.failed == 0);
     let worst = demanded.filter(|c| !c.met).max_by(|a, b| a.scaled.total_cmp(&b.scaled));
     let failed: usize = found.criteria.iter().map(|c| c.failed).sum();
@@ -93,6 +97,7 @@ fn verdict(found: &WorstCaseReport) -> Verdict {
             worst.of.case,
             significant(worst.scaled, 4)
         ),
+        (None, _) if !is_demanded => found.criteria.iter().map(sentence).next().unwrap_or_default(),
         (None, 0) => "All demands are met at every evaluated point of the box.".to_owned(),
         (None, _) => {
             format!(

@@ -113,10 +113,6 @@ impl TaskOptions for CalibrationTask {
 }
 
 impl TaskSpec for CalibrationTask {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
     fn at(&self) -> Option<Place> {
         Some(Place::Optimum)
     }

@@ -55,10 +55,6 @@ impl TaskOptions for DesignTask {
 }
 
 impl TaskSpec for DesignTask {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
     fn at(&self) -> Option<Place> {
         Some(Place::Optimum)
     }

@@ -78,10 +78,6 @@ impl TaskOptions for DiagnosisTask {
 }
 
 impl TaskSpec for DiagnosisTask {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
     fn at(&self) -> Option<Place> {
         None
     }

@@ -215,10 +215,6 @@ impl TaskOptions for ExcitationTask {
 }
 
 impl TaskSpec for ExcitationTask {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
     fn at(&self) -> Option<Place> {
         None
     }

@@ -47,9 +47,6 @@ pub enum Place {
 
 /// Facts of a task with its options.
 pub trait TaskSpec: Any + fmt::Debug + Send + Sync {
-    /// Returns the word of the task in study files.
-    fn name(&self) -> &'static str;
-
     /// Returns the point at which the task is performed, so that [`Place::Optimum`] needs a solver; `None` if it is performed at no
     /// point.
     fn at(&self) -> Option<Place>;
@@ -115,11 +112,14 @@ pub trait TaskOptions: TaskSpec + DeserializeOwned + JsonSchema {
 
 /// Task of a study, with its options.
 #[derive(Debug, Clone)]
-pub struct Task(Arc<dyn TaskSpec>);
+pub struct Task {
+    name: &'static str,
+    spec: Arc<dyn TaskSpec>,
+}
 
-impl<T: TaskSpec> From<T> for Task {
+impl<T: TaskOptions> From<T> for Task {
     fn from(task: T) -> Self {
-        Self(Arc::new(task))
+        Self { name: T::NAME, spec: Arc::new(task) }
     }
 }
 
@@ -133,7 +133,7 @@ impl std::ops::Deref for Task {
     type Target = dyn TaskSpec;
 
     fn deref(&self) -> &Self::Target {
-        &*self.0
+        &*self.spec
     }
 }
 
@@ -143,9 +143,14 @@ impl Task {
         CalibrationTask::default().into()
     }
 
+    /// Returns the word of the task in study files.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
     /// Returns the options if they are those of the kind `T`.
     pub fn options<T: TaskSpec>(&self) -> Option<&T> {
-        let any: &dyn Any = &*self.0;
+        let any: &dyn Any = &*self.spec;
         any.downcast_ref()
     }
 
@@ -157,7 +162,7 @@ impl Task {
 
 impl Serialize for Task {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
+        serializer.serialize_str(self.name)
     }
 }
 

@@ -40,10 +40,6 @@ impl TaskOptions for MonteCarloTask {
 }
 
 impl TaskSpec for MonteCarloTask {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
     fn at(&self) -> Option<Place> {
         Some(self.at)
     }

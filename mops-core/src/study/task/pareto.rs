@@ -39,10 +39,6 @@ impl TaskOptions for ParetoTask {
 }
 
 impl TaskSpec for ParetoTask {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
     fn at(&self) -> Option<Place> {
         Some(Place::Optimum)
     }

@@ -47,10 +47,6 @@ impl TaskOptions for SensitivityTask {
 }
 
 impl TaskSpec for SensitivityTask {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
     fn at(&self) -> Option<Place> {
         Some(self.at)
     }

@@ -136,10 +136,6 @@ impl TaskOptions for SweepTask {
 }
 
 impl TaskSpec for SweepTask {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
     fn at(&self) -> Option<Place> {
         Some(self.at)
     }

@@ -38,10 +38,6 @@ impl TaskOptions for WorstCaseTask {
 }
 
 impl TaskSpec for WorstCaseTask {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
     fn at(&self) -> Option<Place> {
         Some(self.at)
     }
