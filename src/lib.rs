@@ -42,7 +42,6 @@
 
 #[cfg(feature = "cli")]
 mod cli;
-mod files;
 pub mod prelude;
 #[cfg(feature = "report")]
 pub mod report;
@@ -58,6 +57,7 @@ mod watch;
 #[doc = include_str!("../docs/guide/7-in-rust.md")]
 mod guide {}
 
+pub use mops_catalogue::catalogue;
 pub use mops_content as content;
 pub use mops_core as core;
 pub use mops_core::{
@@ -85,21 +85,6 @@ pub use mops_statistics as statistics;
 pub use mops_studies as studies;
 pub use mops_tasks as tasks;
 pub use mops_tasks::{DEFAULT_EVALUATIONS, EvaluationStore, Options, SolveError, Solved, solve, suits};
-
-/// Returns the built-in catalogue: models, criteria, solvers, effects and studies.
-pub fn catalogue() -> Catalogue {
-    Catalogue {
-        models: mops_models::kinds(),
-        criteria: mops_criteria::kinds(),
-        solvers: mops_solvers::kinds(),
-        tasks: mops_tasks::kinds(),
-        effects: mops_effects::effects(),
-        augment: Some(|model, effects| Ok(Box::new(mops_models::WithEffects::new(model, effects)?))),
-        studies: mops_studies::shipped().into_iter().map(Into::into).collect(),
-        program: None,
-        readable: Vec::new(),
-    }
-}
 
 /// Runs the command line with a catalogue, as a program with the name of the calling binary and its version:
 /// `fn main() -> std::process::ExitCode { mops::main!(my_mops::catalogue()) }`.

@@ -8,11 +8,11 @@ use clap::Args;
 use mops_content::numbers::significant;
 use mops_core::{Catalogue, Problem};
 use mops_language::Diagnostic;
+use mops_output::{Inputs, Outputs};
 use serde_json::{Value, json};
 
 use super::past_run::PastRun;
 use super::run_files::of_any_run;
-use crate::files::{Inputs, Outputs};
 use crate::report::{Responses, Rows, comparison_page};
 use crate::terminal::{CommandError, number, print, print_json, table};
 

@@ -9,10 +9,10 @@ use mops_data::{DataFile, unit_since_1970};
 use mops_discrepancy::noise_of;
 use mops_language::Diagnostic;
 use mops_outcome::identification::{excitation_report, spacing};
+use mops_output::{Inputs, Outputs};
 use mops_tasks::excitation;
 
 use super::blocks;
-use crate::files::{Inputs, Outputs};
 use crate::report::{Color, Curve, Draw, Plot};
 use crate::terminal::{CommandError, number, print, table};
 

@@ -6,12 +6,12 @@ use std::time::UNIX_EPOCH;
 
 use mops_core::Catalogue;
 use mops_file::StudyFile;
-use mops_language::Diagnostic;
+use mops_language::{Diagnostic, files::read_regular};
+use mops_output::Inputs;
 use mops_tasks::room;
 use serde_json::Value;
 
 use super::study::{read_at, without_settings};
-use crate::files::{self, Inputs};
 use crate::store::{self, RunRow, RunState};
 
 /// Run in a folder.
@@ -29,7 +29,7 @@ impl PastRun {
     /// Reads the run in a folder; returns `None` if there is none.
     pub fn read(folder: &Path) -> Option<Self> {
         let path = folder.join("result.json");
-        let result = files::read(&path).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+        let result = read_regular(&path).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
         let result = result.filter(|result| result["format"].is_u64() && result["study"].is_string());
         let run = store::last_run(folder);
         // After a killed run the result may be that of an earlier run.

@@ -11,15 +11,15 @@ use mops_file::{
     StudyFile, edit as toml_text,
     edit::{TomlText, key, quoted},
 };
-use mops_language::{Diagnostic, suggestion};
+use mops_language::{Diagnostic, files::read_regular, suggestion};
 use mops_outcome::criterion_reports;
+use mops_output::Outputs;
 use serde_json::Value;
 
 use super::reading;
 use super::run_files::relative_path;
 use super::study::{Home, StudyArguments, inputs, open_as};
 use super::tables::met_text;
-use crate::files::{self, Outputs};
 use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 
 /// Options of `mops pick`.
@@ -135,7 +135,7 @@ fn output_path(arguments: &Arguments) -> Result<PathBuf, Diagnostic> {
 fn front(folder: &Path) -> Result<Vec<Value>, Diagnostic> {
     let path = folder.join("result.json");
     let help = "name the output folder of `mops pareto`, such as results/pid-pareto";
-    let text = files::read(&path)
+    let text = read_regular(&path)
         .map_err(|_| Diagnostic::new(format!("there is no result in `{}`", folder.display())).with_help(help))?;
     let result: Value = serde_json::from_slice(&text)
         .map_err(|error| Diagnostic::new(format!("cannot parse `{}`: {error}", path.display())).with_help(help))?;

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use mops_core::Catalogue;
 use mops_file::StudyFile;
-use mops_language::files::Folder;
+use mops_language::files::{Folder, read_regular};
 
 use super::study::Home;
-use crate::{files, store};
+use crate::store;
 
 /// Largest number of studies written from another one, each below the folder of the first.
 const MOST_GENERATIONS: usize = 20;
@@ -39,7 +39,7 @@ fn origin(folder: &Path, generations: usize) -> Option<PathBuf> {
 
 /// Returns the name of the study in a file.
 fn name_in(file: &Path) -> Option<String> {
-    let text = String::from_utf8(files::read(file).ok()?).ok()?;
+    let text = String::from_utf8(read_regular(file).ok()?).ok()?;
     let table: toml::Table = text.parse().ok()?;
     Some(table.get("study")?.get("name")?.as_str()?.to_owned())
 }

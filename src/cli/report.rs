@@ -5,13 +5,13 @@ use std::process::ExitCode;
 
 use clap::Args;
 use mops_core::{Catalogue, Stop};
-use mops_language::{Diagnostic, suggestion};
+use mops_language::{Diagnostic, files::read_regular, suggestion};
+use mops_output::{Inputs, Outputs};
 use mops_tasks::{Options, Solved, room_of};
 
 use super::past_run::PastRun;
 use super::resume;
 use super::run_files::{REPORT, check_outputs};
-use crate::files::{self, Inputs, Outputs};
 use crate::report::Report;
 use crate::store::{self, Identity, Recorder, RunRow, RunState};
 use crate::terminal::{CommandError, print};
@@ -65,7 +65,7 @@ fn replay(catalogue: &Catalogue, past: &PastRun) -> Result<Restored, CommandErro
         let mut study = file.study.clone();
         study.set_seed(run.seed);
         let options = options(catalogue, &file.solver, run)?;
-        let mut solved = room.restored(&study, &options, files::read(&folder.join(name)))?;
+        let mut solved = room.restored(&study, &options, read_regular(&folder.join(name)))?;
         (solved.outcome.stop, solved.outcome.seconds) = (stop(run.state), past.seconds().unwrap_or(0.0));
         return Ok(Restored { solved, text: file.source.text.clone() });
     }

@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 
 use mops_content::{numbers::counted, write_header};
 use mops_core::{Catalogue, Effect};
+use mops_output::Outputs;
 use mops_tasks::{Origin, OutputFile, OutputNames, Room, Solved, room};
 
 use super::study::Home;
-use crate::files::Outputs;
 use crate::report::Report;
 use crate::terminal::{CommandError, eprint_line};
 

@@ -12,11 +12,11 @@ use mops_content::{
 };
 use mops_core::{Analysis, Catalogue, Failure, Problem, Response, Study, Usage, study::JobPlan};
 use mops_language::{Diagnostic, Quantity, suggestion};
+use mops_output::Outputs;
 
 use super::families::{folded, runs, spelled};
 use super::study::{StudyArguments, home, open, outputs};
 use super::tables::criteria;
-use crate::files::Outputs;
 use crate::report::{Color, Curve, Draw, Plot};
 use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 

@@ -11,9 +11,9 @@ use mops_core::{
 };
 use mops_file::{StudyFile, edit::quoted};
 use mops_language::{Diagnostic, Source, suggestion};
+use mops_output::{Inputs, Outputs};
 
 use super::reading;
-use crate::files::{Inputs, Outputs};
 
 /// Study and settings that override it.
 #[derive(Args)]

@@ -33,9 +33,8 @@ use std::io;
 use std::path::Path;
 
 use mops_content::numbers::FileNames;
+use mops_output::Outputs;
 use mops_tasks::{Room, Solution, Solved, calibration};
-
-use crate::files::Outputs;
 
 pub(crate) use bode::{FrequencyCurve, bode};
 pub(crate) use chart::{SCRIPTS, STYLE as CHART_STYLE};

@@ -7,8 +7,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use mops_content::numbers::file_name;
+use mops_output::Outputs;
 
-use crate::files::{self, Outputs};
+use mops_language::files::read_regular;
 
 /// File that lists the plots of a folder, one name without extension per line.
 const LIST: &str = ".pictures";
@@ -23,7 +24,7 @@ pub(super) struct PlotFiles<'o> {
 impl<'o> PlotFiles<'o> {
     /// Reads the list of a folder; empty without a list.
     pub(super) fn of(folder: &Path, outputs: &'o Outputs) -> Self {
-        let list = files::read(&folder.join(LIST)).unwrap_or_default();
+        let list = read_regular(&folder.join(LIST)).unwrap_or_default();
         let list = String::from_utf8_lossy(&list);
         // A name that leads out of the folder is not ours.
         let names = list.lines().filter(|name| file_name(name) == **name).map(str::to_owned).collect();

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::runs::{RunRow, RunState};
-use crate::files::{self, Outputs};
+use mops_language::files::read_regular;
+use mops_output::Outputs;
 
 /// End of a run, for the row with the same start time.
 #[derive(Serialize, Deserialize)]
@@ -32,7 +33,7 @@ impl Ending {
 
     /// Completes the row of the last run from the note, if there is one.
     pub(super) fn complete(folder: &Path, run: RunRow) -> RunRow {
-        let read = files::read(&Self::path(folder)).ok();
+        let read = read_regular(&Self::path(folder)).ok();
         let noted: Option<Self> = read.and_then(|bytes| serde_json::from_slice(&bytes).ok());
         match noted.filter(|noted| noted.started == run.started && run.state == RunState::Running) {
             Some(noted) => RunRow { state: RunState::of(&noted.state), evaluations: noted.evaluations, ..run },

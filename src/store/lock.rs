@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::files::is_at;
+use mops_output::is_at;
 
 const FILE: &str = "evaluations.lock";
 

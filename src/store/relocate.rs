@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use mops_output::{is_at, temporary_path};
 use rusqlite::{Connection, OpenFlags};
 
 use super::database::{Database, WAITS, is_temporary, prepare};
 use super::runs::{RunRow, insert_run};
-use crate::files::{is_at, temporary_path};
 
 /// New database under its temporary name.
 pub(super) struct StudyBuilder {

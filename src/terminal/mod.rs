@@ -13,8 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use mops_language::Diagnostic;
-
-use crate::files::Overwrites;
+use mops_output::Overwrites;
 
 pub use date::date;
 pub(crate) use limits::{Limit, cancel_after, cancel_on_signal, exit_after};

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use mops_content::numbers::FileNames;
 use mops_linear::StateSpace;
+use mops_output::Outputs;
 use serde_json::Value;
 
 use crate::cli::linear_plots;
-use crate::files::Outputs;
 use crate::terminal::CommandError;
 
 /// Writes the files; returns a summary with notes on missing plots.

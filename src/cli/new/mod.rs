@@ -8,9 +8,9 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use mops_core::{Catalogue, catalogue::CatalogueStudy};
 use mops_language::{Diagnostic, plain::acts, suggestion};
+use mops_output::Outputs;
 
 use super::schema;
-use crate::files::Outputs;
 use crate::terminal::{CommandError, print};
 
 /// Arguments of `mops new`.

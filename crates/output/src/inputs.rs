@@ -9,13 +9,13 @@ const MOST_LINKS: usize = 40;
 
 /// Files that a command reads, and the symbolic links on the way to them, each with words for a message.
 #[derive(Debug, Default)]
-pub(crate) struct Inputs {
+pub struct Inputs {
     known: HashMap<Identity, String>,
 }
 
 impl Inputs {
     /// Adds a file; `what` follows "would overwrite".
-    pub(crate) fn add(&mut self, path: &Path, what: &str) {
+    pub fn add(&mut self, path: &Path, what: &str) {
         for entry in way(path) {
             if let Some(identity) = identity(&entry) {
                 self.known.entry(identity).or_insert_with(|| what.to_owned());

@@ -1,5 +1,7 @@
-//! Output files: each is written under a temporary name in the same folder and then renamed, and none replaces an input of
-//! the same command.
+//! Output files: each is written completely or not at all, and none replaces an input of the same command.
+//!
+//! A file is written under a temporary name in its folder and then renamed. [`Outputs`] writes the files of a command, and refuses to
+//! write ([`Overwrites`]) where one of its [`Inputs`] is. [`AtomicFile`] is one file being written.
 
 mod inputs;
 
@@ -8,7 +10,7 @@ use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-pub(crate) use inputs::Inputs;
+pub use inputs::Inputs;
 
 /// Prefix of a file name during writing. The name is fixed, so that the next process replaces the remains of a killed one;
 /// only one process at a time writes in the folder of a run.
@@ -17,13 +19,13 @@ const TEMPORARY_PREFIX: &str = ".new-";
 /// Writer of all output files of a command. It refuses to replace a file that the command reads, and follows no symbolic link
 /// below the folder of the outputs: a link is replaced.
 #[derive(Debug, Default)]
-pub(crate) struct Outputs {
+pub struct Outputs {
     inputs: Inputs,
 }
 
 /// Refusal to replace an input.
 #[derive(Debug)]
-pub(crate) struct Overwrites {
+pub struct Overwrites {
     path: PathBuf,
     what: String,
 }
@@ -38,7 +40,7 @@ impl std::error::Error for Overwrites {}
 
 impl Outputs {
     /// Creates the writer of a command that reads `inputs`.
-    pub(crate) fn besides(inputs: Inputs) -> Self {
+    pub fn besides(inputs: Inputs) -> Self {
         Self { inputs }
     }
 
@@ -46,7 +48,7 @@ impl Outputs {
     ///
     /// # Errors
     /// If writing the path would replace an input ([`Overwrites`]).
-    pub(crate) fn check(&self, path: &Path) -> io::Result<()> {
+    pub fn check(&self, path: &Path) -> io::Result<()> {
         let what = self.inputs.at(path).or_else(|| self.inputs.at(&temporary_path(path)));
         match what {
             None => Ok(()),
@@ -58,7 +60,7 @@ impl Outputs {
     ///
     /// # Errors
     /// If the path is that of an input, or the folder is not writable.
-    pub(crate) fn create(&self, path: &Path) -> io::Result<AtomicFile> {
+    pub fn create(&self, path: &Path) -> io::Result<AtomicFile> {
         self.check(path)?;
         AtomicFile::create(path)
     }
@@ -67,7 +69,7 @@ impl Outputs {
     ///
     /// # Errors
     /// As [`Outputs::create`]; an existing file then remains unchanged.
-    pub(crate) fn write(&self, path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
+    pub fn write(&self, path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
         let mut file = self.create(path)?;
         file.write_all(content.as_ref())?;
         file.commit()
@@ -77,7 +79,7 @@ impl Outputs {
     ///
     /// # Errors
     /// As [`Outputs::write`].
-    pub(crate) fn write_csv(
+    pub fn write_csv(
         &self,
         path: &Path,
         fill: impl FnOnce(&mut csv::Writer<AtomicFile>) -> Result<(), csv::Error>,
@@ -91,7 +93,7 @@ impl Outputs {
     ///
     /// # Errors
     /// If an input is read through such a link, or the folder cannot be created.
-    pub(crate) fn folder(&self, path: &Path) -> io::Result<()> {
+    pub fn folder(&self, path: &Path) -> io::Result<()> {
         if path.is_symlink() {
             self.check(path)?;
             fs::remove_file(path)?;
@@ -103,7 +105,7 @@ impl Outputs {
 /// File being written. If dropped before [`AtomicFile::commit`], an existing file remains unchanged.
 ///
 /// N.B.: a symbolic link at either name is replaced, not followed.
-pub(crate) struct AtomicFile {
+pub struct AtomicFile {
     file: Option<BufWriter<File>>,
     temporary: PathBuf,
     path: PathBuf,
@@ -120,7 +122,7 @@ impl AtomicFile {
     ///
     /// # Errors
     /// If the file cannot be written or renamed.
-    pub(crate) fn commit(mut self) -> io::Result<()> {
+    pub fn commit(mut self) -> io::Result<()> {
         self.close()?;
         fs::rename(&self.temporary, &self.path)
     }
@@ -129,7 +131,7 @@ impl AtomicFile {
     ///
     /// # Errors
     /// As [`AtomicFile::commit`].
-    pub(crate) fn commit_synced(mut self) -> io::Result<()> {
+    pub fn commit_synced(mut self) -> io::Result<()> {
         self.close()?.sync_data()?;
         fs::rename(&self.temporary, &self.path)
     }
@@ -158,7 +160,7 @@ impl Drop for AtomicFile {
 }
 
 /// Returns the temporary path of a file during writing.
-pub(crate) fn temporary_path(path: &Path) -> PathBuf {
+pub fn temporary_path(path: &Path) -> PathBuf {
     let mut name = std::ffi::OsString::from(TEMPORARY_PREFIX);
     name.push(path.file_name().unwrap_or_default());
     path.with_file_name(name)
@@ -175,23 +177,15 @@ fn cleared_temporary_path(path: &Path) -> io::Result<PathBuf> {
 
 /// Returns true if `path` names the given file.
 #[cfg(unix)]
-pub(crate) fn is_at(path: &Path, file: &Metadata) -> bool {
+pub fn is_at(path: &Path, file: &Metadata) -> bool {
     use std::os::unix::fs::MetadataExt;
     fs::metadata(path).is_ok_and(|there| (there.dev(), there.ino()) == (file.dev(), file.ino()))
 }
 
 /// Returns true if `path` exists: on this platform an open file cannot be replaced.
 #[cfg(not(unix))]
-pub(crate) fn is_at(path: &Path, _: &Metadata) -> bool {
+pub fn is_at(path: &Path, _: &Metadata) -> bool {
     path.exists()
-}
-
-/// Reads a regular file. Devices and pipes are refused, as they may be endless.
-///
-/// # Errors
-/// If the file cannot be read or is not a regular file.
-pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
-    mops_language::files::read_regular(path)
 }
 
 #[cfg(test)]
