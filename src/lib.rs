@@ -43,14 +43,19 @@
 #[cfg(feature = "cli")]
 mod cli;
 pub mod prelude;
-#[cfg(feature = "report")]
-pub mod report;
 #[cfg(feature = "store")]
 mod store;
 #[cfg(feature = "cli")]
 pub mod terminal;
 #[cfg(feature = "watch")]
 mod watch;
+
+/// Reports: pages and pictures of a solved study.
+#[cfg(feature = "report")]
+pub mod report {
+    pub use mops_content::plot::{Band, Color, Curve, CurveStyle, Level, ParallelAxis, Plot, Surface, ZAxis};
+    pub use mops_report::{Draw, Report, page};
+}
 
 /// Rust examples of the guide, compiled and run as doctests.
 #[cfg(doctest)]

@@ -10,10 +10,10 @@ const PICTURES: [(&str, &str); 2] = [("design", "pid-design"), ("diagnosis", "fu
 
 /// Files of the report template: layout, style, and the first part of a page.
 const TEMPLATE: [&str; 5] = [
-    "src/report/page.rs",
-    "src/report/markup.rs",
-    "src/report/style.css",
-    "src/report/charts.js",
+    "crates/report/src/page.rs",
+    "crates/report/src/markup.rs",
+    "crates/report/src/style.css",
+    "crates/report/src/charts.js",
     "crates/tasks/src/verdict.rs",
 ];
 

@@ -1,22 +1,24 @@
 //! `mops bench`: compares solvers on a study, over several seeds.
 
-use crate::report::Draw;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use maud::{PreEscaped, html};
-use mops_content::numbers::{number, significant};
+use mops_content::{
+    numbers::{number, significant},
+    plot::{Color, Curve, Plot},
+};
 use mops_core::{Catalogue, Halt, Objective, Stop, Study, Usage, solver::SMALL_OBJECTIVE};
 use mops_language::Diagnostic;
 use mops_output::Outputs;
+use mops_report::{Draw, page};
 use mops_tasks::{DEFAULT_EVALUATIONS, Options, Solved, solve, suits};
 use serde::Serialize;
 
 use super::default_folder;
 use super::run::{refused, solver_named};
 use super::study::{StudyArguments, home, open, outputs};
-use crate::report::{Color, Curve, Plot, page};
 use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, eprint_line, print, print_json, table};
 
 /// Arguments of `mops bench`.

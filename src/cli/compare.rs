@@ -9,11 +9,11 @@ use mops_content::numbers::significant;
 use mops_core::{Catalogue, Problem};
 use mops_language::Diagnostic;
 use mops_output::{Inputs, Outputs};
+use mops_report::{Responses, Rows, comparison_page};
 use serde_json::{Value, json};
 
 use super::past_run::PastRun;
 use super::run_files::of_any_run;
-use crate::report::{Responses, Rows, comparison_page};
 use crate::terminal::{CommandError, number, print, print_json, table};
 
 /// Arguments of `mops compare`.

@@ -4,16 +4,20 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use mops_content::{numbers::FileNames, sampling::thinned};
+use mops_content::{
+    numbers::FileNames,
+    plot::{Color, Curve, Plot},
+    sampling::thinned,
+};
 use mops_data::{DataFile, unit_since_1970};
 use mops_discrepancy::noise_of;
 use mops_language::Diagnostic;
 use mops_outcome::identification::{excitation_report, spacing};
 use mops_output::{Inputs, Outputs};
+use mops_report::Draw;
 use mops_tasks::excitation;
 
 use super::blocks;
-use crate::report::{Color, Curve, Draw, Plot};
 use crate::terminal::{CommandError, number, print, table};
 
 /// Arguments of `mops data`.

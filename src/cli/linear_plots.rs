@@ -1,10 +1,10 @@
 //! Plots of a linear system: Bode, Nyquist, root locus.
 
+use mops_content::plot::{Color, Curve, CurveStyle, Level, Plot};
 use mops_linear::{Complex, StateSpace, eigenvalues, zeros};
 use mops_math as math;
 use mops_math::complex;
-
-use crate::report::{Color, Curve, CurveStyle, FrequencyCurve, Level, Plot, bode, nyquist};
+use mops_report::{FrequencyCurve, bode, nyquist};
 
 /// Draws the plots of a single-input, single-output system; returns the kind of each, and the plot or the reason why it is
 /// missing.

@@ -7,12 +7,12 @@ use clap::Args;
 use mops_core::{Catalogue, Stop};
 use mops_language::{Diagnostic, files::read_regular, suggestion};
 use mops_output::{Inputs, Outputs};
+use mops_report::Report;
 use mops_tasks::{Options, Solved, room_of};
 
 use super::past_run::PastRun;
 use super::resume;
 use super::run_files::{REPORT, check_outputs};
-use crate::report::Report;
 use crate::store::{self, Identity, Recorder, RunRow, RunState};
 use crate::terminal::{CommandError, print};
 

@@ -11,10 +11,10 @@ use std::time::{Duration, Instant};
 use mops_content::{numbers::counted, write_header};
 use mops_core::{Catalogue, Effect};
 use mops_output::Outputs;
+use mops_report::Report;
 use mops_tasks::{Origin, OutputFile, OutputNames, Room, Solved, room};
 
 use super::study::Home;
-use crate::report::Report;
 use crate::terminal::{CommandError, eprint_line};
 
 /// Time to wait for space on a full disk.

@@ -7,17 +7,18 @@ use std::sync::Arc;
 use clap::Args;
 use mops_content::{
     numbers::{FileNames, counted},
+    plot::{Color, Curve, Plot},
     sampling::points,
     write_header,
 };
 use mops_core::{Analysis, Catalogue, Failure, Problem, Response, Study, Usage, study::JobPlan};
 use mops_language::{Diagnostic, Quantity, suggestion};
 use mops_output::Outputs;
+use mops_report::Draw;
 
 use super::families::{folded, runs, spelled};
 use super::study::{StudyArguments, home, open, outputs};
 use super::tables::criteria;
-use crate::report::{Color, Curve, Draw, Plot};
 use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 
 /// Arguments of `mops simulate`.

@@ -158,13 +158,13 @@ fn serve(mut stream: TcpStream, (port, token): (u16, &str), number: u64, shared:
         Some(None) => return Ok(()),
         slot => slot.flatten(),
     };
-    let style = || [crate::report::STYLE, crate::report::CHART_STYLE, OWN_STYLE].concat();
+    let style = || [mops_report::STYLE, mops_report::CHART_STYLE, OWN_STYLE].concat();
     match request {
         Answer::Page => whole(&mut stream, "200 OK", "text/html; charset=utf-8", &page(shared)),
         Answer::Style => whole(&mut stream, "200 OK", "text/css; charset=utf-8", &style()),
         Answer::Script => whole(&mut stream, "200 OK", "text/javascript; charset=utf-8", SCRIPT),
         Answer::Charts => {
-            whole(&mut stream, "200 OK", "text/javascript; charset=utf-8", &crate::report::SCRIPTS.join("\n"))
+            whole(&mut stream, "200 OK", "text/javascript; charset=utf-8", &mops_report::CHART_SCRIPTS.join("\n"))
         }
         Answer::Events => events(&mut stream, shared),
         Answer::Refused(status, reason) => {

@@ -151,7 +151,7 @@ impl Live {
         drop(newest);
         if let Some(tuners) = tuners.filter(|_| due && of > last.of) {
             let start = Instant::now();
-            last.json = json!({ "of": of, "plots": crate::report::live(&self.problem, &tuners) }).to_string();
+            last.json = json!({ "of": of, "plots": mops_report::live(&self.problem, &tuners) }).to_string();
             (last.of, last.next) = (of, Some(Instant::now() + SHARE * start.elapsed()));
         }
         (last.of > drawn).then(|| (last.of, last.json.clone()))

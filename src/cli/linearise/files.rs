@@ -1,11 +1,11 @@
 //! Output files of `mops linearise`: linearised.json and plots.
 
-use crate::report::Draw;
 use std::path::Path;
 
 use mops_content::numbers::FileNames;
 use mops_linear::StateSpace;
 use mops_output::Outputs;
+use mops_report::Draw;
 use serde_json::Value;
 
 use crate::cli::linear_plots;

@@ -17,9 +17,9 @@ use super::range::{drawable, x_range, y_range};
 use super::svg::class;
 
 /// Style sheet and scripts of pages with interactive plots. uPlot 1.6.32: <https://github.com/leeoniya/uPlot>, MIT licence.
-pub(crate) const STYLE: &str = include_str!("../../assets/uPlot.min.css");
+pub const STYLE: &str = include_str!("../assets/uPlot.min.css");
 /// Scripts of pages with interactive plots.
-pub(crate) const SCRIPTS: [&str; 2] = [include_str!("../../assets/uPlot.iife.min.js"), include_str!("charts.js")];
+pub const SCRIPTS: [&str; 2] = [include_str!("../assets/uPlot.iife.min.js"), include_str!("charts.js")];
 
 /// Largest distance of a simplified line from the original, as a share of the ranges of the axes. At a magnification of 20 it
 /// is less than a quarter of a pixel of a plot 1000 pixels wide.
@@ -52,7 +52,7 @@ fn is_chart(plot: &Plot) -> bool {
 }
 
 /// Returns the data of an interactive plot.
-pub(crate) fn data(plot: &Plot) -> Value {
+pub(super) fn data(plot: &Plot) -> Value {
     let whole = x_range(&Plot { window: None, ..plot.clone() }).unwrap_or([0.0, 1.0]);
     let height = y_range(&Plot { window: None, ..plot.clone() }).unwrap_or([0.0, 1.0]);
     let size = [whole[1] - whole[0], height[1] - height[0]];

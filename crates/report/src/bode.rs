@@ -10,7 +10,7 @@ use mops_content::plot::{Curve, Plot};
 
 /// Response of a system with one input and one output at the frequencies of a plot.
 #[derive(Debug, Clone)]
-pub(crate) struct FrequencyCurve {
+pub struct FrequencyCurve {
     /// Angular frequencies, rad/s, increasing.
     pub(crate) omegas: Vec<f64>,
     /// Complex values of the response.
@@ -20,11 +20,11 @@ pub(crate) struct FrequencyCurve {
 }
 
 impl FrequencyCurve {
-    /// Returns the response at [`frequencies`].
+    /// Returns the response at frequencies that show the corners, the resonances and the delay of the system.
     ///
     /// # Errors
     /// If the response, the poles or the zeros cannot be computed.
-    pub(crate) fn of(system: &StateSpace) -> Result<Self, String> {
+    pub fn of(system: &StateSpace) -> Result<Self, String> {
         let response = system.response()?;
         let omegas = frequencies(system)?;
         let values = omegas.iter().map(|&omega| response.scalar(omega)).collect();
@@ -73,7 +73,7 @@ pub(super) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
 }
 
 /// Returns the plots of magnitude and phase of responses, each with a curve that has its name and style.
-pub(crate) fn bode(name: &str, responses: &[(Curve, &FrequencyCurve)]) -> [Plot; 2] {
+pub fn bode(name: &str, responses: &[(Curve, &FrequencyCurve)]) -> [Plot; 2] {
     let of = |title: &str, y_label: &str, points: &dyn Fn(&FrequencyCurve) -> Vec<(f64, f64)>| Plot {
         title: format!("{title} of {name}"),
         x_label: "frequency (rad/s)".into(),

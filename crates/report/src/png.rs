@@ -24,7 +24,7 @@ pub(super) fn document(scene: &Scene) -> io::Result<Vec<u8>> {
     static FONT_ONCE: Once = Once::new();
     FONT_ONCE.call_once(|| {
         // Fails only if the bytes are not a font.
-        let _ = register_font(FONT, FontStyle::Normal, include_bytes!("../../assets/DejaVuSans.ttf"));
+        let _ = register_font(FONT, FontStyle::Normal, include_bytes!("../assets/DejaVuSans.ttf"));
     });
     let [width, height] = SIZE.map(|length| (SCALE * length) as u32);
     let mut pixels = vec![0; 3 * (width * height) as usize];

@@ -1,4 +1,19 @@
-//! Report of a run: one HTML page, and its plots as SVG and PNG.
+//! Reports: one HTML page of a solved study, and its plots as SVG and PNG.
+//!
+//! [`Report`] writes the files of a run. [`Draw`] draws any plot, [`page()`] wraps any HTML in the style of the reports.
+//!
+//! | module | content |
+//! |---|---|
+//! | `page` | the sections of a report in their order |
+//! | `criteria`, `tuners`, `matrix` | tables of a report |
+//! | `responses`, `comparison`, `front`, `inputs` | plots of the simulations: at the start and at the result, of a front, of a live page |
+//! | `convergence` | the best point over the number of evaluations |
+//! | `bode`, `nyquist` | plots of linear systems |
+//! | `side_by_side` | the page of a comparison of runs |
+//! | `markup` | sections of `mops-content` as HTML |
+//! | `chart` | data of interactive plots, which `charts.js` draws with uPlot |
+//! | `scene` | the layout of a plot as marks, drawn by `svg` and `png`; in it `axis`, `range`, `clip`, `legend`, `surface`, `space`, `parallel_axes` |
+//! | `plot_files` | the files of the plots, of which those of earlier runs are removed |
 
 mod axis;
 mod bode;
@@ -32,22 +47,21 @@ mod tuners;
 use std::io;
 use std::path::Path;
 
-use mops_content::numbers::FileNames;
+use mops_content::{numbers::FileNames, plot::Plot};
 use mops_output::Outputs;
 use mops_tasks::{Room, Solution, Solved, calibration};
 
-pub(crate) use bode::{FrequencyCurve, bode};
-pub(crate) use chart::{SCRIPTS, STYLE as CHART_STYLE};
-pub use mops_content::plot::{Band, Color, Curve, CurveStyle, Level, ParallelAxis, Plot, Surface, ZAxis};
-pub(crate) use nyquist::nyquist;
+pub use bode::{FrequencyCurve, bode};
+pub use chart::{SCRIPTS as CHART_SCRIPTS, STYLE as CHART_STYLE};
+pub use nyquist::nyquist;
 pub use page::page;
 use plot_files::PlotFiles;
-pub(crate) use responses::live;
+pub use responses::live;
 use scene::Scene;
-pub(crate) use side_by_side::{Responses, Rows, comparison_page};
+pub use side_by_side::{Responses, Rows, comparison_page};
 
 /// Style sheet of all pages.
-pub(crate) const STYLE: &str = include_str!("style.css");
+pub const STYLE: &str = include_str!("style.css");
 
 /// Content of a report.
 pub struct Report<'a> {
@@ -77,7 +91,10 @@ impl Report<'_> {
 
     /// Writes as [`Report::write`], but no file that is an input of the command. Returns the number of plots that were not written,
     /// as the run was asked to stop; it is asked before every plot.
-    pub(crate) fn write_by(&self, folder: &Path, outputs: &Outputs) -> io::Result<usize> {
+    ///
+    /// # Errors
+    /// As [`Report::write`].
+    pub fn write_by(&self, folder: &Path, outputs: &Outputs) -> io::Result<usize> {
         let plots = folder.join("plots");
         outputs.folder(&plots)?;
         let of = &self.solution;

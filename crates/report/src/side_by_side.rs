@@ -13,32 +13,27 @@ use super::markup::{scrolling, section};
 use super::page::document;
 
 /// Run with responses to plot.
-pub(crate) struct Responses {
+pub struct Responses {
     /// Name in the legends.
-    pub(crate) name: String,
+    pub name: String,
     /// Problem of the run.
-    pub(crate) problem: Problem,
+    pub problem: Problem,
     /// Values of all tuners.
-    pub(crate) tuners: Vec<f64>,
+    pub tuners: Vec<f64>,
 }
 
 /// Table of a comparison: names, units, then numbers.
-pub(crate) struct Rows {
+pub struct Rows {
     /// Title.
-    pub(crate) title: &'static str,
+    pub title: &'static str,
     /// Header of each column.
-    pub(crate) header: Vec<String>,
+    pub header: Vec<String>,
     /// Lines, each with one cell per column.
-    pub(crate) lines: Vec<Vec<String>>,
+    pub lines: Vec<Vec<String>>,
 }
 
 /// Returns the page: folder of each letter, tables, responses as plots, and sentences on omitted responses.
-pub(crate) fn comparison_page(
-    names: &[(String, String)],
-    tables: &[Rows],
-    runs: &[Responses],
-    omitted: &[String],
-) -> String {
+pub fn comparison_page(names: &[(String, String)], tables: &[Rows], runs: &[Responses], omitted: &[String]) -> String {
     let plots = plots(runs);
     let body = html! {
         header {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use mops_content::{
     numbers,
-    plot::{Curve, CurveStyle, Plot, ZAxis},
+    plot::{Curve, CurveStyle, Level, Plot, ZAxis},
 };
 use mops_core::{
     Analysis, Case, Criterion, CriterionSpec, Evaluation, Failure, Interface, Job, Model, Oracle, Parameter, Problem,
@@ -21,7 +21,7 @@ use mops_math as math;
 use mops_outcome::{CalibrationReport, Ending, Outcome, conclude, criterion_reports};
 use mops_tasks::design::{CriterionSlopes, SlopesReport};
 
-use super::{Level, Report};
+use super::Report;
 
 /// First-order lag `T y' + y = 1`, `y(0) = 0`; not defined for `T` above 10 s.
 pub(super) struct Lag(Interface);

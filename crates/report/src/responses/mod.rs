@@ -10,7 +10,7 @@ mod of_model;
 use mops_core::{Analysis, AnalysisKind, Failure};
 use rayon::prelude::*;
 
-pub(crate) use live::live;
+pub use live::live;
 
 use mops_content::{figures::Group, numbers::counted};
 
