@@ -43,12 +43,8 @@
 #[cfg(feature = "cli")]
 mod cli;
 pub mod prelude;
-#[cfg(feature = "store")]
-mod store;
 #[cfg(feature = "cli")]
 pub mod terminal;
-#[cfg(feature = "watch")]
-mod watch;
 
 /// Reports: pages and pictures of a solved study.
 #[cfg(feature = "report")]

@@ -71,9 +71,9 @@ const ALLOWED: [(&str, &str); 14] = [
     ("reference/run-files.md", "`begun`"),
     ("reference/result-json.md", "| `likeness`"),
     ("reference/result-json.md", "`begun otherwise`"),
-    ("src/store/ending.rs", "begun"),
-    ("src/store/runs.rs", "begun, state"),
-    ("src/store/database.rs", "begun, state"),
+    ("store/src/ending.rs", "begun"),
+    ("store/src/runs.rs", "begun, state"),
+    ("store/src/database.rs", "begun, state"),
 ];
 
 #[test]

@@ -8,11 +8,11 @@ use mops_core::Catalogue;
 use mops_file::StudyFile;
 use mops_language::{Diagnostic, files::read_regular};
 use mops_output::Inputs;
+use mops_store::{RunRow, RunState};
 use mops_tasks::room;
 use serde_json::Value;
 
 use super::study::{read_at, without_settings};
-use crate::store::{self, RunRow, RunState};
 
 /// Run in a folder.
 pub(super) struct PastRun {
@@ -31,7 +31,7 @@ impl PastRun {
         let path = folder.join("result.json");
         let result = read_regular(&path).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
         let result = result.filter(|result| result["format"].is_u64() && result["study"].is_string());
-        let run = store::last_run(folder);
+        let run = mops_store::last_run(folder);
         // After a killed run the result may be that of an earlier run.
         let belongs = |result: &Value| match (&run, result["run"].as_str()) {
             (Some((run, _)), Some(id)) => run.id() == id,
@@ -63,7 +63,7 @@ impl PastRun {
     pub fn add_to(&self, catalogue: &Catalogue, inputs: &mut Inputs) {
         let shown = self.folder.display();
         inputs.add(&self.folder.join("result.json"), &format!("the result of the run in {shown}"));
-        inputs.add(&store::file(&self.folder), &format!("the evaluations of the run in {shown}"));
+        inputs.add(&mops_store::file(&self.folder), &format!("the evaluations of the run in {shown}"));
         for name in catalogue.tasks.iter().filter_map(|kind| room(kind).restored_from()) {
             inputs.add(&self.folder.join(name), &format!("the findings in {shown}"));
         }
@@ -113,11 +113,11 @@ impl PastRun {
     /// If the study is not stored or its data cannot be read.
     pub fn study(&self, catalogue: &Catalogue) -> Result<StudyFile, Diagnostic> {
         let Some((run, _)) = &self.run else {
-            let path = self.folder.join(store::FILE);
+            let path = self.folder.join(mops_store::FILE);
             return Err(match path.exists() {
                 true => Diagnostic::new(format!("{} has no readable run", path.display()))
                     .with_help("the file is damaged or from another program; the result is in result.json"),
-                false => Diagnostic::new(format!("{} has no {}", self.folder.display(), store::FILE))
+                false => Diagnostic::new(format!("{} has no {}", self.folder.display(), mops_store::FILE))
                     .with_help("run the study with this version of mops, which writes it"),
             });
         };

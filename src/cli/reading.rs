@@ -8,7 +8,6 @@ use mops_file::StudyFile;
 use mops_language::files::{Folder, read_regular};
 
 use super::study::Home;
-use crate::store;
 
 /// Largest number of studies written from another one, each below the folder of the first.
 const MOST_GENERATIONS: usize = 20;
@@ -26,7 +25,7 @@ pub(super) fn folder(catalogue: &Catalogue, file: &Path) -> Folder {
 fn origin(folder: &Path, generations: usize) -> Option<PathBuf> {
     let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let real = here.canonicalize().ok()?;
-    let (run, _) = store::last_run(&real).filter(|_| generations > 0)?;
+    let (run, _) = mops_store::last_run(&real).filter(|_| generations > 0)?;
     let is_study = |file: &Path| name_in(file).is_some_and(|name| name == run.name);
     let file = run.home.file_name()?;
     // A project that was moved as a whole still has the study above the run.

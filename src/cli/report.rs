@@ -8,12 +8,12 @@ use mops_core::{Catalogue, Stop};
 use mops_language::{Diagnostic, files::read_regular, suggestion};
 use mops_output::{Inputs, Outputs};
 use mops_report::Report;
+use mops_store::{Identity, Recorder, RunRow, RunState};
 use mops_tasks::{Options, Solved, room_of};
 
 use super::past_run::PastRun;
 use super::resume;
 use super::run_files::{REPORT, check_outputs};
-use crate::store::{self, Identity, Recorder, RunRow, RunState};
 use crate::terminal::{CommandError, print};
 
 /// Arguments of `mops report`.
@@ -38,7 +38,7 @@ pub(super) fn report(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exi
     let outputs = Outputs::besides(inputs);
     check_outputs(&outputs, folder, REPORT)?;
     let Restored { solved, text } = replay(catalogue, &past)?;
-    let _lock = store::lock_folder(folder)?;
+    let _lock = mops_store::lock_folder(folder)?;
     let room = room_of(&catalogue.tasks, solved.outcome.task).expect("the file names a task of the catalogue");
     Report::new(&solved, room, &text).write_by(folder, &outputs).map_err(CommandError::cannot_write(folder))?;
     let from = if room.has_point() {

@@ -6,10 +6,10 @@ use clap::Args;
 use mops_core::{Stop, Study, Watch};
 use mops_file::StudyFile;
 use mops_language::Diagnostic;
+use mops_store::{FinishedRun, Identity, OpenError, Recorder, RunRow, RunState, Start};
 use mops_tasks::{EvaluationStore, Options, Room, SolveError, Solved, solve};
 
 use super::study::{Home, StudyArguments};
-use crate::store::{FinishedRun, Identity, OpenError, Recorder, RunRow, RunState, Start, row};
 use crate::terminal::CommandError;
 
 /// Options for the use of stored evaluations.
@@ -72,7 +72,7 @@ pub(super) fn open(
         seed: file.study.seed(),
         solver: options.solver.kind.to_owned(),
         max_evaluations: options.max_evaluations,
-        ..row(&identity)
+        ..RunRow::of(&identity)
     };
     Ok(Recorder::open(folder, start, &file.study, &identity, &run)?)
 }

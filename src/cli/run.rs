@@ -1,6 +1,8 @@
 //! `mops run`: solves a study and writes the result.
 
+use mops_store::Start;
 use mops_tasks::{Room, calibration, room_of};
+use mops_watch::{Both, Page};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -16,9 +18,7 @@ use mops_tasks::{DEFAULT_EVALUATIONS, Options, Solved, solves, suits};
 use super::run_files::{DISK_TIMEOUT, RunFiles, check_run, relative_path};
 use super::study::{Home, StudyArguments, home, open_as, outputs, without_settings};
 use super::{blocks, default_folder, reading, resume, tables};
-use crate::store::Start;
 use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, eprint_line, print, print_json};
-use crate::watch::{Both, Page};
 
 /// Options of every command that runs a study.
 #[derive(Args)]

@@ -9,12 +9,12 @@ use rusqlite::{Connection, Row, ToSql, params};
 use serde_json::json;
 
 use super::bytes;
-use super::database::{integer, size};
 use super::identity::Identity;
+use super::sizes::{integer, size};
 
 /// State of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum RunState {
+pub enum RunState {
     /// In progress, or killed.
     Running,
     /// Converged.
@@ -51,25 +51,61 @@ impl RunState {
 
 /// Row of the table of runs.
 #[derive(Debug, Clone)]
-pub(crate) struct RunRow {
+pub struct RunRow {
+    /// Start, in seconds since 1970-01-01 UTC.
     pub started: i64,
+    /// State.
     pub state: RunState,
+    /// Version of the program.
     pub mops: String,
+    /// Command line.
     pub command: String,
+    /// Study file, or the name of a study of the catalogue.
     pub home: PathBuf,
+    /// Settings of the command line, `--set`.
     pub settings: Vec<String>,
+    /// Name of the study.
     pub name: String,
+    /// Task of the study.
     pub task: String,
+    /// Text of the study file, settings at its end.
     pub text: String,
+    /// Identity of the run, as JSON.
     pub identity: String,
+    /// Seed of the run.
     pub seed: u64,
+    /// Kind of the solver.
     pub solver: String,
+    /// Budget: largest number of evaluated points.
     pub max_evaluations: usize,
+    /// Initial guess in the unit box, if not the start values.
     pub start_point: Option<Vec<f64>>,
+    /// Number of points of the run so far.
     pub evaluations: usize,
 }
 
 impl RunRow {
+    /// Creates the row of a run that starts now.
+    pub fn of(identity: &Identity) -> Self {
+        Self {
+            started: now(),
+            state: RunState::Running,
+            mops: env!("CARGO_PKG_VERSION").to_owned(),
+            command: std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" "),
+            home: PathBuf::new(),
+            settings: Vec::new(),
+            name: String::new(),
+            task: String::new(),
+            text: String::new(),
+            identity: serde_json::to_string(identity).expect("an identity is JSON"),
+            seed: 0,
+            solver: String::new(),
+            max_evaluations: 0,
+            start_point: None,
+            evaluations: 0,
+        }
+    }
+
     /// Returns the digest of the identity of the run; a result with the same digest belongs to the run.
     pub fn id(&self) -> String {
         digest(self.identity.as_bytes())
@@ -144,25 +180,4 @@ pub(super) fn run_row(row: &Row<'_>) -> rusqlite::Result<RunRow> {
         start_point: row.get_ref(13)?.as_blob_or_null()?.map(bytes::numbers),
         evaluations: size(row, 14)?,
     })
-}
-
-/// Returns the row of a run that starts now.
-pub(crate) fn row(identity: &Identity) -> RunRow {
-    RunRow {
-        started: now(),
-        state: RunState::Running,
-        mops: env!("CARGO_PKG_VERSION").to_owned(),
-        command: std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" "),
-        home: PathBuf::new(),
-        settings: Vec::new(),
-        name: String::new(),
-        task: String::new(),
-        text: String::new(),
-        identity: serde_json::to_string(identity).expect("an identity is JSON"),
-        seed: 0,
-        solver: String::new(),
-        max_evaluations: 0,
-        start_point: None,
-        evaluations: 0,
-    }
 }

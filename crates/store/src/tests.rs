@@ -3,6 +3,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
+use mops_catalogue::catalogue;
 use mops_core::{
     Failure, Problem, Study, Value,
     catalogue::CatalogueStudy,
@@ -12,11 +13,11 @@ use mops_core::{
 use mops_file::StudyFile;
 
 use super::database::{Database, PointRow};
-use super::{FILE, Identity, OpenError, Recorder, RunState, Start, bytes, row};
+use super::{FILE, Identity, OpenError, Recorder, RunRow, RunState, Start, bytes};
 
 /// Reads a shipped study with settings.
 fn file(name: &str, settings: &[&str]) -> StudyFile {
-    let catalogue = crate::catalogue();
+    let catalogue = catalogue();
     let Some(CatalogueStudy::Shipped(shipped)) = catalogue.study(name) else { panic!("{name} is shipped") };
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     mops_file::read_shipped(&catalogue, shipped, &settings).unwrap()
@@ -24,7 +25,7 @@ fn file(name: &str, settings: &[&str]) -> StudyFile {
 
 #[test]
 fn every_shipped_study_measures_as_itself_so_that_its_points_are_stored() {
-    for known in crate::catalogue().studies {
+    for known in catalogue().studies {
         let name = known.name();
         let study = file(name, &[]).study;
         assert!(study.measures_as(&study.clone()), "{name}");
@@ -61,7 +62,7 @@ fn built(settings: &[&str]) -> StudyFile {
     };
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     let study = BuiltStudy::new("closure", "", draft);
-    mops_file::built(&crate::catalogue(), &study, &settings).unwrap()
+    mops_file::built(&catalogue(), &study, &settings).unwrap()
 }
 
 #[test]
@@ -104,7 +105,7 @@ fn every_setting_of_a_study_built_in_rust_makes_another_run() {
 fn written(study: &Study, points: &[PointRow], slopes: &[(Vec<u64>, f64, Option<RowSlopes>)]) -> Database {
     let file = file("pid-design", &[]);
     let mut database = Database::in_memory().unwrap();
-    let run = database.insert_run(&row(&Identity::of(&file, &file.study, "auto"))).unwrap();
+    let run = database.insert_run(&RunRow::of(&Identity::of(&file, &file.study, "auto"))).unwrap();
     database.write(run, study.rows().len(), points, slopes, Some(points.len())).unwrap();
     database
 }
@@ -245,7 +246,7 @@ fn stored_values_give_the_evaluation_of_a_simulation_under_any_demand() {
 fn start_run(folder: &Path, start: &Start) -> Result<Recorder, OpenError> {
     let file = file("pid-design", &[]);
     let identity = Identity::of(&file, &file.study, "auto");
-    Recorder::open(folder, start, &file.study, &identity, &row(&identity))
+    Recorder::open(folder, start, &file.study, &identity, &RunRow::of(&identity))
 }
 
 /// Ends a run after `points` new points.

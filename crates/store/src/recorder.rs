@@ -14,12 +14,13 @@ use mops_language::Diagnostic;
 use rusqlite::ErrorCode;
 
 use super::best::best;
+use super::companions::obstacle;
 use super::database::{Database, Points, Slopes, is_of_machine, is_temporary};
 use super::ending::Ending;
 use super::identity::Identity;
 use super::lock::FolderLock;
 use super::memory::{Memory, Message, ROOM};
-use super::relocate::obstacle;
+use super::open_error::OpenError;
 use super::replace::make_room;
 use super::runs::{RunRow, RunState};
 use super::writer::{DelayedWatch, Unwritten, write};
@@ -30,7 +31,7 @@ const QUEUE: usize = 4096;
 
 /// Stored points that a run starts with.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Start {
+pub enum Start {
     /// No points.
     Fresh,
     /// Points of a run of the same study in the output folder.
@@ -42,22 +43,8 @@ pub(crate) enum Start {
 /// Time to wait for a lock or a full disk after the end of a run.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Reason why a database cannot be opened.
-pub(crate) enum OpenError {
-    /// Mistake of the user.
-    Mistake(Diagnostic),
-    /// Failure of the machine.
-    Failure(String),
-}
-
-impl From<Diagnostic> for OpenError {
-    fn from(diagnostic: Diagnostic) -> Self {
-        Self::Mistake(diagnostic)
-    }
-}
-
 /// Database of a new run, with the stored points of earlier runs.
-pub(crate) struct Recorder {
+pub struct Recorder {
     database: Database,
     run: i64,
     rows: usize,
@@ -78,7 +65,7 @@ pub(crate) struct Recorder {
 }
 
 /// Database of a finished run.
-pub(crate) struct FinishedRun {
+pub struct FinishedRun {
     database: Database,
     run: i64,
     /// Number of points answered without a simulation.
@@ -304,7 +291,7 @@ impl FinishedRun {
 ///
 /// # Errors
 /// If another run has locked the folder, or the folder cannot be written.
-pub(crate) fn lock_folder(folder: &Path) -> Result<FolderLock, OpenError> {
+pub fn lock_folder(folder: &Path) -> Result<FolderLock, OpenError> {
     let cannot = |error: std::io::Error| OpenError::Failure(format!("cannot write in {}: {error}", folder.display()));
     FolderLock::take(folder).map_err(cannot)?.ok_or_else(|| {
         Diagnostic::new(format!("the folder {} is in use by another run", folder.display()))

@@ -8,10 +8,10 @@ use std::time::Duration;
 use mops_language::Diagnostic;
 use rusqlite::{Connection, OpenFlags};
 
+use super::companions::{obstacle, with_companions};
 use super::database::{Database, is_of_machine, is_temporary};
 use super::file;
-use super::recorder::OpenError;
-use super::relocate::{obstacle, with_companions};
+use super::open_error::OpenError;
 use super::runs::RunState;
 
 /// Makes room for the database of a new run; returns a note for the user if an old database was renamed.

@@ -3,6 +3,14 @@
 //! The operating system chooses the port. The token has 128 random bits, so that other pages and users cannot guess the URL.
 //! The run only publishes its latest state. Each viewer reads it on a thread of its own; a slow viewer misses states and
 //! delays neither the run nor other viewers.
+//!
+//! [`Page`] is the page, and [`Both`] the observer of a run that publishes to it.
+//!
+//! | module | content |
+//! |---|---|
+//! | `state` | the latest state of a run; unread states are overwritten |
+//! | `request` | what a request asks for, or why it is refused |
+//! | `server` | one thread for each connection, with limits |
 
 mod request;
 mod server;
@@ -18,7 +26,7 @@ use server::Server;
 use state::Live;
 
 /// Live page of a run.
-pub(crate) struct Page {
+pub struct Page {
     server: Server,
     live: Arc<Live>,
 }
@@ -46,9 +54,11 @@ impl Page {
 }
 
 /// Observer that notifies the page and another observer.
-pub(crate) struct Both<'w> {
-    pub(crate) page: &'w Page,
-    pub(crate) other: &'w dyn Watch,
+pub struct Both<'w> {
+    /// Page.
+    pub page: &'w Page,
+    /// Other observer, which also decides on the end of the run.
+    pub other: &'w dyn Watch,
 }
 
 impl Watch for Both<'_> {

@@ -9,29 +9,15 @@ use std::time::{Duration, Instant};
 use mops_output::{is_at, temporary_path};
 use rusqlite::{Connection, OpenFlags};
 
+use super::companions::{obstacle, with_companions};
 use super::database::{Database, WAITS, is_temporary, prepare};
 use super::runs::{RunRow, insert_run};
 
 /// New database under its temporary name.
-pub(super) struct StudyBuilder {
+pub(super) struct Draft {
     temporary: PathBuf,
     path: PathBuf,
     run: i64,
-}
-
-/// Returns the paths of a database and of the companion files of SQLite.
-pub(super) fn with_companions(path: &Path) -> [PathBuf; 4] {
-    ["", "-wal", "-shm", "-journal"].map(|end| {
-        let mut name = path.as_os_str().to_owned();
-        name.push(end);
-        PathBuf::from(name)
-    })
-}
-
-/// Returns the first of a database and its companion files that is not a regular file: SQLite would wait for the writer of a pipe, and
-/// a device may have no end.
-pub(super) fn obstacle(path: &Path) -> Option<PathBuf> {
-    with_companions(path).into_iter().find(|name| fs::metadata(name).is_ok_and(|file| !file.is_file()))
 }
 
 impl Database {
@@ -42,12 +28,12 @@ impl Database {
         }
     }
 
-    /// Creates a new database that contains only this run, under a temporary name and in one transaction. [`StudyBuilder::commit`]
+    /// Creates a new database that contains only this run, under a temporary name and in one transaction. [`Draft::commit`]
     /// renames it, so that no incomplete database is ever visible.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub(super) fn draft(path: &Path, run: &RunRow) -> rusqlite::Result<StudyBuilder> {
+    pub(super) fn draft(path: &Path, run: &RunRow) -> rusqlite::Result<Draft> {
         let temporary = temporary_path(path);
         let mut connection = Connection::open(&temporary)?;
         let transaction = connection.transaction()?;
@@ -55,7 +41,7 @@ impl Database {
         let run = insert_run(&transaction, run)?;
         transaction.commit()?;
         connection.close().map_err(|(_, error)| error)?;
-        Ok(StudyBuilder { temporary, path: path.to_owned(), run })
+        Ok(Draft { temporary, path: path.to_owned(), run })
     }
 
     /// Returns true if the database contains no run. Earlier versions created the database in several steps and left such a
@@ -118,13 +104,13 @@ impl Database {
     }
 }
 
-impl Drop for StudyBuilder {
+impl Drop for Draft {
     fn drop(&mut self) {
         Database::clear_draft(&self.path);
     }
 }
 
-impl StudyBuilder {
+impl Draft {
     /// Renames the database to its final name and opens it; returns it with the id of its run.
     ///
     /// # Errors

@@ -14,7 +14,7 @@ const FILE: &str = "evaluations.lock";
 const RETRY_PERIOD: Duration = Duration::from_millis(300);
 
 /// Lock on the folder of a run: no other run writes there. The operating system releases it when the process ends.
-pub(crate) struct FolderLock {
+pub struct FolderLock {
     folder: PathBuf,
     file: File,
     /// True if the folder was created by this lock.
@@ -26,7 +26,7 @@ impl FolderLock {
     ///
     /// # Errors
     /// If the folder or the lock file cannot be created.
-    pub fn take(folder: &Path) -> io::Result<Option<Self>> {
+    pub(super) fn take(folder: &Path) -> io::Result<Option<Self>> {
         let created = !folder.exists();
         fs::create_dir_all(folder)?;
         let until = Instant::now() + RETRY_PERIOD;
@@ -49,7 +49,7 @@ impl FolderLock {
     ///
     /// # Errors
     /// As [`FolderLock::take`].
-    pub fn renew(&mut self) -> io::Result<bool> {
+    pub(super) fn renew(&mut self) -> io::Result<bool> {
         if self.is_valid() {
             return Ok(true);
         }
@@ -59,17 +59,17 @@ impl FolderLock {
     }
 
     /// Returns true if the lock file is still in place.
-    pub fn is_valid(&self) -> bool {
+    pub(super) fn is_valid(&self) -> bool {
         is_named(&self.file, &self.folder.join(FILE))
     }
 
     /// Returns the locked folder.
-    pub fn folder(&self) -> &Path {
+    pub(super) fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// Returns true if a run has locked the folder.
-    pub fn is_locked(folder: &Path) -> bool {
+    pub(super) fn is_locked(folder: &Path) -> bool {
         let path = folder.join(FILE);
         // To open a pipe would wait for its writer.
         let file = fs::symlink_metadata(&path).ok().filter(fs::Metadata::is_file).map(|_| File::open(&path));

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 /// Identity of a run: study, data, solver and seed. Two runs with equal identities have the same result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Identity {
+pub struct Identity {
     /// Version of the program; another version may compute other values.
     mops: String,
     /// Content of the study file, settings included.
@@ -31,7 +31,7 @@ pub(crate) struct Identity {
 
 /// Difference between two studies.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Difference {
+struct Difference {
     /// Keys that lead to the value.
     path: Vec<String>,
     before: String,
@@ -66,23 +66,23 @@ impl Identity {
     }
 
     /// Returns the differences that prevent a run of `self` from being continued as a run of `now`, as text.
-    pub fn refuses_to_continue(&self, now: &Self) -> Option<String> {
+    pub(super) fn refuses_to_continue(&self, now: &Self) -> Option<String> {
         summary(self.differences(now).iter().filter(|d| d.meaning() != Meaning::Budget))
     }
 
     /// Returns the differences that make the points of a run of `self` invalid for a run of `now`, as text.
-    pub fn refuses_to_reuse(&self, now: &Self) -> Option<String> {
+    pub(super) fn refuses_to_reuse(&self, now: &Self) -> Option<String> {
         summary(self.differences(now).iter().filter(|d| d.meaning() == Meaning::Values))
     }
 
     /// Returns true if the coordinates of the unit box, and hence the derivatives, have the same meaning.
-    pub fn has_coordinates_of(&self, now: &Self) -> bool {
+    pub(super) fn has_coordinates_of(&self, now: &Self) -> bool {
         let of = |identity: &Self, table: &str| identity.study.get(table).cloned();
         ["tuners", "cases", "experiments"].iter().all(|table| of(self, table) == of(now, table))
     }
 
     /// Returns true if the values of the uncertain parameters have the same meaning.
-    pub fn has_uncertain_of(&self, now: &Self) -> bool {
+    pub(super) fn has_uncertain_of(&self, now: &Self) -> bool {
         self.uncertain == now.uncertain
     }
 

@@ -9,12 +9,13 @@ use mops_core::{
     Study,
     run::{Known, RowSlopes},
 };
-use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, Row, params};
+use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, params};
 
 use super::bytes;
 use super::columns::{columns, known};
-use super::relocate::obstacle;
+use super::companions::obstacle;
 use super::runs::{RunRow, RunState, insert_run, now, run_row};
+use super::sizes::{integer, size};
 
 /// `PRAGMA application_id`: "mops" in ASCII.
 const APPLICATION: i32 = i32::from_be_bytes(*b"mops");
@@ -60,7 +61,7 @@ CREATE TABLE slopes (
 ";
 
 /// Open database.
-pub(crate) struct Database {
+pub(super) struct Database {
     pub(super) connection: Connection,
     /// Path, and metadata of the file when it was opened; `None` in memory.
     ///
@@ -285,12 +286,4 @@ pub(super) fn prepare(connection: &Connection) -> rusqlite::Result<()> {
     connection.pragma_update(None, "application_id", APPLICATION)?;
     connection.pragma_update(None, "user_version", FORMAT)?;
     connection.execute_batch(TABLES)
-}
-
-pub(super) fn size(row: &Row<'_>, column: usize) -> rusqlite::Result<usize> {
-    Ok(usize::try_from(row.get::<_, i64>(column)?).unwrap_or(0))
-}
-
-pub(super) fn integer(size: usize) -> i64 {
-    i64::try_from(size).unwrap_or(i64::MAX)
 }
