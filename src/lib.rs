@@ -38,13 +38,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))] // Smaller builds keep helpers of the command line.
-
-#[cfg(feature = "cli")]
-mod cli;
 pub mod prelude;
-#[cfg(feature = "cli")]
-pub mod terminal;
 
 /// Reports: pages and pictures of a solved study.
 #[cfg(feature = "report")]
@@ -59,6 +53,11 @@ pub mod report {
 mod guide {}
 
 pub use mops_catalogue::catalogue;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub use mops_cli::main as main_as;
+#[cfg(feature = "cli")]
+pub use mops_cli::terminal;
 pub use mops_content as content;
 pub use mops_core as core;
 pub use mops_core::{
@@ -100,11 +99,4 @@ macro_rules! main {
         };
         $crate::main_as($catalogue, [env!("CARGO_PKG_NAME"), NAME], env!("CARGO_PKG_VERSION"))
     }};
-}
-
-/// Runs the command line with a catalogue, as a program of this package, name and version; see [`main!`].
-#[cfg(feature = "cli")]
-#[doc(hidden)]
-pub fn main_as(catalogue: Catalogue, names: [&'static str; 2], version: &'static str) -> std::process::ExitCode {
-    cli::main(catalogue, names, version)
 }

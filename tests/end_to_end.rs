@@ -297,7 +297,7 @@ fn a_study_from_the_template_can_be_checked_and_run() {
 fn the_schema_accepts_every_shipped_study_and_refuses_a_misspelt_one() {
     let schema: Value = serde_json::from_slice(&mops(&["schema"]).output().unwrap().stdout).unwrap();
     let validator = jsonschema::validator_for(&schema).unwrap();
-    let template = include_str!("../src/cli/new/pid.toml").as_bytes();
+    let template = include_str!("../crates/cli/src/new/pid.toml").as_bytes();
     let shipped = mops::studies::shipped();
     let shipped = shipped.iter().map(|study| study.file("study.toml").unwrap());
     for text in shipped.chain([template]) {

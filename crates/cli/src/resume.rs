@@ -9,7 +9,8 @@ use mops_language::Diagnostic;
 use mops_store::{FinishedRun, Identity, OpenError, Recorder, RunRow, RunState, Start};
 use mops_tasks::{EvaluationStore, Options, Room, SolveError, Solved, solve};
 
-use super::study::{Home, StudyArguments};
+use super::home::Home;
+use super::study::StudyArguments;
 use crate::terminal::CommandError;
 
 /// Options for the use of stored evaluations.

@@ -8,7 +8,7 @@ use mops_output::Outputs;
 use mops_report::Draw;
 use serde_json::Value;
 
-use crate::cli::linear_plots;
+use crate::linear_plots;
 use crate::terminal::CommandError;
 
 /// Writes the files; returns a summary with notes on missing plots.

@@ -16,9 +16,10 @@ use mops_outcome::criterion_reports;
 use mops_output::Outputs;
 use serde_json::Value;
 
+use super::home::Home;
 use super::reading;
 use super::run_files::relative_path;
-use super::study::{Home, StudyArguments, inputs, open_as};
+use super::study::{StudyArguments, inputs, open_as};
 use super::tables::met_text;
 use crate::terminal::{CommandError, Limit, cancel_after, number, print, table};
 

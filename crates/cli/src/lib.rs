@@ -1,4 +1,19 @@
-//! The command line of `mops`: commands, and the module of each.
+//! The command line of `mops`.
+//!
+//! [`main`] parses the arguments of a program with a catalogue and performs its command. A command has the module of its name; the
+//! commands of tasks are in `tasks`.
+//!
+//! | module | content |
+//! |---|---|
+//! | [`terminal`] | error messages, tables, progress, Ctrl-C: for other programs too |
+//! | `study`, `home` | opening of studies, and where they are |
+//! | `reading` | folders whose files a study may read |
+//! | `run_files`, `default_folder` | files of a run, and their folder without `--out` |
+//! | `past_run`, `resume` | earlier runs, and their stored evaluations |
+//! | `tables`, `blocks`, `families` | tables on the terminal: criteria and tuners, content of a report, names such as `T[1]` to `T[100]` |
+//! | `effect`, `places` | effects, and the places of a model where they can act |
+//! | `linear_plots` | plots of a linear system |
+//! | `reference` | test of the generated part of the pages in `docs/reference` |
 
 mod bench;
 mod blocks;
@@ -10,6 +25,7 @@ mod describe;
 mod effect;
 mod families;
 mod history;
+mod home;
 mod linear_plots;
 mod linearise;
 mod list;
@@ -29,6 +45,7 @@ mod simulate;
 mod study;
 mod tables;
 mod tasks;
+pub mod terminal;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -114,12 +131,15 @@ enum Command {
     },
 }
 
+/// Package of the program that has no code of its own.
+const PACKAGE: &str = "mops";
+
 /// Parses the command line of a program and runs the command. A program of another package than `mops`, whatever its name, has
 /// code of its own: its version names that of mops too, and its digest is part of the identity of runs.
-pub(crate) fn main(mut catalogue: Catalogue, [package, name]: [&'static str; 2], version: &'static str) -> ExitCode {
+pub fn main(mut catalogue: Catalogue, [package, name]: [&'static str; 2], version: &'static str) -> ExitCode {
     show_each_panic_once();
     let mut program = Arguments::command().name(name).version(version);
-    let has_own_code = package != env!("CARGO_PKG_NAME");
+    let has_own_code = package != PACKAGE;
     if has_own_code {
         program = program.version(format!("{version} (mops {})", env!("CARGO_PKG_VERSION")).leak() as &str);
     }

@@ -14,7 +14,7 @@ use mops_output::Outputs;
 use mops_report::Report;
 use mops_tasks::{Origin, OutputFile, OutputNames, Room, Solved, room};
 
-use super::study::Home;
+use super::home::Home;
 use crate::terminal::{CommandError, eprint_line};
 
 /// Time to wait for space on a full disk.

@@ -7,12 +7,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use mops_core::{
     Catalogue,
-    catalogue::{BuiltStudy, CatalogueStudy, Shipped, StudyFolder},
+    catalogue::{CatalogueStudy, StudyFolder},
 };
 use mops_file::{StudyFile, edit::quoted};
 use mops_language::{Diagnostic, Source, suggestion};
 use mops_output::{Inputs, Outputs};
 
+use super::home::Home;
 use super::reading;
 
 /// Study and settings that override it.
@@ -25,16 +26,6 @@ pub(super) struct StudyArguments {
     pub settings: Vec<String>,
 }
 
-/// Location of a study and its data.
-pub(super) enum Home {
-    /// Study file; data paths are relative to its folder.
-    File(PathBuf),
-    /// Files included in the program.
-    Shipped(Shipped),
-    /// Study built in Rust.
-    Built(BuiltStudy),
-}
-
 /// Returns the location of the study; a folder means the study.toml in it.
 pub(super) fn home(catalogue: &Catalogue, arguments: &StudyArguments) -> Home {
     let path = Path::new(&arguments.study);
@@ -42,27 +33,6 @@ pub(super) fn home(catalogue: &Catalogue, arguments: &StudyArguments) -> Home {
         Some(known) => Home::of(known),
         None if path.is_dir() => Home::File(path.join("study.toml")),
         None => Home::File(path.to_owned()),
-    }
-}
-
-impl Home {
-    /// Returns the location as a database records it: an absolute path, or the name of a study of the catalogue.
-    pub(super) fn recorded(&self) -> PathBuf {
-        match self {
-            Self::Shipped(shipped) => PathBuf::from(shipped.name),
-            Self::Built(built) => PathBuf::from(built.name()),
-            Self::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
-        }
-    }
-
-    /// Returns the location of a study of the catalogue.
-    fn of(known: &CatalogueStudy) -> Self {
-        match known {
-            CatalogueStudy::Shipped(shipped) => Self::Shipped(*shipped),
-            CatalogueStudy::Folder(folder) => Self::File(folder.file()),
-            CatalogueStudy::Built(built) => Self::Built(built.clone()),
-            other => unreachable!("`{}` is an unknown sort of study", other.name()),
-        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Generated part of the pages in `docs/reference`: kinds, keys of study files, command line, keys of `result.json`.
 //!
-//! The part of a page above [`MARK`] is written by hand. `REFERENCE=update cargo test -p mops --lib reference` replaces the part
+//! The part of a page above [`MARK`] is written by hand. `REFERENCE=update cargo test -p mops-cli reference` replaces the part
 //! below.
 
 use std::collections::HashMap;
@@ -8,26 +8,26 @@ use std::fs;
 use std::path::Path;
 
 use clap::CommandFactory;
+use mops_catalogue::catalogue;
 use mops_file as file;
 use schemars::Schema;
 use serde_json::Value;
 
 use super::{Arguments, effect};
-use crate::catalogue;
 
 /// Line between the two parts of a page.
-const MARK: &str = "<!-- Generated from the program by `REFERENCE=update cargo test -p mops --lib reference`. -->\n";
+const MARK: &str = "<!-- Generated from the program by `REFERENCE=update cargo test -p mops-cli reference`. -->\n";
 
 /// Compares the generated part of a page with the file, or replaces it.
 fn check(page: &str, generated: &str) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference").join(page);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference").join(page);
     let stored = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let written = stored.split(MARK).next().expect("a split has a first part");
     let present = format!("{written}{MARK}\n{generated}");
     if std::env::var("REFERENCE").is_ok_and(|update| update == "update") {
         fs::write(&path, present).unwrap();
     } else {
-        assert!(stored == present, "{page} is out of date: REFERENCE=update cargo test -p mops --lib reference");
+        assert!(stored == present, "{page} is out of date: REFERENCE=update cargo test -p mops-cli reference");
     }
 }
 

@@ -8,7 +8,7 @@ use mops_math::complex;
 use nalgebra::DMatrix;
 
 use super::WHERE;
-use crate::cli::families::folded;
+use crate::families::folded;
 use crate::terminal::{number, table};
 
 /// Largest number of states and channels that are printed in full.

@@ -6,8 +6,8 @@ use mops_content::numbers::file_name;
 use mops_core::Catalogue;
 use mops_language::Diagnostic;
 
+use super::home::Home;
 use super::past_run::PastRun;
-use super::study::Home;
 
 /// Returns the folder for a study of this name.
 ///

@@ -15,8 +15,9 @@ use mops_file::StudyFile;
 use mops_language::{Diagnostic, suggestion};
 use mops_tasks::{DEFAULT_EVALUATIONS, Options, Solved, solves, suits};
 
+use super::home::Home;
 use super::run_files::{DISK_TIMEOUT, RunFiles, check_run, relative_path};
-use super::study::{Home, StudyArguments, home, open_as, outputs, without_settings};
+use super::study::{StudyArguments, home, open_as, outputs, without_settings};
 use super::{blocks, default_folder, reading, resume, tables};
 use crate::terminal::{CommandError, Limit, Progress, cancel_on_signal, eprint_line, print, print_json};
 

@@ -7,7 +7,7 @@ use mops_core::Catalogue;
 use mops_file::StudyFile;
 use mops_language::files::{Folder, read_regular};
 
-use super::study::Home;
+use super::home::Home;
 
 /// Largest number of studies written from another one, each below the folder of the first.
 const MOST_GENERATIONS: usize = 20;
