@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `page` | the sections of a report in their order |
 //! | `criteria`, `tuners`, `matrix` | tables of a report |
-//! | `responses`, `comparison`, `front`, `inputs` | plots of the simulations: at the start and at the result, of a front, of a live page |
+//! | `responses`, `comparison`, `front` | plots of the simulations: at the start and at the result, of a front, of a live page |
 //! | `convergence` | the best point over the number of evaluations |
 //! | `bode`, `nyquist` | plots of linear systems |
 //! | `side_by_side` | the page of a comparison of runs |
