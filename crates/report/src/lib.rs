@@ -12,7 +12,8 @@
 //! | `side_by_side` | the page of a comparison of runs |
 //! | `markup` | sections of `mops-content` as HTML |
 //! | `chart` | data of interactive plots, which `charts.js` draws with uPlot |
-//! | `scene` | the layout of a plot as marks, drawn by `svg` and `png`; in it `axis`, `range`, `clip`, `legend`, `surface`, `space`, `parallel_axes` |
+//! | `layout` | from a plot to a scene; its parts are in `axis`, `range`, `clip`, `legend`, `surface`, `parallel_axes` and `space` |
+//! | `scene`, `view` | a drawing as marks, in a box as seen from a viewpoint; `svg` and `png` draw it |
 //! | `plot_files` | the files of the plots, of which those of earlier runs are removed |
 
 mod axis;
@@ -23,6 +24,7 @@ mod comparison;
 mod convergence;
 mod criteria;
 mod front;
+mod layout;
 mod legend;
 mod markup;
 mod matrix;
@@ -43,6 +45,7 @@ mod tests;
 #[cfg(test)]
 mod tests_of_diagnosis;
 mod tuners;
+mod view;
 
 use std::io;
 use std::path::Path;

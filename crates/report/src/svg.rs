@@ -8,7 +8,7 @@ use mops_language::plain::plain;
 
 use super::clip::Point;
 use super::scene::{Anchor, Mark, SIZE, Scene};
-use super::space::View;
+use super::view::View;
 
 /// Returns the document, with a title and a description for screen readers.
 pub(super) fn document(scene: &Scene, title: &str, description: &str) -> String {
