@@ -69,7 +69,7 @@ pub use mops_core::{
 };
 pub use mops_criteria as criteria;
 pub use mops_data as data;
-pub use mops_discrepancy as discrepancy;
+pub use mops_diagnosis as diagnosis;
 pub use mops_effects as effects;
 pub use mops_file as file;
 pub use mops_file::{parse_study, read_study};

@@ -2,8 +2,8 @@
 
 use mops::{
     Catalogue, Options, catalogue,
-    discrepancy::{Diagnosis, Verdict},
     language::files::Files,
+    outcome::diagnosis::{Diagnosis, Verdict},
 };
 use mops_testbed::{Missing, Trial, generate};
 

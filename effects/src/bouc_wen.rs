@@ -41,6 +41,8 @@ impl Definition for BoucWen {
             [1e-4, f64::INFINITY],
             InitialGrid::Scaled(&[0.05, 0.2, 0.7, 2.0]),
         )
+        .least_is(&["coulomb-friction"])
+        .most_is(&["linear-stiffness"])
         .of_kind(ParameterKind::BuildUp),
         EffectParameter::shape(
             "sigma",

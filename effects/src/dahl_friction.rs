@@ -35,6 +35,7 @@ impl Definition for DahlFriction {
             [1e-4, f64::INFINITY],
             InitialGrid::Scaled(&[0.01, 0.05, 0.2]),
         )
+        .least_is(&["coulomb-friction"])
         .of_kind(ParameterKind::BuildUp),
     ];
     const STATES: usize = 1;

@@ -36,7 +36,8 @@ impl Definition for FlexibleMode {
             NOT_NEGATIVE,
             // As far apart as the weaker of the damping ratios lets resonances overlap.
             InitialGrid::Frequencies(0.08),
-        ),
+        )
+        .most_is(&["added-mass"]),
         EffectParameter::shape("d", "damping ratio", Dimension::ONE, [0.0, 2.0], InitialGrid::Plain(&[0.02, 0.2])),
     ];
     const STATES: usize = 2;

@@ -31,7 +31,9 @@ impl Definition for LinearLoss {
             Dimension::POSITION,
             ANY,
             InitialGrid::Within(&[-0.5, 0.0, 0.5]),
-        ),
+        )
+        .least_is(&["constant-force"])
+        .most_is(&["constant-force"]),
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {

@@ -31,7 +31,9 @@ impl Definition for LinearStiffness {
             Dimension::POSITION,
             ANY,
             InitialGrid::Within(&[0.2, 0.5, 0.8]),
-        ),
+        )
+        .least_is(&["constant-force"])
+        .most_is(&["constant-force"]),
     ];
     const RARITY: u8 = 0;
 

@@ -38,7 +38,8 @@ impl Definition for LugreFriction {
             Dimension::ONE,
             NOT_NEGATIVE,
             InitialGrid::Plain(&[0.5]),
-        ),
+        )
+        .least_is(&["dahl-friction"]),
         EffectParameter::shape(
             "vs",
             "speed at which the rise has decreased to 1/e",
@@ -46,6 +47,8 @@ impl Definition for LugreFriction {
             NOT_NEGATIVE,
             InitialGrid::Scaled(&[0.05, 0.2]),
         )
+        .least_is(&["dahl-friction"])
+        .most_is(&["dahl-friction"])
         .of_kind(ParameterKind::BuildUp),
         EffectParameter::shape(
             "y",
@@ -54,6 +57,8 @@ impl Definition for LugreFriction {
             [1e-4, f64::INFINITY],
             InitialGrid::Scaled(&[0.01, 0.05, 0.2]),
         )
+        .least_is(&["stribeck-friction"])
+        .most_is(&["linear-stiffness"])
         .of_kind(ParameterKind::BuildUp),
         EffectParameter::shape(
             "tau",

@@ -39,7 +39,8 @@ impl Definition for PositionDependentFriction {
             Dimension::ONE,
             [0.0, 1.0],
             InitialGrid::Plain(&[0.6]),
-        ),
+        )
+        .least_is(&["coulomb-friction"]),
         waves(InitialGrid::PlainAndScaled(&[1.0, 2.0, 3.0, 4.0, 6.0], &[1.0, 2.0, 3.5, 5.5, 8.5, 13.0])),
         phase(),
     ];

@@ -28,7 +28,8 @@ impl Definition for SecondOrderLag {
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("tau", "inverse of the natural frequency", Dimension::TIME)
             .with_grid(InitialGrid::Scaled(&[0.02, 0.05, 0.1, 0.3])),
-        EffectParameter::shape("d", "damping ratio", Dimension::ONE, [0.05, 5.0], InitialGrid::Plain(&[0.3, 0.8, 1.5])),
+        EffectParameter::shape("d", "damping ratio", Dimension::ONE, [0.05, 5.0], InitialGrid::Plain(&[0.3, 0.8, 1.5]))
+            .most_is(&["actuator-lag", "sensor-lag"]),
     ];
     const STATES: usize = 2;
     const FREE_STARTS: &'static [Dimension] = &[Dimension::VALUE, Dimension::VALUE.over(Dimension::TIME)];

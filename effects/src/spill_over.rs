@@ -53,7 +53,8 @@ impl Definition for SpillOver {
             Dimension::ONE,
             NOT_NEGATIVE,
             InitialGrid::Plain(&[0.3, 1.0]),
-        ),
+        )
+        .least_is(&["overflow"]),
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {

@@ -35,7 +35,8 @@ impl Definition for Stiction {
             Dimension::ONE,
             NOT_NEGATIVE,
             InitialGrid::Jumps(&[0.0, 0.5]),
-        ),
+        )
+        .least_is(&["coulomb-friction"]),
     ];
 
     fn make<S: Scalar>(s: &[S]) -> Box<dyn BoundEffect<S>> {

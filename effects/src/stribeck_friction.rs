@@ -37,7 +37,8 @@ impl Definition for StribeckFriction {
             Dimension::ONE,
             NOT_NEGATIVE,
             InitialGrid::Plain(&[0.4, 1.5]),
-        ),
+        )
+        .least_is(&["coulomb-friction"]),
         EffectParameter::shape(
             "vs",
             "speed at which the rise has decreased to 1/e",
@@ -45,6 +46,8 @@ impl Definition for StribeckFriction {
             NOT_NEGATIVE,
             InitialGrid::Scaled(&[0.03, 0.1, 0.3, 0.8]),
         )
+        .least_is(&["coulomb-friction"])
+        .most_is(&["coulomb-friction"])
         .of_kind(ParameterKind::BuildUp),
     ];
 

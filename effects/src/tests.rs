@@ -335,3 +335,124 @@ fn what_passes_an_actuator_or_a_sensor_is_what_the_formula_says() {
         assert!((found - expected).abs() < 1e-15, "{name} {value}: {found}");
     }
 }
+
+/// Returns the force of an effect along a motion, with the rates of its states and of its dry friction while it slides.
+fn along(effect: &dyn Effect, parameters: &[f64], motion: &[[f64; 3]], step: f64) -> Vec<f64> {
+    let acting = effect.bind(parameters);
+    let mut z = vec![0.0; effect.states()];
+    let of = |&[q, v, a]: &[f64; 3]| PortState {
+        t: 0.0,
+        value: q,
+        q,
+        v,
+        a,
+        mobility: 1.0,
+        other: 0.0,
+        other_speed: 0.0,
+        u: &[],
+        closed: None,
+    };
+    acting.start(&of(&motion[0]), &mut z);
+    let mut rates = z.clone();
+    let force = |pair: &[[f64; 3]]| {
+        let at = of(&pair[0]);
+        let sliding = acting.friction(&at, &z).map_or(0.0, |f| if at.v > 0.0 { -f.sliding[0] } else { f.sliding[1] });
+        let force = acting.value(&at, &z) - acting.inertia(&at) * at.a + sliding;
+        // The states follow the middle of the step.
+        let middle: [f64; 3] = std::array::from_fn(|k| 0.5 * (pair[0][k] + pair[1][k]));
+        for _ in 0..20 {
+            acting.rates(&of(&middle), &z, &mut rates);
+            z.iter_mut().zip(&rates).for_each(|(z, rate)| *z += step / 20.0 * rate);
+        }
+        force
+    };
+    motion.windows(2).map(force).collect()
+}
+
+/// Returns the root mean square of what a multiple of one signal and a constant leave of another, relative to its deviation.
+fn left(signal: &[f64], of: &[f64]) -> f64 {
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    let centred = |x: &[f64]| x.iter().map(|v| v - mean(x)).collect::<Vec<f64>>();
+    let (a, b) = (centred(signal), centred(of));
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    (1.0 - math::powi(dot(&a, &b), 2) / (dot(&a, &a) * dot(&b, &b))).max(0.0).sqrt()
+}
+
+#[test]
+fn an_effect_at_an_end_of_a_shape_is_the_simpler_effect_that_it_names() {
+    // A swing of two frequencies about 0.3, between -1.2 and 1.8.
+    let step = 1e-3;
+    let motion: Vec<[f64; 3]> = (0..12_000)
+        .map(|k| {
+            let t = step * f64::from(k);
+            let (w, u) = (2.0, 3.1);
+            [
+                0.3 + math::sin(w * t) + 0.5 * math::cos(u * t),
+                w * math::cos(w * t) - 0.5 * u * math::sin(u * t),
+                -w * w * math::sin(w * t) - 0.5 * u * u * math::cos(u * t),
+            ]
+        })
+        .collect();
+    let catalogue = effects();
+    let mut compared = 0;
+    for effect in &catalogue {
+        for (k, shape) in effect.parameters().iter().enumerate() {
+            for (end, names) in shape.simpler.iter().enumerate() {
+                for name in *names {
+                    let simpler = catalogue.iter().find(|other| other.name() == *name).expect("it is in the catalogue");
+                    assert!(simpler.parameters().len() < effect.parameters().len(), "{name} in {}", effect.name());
+                    assert!(simpler.ports().iter().any(|port| effect.ports().contains(port)), "{name}");
+                    if effect.second_port().is_some() || !at_joints(effect.as_ref()) && effect.states() == 0 {
+                        continue;
+                    }
+                    // Far enough for the limit, within what steps of a millisecond follow.
+                    let extreme = match (end, shape.bounds) {
+                        (0, [0.0, _]) if shape.name == "y" || shape.name == "w" || shape.name == "vs" => 0.02,
+                        (0, [low, _]) if low.is_finite() && shape.name != "y" => low,
+                        (0, _) if shape.name == "y" => 0.01,
+                        (1, [_, high]) if high.is_finite() => high,
+                        (0, _) => -1e3,
+                        (_, _) if shape.name == "w" => 60.0,
+                        _ => 1e3,
+                    };
+                    let value = |of: &EffectParameter| match of.name {
+                        "y" => 0.4,
+                        "vs" | "rise" | "h" | "a" => 0.7,
+                        "sigma" | "n" | "d" => 1.0,
+                        "tau" if effect.name() == "second-order-lag" => 0.02,
+                        "tau" => 0.0,
+                        _ if of.null_value == Some(0.0) => 1.0,
+                        _ => 0.0,
+                    };
+                    let mut own: Vec<f64> = effect.parameters().iter().map(value).collect();
+                    own[k] = extreme;
+                    let mut theirs: Vec<f64> = simpler.parameters().iter().map(value).collect();
+                    if (effect.name(), shape.name, end) == ("lugre-friction", "vs", 1) {
+                        // The bristles bend as much farther as the force is larger.
+                        theirs[1] *= 1.7;
+                    }
+                    if effect.name() == "second-order-lag" {
+                        theirs[0] = 2.0 * extreme * own[0];
+                    }
+                    // Once it has begun, away from where the motion turns.
+                    let of = |effect: &dyn Effect, parameters: &[f64]| {
+                        let forces = along(effect, parameters, &motion, step);
+                        let moves = forces.into_iter().zip(&motion).skip(6_000).filter(|(_, [_, v, _])| v.abs() > 0.7);
+                        moves.map(|(force, _)| force).collect::<Vec<f64>>()
+                    };
+                    let (own, theirs) = (of(effect.as_ref(), &own), of(simpler.as_ref(), &theirs));
+                    let left = if theirs.iter().all(|force| *force == theirs[0]) {
+                        // Of a constant force only the mean is left.
+                        let mean = own.iter().sum::<f64>() / own.len() as f64;
+                        own.iter().map(|force| (force / mean - 1.0).abs()).fold(0.0, f64::max)
+                    } else {
+                        left(&theirs, &own)
+                    };
+                    assert!(left < 0.1, "{} with {} = {extreme} is {name} but for {left}", effect.name(), shape.name);
+                    compared += 1;
+                }
+            }
+        }
+    }
+    assert!(compared > 12, "{compared}");
+}

@@ -39,7 +39,8 @@ impl Definition for TorsionalHysteresis {
             Dimension::ONE,
             NOT_NEGATIVE,
             InitialGrid::Plain(&[0.3, 2.0]),
-        ),
+        )
+        .least_is(&["linear-stiffness"]),
         EffectParameter::shape(
             "y",
             "displacement over which the effect of a reversal decays",
@@ -47,6 +48,7 @@ impl Definition for TorsionalHysteresis {
             [1e-4, f64::INFINITY],
             InitialGrid::Scaled(&[0.05, 0.3]),
         )
+        .most_is(&["linear-stiffness"])
         .of_kind(ParameterKind::BuildUp),
     ];
     const STATES: usize = 1;

@@ -10,7 +10,7 @@ use mops_content::{
     sampling::thinned,
 };
 use mops_data::{DataFile, unit_since_1970};
-use mops_discrepancy::noise_of;
+use mops_diagnosis::noise_of;
 use mops_language::Diagnostic;
 use mops_outcome::identification::{excitation_report, spacing};
 use mops_output::{Inputs, Outputs};

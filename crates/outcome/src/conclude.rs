@@ -119,7 +119,7 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
         })
         .collect();
     let outcome = Outcome {
-        format: 1,
+        format: 2,
         mops: env!("CARGO_PKG_VERSION"),
         study: study.name().to_owned(),
         task: study.task().name(),

@@ -98,7 +98,7 @@ fn the_verdict_none_is_reported_with_detection_limits() {
 #[test]
 fn what_no_effect_explains_has_a_coordinate_and_a_curve() {
     let mut diagnosis = made_up::unexplained();
-    diagnosis.evidence[0].place = "process:x".into();
+    diagnosis.latent[0].place = "process:x".into();
     diagnosis.next_experiment = None;
     let (folder, page) = written(diagnosis);
     assert!(page.contains(
@@ -127,7 +127,7 @@ fn a_diagnosis_without_numbers_still_has_a_page() {
         prediction.before.fill(f64::NAN);
         prediction.noise = f64::NAN;
     }
-    diagnosis.evidence.iter_mut().for_each(|e| e.evidence = f64::NAN);
+    diagnosis.places.iter_mut().for_each(|place| place.gain = f64::NAN);
     for list in [&mut diagnosis.before, &mut diagnosis.after] {
         list.iter_mut().for_each(|e| e.normalised = f64::NAN);
     }

@@ -6,11 +6,11 @@ use std::process::{Command, ExitCode, Stdio};
 
 use mops::{
     Diagnostic,
-    discrepancy::Settings,
     terminal::{CommandError, Progress, print, table},
 };
 
 use super::write;
+use crate::diagnosis::settings;
 use crate::parallel::each;
 
 /// Factors that a setting is multiplied by.
@@ -61,8 +61,7 @@ type Answers = BTreeMap<String, Answer>;
 
 /// Runs the command.
 pub(super) fn ablation(arguments: &Arguments) -> Result<ExitCode, CommandError> {
-    let all = || Settings::NAMES.iter().map(|&name| name.to_owned()).collect();
-    let names: Vec<String> = if arguments.settings.is_empty() { all() } else { arguments.settings.clone() };
+    let names: Vec<String> = if arguments.settings.is_empty() { settings::names() } else { arguments.settings.clone() };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = arguments.jobs.map_or(cores, usize::from);
     let base = answers(arguments, None, &[], jobs)?;

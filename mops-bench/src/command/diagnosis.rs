@@ -4,17 +4,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use mops::{
-    Catalogue, Diagnostic,
-    discrepancy::{Settings, use_settings},
-    language::suggestion,
-};
+use mops::{Catalogue, Diagnostic, diagnosis::Settings, language::suggestion};
 use mops_testbed::Setting;
 
 use mops::terminal::{CommandError, Progress, print};
 
 use super::{folder, tables, write};
-use crate::diagnosis::{self, Comparisons, Kind, Plan, Tools};
+use crate::diagnosis::{self, Comparisons, Kind, Plan, Tools, settings as by_name};
 
 /// Options of `mops-bench diagnosis`.
 #[derive(Args)]
@@ -131,11 +127,10 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = arguments.jobs.map_or(cores, usize::from);
     let against = arguments.against.is_some();
-    let scaled = arguments.scale.iter().try_fold(Settings::default(), scaled)?;
-    use_settings(scaled);
+    let settings = &arguments.scale.iter().try_fold(Settings::default(), scaled)?;
     if let Some(cases) = &arguments.folder {
         let progress = Progress::of_cases(!arguments.quiet);
-        let tools = Tools { catalogue, watch: &progress, seed: arguments.seed };
+        let tools = Tools { catalogue, watch: &progress, seed: arguments.seed, settings };
         let answers = arguments.answers.as_deref().unwrap_or(Path::new("answers"));
         let done = folder::answer(cases, answers, tools, jobs, against);
         progress.finish();
@@ -150,7 +145,7 @@ pub(super) fn bench(catalogue: &Catalogue, arguments: &Arguments) -> Result<Exit
             .into());
     }
     let progress = Progress::of_cases(!arguments.quiet);
-    let tools = Tools { catalogue, watch: &progress, seed: arguments.seed };
+    let tools = Tools { catalogue, watch: &progress, seed: arguments.seed, settings };
     let comparisons = Comparisons {
         brute_force: against,
         orders: arguments.orders,
@@ -185,11 +180,11 @@ fn scaled(settings: Settings, change: &String) -> Result<Settings, Diagnostic> {
             Diagnostic::new(format!("expected NAME=FACTOR, found `{change}`")).with_help("for example `fires=2`")
         );
     };
-    let unknown = || {
-        let names = Settings::NAMES.iter().copied();
-        Diagnostic::new(format!("the diagnosis has no setting `{name}`")).with_help(suggestion(name, names))
-    };
-    settings.scaled(name, factor).ok_or_else(unknown)
+    by_name::scaled(&settings, name, factor).ok_or_else(|| {
+        let names = by_name::names();
+        Diagnostic::new(format!("the diagnosis has no setting `{name}`"))
+            .with_help(suggestion(name, names.iter().map(String::as_str)))
+    })
 }
 
 /// Returns the plan of the benchmark, with names checked.

@@ -1,7 +1,7 @@
 //! Table of the diagnosis by kind of case, over cases with and without a model error in the background. Rates are counts with
 //! their 95 % intervals in %.
 
-use mops::{core::Role, discrepancy::Verdict, terminal::table};
+use mops::{core::Role, outcome::diagnosis::Verdict, terminal::table};
 
 use crate::diagnosis::{Answer, Kind, Rate, Row, Statement, brier};
 

@@ -2,7 +2,6 @@
 
 mod ablation;
 mod diagnosis;
-mod evidence;
 mod folder;
 mod kinds;
 mod suite;
@@ -48,8 +47,6 @@ enum Benchmark {
     Diagnosis(diagnosis::Arguments),
     /// Repeat the diagnosis of simulated experiments with one setting after the other halved and doubled.
     Ablation(ablation::Arguments),
-    /// Compare given sets of effects by evidence under three error models, and by their errors on other records.
-    Evidence(evidence::Arguments),
     /// Print the JSON schema of case.json, the format of the cases of `diagnosis --folder`.
     Schema,
     /// Print the Markdown table of figures stored with `--csv`.
@@ -66,7 +63,6 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
     let done = match Arguments::parse().benchmark {
         Benchmark::Diagnosis(arguments) => diagnosis::bench(catalogue, &arguments),
         Benchmark::Ablation(arguments) => ablation::ablation(&arguments),
-        Benchmark::Evidence(arguments) => evidence::evidence(catalogue, &arguments),
         Benchmark::Schema => print(&crate::diagnosis::schema()).map(|()| ExitCode::SUCCESS),
         Benchmark::Table { file } => suite::markdown(&file),
         Benchmark::Suite(chosen) => suite::bench(catalogue, &chosen),

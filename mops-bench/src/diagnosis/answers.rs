@@ -1,6 +1,6 @@
 //! Hand-written answers for tests.
 
-use mops::discrepancy::Verdict;
+use mops::outcome::diagnosis::Verdict;
 
 use super::tool::{Answer, Named, Statement};
 

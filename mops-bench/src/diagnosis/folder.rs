@@ -123,7 +123,7 @@ fn diagnosed(
 ) -> Result<CaseAnswer, String> {
     let study = tools.study(&format!("{name}.toml"), text, &Data { folder, declared })?;
     let times: Vec<(String, Vec<f64>)> = study.cases().iter().filter_map(times).collect();
-    let (diagnosis, seconds) = tools.diagnose(study)?;
+    let (diagnosis, seconds) = tools.diagnose(&study)?;
     let after = |name: &str| diagnosis.after.iter().find(|e| e.name == name).map_or(f64::NAN, |e| e.normalised);
     Ok(CaseAnswer {
         json: answer(name, declared, &diagnosis, seconds, &tools.catalogue.effects),
@@ -178,7 +178,8 @@ mod tests {
         let declared = Declared::read(CASE).unwrap();
         let text = declared.study("c", folder).unwrap();
         let catalogue = mops::catalogue();
-        let tools = Tools { catalogue: &catalogue, watch: &(), seed: 1 };
+        let tools =
+            Tools { catalogue: &catalogue, watch: &(), seed: 1, settings: &mops::diagnosis::Settings::default() };
         let data = Data { folder, declared: &declared };
         let study = tools.study("c.toml", &text, &data).unwrap_or_else(|why| panic!("{why}\n{text}"));
         let ports: Vec<String> = study.models()[0].1.interface().ports.iter().map(ToString::to_string).collect();

@@ -1,6 +1,6 @@
 //! Comparison of an answer with the truth.
 
-use mops::discrepancy::Verdict;
+use mops::outcome::diagnosis::Verdict;
 use mops_testbed::{Disturbance, Trial, TrueEffect, Truth};
 
 use super::names::{class_of, coordinates, names, strengths};

@@ -7,6 +7,7 @@ mod judge;
 mod names;
 mod page;
 mod plan;
+pub(crate) mod settings;
 mod statistics;
 mod table;
 mod tool;
@@ -86,7 +87,7 @@ fn answered(plan: &Plan, wish: &Wish, trial: &Trial, tools: Tools<'_>, compariso
     let tools = Tools { catalogue: changed.as_ref().unwrap_or(tools.catalogue), ..tools };
     let read = |tools: Tools<'_>| tools.study("study.toml", &trial.study, &tool::InMemory(&trial.files));
     let answer = |tools: Tools<'_>| {
-        guarded(|| tools.diagnose(read(tools)?)).map(|(diagnosis, seconds)| Answer::of(&diagnosis, seconds))
+        guarded(|| tools.diagnose(&read(tools)?)).map(|(diagnosis, seconds)| Answer::of(&diagnosis, seconds))
     };
     let brute = comparisons.brute_force.then(|| row(guarded(|| tools.brute_force(&read(tools)?))));
     let mut row = row(answer(tools));
@@ -165,10 +166,11 @@ mod tests {
         let mut trial =
             (1..20).find_map(|seed| disturbed(Setting::Effect, "driven-pendulum", effect, seed)).expect("a trial");
         let catalogue = only(&catalogue(), &trial);
-        let tools = Tools { catalogue: &catalogue, watch: &(), seed: 1 };
+        let tools =
+            Tools { catalogue: &catalogue, watch: &(), seed: 1, settings: &mops::diagnosis::Settings::default() };
         let diagnosed = |trial: &Trial| {
             let study = tools.study("study.toml", &trial.study, &tool::InMemory(&trial.files)).unwrap();
-            let (diagnosis, _) = tools.diagnose(study).unwrap();
+            let (diagnosis, _) = tools.diagnose(&study).unwrap();
             Row::new(trial, Kind::Setting(Setting::Effect), 0.0, Ok(Answer::of(&diagnosis, 1.0)))
         };
         let first = diagnosed(&trial);

@@ -1,14 +1,16 @@
 //! Tools that search for missing effects, and their answers.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use mops::{
-    Catalogue, Options, Study, Watch,
-    core::{Role, run::Quiet},
-    discrepancy::{Diagnosis, ExperimentError, Found, Verdict, brute_force},
+    Catalogue, Study, Watch,
+    core::{Effect, Role, run::Quiet, task::DiagnosisTask},
+    diagnosis::{Options, Settings, brute_force, diagnose},
     file,
     language::files::Files,
-    math, solve,
+    math,
+    outcome::diagnosis::{Diagnosis, ExperimentError, Found, Verdict},
 };
 
 /// Common inputs of the tools.
@@ -20,6 +22,8 @@ pub(crate) struct Tools<'a> {
     pub watch: &'a dyn Watch,
     /// Seed of the random numbers of the tools.
     pub seed: u64,
+    /// Settings of the diagnosis.
+    pub settings: &'a Settings,
 }
 
 /// Data files in memory.
@@ -52,26 +56,24 @@ impl Tools<'_> {
     ///
     /// # Errors
     /// If the study cannot be diagnosed; the error is the reason.
-    pub fn diagnose(&self, study: Study) -> Result<(Diagnosis, f64), String> {
-        let options = Options { effects: self.catalogue.effects.clone(), jobs: Some(1), ..Options::default() };
+    pub fn diagnose(&self, study: &Study) -> Result<(Diagnosis, f64), String> {
+        let task = study.options::<DiagnosisTask>().cloned().unwrap_or_default();
+        let tried = |effect: &&Arc<dyn Effect>| task.tries(effect.name());
+        let effects: Vec<Arc<dyn Effect>> = self.catalogue.effects.iter().filter(tried).cloned().collect();
+        let (max_effects, level) = (task.max_effects, task.level);
+        let options = Options { max_effects, level, settings: self.settings.clone() };
         let started = Instant::now();
-        let solved = solve(study, &options, &Quiet(self.watch)).map_err(|why| why.to_string())?;
-        Ok((
-            solved.outcome.found.get::<Diagnosis>().cloned().expect("that was the task"),
-            started.elapsed().as_secs_f64(),
-        ))
+        let done = one_thread().install(|| diagnose(study, &effects, &options, &Quiet(self.watch)));
+        Ok((done.map_err(|why| why.to_string())?, started.elapsed().as_secs_f64()))
     }
-}
 
-impl Tools<'_> {
     /// Runs brute force on one thread: refits the model with each effect in turn and selects the smallest BIC.
     ///
     /// # Errors
     /// If the study cannot be handled; the error is the reason.
     pub fn brute_force(&self, study: &Study) -> Result<Answer, String> {
-        let threads = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");
         let started = Instant::now();
-        let done = threads.install(|| brute_force(study, &self.catalogue.effects)).map_err(|why| why.message)?;
+        let done = one_thread().install(|| brute_force(study, &self.catalogue.effects)).map_err(|why| why.message)?;
         let found: Vec<(Named, f64)> = done.best.into_iter().map(|best| (best, f64::NAN)).collect();
         Ok(Answer {
             verdict: if found.is_empty() { Verdict::None } else { Verdict::Effect },
@@ -90,6 +92,11 @@ impl Tools<'_> {
             seconds: started.elapsed().as_secs_f64(),
         })
     }
+}
+
+/// Returns a pool of one thread, so that times are comparable.
+fn one_thread() -> rayon::ThreadPool {
+    rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started")
 }
 
 /// Effect and its place.
@@ -177,7 +184,7 @@ impl Statement {
 }
 
 impl Dependence {
-    fn of(found: &mops::discrepancy::Dependence) -> Self {
+    fn of(found: &mops::outcome::diagnosis::Dependence) -> Self {
         let places = std::iter::once(&found.place).chain(&found.other).cloned().collect();
         Self { coordinate: found.coordinate.clone(), places }
     }

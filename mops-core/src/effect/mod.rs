@@ -309,6 +309,9 @@ pub struct EffectParameter {
     /// Multiples of the typical size for restarts of a stuck fit, at every shape in the grid. A contact that starts too
     /// soft would act over the whole motion. If empty, the fit restarts from one and two times the estimate.
     pub restarts: &'static [f64],
+    /// Names of the simpler effects that the effect is where the parameter is at the lower, and at the upper end of the values that
+    /// are possible or that records can show: Stribeck friction without a rise is Coulomb friction.
+    pub simpler: [&'static [&'static str]; 2],
 }
 
 impl EffectParameter {
@@ -325,6 +328,7 @@ impl EffectParameter {
             scope: Scope::Study,
             fixed: false,
             restarts: &[],
+            simpler: [&[]; 2],
         }
     }
 
@@ -391,6 +395,20 @@ impl EffectParameter {
     pub const fn restarted_from(mut self, multiples: &'static [f64]) -> Self {
         self.kind = ParameterKind::Steepness;
         self.restarts = multiples;
+        self
+    }
+
+    /// Names the simpler effects that the effect is where the parameter is at its lower end.
+    #[must_use]
+    pub const fn least_is(mut self, simpler: &'static [&'static str]) -> Self {
+        self.simpler[0] = simpler;
+        self
+    }
+
+    /// Names the simpler effects that the effect is where the parameter is at its upper end.
+    #[must_use]
+    pub const fn most_is(mut self, simpler: &'static [&'static str]) -> Self {
+        self.simpler[1] = simpler;
         self
     }
 

@@ -1,4 +1,4 @@
-//! Simulated experiments with an effect that the study does not declare, to test the discrepancy search. Shares no code
+//! Simulated experiments with an effect that the study does not declare, to test the diagnosis. Shares no code
 //! with the search: own plants, formulas, integrator and fit.
 //!
 //! A [`Trial`] is a study file, its data files and the truth. [`generate`] creates one from a plant, the effects

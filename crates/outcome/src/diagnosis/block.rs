@@ -10,8 +10,8 @@ use serde_json::{Map, Value, json};
 use crate::Finding;
 
 use super::{
-    Alignment, Dependence, Diagnosis, Evidence, ExperimentError, ForecastOf, Found, HeldBack, Noticeable,
-    ParameterMove, Ranked, Removed, Rival, Rule, Stability, Step, StrengthValue, Unexplained, Verdict,
+    Alignment, Dependence, Diagnosis, ExperimentError, ForecastOf, Found, HeldBack, Noticeable, ParameterMove, Ranked,
+    Removed, Rival, Rule, Step, StrengthValue, Unexplained, Verdict,
 };
 
 /// Result of a diagnosis.
@@ -72,8 +72,8 @@ pub struct Block {
     starts: Vec<InitialState>,
     /// Detection limits, for the verdict `none`.
     noticeable: Vec<DetectionLimit>,
-    /// Unknown inputs that would explain the residual, best place first.
-    evidence: Vec<PlaceEvidence>,
+    /// Places with the coordinate on which what the nominal model lacks depends there, the largest gain first.
+    places: Vec<Place>,
     /// Remarks on data and fit.
     notes: Vec<String>,
     /// Number of simulations.
@@ -115,8 +115,6 @@ struct FoundEffect {
     bic_gain: f64,
     /// Alternatives at the same place whose BIC is at most 6 higher.
     indistinguishable: Vec<Rival>,
-    /// Stability of the choice when the data change; null without an alternative.
-    stability: Option<Stability>,
     /// Errors on held-out data with and without the effect, initial states fitted. Empty for a single effect, whose errors before
     /// and after show the same, and if the model without the effect cannot be simulated over whole records.
     held_back: Vec<HeldBack>,
@@ -207,24 +205,23 @@ struct DetectionLimit {
     unit: String,
 }
 
-/// Unknown input at a place that would explain the residual of the nominal model.
+/// Place with the coordinate on which what the nominal model lacks depends there, if it acts there.
 #[derive(Serialize, JsonSchema)]
-struct PlaceEvidence {
+struct Place {
     /// The place, as `kind:name`.
     place: String,
-    /// Log ratio of the marginal likelihoods with and without the unknown input.
-    evidence: f64,
-    /// Share of the residual above the noise that the unknown input explains.
-    share: f64,
-    /// Effective degrees of freedom of the unknown input.
-    freedom: f64,
-    /// Unit of the signal; empty if the model's equations do not determine it.
-    unit: String,
+    /// Second place, on which the opposite force acts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    other: Option<String>,
+    /// The coordinate.
+    coordinate: String,
+    /// Gain in log-evidence of a free curve over the coordinate, nats.
+    gain: f64,
 }
 
 impl Block {
     fn of(diagnosis: &Diagnosis) -> Self {
-        let Diagnosis { found, ranked, before, after, starts, noticeable, evidence, .. } = diagnosis;
+        let Diagnosis { found, ranked, before, after, starts, noticeable, places, .. } = diagnosis;
         let start = |(experiment, parameter, value): &(String, String, f64)| InitialState {
             experiment: experiment.clone(),
             parameter: parameter.clone(),
@@ -254,7 +251,7 @@ impl Block {
             parameters: diagnosis.parameters.clone(),
             starts: starts.iter().map(start).collect(),
             noticeable: noticeable.iter().map(DetectionLimit::of).collect(),
-            evidence: evidence.iter().map(PlaceEvidence::of).collect(),
+            places: places.iter().map(Place::of).collect(),
             alignment: diagnosis.alignment.clone(),
             notes: diagnosis.notes.clone(),
             simulations: diagnosis.simulations,
@@ -279,7 +276,6 @@ impl FoundEffect {
             given: found.given,
             bic_gain: found.bic_gain,
             indistinguishable: found.indistinguishable.clone(),
-            stability: found.stability.clone(),
             held_back: found.held_back.clone(),
             companion: found.companion.clone(),
             experiment: found.only.clone(),
@@ -310,11 +306,10 @@ impl DetectionLimit {
     }
 }
 
-impl PlaceEvidence {
-    fn of(evidence: &Evidence) -> Self {
-        let Evidence { place, unit, evidence, share, freedom, .. } = evidence;
-        let (evidence, share, freedom) = (*evidence, *share, *freedom);
-        Self { place: place.clone(), evidence, share, freedom, unit: unit.clone() }
+impl Place {
+    fn of(curve: &Dependence) -> Self {
+        let Dependence { place, other, coordinate, gain, .. } = curve.clone();
+        Self { place, other, coordinate, gain }
     }
 }
 

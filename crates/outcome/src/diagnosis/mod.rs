@@ -51,7 +51,7 @@ pub struct Rival {
     pub bic_behind: f64,
     /// Cosine similarity of the responses of the outputs to both effects, without the part that the parameters absorb; 1 if
     /// equal.
-    pub likeness: f64,
+    pub cosine: f64,
 }
 
 /// Missing effect that was added to the model.
@@ -89,8 +89,6 @@ pub struct Found {
     pub bic_gain: f64,
     /// Alternatives at the same place whose BIC is at most 6 higher.
     pub indistinguishable: Vec<Rival>,
-    /// Stability of the choice when the data change; null without an alternative.
-    pub stability: Option<Stability>,
     /// Errors on held-out data with and without the effect, initial states fitted. Empty for a single effect, whose errors before
     /// and after show the same, and if the model without the effect cannot be simulated over whole records.
     pub held_back: Vec<HeldBack>,
@@ -134,30 +132,6 @@ pub struct HeldBack {
     pub without: f64,
     /// Error with the effect, in units of the noise.
     pub with: f64,
-}
-
-/// Stability of the choice of an effect when the data change.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Stability {
-    /// Share of resampled data sets (blocks of the data) in which the same effect is best.
-    ///
-    /// The fits are not repeated; their residuals are resampled. Source: H. Kishino, T. Miyata, M. Hasegawa, Maximum likelihood
-    /// inference of protein phylogeny, Journal of Molecular Evolution 31 (1990) 151, for estimated likelihoods; E. Carlstein, The
-    /// use of subseries values for estimating the variance of a general statistic, Annals of Statistics 14 (1986) 1171, for blocks.
-    pub share: f64,
-    /// Experiments without which another effect would be best; fitted again without them.
-    pub hangs_on: Vec<HangsOn>,
-}
-
-/// Experiment on which the choice of an effect depends.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct HangsOn {
-    /// The experiment.
-    pub experiment: String,
-    /// Effect that would be best without the experiment.
-    pub effect: String,
-    /// Place of that effect, as `kind:name`.
-    pub place: String,
 }
 
 /// Rule that a candidate effect failed.
@@ -264,9 +238,7 @@ pub struct Ranked {
 pub struct Unexplained {
     /// Most likely place, as `kind:name`.
     pub place: String,
-    /// Share of the residual above the noise that a free signal there explains.
-    pub share: f64,
-    /// Variable that the missing signal depends on: `position`, `speed`, `input` or `time`.
+    /// Coordinate that the missing signal depends on, such as `position`, `speed`, `level` or `input`.
     pub over: String,
     /// Lookup table of the missing signal, linear between its points.
     pub table: Vec<[f64; 2]>,
@@ -369,23 +341,17 @@ pub struct Curve {
     pub found: Vec<f64>,
 }
 
-/// Unknown input at a place that would explain the residual. The evidence refers to the nominal model. The curves refer to the
-/// augmented model without the effects at this place, if their formula can be drawn.
+/// Course of what is missing at a place, without a catalogue: a smooth force at a balance, a smooth error at a sensor. It is what
+/// the nominal model lacks there, or, where effects were added, their formulas plus what remains with them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Evidence {
+pub struct LatentInput {
     /// The place, as `kind:name`.
     pub place: String,
     /// Unit of the signal; empty if the model's equations do not determine it.
     pub unit: String,
-    /// Log ratio of the marginal likelihoods with and without the unknown input.
-    pub evidence: f64,
-    /// Share of the residual above the noise that the unknown input explains.
-    pub share: f64,
-    /// Effective degrees of freedom of the unknown input.
-    pub freedom: f64,
     /// Signal over time, by experiment.
     pub over_time: Vec<(String, Curve)>,
-    /// Signal over variables that it may depend on (`position`, `speed`, `input`), with their units.
+    /// Signal over coordinates of the place (`position`, `speed`, `level`), with their units.
     pub over: Vec<(String, String, Curve)>,
 }
 
@@ -400,7 +366,7 @@ pub enum Change {
     #[serde(rename = "exchanged")]
     Swapped,
     /// The search was restarted with another first effect.
-    #[serde(rename = "begun otherwise")]
+    #[serde(rename = "restarted")]
     Restarted,
     /// An effect was eliminated.
     #[serde(rename = "left out")]
@@ -408,9 +374,6 @@ pub enum Change {
     /// One effect was substituted for two.
     #[serde(rename = "one for two")]
     Substituted,
-    /// A discrete shape of an effect was changed.
-    #[serde(rename = "reshaped")]
-    Reshaped,
 }
 
 impl Change {
@@ -422,7 +385,6 @@ impl Change {
             Self::Restarted => "restarted with another effect",
             Self::Eliminated => "effect eliminated",
             Self::Substituted => "one effect substituted for two",
-            Self::Reshaped => "shape changed",
         }
     }
 }
@@ -434,8 +396,6 @@ pub struct Step {
     pub did: Change,
     /// Effects, each as `effect at kind:name`.
     pub effects: Vec<String>,
-    /// Number of windows per record; 1 for whole records.
-    pub windows: usize,
     /// Error on calibration data, in units of the noise.
     pub normalised: f64,
 }
@@ -491,8 +451,10 @@ pub struct Diagnosis {
     pub parameters: Vec<ParameterMove>,
     /// Detection limits, for the verdict `none`.
     pub noticeable: Vec<Noticeable>,
-    /// Unknown inputs that would explain the residual, best place first.
-    pub evidence: Vec<Evidence>,
+    /// Free curve with the largest gain of each place, the largest first: where the missing input acts, whatever its form.
+    pub places: Vec<Dependence>,
+    /// Course of what is missing at the places of the effects found, or else at the first place.
+    pub latent: Vec<LatentInput>,
     /// Measured outputs and their predictions.
     pub predictions: Vec<Prediction>,
     /// Remarks on data and fit.

@@ -3,8 +3,8 @@
 use mops_core::Role;
 use mops_math as math;
 use mops_outcome::diagnosis::{
-    Change, Curve, Dependence, Diagnosis, Evidence, ExperimentError, Found, HangsOn, Noticeable, ParameterMove,
-    Prediction, Ranked, Rival, Rule, Stability, Step, StrengthValue, Unexplained, Verdict,
+    Change, Curve, Dependence, Diagnosis, ExperimentError, Found, LatentInput, Noticeable, ParameterMove, Prediction,
+    Ranked, Rival, Rule, Step, StrengthValue, Unexplained, Verdict,
 };
 
 /// Returns a pseudorandom value between -1 and 1.
@@ -51,25 +51,18 @@ fn error(name: &str, role: Role, [phi, theta, normalised]: [f64; 3]) -> Experime
     }
 }
 
-/// Returns a torque over time, speed and position; Coulomb friction of 0.0124 N m if `true_place`, else noise.
-fn evidence(place: &str, evidence: f64, share: f64, true_place: bool) -> Evidence {
+/// Returns a torque over time, speed and position: Coulomb friction of 0.0124 N m.
+fn latent(place: &str) -> LatentInput {
     let times: Vec<f64> = (0..300).map(|i| 0.01 * i as f64).collect();
     let speed: Vec<f64> = times.iter().map(|&t| -7.0 * math::exp(-0.5 * t) * math::sin(7.0 * t)).collect();
-    let force: Vec<f64> = speed
-        .iter()
-        .enumerate()
-        .map(|(i, v)| if true_place { -0.0124 * math::tanh(4.0 * v) } else { 0.004 * chance(i) } + 0.0012 * chance(i + 7))
-        .collect();
-    let formula = speed.iter().map(|v| -0.0124 * v.signum()).collect();
+    let force: Vec<f64> =
+        speed.iter().enumerate().map(|(i, v)| -0.0124 * math::tanh(4.0 * v) + 0.0012 * chance(i + 7)).collect();
+    let found: Vec<f64> = speed.iter().map(|v| -0.0124 * v.signum()).collect();
     let position = times.iter().map(|t| math::cos(7.0 * t)).collect();
-    let found: Vec<f64> = if true_place { formula } else { Vec::new() };
     let curve = |x: Vec<f64>| Curve { x, estimated: force.clone(), found: found.clone() };
-    Evidence {
+    LatentInput {
         place: place.into(),
         unit: "N m".into(),
-        evidence,
-        share,
-        freedom: 41.0,
         over_time: vec![("swing".into(), curve(times))],
         over: vec![("speed".into(), "rad/s".into(), curve(speed)), ("position".into(), "rad".into(), curve(position))],
     }
@@ -121,7 +114,7 @@ pub fn coulomb() -> Diagnosis {
         place: "joint:phi".into(),
         probability: 0.01,
         bic_behind,
-        likeness: 0.995,
+        cosine: 0.995,
     };
     let mut made = Diagnosis::default();
     made.verdict = Verdict::Effect;
@@ -148,23 +141,11 @@ pub fn coulomb() -> Diagnosis {
         given: false,
         bic_gain: 2400.0,
         indistinguishable: vec![rival("stribeck-friction", 0.7), rival("quadratic-drag", 4.1)],
-        stability: Some(Stability {
-            share: 0.83,
-            hangs_on: vec![HangsOn {
-                experiment: "swing".into(),
-                effect: "stribeck-friction".into(),
-                place: "joint:phi".into(),
-            }],
-        }),
         held_back: Vec::new(),
     }];
     made.removed = Vec::new();
-    made.steps = vec![Step {
-        did: Change::Added,
-        effects: vec!["coulomb-friction at joint:phi".into()],
-        windows: 1,
-        normalised: 1.0,
-    }];
+    made.steps =
+        vec![Step { did: Change::Added, effects: vec!["coulomb-friction at joint:phi".into()], normalised: 1.0 }];
     made.ranked = vec![
         ranked("coulomb-friction", "joint:phi", 0.9, 2400.0),
         ranked("stribeck-friction", "joint:phi", 0.04, 2399.3),
@@ -184,11 +165,12 @@ pub fn coulomb() -> Diagnosis {
     ];
     made.parameters = vec![moved("b", 2.1e-3, 1.133e-3), moved("d", 2.6e-2, 2.5267e-2)];
     made.noticeable = Vec::new();
-    made.evidence = vec![
-        evidence("joint:phi", 812.0, 0.97, true),
-        evidence("joint:theta", 260.0, 0.41, false),
-        evidence("sensor:phi", 90.0, 0.22, false),
+    made.places = vec![
+        dependence("speed", "joint:phi", 812.0),
+        dependence("position", "joint:theta", 260.0),
+        dependence("input", "actuator:u", 90.0),
     ];
+    made.latent = vec![latent("joint:phi")];
     made.predictions = vec![
         prediction("swing", Role::Calibration, "phi", 0.0),
         prediction("swing", Role::Calibration, "theta", 1.0),
@@ -229,7 +211,7 @@ pub fn nothing() -> Diagnosis {
 pub fn unexplained() -> Diagnosis {
     let diagnosis = coulomb();
     let table = (0..9).map(|i| [f64::from(i), math::sin(0.7 * f64::from(i))]).collect();
-    let unexplained = Unexplained { place: "process:x".into(), share: 0.8, over: "position".into(), table };
+    let unexplained = Unexplained { place: "process:x".into(), over: "position".into(), table };
     let mut made = diagnosis.clone();
     made.verdict = Verdict::Unexplained;
     made.probability = f64::NAN;

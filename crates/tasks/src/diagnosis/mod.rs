@@ -172,8 +172,12 @@ fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved,
 fn search(study: &Study, options: &Options, watch: &dyn Watch) -> Result<Diagnosis, SolveError> {
     let task = &study.options::<DiagnosisTask>().cloned().unwrap_or_default();
     let effects = effects(task, &options.effects)?;
-    let options = mops_discrepancy::Options { max_effects: task.max_effects, level: task.level };
-    mops_discrepancy::diagnose(study, &effects, &options, watch).map_err(SolveError)
+    let options = mops_diagnosis::Options {
+        max_effects: task.max_effects,
+        level: task.level,
+        ..mops_diagnosis::Options::default()
+    };
+    mops_diagnosis::diagnose(study, &effects, &options, watch).map_err(SolveError)
 }
 
 /// Returns the effects selected by the task. N.B.: names in a study file are checked when the file is read.
@@ -198,7 +202,7 @@ fn effects(task: &DiagnosisTask, all: &[Arc<dyn Effect>]) -> Result<Vec<Arc<dyn 
 fn interrupted(study: Study, options: &Options, watch: &dyn Watch) -> Solved {
     let mut solved = evaluate_start(study.without_criteria(), options, watch);
     let outcome = &mut solved.outcome;
-    (outcome.solver, outcome.evaluations, outcome.calibration) = ("discrepancy".to_owned(), 0, None);
+    (outcome.solver, outcome.evaluations, outcome.calibration) = ("diagnosis".to_owned(), 0, None);
     outcome.front.clear();
     outcome.warnings.push("the diagnosis was stopped before it reached a verdict".to_owned());
     solved
@@ -223,7 +227,7 @@ pub fn of(study: Study, options: &Options, diagnosis: Diagnosis) -> Solved {
             report.at_bound = if report.active { tuner.at_bound(value) } else { None };
         }
     }
-    (outcome.solver, outcome.evaluations) = ("discrepancy".to_owned(), 0);
+    (outcome.solver, outcome.evaluations) = ("diagnosis".to_owned(), 0);
     (outcome.simulations, outcome.calibration) = (diagnosis.simulations, None);
     outcome.front.clear();
     outcome.found.add(diagnosis);

@@ -35,7 +35,10 @@ fn the_block_has_the_documented_keys_and_values() {
     );
     assert_eq!(found["after"]["swing"]["normalised"], 1.0);
     let unexplained = block(&made_up::unexplained());
-    assert_eq!((&unexplained["verdict"], &unexplained["unexplained"]["share"]), (&json!("unexplained"), &json!(0.8)));
+    assert_eq!(
+        (&unexplained["verdict"], &unexplained["unexplained"]["over"]),
+        (&json!("unexplained"), &json!("position"))
+    );
     assert_eq!(unexplained["probability"], Value::Null);
     assert_eq!(block(&made_up::nothing())["verdict"], "none");
     assert_eq!((&effect["claimed"], &effect["class_probability"]), (&json!(true), &json!(0.95)));

@@ -256,11 +256,11 @@ pub fn strength(strength: &StrengthValue) -> String {
     format!("{name} = {}{range}{unit}", significant(*value, 4))
 }
 
-/// Returns sentences on an effect: its only experiment, held-out errors, alternatives and stability of the choice.
+/// Returns sentences on an effect: its only experiment, held-out errors and alternatives.
 pub fn remarks(found: &Found) -> Vec<String> {
     let only = |only: &String| format!("`{}` {} acts in experiment `{only}` only.", found.effect, at(&found.places()));
     let only = found.only.iter().map(only);
-    only.chain(held_out_errors(found)).chain(alternatives(found)).chain(instability(found)).collect()
+    only.chain(held_out_errors(found)).chain(alternatives(found)).collect()
 }
 
 /// Returns sentences on the errors with and without an effect on held-out data.
@@ -282,22 +282,6 @@ fn held_out_errors(found: &Found) -> Vec<String> {
     };
     let better = sentence(&format!("The model predicts better with {effect}: without it,"), &better);
     better.into_iter().chain(sentence(&format!("The model predicts better without {effect}:"), &worse)).collect()
-}
-
-/// Returns a sentence on the dependence of the choice on parts of the data. `None` if the effect is best in 95 % of the
-/// bootstrap samples and without any one experiment.
-fn instability(found: &Found) -> Option<String> {
-    let stability = found.stability.as_ref()?;
-    let others = stability
-        .hangs_on
-        .iter()
-        .map(|h| format!("without `{}`, the best is `{}` {}", h.experiment, h.effect, at(&h.place)));
-    let others: Vec<String> = others.collect();
-    (stability.share < 0.95 || !others.is_empty()).then(|| {
-        let others = if others.is_empty() { String::new() } else { format!("; {}", list(&others)) };
-        let (effect, place, percent) = (&found.effect, at(&found.places()), share(stability.share));
-        format!("`{effect}` {place} is the best effect in {percent} of block bootstrap samples of the data{others}.")
-    })
 }
 
 /// Returns a sentence on the alternatives that the data do not exclude; `None` if there are none.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mops::{
     core::Effect,
-    discrepancy::{Diagnosis, ExperimentError, Prediction},
+    outcome::diagnosis::{Diagnosis, ExperimentError, Prediction},
 };
 use serde_json::{Map, Value, json};
 
@@ -41,7 +41,7 @@ pub(super) fn answer(
     });
     let unexplained = diagnosis.unexplained.as_ref().map(|u| &u.place);
     let residual = unexplained.or_else(|| diagnosis.found.first().map(|f| &f.place));
-    let residual = residual.or_else(|| diagnosis.evidence.first().map(|e| &e.place));
+    let residual = residual.or_else(|| diagnosis.places.first().map(|curve| &curve.place));
     let value = json!({
         "case": case,
         "verdict": spelt(diagnosis.verdict),

@@ -52,7 +52,7 @@ pub(super) fn sections(diagnosis: &Diagnosis) -> Vec<Section> {
         let about = Block::text(residuals::WHITE_RESIDUALS);
         add("Residuals of the nominal model", std::iter::once(about).chain(residuals).collect());
     }
-    if !diagnosis.evidence.is_empty() {
+    if !diagnosis.places.is_empty() {
         let plots = places::groups(diagnosis).into_iter().map(Block::Plots);
         add("Evidence by place", places::blocks(diagnosis).into_iter().chain(plots).collect());
     }

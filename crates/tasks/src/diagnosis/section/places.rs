@@ -1,4 +1,4 @@
-//! Evidence by place, and the unknown input at a place that would explain the residuals.
+//! Evidence by place, and the course of what is missing there.
 
 use mops_content::{
     figures::{Figure, Group},
@@ -8,7 +8,7 @@ use mops_content::{
     section::{Block, Part},
     table::{Cell, Table, numbers, text},
 };
-use mops_outcome::diagnosis::{Curve as Points, Diagnosis, Evidence};
+use mops_outcome::diagnosis::{Curve as Points, Diagnosis, LatentInput};
 
 use crate::diagnosis::words;
 
@@ -19,30 +19,21 @@ const MOST_EXPERIMENTS: usize = 2;
 
 /// Returns an explanation and the table of evidence by place.
 pub(super) fn blocks(diagnosis: &Diagnosis) -> [Block; 2] {
-    let largest = diagnosis.evidence.iter().map(|e| e.evidence).filter(|e| e.is_finite()).fold(1e-9, f64::max);
-    let columns = [
-        text("place"),
-        text("evidence"),
-        numbers("ln Bayes factor"),
-        numbers("explained share"),
-        numbers("degrees of freedom"),
-    ];
-    let rows = diagnosis.evidence.iter().map(|place| -> Vec<Cell> {
+    let largest = diagnosis.places.iter().map(|place| place.gain).filter(|gain| gain.is_finite()).fold(1e-9, f64::max);
+    let columns = [text("place"), text("depends on"), text("evidence"), numbers("gain (nats)")];
+    let rows = diagnosis.places.iter().map(|curve| -> Vec<Cell> {
+        let place =
+            curve.other.as_ref().map_or_else(|| curve.place.clone(), |other| format!("{} with {other}", curve.place));
         vec![
-            if has_effect(diagnosis, &place.place) {
-                Cell::with_remark(&place.place, "effect added")
-            } else {
-                place.place.clone().into()
-            },
-            Cell::new([Part::Bar(place.evidence / largest)]),
-            significant(place.evidence, 3).into(),
-            words::share(place.share).into(),
-            significant(place.freedom, 3).into(),
+            if has_effect(diagnosis, &curve.place) { Cell::with_remark(place, "effect added") } else { place.into() },
+            curve.coordinate.as_str().into(),
+            Cell::new([Part::Bar((curve.gain / largest).max(0.0))]),
+            significant(curve.gain, 3).into(),
         ]
     });
-    let about = "At each place in turn an unknown input was added and estimated by a smoother subject to the model equations. A missing \
-                 effect most likely acts where the evidence is largest: the input explains most of the residual with few degrees of \
-                 freedom. The input is an illustration only; the verdict does not use it.";
+    let about = "At each place in turn a free curve over each coordinate was added to the nominal model: a force at a balance, or a \
+                 change of an input. The gain in log-evidence of the best curve of a place says how well what is missing is described \
+                 as acting there. At sensors there is no such curve.";
     [Block::text(about), Block::Table(Table::new("Evidence by place", columns).rows(rows))]
 }
 
@@ -51,12 +42,9 @@ fn has_effect(diagnosis: &Diagnosis, place: &str) -> bool {
     diagnosis.found.iter().any(|found| found.place == place)
 }
 
-/// Returns the plots of places: those with added effects; without any, the place with the largest evidence.
+/// Returns the plots of what is missing at the places that have a course of it.
 pub(super) fn groups(diagnosis: &Diagnosis) -> Vec<Group> {
-    let (at_effects, others): (Vec<&Evidence>, Vec<&Evidence>) =
-        diagnosis.evidence.iter().partition(|e| has_effect(diagnosis, &e.place));
-    let most = if at_effects.is_empty() { 1 } else { at_effects.len() };
-    at_effects.into_iter().chain(others).take(most.min(MOST_PLACES)).map(|e| group(diagnosis, e)).collect()
+    diagnosis.latent.iter().take(MOST_PLACES).map(|latent| group(diagnosis, latent)).collect()
 }
 
 /// Returns the plot of what is missing over the coordinate that it depends on: the free curve, and the estimated input at the
@@ -64,10 +52,9 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> Vec<Group> {
 pub(super) fn dependence(diagnosis: &Diagnosis) -> Option<Group> {
     let dependence = diagnosis.depends_on.as_ref()?;
     let [x, y] = [0, 1].map(|k| dependence.curve.iter().map(|point| point[k]).collect::<Vec<f64>>());
-    // A level is the position of a store.
-    let over = if dependence.coordinate == "level" { "position" } else { dependence.coordinate.as_str() };
-    let evidence = diagnosis.evidence.iter().find(|e| e.place == dependence.place && dependence.other.is_none());
-    let points = evidence.and_then(|e| e.over.iter().find(|(name, ..)| name == over)).map(|(.., points)| points);
+    let latent = diagnosis.latent.iter().find(|latent| latent.place == dependence.place && dependence.other.is_none());
+    let points = latent.and_then(|latent| latent.over.iter().find(|(name, ..)| *name == dependence.coordinate));
+    let points = points.map(|(.., points)| points);
     let mut curves = Vec::new();
     if let Some(points) = points {
         curves.push(dots("estimated input", &points.x, &points.estimated, Color::Measured));
@@ -87,11 +74,11 @@ pub(super) fn dependence(diagnosis: &Diagnosis) -> Option<Group> {
     Some(Group { figures: vec![figure], ..Group::default() })
 }
 
-fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
+fn group(diagnosis: &Diagnosis, latent: &LatentInput) -> Group {
     let effects: Vec<&str> =
-        diagnosis.found.iter().filter(|f| f.place == evidence.place).map(|f| f.effect.as_str()).collect();
+        diagnosis.found.iter().filter(|f| f.place == latent.place).map(|f| f.effect.as_str()).collect();
     let effects = effects.join(" and ");
-    let y_label = labelled("unknown input", &evidence.unit);
+    let y_label = labelled("missing", &latent.unit);
     // The estimate, and the formulas of the effects found.
     let curves_of = |points: &Points, curve: fn(&str, &[f64], &[f64], Color) -> Curve| {
         let mut curves = vec![curve("estimate without a formula", &points.x, &points.estimated, Color::Measured)];
@@ -102,24 +89,24 @@ fn group(diagnosis: &Diagnosis, evidence: &Evidence) -> Group {
     };
     let figure = |key: &str, title: String, x_label: String, curves| {
         let plot = Plot { title, x_label, y_label: y_label.clone(), curves, ..Plot::default() };
-        Figure { plots: vec![(format!("missing-{}-{key}", evidence.place), plot)], ..Figure::default() }
+        Figure { plots: vec![(format!("missing-{}-{key}", latent.place), plot)], ..Figure::default() }
     };
     let mut figures = Vec::new();
-    for (over, unit, points) in &evidence.over {
+    for (over, unit, points) in &latent.over {
         let curves = curves_of(points, dots);
-        let title = format!("unknown input at {} over {over}", evidence.place);
+        let title = format!("what is missing at {} over {over}", latent.place);
         figures.push(figure(over, title, labelled(over, unit), curves));
     }
-    for (experiment, points) in evidence.over_time.iter().take(MOST_EXPERIMENTS) {
-        let title = format!("unknown input at {} in {experiment}", evidence.place);
+    for (experiment, points) in latent.over_time.iter().take(MOST_EXPERIMENTS) {
+        let title = format!("what is missing at {} in {experiment}", latent.place);
         figures.push(figure(&format!("time-{experiment}"), title, "time (s)".into(), curves_of(points, line)));
     }
-    let title = format!("Unknown input {}", words::at(&evidence.place));
-    let with_formula = evidence.over.iter().any(|(_, _, points)| !points.found.is_empty());
+    let title = format!("What is missing {}", words::at(&latent.place));
+    let with_formula = latent.over.iter().any(|(_, _, points)| !points.found.is_empty());
     let about = if with_formula {
         vec![format!(
-            "Component-plus-residual plot: the input is estimated for the recalibrated model without {effects}, with all \
-             other parameters fixed. If the formula is correct, the estimate follows it."
+            "Component-plus-residual plot of the recalibrated model: the formula of {effects}, and the formula plus the smooth \
+             remainder with all parameters fixed. If the formula is correct, the estimate follows it."
         )]
     } else {
         Vec::new()

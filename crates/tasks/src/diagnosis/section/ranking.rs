@@ -76,22 +76,11 @@ fn mark(diagnosis: &Diagnosis, effect: &Ranked) -> Option<&'static str> {
 
 /// Returns the table of the models along the search.
 pub(super) fn steps(diagnosis: &Diagnosis) -> Vec<Block> {
-    let mut windows: Vec<usize> = diagnosis.steps.iter().map(|step| step.windows).collect();
-    windows.dedup();
-    let about = "Each window has its own initial states. Errors over more windows are therefore smaller, and not comparable with errors \
-                 over whole records.";
-    let about = (windows.len() > 1).then(|| Block::Paragraph(vec![Part::Quiet(about.to_owned())]));
     let rows = diagnosis.steps.iter().map(|step| -> Vec<Cell> {
-        let windows = if step.windows > 1 { format!(" in {} windows", step.windows) } else { String::new() };
-        vec![
-            step.did.name().into(),
-            step.effects.join(", ").into(),
-            format!("{}{windows}", words::times(step.normalised)).into(),
-        ]
+        vec![step.did.name().into(), step.effects.join(", ").into(), words::times(step.normalised).into()]
     });
     let columns = [text("step"), text("effects in the model"), numbers("error / noise")];
-    let table = Table::new("Steps of the search", columns).rows(rows);
-    about.into_iter().chain([Block::Table(table)]).collect()
+    vec![Block::Table(Table::new("Steps of the search", columns).rows(rows))]
 }
 
 /// Returns the table of parameter shifts.

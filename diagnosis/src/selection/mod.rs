@@ -1,0 +1,26 @@
+//! Which effects a model lacks: sets of effects, fitted under the error models, compared by evidence and by forecast.
+
+mod alignment;
+mod baseline;
+mod contradiction;
+mod fitted_set;
+mod forecast;
+mod preparation;
+mod refit;
+mod screening;
+mod search;
+mod sets;
+#[cfg(test)]
+mod tests;
+mod verdict;
+
+pub(crate) use alignment::align;
+#[cfg(test)]
+pub(crate) use baseline::baseline;
+pub(crate) use fitted_set::{FittedSet, Key, STRONG, estimation};
+pub(crate) use forecast::{Forecasts, with_free_starts};
+pub(crate) use preparation::{prepare, with_given};
+pub(crate) use refit::{WORSE, price};
+pub(crate) use screening::{Screened, Screening};
+pub(crate) use sets::{FittedSets, without};
+pub(crate) use verdict::{Conclusion, Verdict, decide, entry};
