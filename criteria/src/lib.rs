@@ -48,11 +48,10 @@ pub mod step_envelope;
 pub mod undershoot;
 
 mod common;
-#[cfg(test)]
-mod tests;
 
 use mops_core::catalogue::CriterionKind;
 
+pub use common::{Of, part};
 pub use from_fn::{FnCriterion, from_fn};
 
 /// Returns all kinds of criteria. A new kind needs a file and a line here.

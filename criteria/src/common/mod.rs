@@ -5,8 +5,6 @@ mod error_integral;
 mod linear;
 mod part;
 mod step;
-#[cfg(test)]
-pub mod testing;
 
 use mops_core::{Analysis, StudyError, Trace};
 use mops_language::{Quantity, Unit};

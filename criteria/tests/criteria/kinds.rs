@@ -8,13 +8,12 @@ use mops_core::{
     SolverOptions, StudyError, Trace, Variable,
     catalogue::{ModelKind, SolverKind},
 };
+use mops_criteria::kinds;
 use mops_file::{describe, read};
 use mops_language::files::Files;
 use mops_math as math;
 use schemars::JsonSchema;
 use serde::Deserialize;
-
-use crate::kinds;
 
 /// Every kind, with options as written in a study file.
 const EXAMPLES: [(&str, &str); 35] = [
@@ -178,8 +177,7 @@ impl Model for LagModel {
     }
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        let trace: Trace =
-            crate::common::testing::sampled(job.horizon, 500, |t| 1.0 - math::exp(-t / job.parameters[0]));
+        let trace: Trace = crate::testing::sampled(job.horizon, 500, |t| 1.0 - math::exp(-t / job.parameters[0]));
         Ok(Analysis::Time(Response { traces: vec![("y".into(), trace)], ..Response::default() }))
     }
 }
@@ -211,7 +209,7 @@ impl Model for LinearLagModel {
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
         let t = job.parameters[0];
-        Ok(crate::common::testing::linear(&[3.0], &[t, 1.0 + t, 1.0]))
+        Ok(crate::testing::linear(&[3.0], &[t, 1.0 + t, 1.0]))
     }
 }
 
