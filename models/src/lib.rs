@@ -36,8 +36,3 @@ pub fn kinds() -> Vec<ModelKind> {
         ModelKind::of::<equations::EquationsOptions>(),
     ]
 }
-
-#[cfg(test)]
-mod linear_tests;
-#[cfg(test)]
-mod tests;

@@ -3,7 +3,9 @@
 //! All functions are pure computations on small dense matrices. A request without an answer returns an error of one
 //! sentence.
 
+mod banded;
 mod bounded_response;
+mod columns;
 mod components;
 mod controllability;
 mod delays;
@@ -37,6 +39,8 @@ mod zeros;
 
 use nalgebra::DMatrix;
 
+pub use banded::Banded;
+pub use columns::column_groups;
 pub use controllability::check_controllable;
 pub use disk_margin::disk_margin;
 pub use eigen::{eigenvalues, undecided};

@@ -13,6 +13,7 @@ pub mod complex;
 mod layers;
 mod normal;
 mod random;
+pub mod rough;
 
 pub use normal::normal;
 pub use random::{Stream, stream};

@@ -1,6 +1,7 @@
-//! Complex functions against those of real numbers, and normal random numbers against their distribution.
+//! Complex functions against those of real numbers, rough functions against accurate ones, and normal random numbers against their
+//! distribution.
 
-use mops_math::{self as math, complex};
+use mops_math::{self as math, complex, rough};
 use nalgebra::Complex;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -61,4 +62,14 @@ fn the_tail_has_its_mean() {
     let found = tail.iter().sum::<f64>() / tail.len() as f64;
     // The standard deviation of the tail is about 1/r.
     assert!((found - mean).abs() <= 4.0 / edge / (tail.len() as f64).sqrt(), "{found}, not {mean}");
+}
+
+#[test]
+fn logarithm_and_power_have_their_stated_accuracy() {
+    for k in -3000..3000 {
+        let x = f64::from(k) / 97.0;
+        let power = math::exp2(x);
+        assert!((rough::exp2(x) / power - 1.0).abs() < 1.2e-4, "{x}");
+        assert!((rough::log2(power) - x).abs() < 1.1e-3, "{x}");
+    }
 }

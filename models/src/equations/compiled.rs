@@ -3,13 +3,13 @@
 use std::ops::Range;
 
 use mops_core::StudyError;
+use mops_linear::column_groups;
 
 use super::graph::{Id, Level, Op};
 use super::layout::Layout;
 use super::program::Program;
 use super::system::{self, Contact, System};
 use super::tape::compile;
-use crate::kernel::groups;
 
 /// Source of a signal.
 #[derive(Debug)]
@@ -137,7 +137,7 @@ fn grouped(pattern: &[(usize, usize)], states: usize) -> Vec<Vec<Column>> {
         rows[column].push(row);
     }
     let columns = |group: Vec<usize>| group.into_iter().map(|column| (column, rows[column].clone())).collect();
-    groups(&rows).into_iter().map(columns).collect()
+    column_groups(&rows).into_iter().map(columns).collect()
 }
 
 impl Compiled {

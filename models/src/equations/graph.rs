@@ -363,34 +363,3 @@ impl Graph {
         seen
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn repeated_subexpressions_share_a_node_in_any_order() {
-        let mut g = Graph::default();
-        let (x, y) = (g.add_op(Op::State(0)), g.add_op(Op::State(1)));
-        let (a, two) = (g.add_op(Op::Parameter(0)), g.number(2.0));
-        let sin = g.function(Function::Sin, x);
-        let one = [two, a, y, sin].into_iter().reduce(|p, f| g.mul(p, f)).unwrap();
-        let other = [sin, two, y, a].into_iter().reduce(|p, f| g.mul(p, f)).unwrap();
-        assert_eq!(one, other);
-        let Op::Mul(hoisted, _) = g.op(one) else { panic!("a product") };
-        assert_eq!(g.level(hoisted), Level::Parameter);
-    }
-
-    #[test]
-    fn numbers_are_folded_and_neutral_operands_are_removed() {
-        let mut g = Graph::default();
-        let x = g.add_op(Op::State(0));
-        let (zero, one, three) = (g.number(0.0), g.number(1.0), g.number(3.0));
-        assert_eq!([g.add(x, zero), g.mul(one, x), g.div(x, one), g.power(x, one)], [x; 4]);
-        assert_eq!([g.mul(x, zero), g.sub(x, x)], [zero; 2]);
-        let nine = g.mul(three, three);
-        assert_eq!(g.constant(nine), Some(9.0));
-        let minus = g.negative(x);
-        assert_eq!([g.add(x, minus), g.negative(minus)], [zero, x]);
-    }
-}

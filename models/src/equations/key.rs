@@ -105,22 +105,3 @@ fn index(text: &str) -> Option<Index> {
     }
     is_name(text).then(|| Index::Rest(text.to_owned()))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_key_is_a_name_or_a_family() {
-        let of = |key: &str| Key::parse(key).unwrap().index;
-        assert_eq!(of("phi"), Index::None);
-        assert_eq!(of("T[3]"), Index::One(3));
-        assert_eq!(of("T[1..100]"), Index::Range(None, 1, 100));
-        assert_eq!(of("T[ i = 2 .. 99 ]"), Index::Range(Some("i".into()), 2, 99));
-        assert_eq!(of("T[i]"), Index::Rest("i".into()));
-        assert_eq!(Key::parse("T[1..3]").unwrap().declared().unwrap(), ["T[1]", "T[2]", "T[3]"]);
-        for wrong in ["phi-dot", "2x", "T[", "T[1..]", "T[i..3]", "T[3..1]", "time"] {
-            assert!(Key::parse(wrong).is_err(), "{wrong}");
-        }
-    }
-}

@@ -261,6 +261,3 @@ impl PlantModel for Equations {
         Ok(self.running(self.opened(), parameters))
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -143,8 +143,9 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
         self.inputs.look(t, x, |at| self.plant.rates(at, dx));
     }
 
+    /// Returns the value of a signal, by its index in the interface, at the time `t`, s, and the states `x`.
     #[inline]
-    pub(super) fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
+    pub fn signal(&self, signal: usize, t: f64, x: &[S]) -> S {
         self.inputs.look(t, x, |at| self.plant.signal(signal, at))
     }
 

@@ -12,10 +12,10 @@
 
 use mops_core::model::Work;
 use mops_language::Scalar;
+use mops_linear::{Banded, column_groups};
 use mops_math as math;
 
 use super::Driven;
-use super::banded::Banded;
 use super::integrable::Integrable;
 use super::integrate::{Attempt, Method};
 use super::weights::Weights;
@@ -95,7 +95,7 @@ impl<S: Scalar> Method<S> for Esdirk<S> {
         let places = || rows.iter().enumerate().flat_map(|(column, rows)| rows.iter().map(move |&row| (row, column)));
         let lower = places().map(|(row, column)| row.saturating_sub(column)).max().unwrap_or(0);
         let upper = places().map(|(row, column)| column.saturating_sub(row)).max().unwrap_or(0);
-        let groups = groups(&rows);
+        let groups = column_groups(&rows);
         Self {
             k: std::array::from_fn(|_| x.to_vec()),
             base: x.to_vec(),
@@ -355,146 +355,4 @@ fn solve<S: Scalar>(factors: &Banded, b: &mut [S], column: &mut [f64]) {
     column.iter_mut().zip(b.iter()).for_each(|(c, b)| *c = b.value());
     factors.solve(column);
     b.iter_mut().zip(column.iter()).for_each(|(b, &c)| *b = b.chain(c, 1.0));
-}
-
-/// Partitions columns into groups in which no two share a row; each column joins the first group that fits.
-///
-/// Source: A. Curtis, M. Powell, J. Reid, Journal of the Institute of Mathematics and its Applications 13 (1974) 117-119.
-pub(crate) fn groups(rows: &[Vec<usize>]) -> Vec<Vec<usize>> {
-    let mut groups: Vec<(Vec<usize>, Vec<bool>)> = Vec::new();
-    for (column, of_column) in rows.iter().enumerate() {
-        let fits = |(_, taken): &&mut (Vec<usize>, Vec<bool>)| of_column.iter().all(|&row| !taken[row]);
-        let group = match groups.iter_mut().find(fits) {
-            Some(group) => group,
-            None => {
-                groups.push((Vec::new(), vec![false; rows.len()]));
-                groups.last_mut().expect("one was pushed")
-            }
-        };
-        group.0.push(column);
-        of_column.iter().for_each(|&row| group.1[row] = true);
-    }
-    groups.into_iter().map(|(columns, _)| columns).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use mops_core::{Failure, Instant, Plant};
-    use mops_language::Dual;
-
-    use super::super::{IntegrationMethod, Tolerance, integrate};
-    use super::*;
-
-    fn stiff(relative: f64) -> Tolerance {
-        Tolerance { relative, method: IntegrationMethod::Stiff, ..Tolerance::DEFAULT }
-    }
-
-    /// Van der Pol oscillator `x'' = mu (1 - x^2) x' - x`.
-    struct VanDerPol<S>(S);
-    impl<S: Scalar> Plant<S> for VanDerPol<S> {
-        fn start(&self) -> Vec<S> {
-            vec![S::from(2.0), S::from(0.0)]
-        }
-        fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
-            let x = at.x;
-            dx.copy_from_slice(&[x[1], self.0 * (-x[0] * x[0] + 1.0) * x[1] - x[0]]);
-        }
-    }
-
-    #[test]
-    fn van_der_pol_agrees_with_its_published_value() {
-        // Reference at t = 2000 for mu = 1000 from (2, 0): 1.706167732170483 (test set for IVP solvers, Bari, vdpolm).
-        let (x, work) =
-            integrate(&mut Driven::alone(VanDerPol(1000.0)), 0.0, 2000.0, &[2.0, 0.0], &stiff(1e-8), &mut ()).unwrap();
-        assert!((x[0] - 1.706_167_732_170_483).abs() < 1e-6, "{x:?} {work:?}");
-        let explicit = Tolerance { method: IntegrationMethod::Explicit, ..stiff(1e-8) };
-        let failure = integrate(&mut Driven::alone(VanDerPol(1000.0)), 0.0, 2000.0, &[2.0, 0.0], &explicit, &mut ());
-        assert!(matches!(failure, Err(Failure::StepLimit(..))));
-    }
-
-    #[test]
-    fn the_error_falls_with_the_fourth_power_of_the_step() {
-        // The solution of `x' = -cos(t) x^2`, `x(0) = 1` is `1/(1 + sin t)`.
-        struct Rational;
-        impl Plant<f64> for Rational {
-            fn start(&self) -> Vec<f64> {
-                vec![1.0]
-            }
-            fn rates(&self, at: &Instant<'_, f64>, dx: &mut [f64]) {
-                dx[0] = -math::cos(at.t) * at.x[0] * at.x[0];
-            }
-        }
-        let fixed = |steps: u32| {
-            let h = 2.0 / f64::from(steps);
-            let (mut x, mut next, mut work) = ([1.0], [0.0], Work::default());
-            let rational = Driven::alone(Rational);
-            let weights = Weights::new(&rational, &x, 2.0, &stiff(1e-10));
-            let mut method = Esdirk::new(&rational, &x);
-            for i in 0..steps {
-                let t = h * f64::from(i);
-                method.restart(&rational, t, &x, &mut work);
-                let attempt = Attempt { t, h, x: &x, weights: &weights };
-                assert!(method.attempt(&rational, attempt, &mut next, &mut work).is_finite());
-                x = next;
-            }
-            (x[0] - 1.0 / (1.0 + math::sin(2.0))).abs()
-        };
-        let order = math::log2(fixed(20) / fixed(40));
-        assert!((order - 4.0).abs() < 0.25, "{order}");
-    }
-
-    #[test]
-    fn tangents_are_exact_and_change_no_value() {
-        let tolerance = stiff(1e-9);
-        let run = |mu: f64| {
-            integrate(&mut Driven::alone(VanDerPol(mu)), 0.0, 5.0, &[2.0, 0.0], &tolerance, &mut ()).unwrap().0
-        };
-        let start = [Dual::from(2.0), Dual::from(0.0)];
-        let mut dual = Driven::alone(VanDerPol(Dual::<1>::variable(10.0, 0)));
-        let (x, _) = integrate(&mut dual, 0.0, 5.0, &start, &tolerance, &mut ()).unwrap();
-        assert_eq!(x.iter().map(|x| x.value).collect::<Vec<_>>(), run(10.0));
-        let (high, low) = (run(10.0 + 1e-3), run(10.0 - 1e-3));
-        for i in 0..2 {
-            let slope = (high[i] - low[i]) / 2e-3;
-            assert!((x[i].tangent[0] - slope).abs() < 1e-5 * slope.abs().max(1e-2), "{:?} {slope}", x[i]);
-        }
-    }
-
-    #[test]
-    fn a_chain_that_rests_at_zero_is_driven() {
-        /// Chain of integrators `x1' = x2`, ..., `xn' = push(t)`, with all states 0 at the start.
-        struct Chain<const N: usize>(fn(f64) -> f64);
-        impl<const N: usize> Plant<f64> for Chain<N> {
-            fn start(&self) -> Vec<f64> {
-                vec![0.0; N]
-            }
-            fn rates(&self, at: &Instant<'_, f64>, dx: &mut [f64]) {
-                dx.copy_from_slice(at.x);
-                dx.rotate_left(1);
-                dx[N - 1] = self.0(at.t);
-            }
-        }
-        fn end<const N: usize>(push: fn(f64) -> f64) -> f64 {
-            integrate(&mut Driven::alone(Chain::<N>(push)), 0.0, 1.0, &[0.0; N], &stiff(1e-8), &mut ()).unwrap().0[0]
-        }
-        for unit in [1.0, 1e-30, 1e30] {
-            let near = |found: f64, exact: f64| assert!((found - exact).abs() < 1e-6 * exact.abs(), "{found} {exact}");
-            let push: fn(f64) -> f64 = match unit {
-                1.0 => |_| 1.0,
-                1e-30 => |_| 1e-30,
-                _ => |_| 1e30,
-            };
-            let found = [end::<1>(push), end::<2>(push), end::<3>(push), end::<4>(push)];
-            found.into_iter().zip([1.0, 0.5, 1.0 / 6.0, 1.0 / 24.0]).for_each(|(x, exact)| near(x, exact * unit));
-        }
-        let driven = end::<2>(math::sin);
-        assert!((driven - (1.0 - math::sin(1.0))).abs() < 1e-7, "{driven}");
-    }
-
-    #[test]
-    fn columns_that_share_no_row_are_grouped() {
-        let tridiagonal: Vec<Vec<usize>> =
-            (0..9_usize).map(|j| (j.saturating_sub(1)..=(j + 1).min(8)).collect()).collect();
-        assert_eq!(groups(&tridiagonal).len(), 3);
-    }
 }

@@ -270,6 +270,3 @@ impl<S: Scalar, B: Bodies<S, N>, const N: usize> Events<S> for Mechanism<S, B, N
         }
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -38,7 +38,6 @@ macro_rules! by_size {
     };
 }
 
-mod banded;
 mod dormand_prince;
 pub mod drive;
 mod driven;
@@ -65,7 +64,6 @@ pub use mops_core::plant::{IntegrationMethod, Tolerance};
 
 pub use driven::Driven;
 pub(crate) use driven::mobility;
-pub(crate) use esdirk::groups;
 pub(crate) use events::{common, shift};
 pub use inputs::Inputs;
 pub use integrable::Integrable;
@@ -74,8 +72,10 @@ pub(crate) use integrate::integrate_for;
 pub(crate) use local::rests;
 pub use plant_model::{PlantModel, Simulated};
 pub(crate) use plant_model::{Simulation, cut_at, shown};
-pub(crate) use record::{Recording, Wanted, allowed, record, tangents_of, wanted};
+pub use record::{Recording, Wanted, record};
+pub(crate) use record::{allowed, tangents_of, wanted};
 pub use step::Step;
+pub use step_size::StepSizes;
 
 /// Returns the time in s that a model's options give under `key`.
 ///

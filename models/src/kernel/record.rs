@@ -43,22 +43,24 @@ pub fn tangents_of(
     Ok((Analysis::Time(analysis.expect("there is a seed")), tangents))
 }
 
-/// Signals to record, and the means to cancel the simulation.
+/// Signals to record, the means to cancel the simulation, and the limit on what it records.
 pub struct Wanted {
     /// Signals, by index and name.
     pub signals: Vec<(usize, String)>,
     /// Requests the end of the simulation.
     pub cancellation: Cancellation,
+    /// Limit on the size of the recording in bytes, tangents included. A segment of a trace is 7 numbers of 8 bytes: its end, five
+    /// coefficients, and the derivative of its end.
+    pub room: usize,
 }
 
 impl From<Vec<(usize, String)>> for Wanted {
     fn from(signals: Vec<(usize, String)>) -> Self {
-        Self { signals, cancellation: Cancellation::default() }
+        Self { signals, cancellation: Cancellation::default(), room: ROOM }
     }
 }
 
-/// Limit on the size of a recording in bytes, tangents included: sufficient for 100,000 steps, the default step limit,
-/// of a hundred signals.
+/// Default of [`Wanted::room`]: sufficient for 100,000 steps, the default step limit, of a hundred signals.
 const ROOM: usize = 512 << 20;
 
 /// Limit on the initial capacity of all traces in bytes; most simulations take few steps.
@@ -433,30 +435,7 @@ pub fn record<S: Scalar, P: Plant<S>>(
     tolerance: &Tolerance,
     wanted: &Wanted,
 ) -> Result<Recording, Failure> {
-    record_within(ROOM, system, (start, end), tolerance, wanted)
-}
-
-impl Recording {
-    /// Sets the values of all signals just before the start.
-    pub fn set_initial<S: Scalar>(&mut self, values: &[S]) {
-        for (i, value) in values.iter().enumerate() {
-            self.response.traces[i].1.set_initial(value.value());
-            for (tangents, &tangent) in self.tangents.iter_mut().zip(value.tangents()) {
-                tangents.traces[i].1.set_initial(tangent);
-            }
-        }
-    }
-}
-
-/// Implements [`record`] with a limit on the recorded bytes.
-fn record_within<S: Scalar, P: Plant<S>>(
-    room: usize,
-    system: &mut Driven<'_, S, P>,
-    (start, end): (&[S], f64),
-    tolerance: &Tolerance,
-    wanted: &Wanted,
-) -> Result<Recording, Failure> {
-    let Wanted { signals, cancellation } = wanted;
+    let Wanted { signals, cancellation, room } = wanted;
     let traces = (1 + S::DIRECTIONS) * signals.len();
     let segments = (FIRST_ROOM / SEGMENT / traces.max(1)).min(256);
     let mut recorder = Recorder {
@@ -464,7 +443,7 @@ fn record_within<S: Scalar, P: Plant<S>>(
         shows: signals.iter().map(|(signal, _)| system.shows(*signal)).collect(),
         cancellation,
         taken: 0,
-        room,
+        room: *room,
         traces: vec![vec![Trace::starting_at(0.0, segments); signals.len()]; 1 + S::DIRECTIONS],
         events: Vec::new(),
         restarts: Vec::new(),
@@ -488,13 +467,23 @@ fn record_within<S: Scalar, P: Plant<S>>(
     Ok(Recording { response, tangents })
 }
 
+impl Recording {
+    /// Sets the values of all signals just before the start.
+    pub fn set_initial<S: Scalar>(&mut self, values: &[S]) {
+        for (i, value) in values.iter().enumerate() {
+            self.response.traces[i].1.set_initial(value.value());
+            for (tangents, &tangent) in self.tangents.iter_mut().zip(value.tangents()) {
+                tangents.traces[i].1.set_initial(tangent);
+            }
+        }
+    }
+}
+
 /// Returns the signals to record and the cancellation of a job, for a model with these signals.
 pub fn wanted(job: &Job<'_>, signals: &[mops_core::Variable]) -> Wanted {
     Wanted {
         signals: job.signals.iter().map(|&i| (i, signals[i].name.clone())).collect(),
         cancellation: job.case.cancellation.clone(),
+        room: ROOM,
     }
 }
-
-#[cfg(test)]
-mod tests;

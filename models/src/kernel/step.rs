@@ -96,7 +96,7 @@ impl<S: Scalar> Step<S> {
     }
 
     /// Computes bounds of all components and of their rates between the fractions `from` and `to` of the step length.
-    pub(super) fn enclose(&self, from: f64, to: f64, bounds: &mut Vec<Enclosure>) {
+    pub fn enclose(&self, from: f64, to: f64, bounds: &mut Vec<Enclosure>) {
         let (m, radius) = (0.5 * (from + to), 0.5 * (to - from));
         let per_second = Interval::point(1.0 / self.length);
         bounds.clear();
@@ -144,33 +144,4 @@ fn taylor([r0, r1, r2, r3, r4]: [f64; 5], m: f64) -> [f64; 5] {
     let first = c[1] + m * (2.0 * c[2] + m * (3.0 * c[3] + m * 4.0 * c[4]));
     let second = c[2] + m * (3.0 * c[3] + m * 6.0 * c[4]);
     [value, first, second, c[3] + 4.0 * m * c[4], c[4]]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bounds_enclose_the_dense_output_and_its_derivative() {
-        let mut step = Step::new(&[0.0]);
-        step.begin(2.0, 0.5);
-        step.dense = [1.0, -2.0, 3.0, 0.5, -4.0].map(|r| vec![r]);
-        let mut bounds = Vec::new();
-        let at = |theta: f64| {
-            let mut x = [0.0];
-            step.at(theta, &mut x);
-            x[0]
-        };
-        for (from, to) in [(0.0, 1.0), (0.2, 0.3), (0.7, 1.0)] {
-            step.enclose(from, to, &mut bounds);
-            for k in 0..=20 {
-                let theta = from + (to - from) * f64::from(k) / 20.0;
-                let slope = (at(theta + 1e-6) - at(theta - 1e-6)) / (2e-6 * step.length);
-                let wider = |i: Interval| (i.low - 1e-7, i.high + 1e-7);
-                let (value, rate) = (wider(bounds[0].value), wider(bounds[0].rate));
-                assert!(value.0 <= at(theta) && at(theta) <= value.1, "{bounds:?} {theta}");
-                assert!(rate.0 <= slope && slope <= rate.1, "{bounds:?} {theta} {slope}");
-            }
-        }
-    }
 }

@@ -461,6 +461,3 @@ impl Model for WithEffects {
         Some(tangents_of(|parameters| self.simulate(job, parameters), job.parameters, seeds))
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -22,6 +22,3 @@ pub use lag::Lag;
 pub use piecewise_linear::PiecewiseLinear;
 pub use saturation::Saturation;
 pub use spring_damper::SpringDamper;
-
-#[cfg(test)]
-mod tests;

@@ -10,13 +10,12 @@ use mops_language::Quantity;
 use mops_linear::{Complex, Loop, StateSpace, TransferFunction};
 use mops_math as math;
 use mops_math::complex;
-
-use crate::furuta::Furuta;
-use crate::kernel::Tolerance;
-use crate::pid_loop::PidLoopOptions;
-use crate::pid_open_loop::PidOpenLoopOptions;
-use crate::state_space::StateSpaceOptions;
-use crate::transfer_function::TransferFunctionOptions;
+use mops_models::furuta::Furuta;
+use mops_models::kernel::Tolerance;
+use mops_models::pid_loop::PidLoopOptions;
+use mops_models::pid_open_loop::PidOpenLoopOptions;
+use mops_models::state_space::StateSpaceOptions;
+use mops_models::transfer_function::TransferFunctionOptions;
 
 fn model<O: ModelOptions>(options: &str) -> Box<dyn Model> {
     toml::from_str::<O>(options).expect("options are right").build().expect("options make sense")
@@ -62,7 +61,7 @@ fn the_furuta_pendulum_upright_is_the_linear_pendulum() {
 
 #[test]
 fn bearings_rest_without_dry_friction_and_slide_where_they_move() {
-    let furuta = model::<crate::furuta_2_joint::Furuta2JointOptions>("");
+    let furuta = model::<mops_models::furuta_2_joint::Furuta2JointOptions>("");
     let value = |p: &mops_core::Parameter| match p.variable.name.as_str() {
         "tau11" => 0.01,
         "tau12" => 0.03,

@@ -7,10 +7,9 @@ mod state_feedback;
 
 use mops_core::{Case, Input, Job, Model, ModelOptions, Parameter, Response};
 use mops_math as math;
-
-use crate::furuta::Furuta;
-use crate::kernel::Tolerance;
-use crate::pid_loop::PidLoopOptions;
+use mops_models::furuta::Furuta;
+use mops_models::kernel::Tolerance;
+use mops_models::pid_loop::PidLoopOptions;
 
 fn values(model: &dyn Model, given: &[(&str, f64)]) -> Vec<f64> {
     let value = |p: &Parameter| {

@@ -8,16 +8,16 @@ use mops_core::{
     effect::{Placement, Port},
     model::OperatingPoint,
 };
+use mops_effects::effects;
 use mops_language::Scalar;
 use mops_math as math;
+use mops_models::WithEffects;
+use mops_models::equations::EquationsOptions;
+use mops_models::kernel::{PlantModel, Simulated, mechanism};
 
-use mops_effects::effects;
+use crate::simulated::{check_tangents_by, respond};
 
-use super::WithEffects;
-use crate::equations::EquationsOptions;
-use crate::kernel::{PlantModel, Simulated, mechanism};
-use crate::tests::{check_tangents_by, respond};
-
+mod along;
 mod past;
 
 fn equations(text: &str) -> Arc<dyn Model> {
@@ -293,7 +293,7 @@ fn a_window_of_a_record_agrees_with_the_whole_record_for_actuators_with_hysteres
 }
 
 fn built_in(kind: &str) -> Arc<dyn Model> {
-    let kinds = crate::kinds();
+    let kinds = mops_models::kinds();
     let kind = kinds.iter().find(|known| known.name == kind).expect("it is there");
     Arc::from(kind.default_model().expect("every option has a default"))
 }
@@ -373,7 +373,7 @@ fn dry_friction_as_an_effect_agrees_with_that_of_the_model_with_sticking() {
 
 #[test]
 fn a_pendulum_of_equations_takes_friction_as_the_built_in_one_does() {
-    let text = equations(include_str!("../../tests/equations/furuta-free.toml"));
+    let text = equations(include_str!("../../equations/furuta-free.toml"));
     let text = with(&text, &[("coulomb-friction", "joint:ph"), ("coulomb-friction", "joint:th")]);
     let of_text = [("b", 0.012), ("c", 0.004), ("d", 0.05), ("ba", 0.002), ("bp", 3e-4), ("th0", 2.2)];
     let (added, _) = pushed(&text, &[&of_text[..], &[("e0.c", 0.012), ("e1.c", 0.001)]].concat(), &["ph", "th"]);

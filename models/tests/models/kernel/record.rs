@@ -1,9 +1,9 @@
 //! Recorded signals, compared with the functions that define them.
 
-use mops_core::{Halt, Instant, Plant};
+use mops_core::{Failure, Halt, Instant, Plant};
+use mops_language::{Dual, Scalar};
 use mops_math as math;
-
-use super::*;
+use mops_models::kernel::{Driven, Tolerance, Wanted, record};
 
 /// State with this constant rate, 0 or that of the clock, so that steps are as long as possible. The signal is a
 /// function of time and state.
@@ -21,6 +21,9 @@ impl<S: Scalar, F: Fn(f64, S) -> S> Plant<S> for Idle<F> {
 }
 
 const TOLERANCE: Tolerance = Tolerance { max_steps: 1000, ..Tolerance::DEFAULT };
+
+/// Size of a segment of a trace in bytes: 7 numbers.
+const SEGMENT: usize = 56;
 
 /// Returns the largest difference between the recorded signal and its function of time and state, over a thousand
 /// times.
@@ -105,15 +108,15 @@ impl<S: Scalar, F: Fn(f64)> Plant<S> for Clock<F> {
 fn the_limit_of_a_recording_counts_tangents_and_signals() {
     let endless = Tolerance { max_steps: usize::MAX, ..TOLERANCE };
     for signals in [1, 2, 7] {
-        let wanted = (0..signals).map(|i| (i, format!("y{i}"))).collect::<Vec<_>>().into();
-        let room = 100 * signals * SEGMENT;
+        let mut wanted = Wanted::from((0..signals).map(|i| (i, format!("y{i}"))).collect::<Vec<_>>());
+        wanted.room = 100 * signals * SEGMENT;
         // Steps of 1 s: the limit allows 100 of them, and a quarter of that with three tangents.
-        let run = |end: f64| record_within(room, &mut Driven::alone(Clock(|_| ())), (&[0.0], end), &endless, &wanted);
+        let run = |end: f64| record(&mut Driven::alone(Clock(|_| ())), &[0.0], end, &endless, &wanted);
         assert!(run(95.0).is_ok());
         let Err(Failure::RecordLimit(t)) = run(1e300) else { panic!("it ends") };
         assert!((95.0..=105.0).contains(&t), "{t}");
         let start = [Dual::<3>::from(0.0)];
-        let run = |end: f64| record_within(room, &mut Driven::alone(Clock(|_| ())), (&start, end), &endless, &wanted);
+        let run = |end: f64| record(&mut Driven::alone(Clock(|_| ())), &start, end, &endless, &wanted);
         assert!(run(20.0).is_ok());
         let Err(Failure::RecordLimit(t)) = run(1e300) else { panic!("it ends") };
         assert!((20.0..=30.0).contains(&t), "{t}");

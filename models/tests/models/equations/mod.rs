@@ -1,14 +1,11 @@
 //! Models from text, compared with an independent integration, closed forms and compiled models.
 
-mod large;
-
 use mops_core::{Analysis, Case, Failure, Input, Job, Model, Response, StudyError};
 use mops_math as math;
+use mops_models::equations::EquationsOptions;
+use mops_models::{equations, kernel::Simulated};
 
-use super::EquationsOptions;
-use crate::kernel::Simulated;
-
-type Equations = Simulated<super::Equations>;
+type Equations = Simulated<equations::Equations>;
 
 mod clocks;
 mod controllers;
@@ -16,6 +13,9 @@ mod delays;
 mod dry_friction;
 mod events;
 mod filters;
+mod graph;
+mod key;
+mod large;
 mod linear;
 mod order;
 mod scales;
@@ -26,7 +26,7 @@ const TIGHT: &str = "\n[tolerance]\nrelative = 1e-10\nabsolute = 1e-12\n";
 
 fn read(text: &str) -> Result<Equations, StudyError> {
     let options = toml::from_str::<EquationsOptions>(text).unwrap_or_else(|e| panic!("{e}\n{text}"));
-    super::Equations::new(&options).map(Simulated::new)
+    equations::Equations::new(&options).map(Simulated::new)
 }
 
 fn model(text: &str) -> Equations {
@@ -70,7 +70,7 @@ type Plant = (&'static str, Vec<(&'static str, Input)>, Vec<(&'static str, f64)>
 
 macro_rules! text {
     ($name:literal) => {
-        include_str!(concat!("../../tests/equations/", $name, ".toml"))
+        include_str!(concat!("../../equations/", $name, ".toml"))
     };
 }
 
@@ -168,8 +168,8 @@ fn tangents_agree_with_central_differences() {
 
 #[test]
 fn a_model_from_text_agrees_with_the_compiled_model_with_dry_friction() {
-    use crate::furuta::Furuta;
-    use crate::kernel::Tolerance;
+    use mops_models::furuta::Furuta;
+    use mops_models::kernel::Tolerance;
     let friction = "\n[friction]\nth = { viscous = 'bp', coulomb = 'cp' }\nphd = { viscous = 'ba', coulomb = 'ca' }\n";
     let text = text!("furuta-driven")
         .replace(" - bp*thd\"", "\"")

@@ -2,11 +2,11 @@
 
 use mops_core::{Case, Model, ModelOptions, Response, model::OperatingPoint};
 use mops_math as math;
+use mops_models::furuta_2_joint::Furuta2JointOptions;
+use mops_models::furuta_linear::FurutaLinearOptions;
+use mops_models::furuta_state_feedback::FurutaStateFeedbackOptions;
 
 use super::{check_tangents_by, respond, values as values_of};
-use crate::furuta_2_joint::Furuta2JointOptions;
-use crate::furuta_linear::FurutaLinearOptions;
-use crate::furuta_state_feedback::FurutaStateFeedbackOptions;
 
 /// Lumped parameters of table 4.5 of the thesis before rounding, spring of the arm, damper of the pendulum, setpoint of
 /// 30 deg.

@@ -10,9 +10,8 @@ use mops_core::{
 };
 use mops_effects::effects;
 use mops_math as math;
-
-use crate::equations::EquationsOptions;
-use crate::with_effects::WithEffects;
+use mops_models::WithEffects;
+use mops_models::equations::EquationsOptions;
 
 const BLOCK: &str = r#"
 states     = { x = "m", v = "m/s" }

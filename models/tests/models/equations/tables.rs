@@ -31,7 +31,7 @@ fn with_table(table: &str, output: &str) -> Result<Equations, StudyError> {
          tables.f = {table}{TIGHT}"
     );
     let options = toml::from_str::<EquationsOptions>(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
-    super::super::Equations::with_files(&options, &FILES).map(Simulated::new)
+    equations::Equations::with_files(&options, &FILES).map(Simulated::new)
 }
 
 /// Returns `y` where `x`, in rad/s, has these values.

@@ -6,10 +6,11 @@ use mops_core::{
 };
 use mops_language::{Dual, Scalar};
 use mops_math as math;
-
-use super::delay::Restart;
-use super::*;
-use crate::kernel::{Driven, Sink, Step, Tolerance, integrate};
+use mops_models::kernel::elements::delay::Restart;
+use mops_models::kernel::elements::{
+    Backlash, BearingFriction, DeadZone, Delay, Lag, PiecewiseLinear, Saturation, SpringDamper,
+};
+use mops_models::kernel::{Driven, Sink, Step, Tolerance, integrate};
 
 const TIGHT: Tolerance = Tolerance { relative: 1e-10, absolute: Some(1e-12), max_steps: 100_000, ..Tolerance::DEFAULT };
 

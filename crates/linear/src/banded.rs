@@ -2,9 +2,9 @@
 //!
 //! Source: G. Golub, C. Van Loan, Matrix Computations, 4th edition (2013), section 4.3.5.
 
-/// Matrix of size `n` x `n` with `lower` diagonals below the main diagonal and `upper` above it.
+/// Matrix of size `n` x `n` with `lower` diagonals below the main diagonal and `upper` above it; first the matrix, then its LU factors.
 #[derive(Debug, Clone)]
-pub(super) struct Banded {
+pub struct Banded {
     n: usize,
     lower: usize,
     /// Stored diagonals above the main diagonal: `upper`, plus the fill-in from row exchanges.
@@ -16,33 +16,38 @@ pub(super) struct Banded {
 }
 
 impl Banded {
-    /// Creates a matrix of zeros.
-    pub(super) fn zeros(n: usize, lower: usize, upper: usize) -> Self {
+    /// Creates a matrix of zeros with `lower` diagonals below the main diagonal and `upper` above it.
+    #[must_use]
+    pub fn zeros(n: usize, lower: usize, upper: usize) -> Self {
         let reach = (upper + lower).min(n.saturating_sub(1));
         Self { n, lower, reach, rows: vec![0.0; n * (lower + reach + 1)], exchanged: (0..n).collect() }
     }
 
+    #[inline]
     fn width(&self) -> usize {
         self.lower + self.reach + 1
     }
 
+    #[inline]
     fn index(&self, row: usize, column: usize) -> usize {
         row * self.width() + column + self.lower - row
     }
 
     /// Sets every entry to 0.
-    pub(super) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.rows.fill(0.0);
     }
 
-    /// Sets an entry inside the band.
-    pub(super) fn set(&mut self, row: usize, column: usize, value: f64) {
+    /// Sets an entry; its place must be inside the band.
+    #[inline]
+    pub fn set(&mut self, row: usize, column: usize, value: f64) {
         let index = self.index(row, column);
         self.rows[index] = value;
     }
 
     /// Sets the matrix to `I - factor matrix`, for a matrix of the same band.
-    pub(super) fn set_shifted(&mut self, matrix: &Self, factor: f64) {
+    #[inline]
+    pub fn set_shifted(&mut self, matrix: &Self, factor: f64) {
         for (own, other) in self.rows.iter_mut().zip(&matrix.rows) {
             *own = -factor * other;
         }
@@ -53,7 +58,7 @@ impl Banded {
     }
 
     /// Replaces the matrix by its LU factors; returns false if it is singular.
-    pub(super) fn factorise(&mut self) -> bool {
+    pub fn factorise(&mut self) -> bool {
         let width = self.width();
         for k in 0..self.n {
             let last = (k + self.lower).min(self.n - 1);
@@ -87,8 +92,9 @@ impl Banded {
         true
     }
 
-    /// Solves with the LU factors, in place.
-    pub(super) fn solve(&self, b: &mut [f64]) {
+    /// Solves `A x = b` with the LU factors: `b` becomes `x`.
+    #[inline]
+    pub fn solve(&self, b: &mut [f64]) {
         let width = self.width();
         for k in 0..self.n {
             b.swap(k, self.exchanged[k]);

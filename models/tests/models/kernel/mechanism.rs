@@ -2,9 +2,10 @@
 
 use mops_language::{Dual, Scalar};
 use mops_math as math;
-
-use super::*;
-use crate::kernel::{Driven, Inputs, Sink, Step, Tolerance, integrate};
+use mops_models::kernel::elements::BearingFriction;
+use mops_models::kernel::friction::Contact;
+use mops_models::kernel::mechanism::{Bodies, Joint, Mechanism};
+use mops_models::kernel::{Driven, Inputs, Sink, Step, Tolerance, integrate};
 
 const TIGHT: Tolerance = Tolerance { relative: 1e-11, absolute: Some(1e-12), max_steps: 100_000, ..Tolerance::DEFAULT };
 

@@ -6,9 +6,8 @@ use std::sync::Arc;
 use mops_core::{Analysis, Case, Input, Job, Model, ModelOptions, case::Hold, effect::Placement};
 use mops_effects::effects;
 use mops_math as math;
-
-use crate::equations::EquationsOptions;
-use crate::with_effects::WithEffects;
+use mops_models::WithEffects;
+use mops_models::equations::EquationsOptions;
 
 /// Tank that collects its input: `h` is the integral of what reaches the plant.
 const TANK: &str = r#"

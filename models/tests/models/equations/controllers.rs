@@ -1,9 +1,9 @@
 //! PID controllers of a model, compared with the compiled loop `pid-loop`.
 
 use mops_core::ModelOptions;
+use mops_models::pid_loop::PidLoopOptions;
 
 use super::*;
-use crate::pid_loop::PidLoopOptions;
 
 /// Returns the traces of `y` and `u` of `2/((s + 1)(s + 0.5)(s + 2))`, with the loop written by hand in Rust.
 fn compiled(keys: &str, parameters: &[(&str, f64)]) -> [mops_core::Trace; 2] {
