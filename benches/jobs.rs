@@ -1,7 +1,8 @@
-//! Speed-up by a second thread for evaluations of 0.2 s: generations, polls of pattern search, gradients by differences.
+//! Speed-up by a second thread for evaluations of 0.2 s: generations, polls of pattern search, gradients by
+//! differences.
 //!
-//! An evaluation sleeps instead of computing. The speed-up is then that of the solver and the engine, independent of other
-//! load of the machine.
+//! An evaluation sleeps instead of computing. The speed-up is then that of the solver and the engine, independent of
+//! other load of the machine.
 
 mod common;
 
@@ -20,8 +21,8 @@ use common::ClosedForm;
 /// Duration of an evaluation.
 const DURATION: Duration = Duration::from_millis(200);
 
-/// Numbers of tuners and of evaluations. Single points are evaluated between polls and gradients; their share is larger for
-/// fewer tuners.
+/// Numbers of tuners and of evaluations. Single points are evaluated between polls and gradients; their share is larger
+/// for fewer tuners.
 const SIZES: [(usize, usize); 2] = [(6, 80), (20, 160)];
 
 /// Name and constructor of a solver.

@@ -1,7 +1,7 @@
 //! Own time of the solvers: at most 500 evaluations of a problem that costs next to nothing.
 //!
-//! The problem is the maximum of two ellipsoids; the solvers for fronts minimise both. The time contains the engine: cache,
-//! archive, comparison of merits.
+//! The problem is the maximum of two ellipsoids; the solvers for fronts minimise both. The time contains the engine:
+//! cache, archive, comparison of merits.
 
 mod common;
 

@@ -1,7 +1,7 @@
 //! A complete study in one file: a model with exact gradients, a criterion from a closure, the solution.
 //!
-//! A pothole gives a wheel suspension `m x'' = -k x - d x'` an initial speed of 1 m/s. Spring and damper are tuned for a short
-//! settling time and a small acceleration of the load.
+//! A pothole gives a wheel suspension `m x'' = -k x - d x'` an initial speed of 1 m/s. Spring and damper are tuned for
+//! a short settling time and a small acceleration of the load.
 
 use mops::{
     criteria::settling_time::SettlingTime,

@@ -1,4 +1,5 @@
-//! The model does not need bp: the error falls from 4.20 to 1.00 times the noise level on calibration data and from 15.40 to 1.02 on validation data.
+//! The model does not need bp: the error falls from 4.20 to 1.00 times the noise level on calibration data and from
+//! 15.40 to 1.02 on validation data.
 //!
 //! Written by `mops diagnose --export rust`. Requires the crate `mops` and the data files of the experiments.
 

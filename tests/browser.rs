@@ -1,5 +1,5 @@
-//! Reports in a browser: linked selection of front points, rotation, sorting of tables, zoom and values of plots, by pointer and
-//! by keyboard, without errors on the console.
+//! Reports in a browser: linked selection of front points, rotation, sorting of tables, zoom and values of plots, by
+//! pointer and by keyboard, without errors on the console.
 
 #[path = "common/devtools.rs"]
 mod devtools;

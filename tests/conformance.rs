@@ -138,7 +138,8 @@ fn alone(n: usize, f: fn(&[f64]) -> Option<Vec<f64>>) -> Vec<(Arc<Problem>, Solv
     solvers(&problem).into_iter().map(|kind| (Arc::clone(&problem), kind)).collect()
 }
 
-/// Problem with two criteria that meet at a kink, and one with a smooth criterion; both have the minimum 1.25 at (0.5, 0).
+/// Problem with two criteria that meet at a kink, and one with a smooth criterion; both have the minimum 1.25 at (0.5,
+/// 0).
 fn ordinary(n: usize) -> Vec<(Arc<Problem>, SolverKind)> {
     [both(problems(n, MINIMISE, kink)), alone(n, bowl)].concat()
 }
@@ -252,8 +253,8 @@ fn a_discontinuous_criterion_ends_near_its_minimum() {
         let jump = if x[0] < 0.3 { 1.0 } else { 0.0 };
         Some(vec![x[0] * x[0] + x[1] * x[1] + jump, 0.0])
     };
-    // As a single criterion this function has a local minimum beyond the discontinuity, in which a local solver may end; here
-    // it has none.
+    // As a single criterion this function has a local minimum beyond the discontinuity, in which a local solver may
+    // end; here it has none.
     let leads_back = |x: &[f64]| Some(vec![x[1] * x[1] + if x[0] < 0.3 { 2.3 - x[0] } else { x[0] * x[0] }]);
     for (problem, kind) in [both(problems(2, MINIMISE, f)), alone(2, leads_back)].concat() {
         let found = solve(&problem, &kind, 5000, &()).best.merit.objective;

@@ -6,7 +6,8 @@ use assert_cmd::cargo::cargo_bin_cmd;
 use mops_math as math;
 use serde_json::Value;
 
-/// An integrating loop with a lag, `k/(s (s + 1))`: phase margin 51.8 deg at k = 1, bandwidth and crossover near 1 rad/s.
+/// An integrating loop with a lag, `k/(s (s + 1))`: phase margin 51.8 deg at k = 1, bandwidth and crossover near 1
+/// rad/s.
 const LOOP: &str = r#"
     [study]
     name = "loop"

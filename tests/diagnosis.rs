@@ -78,7 +78,8 @@ fn a_missing_effect_is_found_with_its_place_and_its_parameter() {
 #[test]
 #[ignore = "full tier"]
 fn a_simple_friction_is_refitted_from_the_optimum_of_a_more_general_one() {
-    // The pendulum comes to rest. A fit of Coulomb friction alone ends in a local minimum with 25 times the sum of squares.
+    // The pendulum comes to rest. A fit of Coulomb friction alone ends in a local minimum with 25 times the sum of
+    // squares.
     let missing = Missing::Effects(&["coulomb-friction"]);
     let case = generate("pendulum", missing, 20.0, 403_726_925_825).expect("the case can be generated");
     let diagnosis = diagnosis(&case, false);

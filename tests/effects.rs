@@ -36,8 +36,8 @@ channels = { th = { column = "th", noise = 1e-3 } }
 th = { fit = { signal = "th" }, demand = 1e-3 }
 "#;
 
-/// Angle of the torsion pendulum with dry friction `c` (N m): half swings about `c/k` and `-c/k` in turn (J. P. Den Hartog,
-/// Mechanical Vibrations, section 8.6).
+/// Angle of the torsion pendulum with dry friction `c` (N m): half swings about `c/k` and `-c/k` in turn (J. P. Den
+/// Hartog, Mechanical Vibrations, section 8.6).
 fn swing(c: f64, t: f64) -> f64 {
     let (angular, offset) = (2.0, c / 4.0);
     let half = (t * angular / PI).floor();

@@ -137,7 +137,8 @@ fn objective(result: &Value, case: &str) -> f64 {
 
 #[test]
 fn a_third_joint_explains_the_residual_of_the_two_joint_model() {
-    // Data simulated by an independent derivation and integrator; table 4.6 of the thesis, noise of 0.003 rad: residual 0.0945.
+    // Data simulated by an independent derivation and integrator; table 4.6 of the thesis, noise of 0.003 rad: residual
+    // 0.0945.
     let device = [
         "tuners.J.start=1.082e-3",
         "tuners.Ja.start=1.656e-3",
@@ -364,8 +365,8 @@ fn an_interrupted_run_writes_the_best_point() {
     assert!(result["evaluations"].as_u64().unwrap() >= 1);
 }
 
-/// Rate `k` of `x' = k u` from 0.5 at 0 s, calibrated with further keys of the experiment. The input is 3 until 1.5 s, then -1, and is
-/// recorded so many steps of 0.1 s late; `k` is 0.7.
+/// Rate `k` of `x' = k u` from 0.5 at 0 s, calibrated with further keys of the experiment. The input is 3 until 1.5 s,
+/// then -1, and is recorded so many steps of 0.1 s late; `k` is 0.7.
 fn rate(keys: &str, input: &str, late: i32) -> f64 {
     let folder = tempfile::tempdir().unwrap();
     let study = format!(

@@ -1,4 +1,5 @@
-//! Errors of estimates: standard errors, intervals and profiles against closed forms and against simulated calibrations.
+//! Errors of estimates: standard errors, intervals and profiles against closed forms and against simulated
+//! calibrations.
 
 #[path = "estimates/models.rs"]
 mod models;

@@ -10,8 +10,8 @@ use mops::core::front::hypervolume;
 use mops_math as math;
 use serde_json::Value;
 
-/// Settling time, s, and overshoot of points of the front of the PID design. Source: independent computation with SciPy, the
-/// overshoot minimised for each settling time, rounded to four digits.
+/// Settling time, s, and overshoot of points of the front of the PID design. Source: independent computation with
+/// SciPy, the overshoot minimised for each settling time, rounded to four digits.
 const FRONT: [[f64; 2]; 14] = [
     [2.40, 0.4576],
     [3.0, 0.4032],
@@ -163,8 +163,8 @@ fn a_picked_point_is_optimal_for_its_demands() {
     }
 }
 
-/// A model whose outputs are functions of its parameters, over two cases: `f` is worst in the case `right` below `p` = 0.5, else
-/// in `left`, and `g` does not depend on the case.
+/// A model whose outputs are functions of its parameters, over two cases: `f` is worst in the case `right` below `p` =
+/// 0.5, else in `left`, and `g` does not depend on the case.
 const CASES: &str = r#"
 [study]
 name = "cases"

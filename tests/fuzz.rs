@@ -1,5 +1,6 @@
-//! Damaged input: expressions, studies and data files of any content are read or refused, without panic, overflow or hang.
-//! A tenth of 20,000 inputs in the quick tier; `MOPS_FUZZ=1000000 cargo test --test fuzz -- --nocapture` reads a million.
+//! Damaged input: expressions, studies and data files of any content are read or refused, without panic, overflow or
+//! hang. A tenth of 20,000 inputs in the quick tier; `MOPS_FUZZ=1000000 cargo test --test fuzz -- --nocapture` reads a
+//! million.
 //!
 //! Input `i` depends on `i` alone, so that a failure can be reproduced.
 

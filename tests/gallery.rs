@@ -1,5 +1,5 @@
-//! Studies of the gallery give the known answers of their README: closed forms, published values, and results of independent
-//! simulations.
+//! Studies of the gallery give the known answers of their README: closed forms, published values, and results of
+//! independent simulations.
 
 use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
@@ -58,8 +58,8 @@ fn contains(list: &[Complex], expected: Complex) {
     assert!(distance < 1e-6 * complex::norm(expected), "{expected} in {list:?}");
 }
 
-/// The gain crossover of a PI controller with a lag is the root of a quadratic equation in w^2; the ITAE is that of the method of
-/// steps, order 8, tolerance 1e-11.
+/// The gain crossover of a PI controller with a lag is the root of a quadratic equation in w^2; the ITAE is that of the
+/// method of steps, order 8, tolerance 1e-11.
 #[test]
 fn the_heat_exchanger_has_the_margins_of_its_closed_form() {
     let (kc, ti, tau, dead) = (1.2341, 24.558, 21.3, 14.7);
@@ -111,8 +111,8 @@ fn the_cart_pole_has_the_published_gains() {
     }
 }
 
-/// `(1 + s T3)(1 + s T4) = (1 - g1)(1 - g2)/(g1 g2)`. Source: K. H. Johansson, IEEE Transactions on Control Systems Technology 8
-/// (2000) 456-465, section III.
+/// `(1 + s T3)(1 + s T4) = (1 - g1)(1 - g2)/(g1 g2)`. Source: K. H. Johansson, IEEE Transactions on Control Systems
+/// Technology 8 (2000) 456-465, section III.
 #[test]
 #[allow(clippy::approx_constant)] // A pump gain of 3.14 cm3/s/V.
 fn the_quadruple_tank_has_the_zeros_of_its_closed_form_in_both_phases() {
@@ -131,8 +131,8 @@ fn the_quadruple_tank_has_the_zeros_of_its_closed_form_in_both_phases() {
     }
 }
 
-/// Loop of the book's design: filter and controller, evaluated at single frequencies; R. W. Erickson, D. Maksimovic, Fundamentals
-/// of Power Electronics, section 9.5.4.
+/// Loop of the book's design: filter and controller, evaluated at single frequencies; R. W. Erickson, D. Maksimovic,
+/// Fundamentals of Power Electronics, section 9.5.4.
 #[test]
 fn the_buck_converter_has_the_margin_of_its_loop() {
     let found = at_start("buck-converter/study.toml", &[]);
@@ -156,8 +156,8 @@ fn the_buck_converter_has_the_margin_of_its_loop() {
     near(found("rest", "v-ripple"), 3.48252, 1e-5);
 }
 
-/// The shaft between motor and load makes zeros of the motor speed at the roots of `Jl s^2 + cs s + ks`. The values of the
-/// sampled controller are those of difference equations with an exact hold of the drive.
+/// The shaft between motor and load makes zeros of the motor speed at the roots of `Jl s^2 + cs s + ks`. The values of
+/// the sampled controller are those of difference equations with an exact hold of the drive.
 #[test]
 fn the_servo_has_the_antiresonance_of_its_load_and_the_response_of_its_sampled_controller() {
     let arguments = ["--model", "drive", "--at", "Jl=0.4", "--input", "e", "--output", "wm"];
@@ -177,7 +177,8 @@ fn the_servo_has_the_antiresonance_of_its_load_and_the_response_of_its_sampled_c
     near(sampled("load-Jl=0.4", "gain"), 8.38292, 1e-5);
 }
 
-/// Optima of Nelder-Mead (heat exchanger) and of differential evolution (buck converter) in SciPy, and the tables of the READMEs.
+/// Optima of Nelder-Mead (heat exchanger) and of differential evolution (buck converter) in SciPy, and the tables of
+/// the READMEs.
 #[test]
 #[ignore = "full tier"]
 fn the_designs_end_at_the_stated_optima() {

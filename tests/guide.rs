@@ -51,8 +51,8 @@ fn arguments(command: &str) -> Vec<String> {
     words
 }
 
-/// Runs the command of a line that starts with `$ `. `shown` is the output on the page: `? 2` is the exit status, `...` means any
-/// lines, and a line may continue.
+/// Runs the command of a line that starts with `$ `. `shown` is the output on the page: `? 2` is the exit status, `...`
+/// means any lines, and a line may continue.
 fn run(command: &str, shown: &[String], folder: &Path) {
     let words = arguments(command);
     assert_eq!(words[0], "mops", "{command}");

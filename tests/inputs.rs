@@ -525,7 +525,8 @@ fn a_sum_of_two_temperatures_is_refused() {
 
 #[test]
 fn a_formula_in_a_window_leaves_other_criteria_their_own() {
-    // x = t: the peak of its own window from 5 to 8 s is 8, the maximum from 1 s on 10, the kink of the absolute value no extremum.
+    // x = t: the peak of its own window from 5 to 8 s is 8, the maximum from 1 s on 10, the kink of the absolute value
+    // no extremum.
     let text = integrators(&[("one", " = 1")], 10.0)
         + "ph = { peak = { signal = 'x' }, from = 5, until = 8, usage = 'monitor' }\n\
            late = { expression = { value = 'ph + maximum(x)' }, from = 1, usage = 'monitor' }\n\
@@ -595,7 +596,8 @@ fn a_window_ends_at_a_pause_of_the_record() {
 
 #[test]
 fn an_unstable_plant_in_closed_loop_is_calibrated_in_windows() {
-    // x'' = a x - d x' + b u, unstable, with u of a sampled controller held over 20 ms. The matrix exponential is a Taylor series.
+    // x'' = a x - d x' + b u, unstable, with u of a sampled controller held over 20 ms. The matrix exponential is a
+    // Taylor series.
     let [a, d, b, step] = [9.0, 0.4, 4.0, 0.02];
     let rate = |x: [f64; 2], u: f64| [x[1], a * x[0] - d * x[1] + b * u];
     let next = |x: [f64; 2], u: f64| {

@@ -1,5 +1,5 @@
-//! Files of a command: no output replaces an input, no link leads an output elsewhere, two studies never share a folder, and a
-//! study reads files of its own folder only.
+//! Files of a command: no output replaces an input, no link leads an output elsewhere, two studies never share a
+//! folder, and a study reads files of its own folder only.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
-//! Jumps of criteria near a design: where they are found, what is reported beyond them, and whether the suggested line avoids them.
+//! Jumps of criteria near a design: where they are found, what is reported beyond them, and whether the suggested line
+//! avoids them.
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use serde_json::Value;

@@ -1,7 +1,7 @@
 //! A run killed at a system call resumes to the result of an uninterrupted run.
 //!
-//! The quick tier kills at a few calls, the full tier at a tenth of them, `MOPS_KILLS=all` at all. The tests need strace, and
-//! are skipped without it.
+//! The quick tier kills at a few calls, the full tier at a tenth of them, `MOPS_KILLS=all` at all. The tests need
+//! strace, and are skipped without it.
 
 #![cfg(target_os = "linux")]
 
@@ -80,8 +80,8 @@ fn counted(arguments: &[&str], root: &Path, prepare: &dyn Fn(&Path)) -> Vec<(&'s
     CALLS.iter().map(|&call| (call, most(call))).collect()
 }
 
-/// Kills a run at `some` of its system calls, each in a folder set up by `prepare`, and resumes it; `keeps` then checks the
-/// folder. Returns the number of kills.
+/// Kills a run at `some` of its system calls, each in a folder set up by `prepare`, and resumes it; `keeps` then checks
+/// the folder. Returns the number of kills.
 fn killed(arguments: &[&str], root: &Path, [prepare, keeps]: [&dyn Fn(&Path); 2], some: usize) -> usize {
     let whole = root.join("whole");
     assert!(mops(&STUDY, &whole).status().unwrap().success());

@@ -370,7 +370,8 @@ fn a_linearisation_that_does_not_exist_is_refused() {
         assert_eq!(refused.status.code(), Some(3), "{der}: {told}");
         assert!(told.contains("the rate of `x` is not differentiable with respect to `x` at x = 0"), "{der}: {told}");
     }
-    // At other points, and for smooth equations, the linearisation exists. An output that is not differentiable gets a note.
+    // At other points, and for smooth equations, the linearisation exists. An output that is not differentiable gets a
+    // note.
     for (der, at) in
         [("u - k*sqrt(x)", "x=0.25"), ("u - k*x^1.5", "x=0"), ("u - k*x*abs(x)", "x=0"), ("u - k*abs(x)", "x=-1")]
     {

@@ -37,7 +37,8 @@ fn assert_same(result: &Value, case: &str) {
 
 #[test]
 fn the_margins_of_a_cut_loop_are_those_of_the_loop_written_by_hand() {
-    // A motor with a flexible coupling and a cascade of two controllers; the amplifier is limited and its integrator tracks it.
+    // A motor with a flexible coupling and a cascade of two controllers; the amplifier is limited and its integrator
+    // tracks it.
     let servo = "
         [study]
         name = 'servo'
@@ -167,8 +168,8 @@ fn a_loop_of_a_shipped_plant_has_no_margins_beyond_a_limit() {
 
 #[test]
 fn the_margins_of_a_sampled_controller_are_those_of_its_difference_equation() {
-    // A limited PI controller with computing time at a tank, A h' = q - kv h, by hand: from the change of q to the next sample of h,
-    // and u = k e + s, s(k+1) = s + k T/Ti e.
+    // A limited PI controller with computing time at a tank, A h' = q - kv h, by hand: from the change of q to the next
+    // sample of h, and u = k e + s, s(k+1) = s + k T/Ti e.
     let (area, outflow, gain, integral, period, delay) = (0.5, 0.02, 0.05, 20.0, 2.0, 0.5);
     let text = format!(
         "[study]\nname = 'tank'
@@ -239,7 +240,8 @@ fn the_margins_of_a_sampled_controller_are_those_of_its_difference_equation() {
 
 #[test]
 fn the_closed_loop_of_a_cut_state_feedback_has_the_poles_that_were_placed() {
-    // The gains of pole-placement-retuning place -5, -8, -10 and -14, for the linear plant; the filter of the reference has -20.
+    // The gains of pole-placement-retuning place -5, -8, -10 and -14, for the linear plant; the filter of the reference
+    // has -20.
     let text = "[study]\nname = 'upright'
         [models.cut]
         furuta-state-feedback = { horizon = '1 s', plant = 'linear' }

@@ -1,7 +1,8 @@
 //! Simulations of plants with two effects at one place, compared with independent simulations.
 //!
-//! Pairs of effects at every place of three plants, with a step, a sloped recording and a sine. The twins of the testbed share no code
-//! with the models: the laws follow the documented formulas, the integrator has fixed steps. `MOPS_SLOPES=all cargo test --release
+//! Pairs of effects at every place of three plants, with a step, a sloped recording and a sine. The twins of the
+//! testbed share no code with the models: the laws follow the documented formulas, the integrator has fixed steps.
+//! `MOPS_SLOPES=all cargo test --release
 //! --test pairs -- --include-ignored --nocapture` compares all pairs; the full tier compares a tenth.
 
 #[path = "common/plants.rs"]
@@ -23,8 +24,8 @@ const TIMES: u32 = 100;
 /// Permitted deviation of a signal, relative to its largest magnitude.
 const TOLERANCE: f64 = 1e-5;
 
-/// Largest integration steps of a twin, s: the second one is used where signals deviate, the others where a smaller step changes the
-/// twin's own signals.
+/// Largest integration steps of a twin, s: the second one is used where signals deviate, the others where a smaller
+/// step changes the twin's own signals.
 const STEPS: [f64; 5] = [5e-4, 2.5e-4, 1e-4, 2.5e-5, 1e-5];
 
 /// Change of the twin's signals with the step size up to which they have converged, relative to the largest magnitude.

@@ -13,8 +13,8 @@ use toml::Value as Toml;
 /// Studies that together set every number of the schema.
 const STUDIES: [&str; 3] = ["loops", "equations", "recordings"];
 
-/// Ends of paths without a limit: any finite number has a meaning, or the largest is limited by time and memory alone. `+` stands for
-/// no largest value, `-` for no smallest one.
+/// Ends of paths without a limit: any finite number has a meaning, or the largest is limited by time and memory alone.
+/// `+` stands for no largest value, `-` for no smallest one.
 const UNLIMITED: &[(&str, &str)] = &[
     // Numbers of a plant, a case or a formula.
     ("models.*.parameters.*", "+-"),

@@ -96,8 +96,8 @@ fn cases_that_differ_only_in_uncertain_values_are_searched_once() {
     assert!((found.criteria[0].value - 2.0).abs() < 1e-9);
 }
 
-/// Worst cases at a corner, at the higher of two interior maxima, at the far side of an equality, and at the minimum of a
-/// criterion to be maximised.
+/// Worst cases at a corner, at the higher of two interior maxima, at the far side of an equality, and at the minimum of
+/// a criterion to be maximised.
 #[test]
 fn worst_cases_agree_with_closed_forms() {
     let f = |p: &[f64]| {
@@ -148,8 +148,8 @@ fn failures_in_the_box_are_reported_and_do_not_count_as_values() {
     );
 }
 
-/// The standard normal distribution function, by the series of its integral. Source: M. Abramowitz, I. A. Stegun, Handbook
-/// of Mathematical Functions (1964), 26.2.10.
+/// The standard normal distribution function, by the series of its integral. Source: M. Abramowitz, I. A. Stegun,
+/// Handbook of Mathematical Functions (1964), 26.2.10.
 fn phi(x: f64) -> f64 {
     let (mut term, mut sum) = (x, x);
     for k in 1..200 {
@@ -189,7 +189,8 @@ fn samples_of_a_linear_criterion_are_distributed_as_its_closed_form() {
     }
 }
 
-/// A tuner of 1.5 with a tolerance of 10 % is uniform between 1.35 and 1.65: a demand of 1.6 is met with probability 5/6.
+/// A tuner of 1.5 with a tolerance of 10 % is uniform between 1.35 and 1.65: a demand of 1.6 is met with probability
+/// 5/6.
 #[test]
 fn a_tolerance_is_a_range_around_the_design() {
     let mut draft = draft(monte_carlo(), BOX(), vec![end(0, 1.6, Usage::Minimise)], |p| Some(vec![p[0]]));
@@ -216,7 +217,8 @@ fn samples_that_fail_do_not_meet_a_demand() {
     assert_eq!(found.criteria[0].met.unwrap().count, 1000 - found.failed);
 }
 
-/// `min over t of max over x0 of (t - x0)^2`: t = 0 with the value 1 at both ends; the nominal optimum is t = 0.5 with 0.
+/// `min over t of max over x0 of (t - x0)^2`: t = 0 with the value 1 at both ends; the nominal optimum is t = 0.5 with
+/// 0.
 #[test]
 fn the_robust_design_of_a_symmetric_problem_is_the_centre_of_the_box() {
     let f = |p: &[f64]| Some(vec![math::powi(p[0] - p[1], 2) + 0.1 * math::powi(p[2], 2)]);
@@ -231,7 +233,8 @@ fn the_robust_design_of_a_symmetric_problem_is_the_centre_of_the_box() {
     assert!((round.found - 1.1).abs() < 3e-3 && round.found - round.for_cases <= 1e-3, "{round:?}");
     // The worst value over the present cases does not decrease.
     assert!(found.rounds.windows(2).all(|two| two[1].for_cases >= two[0].for_cases - 1e-9));
-    // The initial guess is that of the study, not of the last round, which starts near the optimum; the worst case is an end.
+    // The initial guess is that of the study, not of the last round, which starts near the optimum; the worst case is
+    // an end.
     let start = study.start()[0];
     let at_start = math::powi(1.0 + start.abs(), 2) + 0.1;
     assert!((solved.outcome.start.worst_scaled - at_start).abs() < 2e-3, "{:?}", solved.outcome.start);
@@ -242,8 +245,8 @@ fn the_robust_design_of_a_symmetric_problem_is_the_centre_of_the_box() {
     assert!(worst <= round.found + 1e-9, "{worst} {}", round.found);
 }
 
-/// A criterion of some 1 that jumps to 3 at `x0 = 0.95 + 0.05 t`: every design moves the edge past the case found last, by a little, until it
-/// leaves the box at t = 1.
+/// A criterion of some 1 that jumps to 3 at `x0 = 0.95 + 0.05 t`: every design moves the edge past the case found last,
+/// by a little, until it leaves the box at t = 1.
 #[test]
 fn an_edge_that_each_design_moves_by_a_little_is_followed_in_large_steps() {
     let f = |p: &[f64]| {
@@ -332,7 +335,8 @@ impl Model for Line {
     }
 }
 
-/// Line through 41 noisy samples, and its least-squares solution: estimates, residual variance, inverse of the normal matrix.
+/// Line through 41 noisy samples, and its least-squares solution: estimates, residual variance, inverse of the normal
+/// matrix.
 struct Fitted {
     outcome: Outcome,
     estimates: [f64; 2],
@@ -412,8 +416,8 @@ fn the_profile_of_a_linear_model_is_its_t_interval() {
     }
 }
 
-/// The variance over replicates, drawn sample by sample, equals that of least squares within three times the sampling error of
-/// 200 replicates, 5 %.
+/// The variance over replicates, drawn sample by sample, equals that of least squares within three times the sampling
+/// error of 200 replicates, 5 %.
 #[test]
 fn bootstrap_errors_of_a_linear_model_are_those_of_least_squares() {
     let task = UncertaintyTask { bootstrap: 200, block: Some(1), ..UncertaintyTask::default() };
@@ -471,7 +475,8 @@ fn the_worst_cases_of_the_pid_controller_are_the_published_ones() {
     assert!(folder.path().join("out/plots/slice-nominal-settling-a.svg").exists());
 }
 
-/// For the controller of table 5.1 the worst settling time is inside the box, at a discontinuity: 21.738 s at a = 0.184.
+/// For the controller of table 5.1 the worst settling time is inside the box, at a discontinuity: 21.738 s at a =
+/// 0.184.
 #[test]
 fn a_worst_case_inside_the_box_on_a_jump_is_found() {
     let folder = tempfile::tempdir().unwrap();
@@ -625,8 +630,8 @@ impl mops::language::files::Files for NoFiles {
     }
 }
 
-/// The search finds the three cases of `pid-design-multi-case`, with their optimum 3.8955098, and a further one with a settling
-/// time of 16.9 s. The reported design satisfies its worst case at every point of an independent grid.
+/// The search finds the three cases of `pid-design-multi-case`, with their optimum 3.8955098, and a further one with a
+/// settling time of 16.9 s. The reported design satisfies its worst case at every point of an independent grid.
 #[test]
 #[ignore = "full tier"]
 fn the_robust_pid_design_satisfies_its_worst_case_on_an_independent_grid() {
@@ -667,8 +672,8 @@ fn the_robust_pid_design_satisfies_its_worst_case_on_an_independent_grid() {
 
 #[test]
 fn a_design_keeps_its_demands_within_the_tolerance_of_its_own_values() {
-    // One criterion grows with R, the other with 1/R: without tolerance both are 1 at R = 1. With 10 % the worst cases are R(1 + e)
-    // and 1/(R(1 - e))^2: equal at R^3 = 1/((1 + e)(1 - e)^2).
+    // One criterion grows with R, the other with 1/R: without tolerance both are 1 at R = 1. With 10 % the worst cases
+    // are R(1 + e) and 1/(R(1 - e))^2: equal at R^3 = 1/((1 + e)(1 - e)^2).
     let text = "[study]\nname = 'tolerance'\n[models.rc.equations]\nstates = { x = '1' }\nparameters = { R = '1' }\nder = { x = 'R/1 [s]' }\n\
                 horizon = '1 s'\n[tuners]\nR = { start = 2, min = 0.1, max = 10 }\n[uncertain]\nR = { tolerance = 0.1 }\n[robust]\n\
                 [criteria]\nup = { final-value = { signal = 'x' }, demand = 1 }\n\

@@ -1,7 +1,8 @@
 //! Equal bits on processors with and without fused multiply-add and wide registers.
 //!
-//! The C library chooses its kernels by the processor when a program is loaded; an environment variable disables features. A
-//! run that calls one of its elementary functions then has other bits. Code that queries the processor itself is not covered.
+//! The C library chooses its kernels by the processor when a program is loaded; an environment variable disables
+//! features. A run that calls one of its elementary functions then has other bits. Code that queries the processor
+//! itself is not covered.
 
 use std::path::Path;
 
@@ -25,7 +26,8 @@ fn run(study: &str, more: &[&str], out: &Path, tunables: Option<&str>) -> [Strin
     [clockless(read("result.json")), read("evaluations.csv")]
 }
 
-/// Studies that together use every elementary function of solvers, models, criteria, estimates and noise, with small budgets.
+/// Studies that together use every elementary function of solvers, models, criteria, estimates and noise, with small
+/// budgets.
 #[test]
 fn a_processor_without_fused_products_gives_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
@@ -94,8 +96,8 @@ fn imported(file: &[u8]) -> Vec<String> {
     undefined.map(|at| file[at..].iter().take_while(|b| **b != 0).map(|b| char::from(*b)).collect()).collect()
 }
 
-/// The two remaining functions do not affect results: SQLite uses `log` for ranks of a full-text search, indicatif uses `pow`
-/// for the remaining time of a progress bar.
+/// The two remaining functions do not affect results: SQLite uses `log` for ranks of a full-text search, indicatif uses
+/// `pow` for the remaining time of a progress bar.
 #[cfg(target_os = "linux")]
 #[test]
 fn the_program_links_no_elementary_function_that_affects_results() {

@@ -1,8 +1,9 @@
 //! Derivatives of criteria with respect to the parameters of effects, compared with differences of simulations.
 //!
-//! Pairs of effects at every place of three plants and across places, with a step, a sloped recording and a sine; every criterion over
-//! time is asked for its slope alone. `MOPS_SLOPES=all cargo test --release --test slopes -- --include-ignored --nocapture` runs all of
-//! them; the full tier runs a tenth.
+//! Pairs of effects at every place of three plants and across places, with a step, a sloped recording and a sine; every
+//! criterion over time is asked for its slope alone.
+//! `MOPS_SLOPES=all cargo test --release --test slopes -- --include-ignored --nocapture` runs all of them; the full
+//! tier runs a tenth.
 
 #[path = "slopes/criteria.rs"]
 mod criteria;
@@ -30,8 +31,8 @@ const REACH: f64 = 1e-6;
 /// Share of the slopes that may stay undecided.
 const UNDECIDED: f64 = 0.1;
 
-/// Share of the slopes that may be off: those of effects whose law has an infinite derivative at a threshold, or bends where a joint
-/// reverses (see ADR 5).
+/// Share of the slopes that may be off: those of effects whose law has an infinite derivative at a threshold, or bends
+/// where a joint reverses (see ADR 5).
 const OFF: f64 = 0.003;
 
 /// One of so many setups is compared in the full tier.

@@ -304,7 +304,8 @@ fn unity_feedback_requires_equal_dimensions_and_converts_units() {
     }
 }
 
-/// Returns a loop `k/s` and an axis with the angular speed `w`, its frequency `f` and a rate `r`; all are 5 1/s for `k` = 5.
+/// Returns a loop `k/s` and an axis with the angular speed `w`, its frequency `f` and a rate `r`; all are 5 1/s for `k`
+/// = 5.
 fn speeds(criterion: &str) -> String {
     format!(
         "[study]\nname = 'speeds'\n[models.L.transfer-function]\nnumerator = ['k']\ndenominator = [1, 0]\n\

@@ -172,8 +172,8 @@ fn idle_and_faulty_viewers_do_not_affect_a_run() {
     let elsewhere = head.replacen(&run.token, "nowhere", 1);
     let rebound = head.replacen("Host: 127.0.0.1", "Host: rebound.example", 1);
     for i in 0..60 {
-        // Viewers send nothing or half a request, never read, disconnect at once, or request a wrong address. A finished run
-        // accepts no connection.
+        // Viewers send nothing or half a request, never read, disconnect at once, or request a wrong address. A
+        // finished run accepts no connection.
         let Ok(mut viewer) = TcpStream::connect(("127.0.0.1", run.port)) else { break };
         let said = ["", &head[..head.len() / 2], &head, &head, &elsewhere, &rebound][i % 6];
         let _ = viewer.write_all(said.as_bytes());

@@ -12,7 +12,8 @@ use crate::common::{Channel, LinearCriterion, Of, Values, poles};
 /// Damping ratio of the least damped pole, `min -Re p/|p|`, dimensionless.
 ///
 /// With `of = "closed-loop"` the model is the loop transfer function L, and the poles are those of `L/(1 + L)`.
-/// Uncontrollable and unobservable poles count too. A pole z of a sampled system counts as `ln(z)/T`, with the sampling period T.
+/// Uncontrollable and unobservable poles count too. A pole z of a sampled system counts as `ln(z)/T`, with the sampling
+/// period T.
 ///
 /// Range: -1 to 1; 1 for real stable poles, negative for unstable ones, 0 for a pole at the origin. More is better:
 /// `demand = 0.5` requires at least 0.5. A closed loop with a delay has infinitely many poles, and no value.

@@ -18,8 +18,8 @@ use crate::common::{Channel, LinearCriterion, Values, capped, feedback, second};
 /// stabilises it. A reduction may exceed the existing delay. There is no value if no change of the delay stabilises an
 /// unstable loop.
 ///
-/// For a sampled loop it is the delay of the sampled values: exact for whole periods, otherwise that of values without frequencies
-/// above half of the sampling frequency.
+/// For a sampled loop it is the delay of the sampled values: exact for whole periods, otherwise that of values without
+/// frequencies above half of the sampling frequency.
 ///
 /// Source: K. J. Astrom, R. M. Murray, Feedback Systems (2008), section 9.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]

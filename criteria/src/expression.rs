@@ -21,18 +21,19 @@ use serde::Deserialize;
 
 use crate::common::trace;
 
-/// Value of a formula such as `value = "3*rise + integral(u^2)/1 [V2]"`, over other criteria of the study for the same model,
-/// parameters of the model, and reductions of signals.
+/// Value of a formula such as `value = "3*rise + integral(u^2)/1 [V2]"`, over other criteria of the study for the same
+/// model, parameters of the model, and reductions of signals.
 ///
-/// `initial(x)` and `final(x)` are the values at the start and at the end of the simulation, `maximum(x)` and `minimum(x)` the
-/// extrema, `integral(x)` the integral over time, `mean(x)` and `rms(x)` the mean and the root mean square. `x` is a signal, or a
-/// formula over signals and parameters. Operators and functions are those of equations. All quantities count in coherent SI units,
-/// and dimensions are checked; a number may have a unit, `5 [N m]`. A demand in Hz, rpm or deg/s needs a `unit` of the formula, as 1/s
-/// may count cycles or angles.
+/// `initial(x)` and `final(x)` are the values at the start and at the end of the simulation, `maximum(x)` and
+/// `minimum(x)` the extrema, `integral(x)` the integral over time, `mean(x)` and `rms(x)` the mean and the root mean
+/// square. `x` is a signal, or a formula over signals and parameters. Operators and functions are those of equations.
+/// All quantities count in coherent SI units, and dimensions are checked; a number may have a unit, `5 [N m]`. A demand
+/// in Hz, rpm or deg/s needs a `unit` of the formula, as 1/s may count cycles or angles.
 ///
-/// Range: any number. Whether less or more is better depends on the study: a demand is an upper limit, `good` and `bad` set either
-/// direction. If another criterion in the formula has no value, because its condition was not reached, the formula has none.
-/// `from` and `until` restrict the reductions; other criteria keep the parts of the simulation that they read.
+/// Range: any number. Whether less or more is better depends on the study: a demand is an upper limit, `good` and `bad`
+/// set either direction. If another criterion in the formula has no value, because its condition was not reached, the
+/// formula has none. `from` and `until` restrict the reductions; other criteria keep the parts of the simulation that
+/// they read.
 ///
 /// Source: extrema and integrals are those of the piecewise quartic of each signal; a formula over several signals is
 /// interpolated by such a quartic within the steps of all of them.

@@ -16,8 +16,8 @@ pub struct FnCriterion {
     value: ValueFn,
 }
 
-/// Creates a criterion from a closure. The closure receives the time responses of `signals`, in this order, and returns the
-/// value in `unit`; a value that is not finite makes the point fail.
+/// Creates a criterion from a closure. The closure receives the time responses of `signals`, in this order, and returns
+/// the value in `unit`; a value that is not finite makes the point fail.
 ///
 /// ```
 /// use mops_core::study::CriterionBuilder;

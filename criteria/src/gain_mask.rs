@@ -11,13 +11,14 @@ use crate::common::{Channel, LinearCriterion, Values, number};
 
 /// Largest ratio `max_w max(|G(j w)|/upper(w), lower(w)/|G(j w)|)`, dimensionless: 1 if the gain touches its mask.
 ///
-/// Each bound is given by points `[frequency, gain]` and is a straight line between them in the Bode plot; beyond its ends there is
-/// none. Frequencies without a unit are in rad/s. Gains are in the unit of the output divided by that of the input, or in dB with
-/// `decibel = true`. At least one bound is needed. Example: `of = "sensitivity"`, `upper = [["0.1 Hz", -40], ["1 Hz", -20], ["10 Hz", 6],
+/// Each bound is given by points `[frequency, gain]` and is a straight line between them in the Bode plot; beyond its
+/// ends there is none. Frequencies without a unit are in rad/s. Gains are in the unit of the output divided by that of
+/// the input, or in dB with `decibel = true`. At least one bound is needed. Example: `of = "sensitivity"`,
+/// `upper = [["0.1 Hz", -40], ["1 Hz", -20], ["10 Hz", 6],
 /// ["100 Hz", 6]]`, `decibel = true`.
 ///
-/// The ratio is located by bounds of the response over all frequencies of the mask, with or without delay, not on a grid. A sampled
-/// system is compared up to half of the sampling frequency; a bound that begins above it is refused.
+/// The ratio is located by bounds of the response over all frequencies of the mask, with or without delay, not on a
+/// grid. A sampled system is compared up to half of the sampling frequency; a bound that begins above it is refused.
 ///
 /// Less is better. Range: from 0 up. The default demand is 1. There is no value if a loop is unstable.
 ///

@@ -13,12 +13,13 @@ use crate::common::{Channel, LinearCriterion, Values};
 /// Equals the square root of the integrated square of the impulse response. The unit is that of the output divided
 /// by that of the input, times s^(-1/2), which is omitted.
 ///
-/// Of a sampled system it is `sqrt(T/(2 pi) integral |G(e^(j w T))|^2 dw)` over w from -pi/T to pi/T, with the period T: the
-/// root mean square of the output for independent samples of unit variance at the input, such as measurement noise.
+/// Of a sampled system it is `sqrt(T/(2 pi) integral |G(e^(j w T))|^2 dw)` over w from -pi/T to pi/T, with the period
+/// T: the root mean square of the output for independent samples of unit variance at the input, such as measurement
+/// noise.
 ///
 /// The norm is computed from both Gramians, which must agree. Less is better. Range: from 0 up. There is no value if
-/// the system is unstable or its stability is undecided within rounding. There is none either if a continuous system has
-/// direct feedthrough, or if the Gramians differ by more than 1e-6 (relative).
+/// the system is unstable or its stability is undecided within rounding. There is none either if a continuous system
+/// has direct feedthrough, or if the Gramians differ by more than 1e-6 (relative).
 ///
 /// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]

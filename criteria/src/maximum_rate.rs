@@ -38,8 +38,8 @@ struct Bound {
     signal: Variable,
 }
 
-/// Largest jump between steps, as a fraction of the signal's largest value, that counts as rounding: some ten times the accuracy of recorded
-/// signals.
+/// Largest jump between steps, as a fraction of the signal's largest value, that counts as rounding: some ten times the
+/// accuracy of recorded signals.
 const ROUNDING: f64 = 1e-6;
 
 impl Criterion for Bound {

@@ -17,17 +17,17 @@ use crate::common::{NOT_NEGATIVE, compare, compared_slopes, positive};
 /// experiment. The value is the sum of squares of the residuals
 /// `r_i = (y_simulated - y_measured)(t_i)/(noise sqrt(N))`, N samples, that least-squares solvers use.
 ///
-/// With a robust `loss`, the squares are replaced by Huber's loss or that of Student's distribution with 4 degrees of freedom; pure
-/// normal noise then has the value 0.93 or 0.97. Standard errors and profiles are those of M-estimates, and the bootstrap resamples
-/// the residuals with their outliers.
+/// With a robust `loss`, the squares are replaced by Huber's loss or that of Student's distribution with 4 degrees of
+/// freedom; pure normal noise then has the value 0.93 or 0.97. Standard errors and profiles are those of M-estimates,
+/// and the bootstrap resamples the residuals with their outliers.
 ///
 /// The criterion is evaluated in the experiments that measure the signal. Less is better. Range: from 0 up. A value
 /// well below 1 means that the noise level is too high or that the model fits the noise. A value well above 1 means
 /// that the model lacks an effect. The default demand is 1.
 ///
 /// Source: P. R. Bevington, D. K. Robinson, Data Reduction and Error Analysis for the Physical Sciences (3rd ed.,
-/// 2003), chapter 11 (reduced chi-square, here without the number of estimated parameters). Robust losses: P. J. Huber, E. M.
-/// Ronchetti, Robust Statistics (2nd ed., 2009), sections 4.5, 7.3.
+/// 2003), chapter 11 (reduced chi-square, here without the number of estimated parameters). Robust losses: P. J. Huber,
+/// E. M. Ronchetti, Robust Statistics (2nd ed., 2009), sections 4.5, 7.3.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct NormalisedError {
@@ -35,8 +35,8 @@ pub struct NormalisedError {
     pub signal: String,
     /// Noise level (standard deviation), in the unit of the signal; by default that of the channel.
     pub noise: Option<Quantity>,
-    /// How much a deviation counts. `squares` (default) is right for normal noise. `huber` grows linearly beyond 1.345 standard
-    /// deviations and `student` with the logarithm, so that outliers have little or no influence.
+    /// How much a deviation counts. `squares` (default) is right for normal noise. `huber` grows linearly beyond 1.345
+    /// standard deviations and `student` with the logarithm, so that outliers have little or no influence.
     #[serde(default)]
     pub loss: Loss,
 }

@@ -11,7 +11,8 @@ use crate::common::{Channel, LinearCriterion, Of, Values, poles};
 /// slowest mode decays.
 ///
 /// With `of = "closed-loop"` the model is the loop transfer function L, and the poles are those of `L/(1 + L)`.
-/// Uncontrollable and unobservable poles count too. A pole z of a sampled system counts as `ln(z)/T`, with the sampling period T.
+/// Uncontrollable and unobservable poles count too. A pole z of a sampled system counts as `ln(z)/T`, with the sampling
+/// period T.
 ///
 /// Less is better. Range: up to 0 for a demand, since an unstable system would meet any positive one; an unstable
 /// system has a positive value. Use the pair `good` and `bad` as demand, such as `good = -2`, `bad = 0`. A closed loop

@@ -25,8 +25,9 @@ pub struct BruteForce {
     pub simulations: usize,
 }
 
-/// Refits the declared model to the calibration data with every effect in turn, from the strengths that explain most of the
-/// residual to first order, and believes the least BIC: no other data, no correlation of residuals, no second effect.
+/// Refits the declared model to the calibration data with every effect in turn, from the strengths that explain most of
+/// the residual to first order, and believes the least BIC: no other data, no correlation of residuals, no second
+/// effect.
 ///
 /// Source: G. Schwarz, Estimating the dimension of a model, Annals of Statistics 6 (1978).
 ///

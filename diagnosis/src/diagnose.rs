@@ -29,12 +29,13 @@ impl Default for Options {
     }
 }
 
-/// Finds what the model of a calibration study lacks: fits the declared model, searches the sets of effects that explain the
-/// calibration records, and decides by evidence and forecast which of them are claimed. If the watch stops the search, the
-/// diagnosis rests on the sets fitted so far.
+/// Finds what the model of a calibration study lacks: fits the declared model, searches the sets of effects that
+/// explain the calibration records, and decides by evidence and forecast which of them are claimed. If the watch stops
+/// the search, the diagnosis rests on the sets fitted so far.
 ///
 /// # Errors
-/// A study that cannot be diagnosed, a declared model that cannot be simulated, or a stop before the declared model was fitted.
+/// A study that cannot be diagnosed, a declared model that cannot be simulated, or a stop before the declared model was
+/// fitted.
 pub fn diagnose(
     study: &Study,
     effects: &[Arc<dyn Effect>],

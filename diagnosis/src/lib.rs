@@ -1,5 +1,5 @@
-//! The diagnosis: finds what a calibrated model leaves unexplained in measured data, traces it to the place and the physical effect
-//! that the model lacks, and reports the error before and after.
+//! The diagnosis: finds what a calibrated model leaves unexplained in measured data, traces it to the place and the
+//! physical effect that the model lacks, and reports the error before and after.
 
 mod brute_force;
 mod candidates;

@@ -1,8 +1,8 @@
-//! Settings of the diagnosis: what a statistician would argue about, each with its unit and its basis. Iterations and tolerances are
-//! constants of their methods.
+//! Settings of the diagnosis: what a statistician would argue about, each with its unit and its basis. Iterations and
+//! tolerances are constants of their methods.
 //!
-//! "The studies" are the simulated data sets and recordings on which the method was tried first. `mops-bench ablation` shows which
-//! answers a setting changes.
+//! "The studies" are the simulated data sets and recordings on which the method was tried first. `mops-bench ablation`
+//! shows which answers a setting changes.
 
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +34,8 @@ pub struct Settings {
     pub matters: f64,
     /// Share of a calibration record that parameters are fitted to where its end is forecast. Basis: the studies.
     pub beginning: f64,
-    /// Cosine of the changes of the outputs from which the records cannot distinguish two effects. Basis: an assumption.
+    /// Cosine of the changes of the outputs from which the records cannot distinguish two effects. Basis: an
+    /// assumption.
     pub alike: f64,
     /// Gain in log-likelihood below which an effect under every error model does nothing, nats. Basis: an assumption.
     pub inert: f64,

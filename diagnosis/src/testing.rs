@@ -176,8 +176,8 @@ pub fn selected<T>(
     look(&sets, &forecasts, &verdict)
 }
 
-/// Screens effects on the fitted model of a subject; returns them, the best first, with their gains in log-likelihood in white
-/// noise, nats.
+/// Screens effects on the fitted model of a subject; returns them, the best first, with their gains in log-likelihood
+/// in white noise, nats.
 pub fn screened(subject: &Subject, effects: &[Arc<dyn Effect>], simulations: &Meter<'_>) -> Vec<(String, f64)> {
     let (refit, declared) = prepare(subject, effects, simulations).expect("it simulates");
     let white = [Errors::White];

@@ -39,7 +39,8 @@ impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
         at.value
     }
 
-    /// The state is the output, and the flank at rest on the input: 1 if the input pushes upwards, -1 downwards, 0 within the gap.
+    /// The state is the output, and the flank at rest on the input: 1 if the input pushes upwards, -1 downwards, 0
+    /// within the gap.
     fn update_hysteresis(&self, at: &PortState<'_, S>, memory: &mut [S]) {
         let half = self.gap * 0.5;
         let first = memory[0].value().is_nan();

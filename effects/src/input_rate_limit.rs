@@ -38,8 +38,8 @@ impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
         at.value
     }
 
-    /// The state is the output at the last update, the time of that, and the direction in which the output lags behind: 0 if it
-    /// follows the command.
+    /// The state is the output at the last update, the time of that, and the direction in which the output lags behind:
+    /// 0 if it follows the command.
     fn update_hysteresis(&self, at: &PortState<'_, S>, memory: &mut [S]) {
         let first = memory[0].value().is_nan();
         let way = self.rate * (at.t - memory[1]);

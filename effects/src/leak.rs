@@ -48,7 +48,8 @@ impl<S: Scalar> BoundEffect<S> for AtParameters<S> {
         if !flows {
             return S::from(0.0);
         }
-        // The derivative of the root is infinite at the hole, but its integral is not: at the crossing itself it counts as 0.
+        // The derivative of the root is infinite at the hole, but its integral is not: at the crossing itself it counts
+        // as 0.
         let crosses = head.value() <= CROSSING * (at.q.value().abs() + self.hole.value().abs());
         -self.k * if crosses { S::from(head.value().sqrt()) } else { head.sqrt() }
     }

@@ -111,8 +111,8 @@ pub(super) fn power<S: Scalar>(x: S, exponent: S) -> S {
     if x.value() > 0.0 { (exponent * x.ln()).exp() } else { S::from(0.0) }
 }
 
-/// Returns `head^exponent` over an edge, 0 below it. `closed` selects one law until the step ends: with the exponent 1 the outflow
-/// bends at the edge.
+/// Returns `head^exponent` over an edge, 0 below it. `closed` selects one law until the step ends: with the exponent 1
+/// the outflow bends at the edge.
 pub(super) fn over<S: Scalar>(head: S, exponent: S, closed: Option<bool>) -> S {
     match closed {
         Some(false) => S::from(0.0),

@@ -369,7 +369,8 @@ fn along(effect: &dyn Effect, parameters: &[f64], motion: &[[f64; 3]], step: f64
     motion.windows(2).map(force).collect()
 }
 
-/// Returns the root mean square of what a multiple of one signal and a constant leave of another, relative to its deviation.
+/// Returns the root mean square of what a multiple of one signal and a constant leave of another, relative to its
+/// deviation.
 fn left(signal: &[f64], of: &[f64]) -> f64 {
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
     let centred = |x: &[f64]| x.iter().map(|v| v - mean(x)).collect::<Vec<f64>>();
@@ -434,7 +435,7 @@ fn an_effect_at_an_end_of_a_shape_is_the_simpler_effect_that_it_names() {
                     if effect.name() == "second-order-lag" {
                         theirs[0] = 2.0 * extreme * own[0];
                     }
-                    // Once it has begun, away from where the motion turns.
+                    // After a transient, away from where the motion turns.
                     let of = |effect: &dyn Effect, parameters: &[f64]| {
                         let forces = along(effect, parameters, &motion, step);
                         let moves = forces.into_iter().zip(&motion).skip(6_000).filter(|(_, [_, v, _])| v.abs() > 0.7);

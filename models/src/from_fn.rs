@@ -19,11 +19,12 @@ struct Equations {
     rates: Rates,
 }
 
-/// Creates a model `x' = f(t, x, u, p)` from a closure. `rates` receives the instant (`at.t`, states `at.x`, inputs `at.u`) and the
-/// parameters, and fills in the derivatives of the states. The signals of `interface` are the first states, in their order.
+/// Creates a model `x' = f(t, x, u, p)` from a closure. `rates` receives the instant (`at.t`, states `at.x`, inputs
+/// `at.u`) and the parameters, and fills in the derivatives of the states. The signals of `interface` are the first
+/// states, in their order.
 ///
-/// Derivatives with respect to parameters are finite differences; a [`PlantModel`], written once over the scalar, has exact
-/// ones, and can be linearised and augmented with effects.
+/// Derivatives with respect to parameters are finite differences; a [`PlantModel`], written once over the scalar, has
+/// exact ones, and can be linearised and augmented with effects.
 ///
 /// # Panics
 /// If `interface` has more signals than there are states.

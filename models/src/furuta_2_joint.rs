@@ -30,8 +30,8 @@ use crate::kernel::{PlantModel, Simulated, Tolerance, seconds};
 ///
 /// Signals: `phi`, `dphi`, `theta`, `dtheta`, `u`. Input: `u`, the torque on the arm, N m.
 ///
-/// Source: M. Gafvert, Derivation of Furuta pendulum dynamics, report TFRT-7574, Lund (1998); friction as in the Modelica
-/// Standard Library 2.2, Mechanics.Rotational.BearingFriction.
+/// Source: M. Gafvert, Derivation of Furuta pendulum dynamics, report TFRT-7574, Lund (1998); friction as in the
+/// Modelica Standard Library 2.2, Mechanics.Rotational.BearingFriction.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Furuta2JointOptions {

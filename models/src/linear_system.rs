@@ -52,7 +52,8 @@ pub(crate) struct InTime<G> {
 }
 
 impl<G: LinearSystem + Send + Sync> InTime<G> {
-    /// Returns the model of a linear system with this interface and these states, simulated over time until the horizon (s).
+    /// Returns the model of a linear system with this interface and these states, simulated over time until the horizon
+    /// (s).
     pub fn model(of: G, interface: &Interface, states: &[String], horizon: f64) -> Simulated<Self> {
         let interface = Interface { analysis: AnalysisKind::Time, horizon: Some(horizon), ..interface.clone() };
         let states = states.iter().map(|name| Variable::new(name, "1", "state of the system")).collect();

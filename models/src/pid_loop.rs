@@ -30,7 +30,8 @@ use crate::rational::{PlantOptions, TransferFunction};
 /// derivative part (default 1), `Tt` tracking time (s; default sqrt(Ti Td), or Ti if Td = 0), and every name given in
 /// place of a number in the plant.
 ///
-/// Signals: `r`, `y`, `e = r - y`, `u = sat(v)`, `d`. Inputs: `r`, `d`. With a continuous controller the loop can be cut at `u`.
+/// Signals: `r`, `y`, `e = r - y`, `u = sat(v)`, `d`. Inputs: `r`, `d`. With a continuous controller the loop can be
+/// cut at `u`.
 ///
 /// Source: K. J. Astrom, T. Hagglund, PID Controllers, 2nd edition (1995), sections 3.4 to 3.6; block form of the
 /// derivative as in the Modelica Standard Library, Blocks.Continuous.PID.
@@ -39,7 +40,8 @@ use crate::rational::{PlantOptions, TransferFunction};
 pub struct PidLoopOptions {
     /// Plant: `{ poles = [...], zeros = [...], gain = 1.0 }`, or `{ numerator = [...], denominator = [...] }` with
     /// coefficients of descending powers of s, or `{ a = [[...], ...], b = [...], c = [...] }` with state-space
-    /// matrices. A name instead of a number becomes a parameter. For a plant of the kind `equations`, see its key `pid`.
+    /// matrices. A name instead of a number becomes a parameter. For a plant of the kind `equations`, see its key
+    /// `pid`.
     plant: PlantOptions,
     /// End of the simulation.
     horizon: Quantity,

@@ -30,7 +30,8 @@ use crate::rational::{PlantOptions, TransferFunction};
 pub struct PidOpenLoopOptions {
     /// Plant, as in `pid-loop`: `{ poles = [...], zeros = [...], gain = 1.0 }`, or
     /// `{ numerator = [...], denominator = [...] }` with coefficients of descending powers of s, or
-    /// `{ a = [[...], ...], b = [...], c = [...] }` with state-space matrices. A name instead of a number becomes a parameter.
+    /// `{ a = [[...], ...], b = [...], c = [...] }` with state-space matrices. A name instead of a number becomes a
+    /// parameter.
     plant: PlantOptions,
 }
 

@@ -226,8 +226,8 @@ fn is_name(text: &str) -> bool {
     letters.next().is_some_and(|c| c.is_alphabetic() || c == '_') && letters.all(|c| c.is_alphanumeric() || c == '_')
 }
 
-/// Returns numerator and denominator, in ascending powers, of `c (s - A)^-1 b`, by the method of Leverrier and Faddeev: the
-/// adjugate of `s - A` is a polynomial in s, whose matrices and those of the determinant follow from each other.
+/// Returns numerator and denominator, in ascending powers, of `c (s - A)^-1 b`, by the method of Leverrier and Faddeev:
+/// the adjugate of `s - A` is a polynomial in s, whose matrices and those of the determinant follow from each other.
 ///
 /// Source: D. K. Faddeev, V. N. Faddeeva, Computational Methods of Linear Algebra (1963).
 fn from_matrices<S: Scalar>(a: &[Vec<S>], b: &[S], c: &[S]) -> (Vec<S>, Vec<S>) {

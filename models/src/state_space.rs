@@ -40,9 +40,9 @@ pub struct StateSpaceOptions {
     inputs: Option<Vec<String>>,
     /// Names of the outputs; default `y`, or `y1`, `y2`, ...
     outputs: Option<Vec<String>>,
-    /// End of a simulation. With it, the system is simulated over time, from rest, for criteria over time; without it, criteria of
-    /// linear systems read it. `like` makes one of the other. A delay is then above 0 s; steps are at most half as long. Before it has
-    /// passed, the delayed input has its value just before 0 s.
+    /// End of a simulation. With it, the system is simulated over time, from rest, for criteria over time; without it,
+    /// criteria of linear systems read it. `like` makes one of the other. A delay is then above 0 s; steps are at most
+    /// half as long. Before it has passed, the delayed input has its value just before 0 s.
     horizon: Option<Quantity>,
     /// Units of parameters, inputs and outputs, such as `{ k = "N/m" }`.
     #[serde(default)]

@@ -43,9 +43,9 @@ pub struct TransferFunctionOptions {
     input: Option<String>,
     /// Name of the output; default `y`.
     output: Option<String>,
-    /// End of a simulation. With it, the system is simulated over time, from rest, for criteria over time; without it, criteria of
-    /// linear systems read it. `like` makes one of the other. A delay is then above 0 s; steps are at most half as long. Before it has
-    /// passed, the delayed input has its value just before 0 s.
+    /// End of a simulation. With it, the system is simulated over time, from rest, for criteria over time; without it,
+    /// criteria of linear systems read it. `like` makes one of the other. A delay is then above 0 s; steps are at most
+    /// half as long. Before it has passed, the delayed input has its value just before 0 s.
     horizon: Option<Quantity>,
     /// Units of parameters, input and output, such as `{ T = "s" }`.
     units: BTreeMap<String, String>,

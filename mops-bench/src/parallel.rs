@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mops::Watch;
 
-/// Runs every task on one of `jobs` threads, until `watch` requests a stop. Returns the results so far, in the order of the
-/// tasks. A task that panics has no result.
+/// Runs every task on one of `jobs` threads, until `watch` requests a stop. Returns the results so far, in the order of
+/// the tasks. A task that panics has no result.
 pub(crate) fn each<T: Sync, R: Send>(
     tasks: &[T],
     jobs: usize,

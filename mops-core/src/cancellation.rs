@@ -31,7 +31,8 @@ const INSISTED: u8 = 4;
 const TIME_LIMIT: u8 = 8;
 
 impl Cancellation {
-    /// Requests the end of searches. An interruption takes precedence over the time limit, and that over a spent budget.
+    /// Requests the end of searches. An interruption takes precedence over the time limit, and that over a spent
+    /// budget.
     pub fn request(&self, why: Halt) {
         let bit = match why {
             Halt::Budget => BUDGET,

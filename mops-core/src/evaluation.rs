@@ -17,8 +17,8 @@ pub enum Objective {
     Max,
     /// Sum of the weighted scaled values.
     Sum,
-    /// Vector of all scaled values: the run keeps the Pareto front. The reported point is the front point with the smallest
-    /// largest scaled value.
+    /// Vector of all scaled values: the run keeps the Pareto front. The reported point is the front point with the
+    /// smallest largest scaled value.
     Each,
 }
 
@@ -33,8 +33,8 @@ pub struct Evaluation {
     pub readings: Vec<Option<Reading>>,
     /// Scaled values of all rows, 0 for monitored ones; `None` if a row that counts has no value.
     pub scaled: Option<Vec<f64>>,
-    /// Weighted residuals whose sum of squares is the objective; empty if the objective is not a sum of squares. A solver gets them
-    /// from [`crate::Oracle::linearise`], as those of earlier points are not kept.
+    /// Weighted residuals whose sum of squares is the objective; empty if the objective is not a sum of squares. A
+    /// solver gets them from [`crate::Oracle::linearise`], as those of earlier points are not kept.
     pub residuals: Vec<f64>,
     /// Failures: index of the job, and the reason.
     pub failures: Vec<(usize, Failure)>,

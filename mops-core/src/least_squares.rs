@@ -1,4 +1,5 @@
-//! Levenberg-Marquardt iteration within bounds, by QR factorisation: the core of the solver of that name and of the fits of the diagnosis.
+//! Levenberg-Marquardt iteration within bounds, by QR factorisation: the core of the solver of that name and of the
+//! fits of the diagnosis.
 
 use mops_math as math;
 use nalgebra::{DMatrix, DVector};
@@ -7,8 +8,8 @@ use nalgebra::{DMatrix, DVector};
 /// ```text
 /// (J'J + lambda D^2) d = -J'r,   D^2 the largest diagonal of J'J so far
 /// ```
-/// Bounds are handled by an active set: coordinates that the step would move beyond a bound are fixed there, and the step is
-/// recomputed.
+/// Bounds are handled by an active set: coordinates that the step would move beyond a bound are fixed there, and the
+/// step is recomputed.
 ///
 /// The step is that of least squares with the rows of `J` and of `sqrt(lambda) D`.
 ///
@@ -44,7 +45,8 @@ const LEAST_SCALE: f64 = 1e-30;
 /// Ratio of actual to predicted decrease up to which a step is rejected.
 const REJECTED: f64 = 1e-4;
 
-/// Largest factor of the damping by which a single ratio shortens a step. Half of that of the source passes kinks more often.
+/// Largest factor of the damping by which a single ratio shortens a step. Half of that of the source passes kinks more
+/// often.
 ///
 /// Source: J. J. More, B. S. Garbow, K. E. Hillstrom, User guide for MINPACK-1, report ANL-80-74 (1980), `lmder`.
 const MOST_GROWTH: f64 = 5.0;
@@ -116,9 +118,9 @@ impl LeastSquares {
         ratio > REJECTED
     }
 
-    /// Increases the damping after a step that was not accepted; `ratio` is that of actual to predicted decrease, of which the
-    /// parabola through both sums of squares has its minimum at the share `1/(2 - ratio)` of the step. Returns false if no step
-    /// can make progress any more.
+    /// Increases the damping after a step that was not accepted; `ratio` is that of actual to predicted decrease, of
+    /// which the parabola through both sums of squares has its minimum at the share `1/(2 - ratio)` of the step.
+    /// Returns false if no step can make progress any more.
     pub fn reject(&mut self, ratio: f64) -> bool {
         let shorter = if ratio.is_nan() { MOST_GROWTH } else { (2.0 - ratio).min(MOST_GROWTH) };
         self.damping = (self.damping * self.damping_growth.max(shorter)).min(MOST_DAMPING);
@@ -137,8 +139,8 @@ impl LeastSquares {
         self.damping_growth = 2.0;
     }
 
-    /// Returns the largest cosine of the angle between the residuals and a column of the Jacobian, over the coordinates that
-    /// no bound holds: 0 at an optimum.
+    /// Returns the largest cosine of the angle between the residuals and a column of the Jacobian, over the coordinates
+    /// that no bound holds: 0 at an optimum.
     pub fn largest_cosine(&self) -> f64 {
         let norm = self.residuals.norm();
         let cosine = |j: usize| {
@@ -194,13 +196,14 @@ const TALL: usize = 4096;
 const CHUNK: usize = 256;
 const ROWS_PER_COLUMN: usize = 4;
 
-/// Returns the triangular factor `R` of a matrix `J = QR`, and `Q'r`. The condition of `J` is not squared, as by normal equations.
+/// Returns the triangular factor `R` of a matrix `J = QR`, and `Q'r`. The condition of `J` is not squared, as by normal
+/// equations.
 ///
-/// A tall matrix is factorised by chunks of rows, without the columns that vanish in a chunk, and then the factors of all chunks
-/// together: the time for coordinates that act in few rows each is linear in the number of rows.
+/// A tall matrix is factorised by chunks of rows, without the columns that vanish in a chunk, and then the factors of
+/// all chunks together: the time for coordinates that act in few rows each is linear in the number of rows.
 ///
-/// Source: J. Demmel, L. Grigori, M. Hoemmen, J. Langou, SIAM Journal on Scientific Computing 34 (2012) A206-A239 (tall and skinny
-/// QR).
+/// Source: J. Demmel, L. Grigori, M. Hoemmen, J. Langou, SIAM Journal on Scientific Computing 34 (2012) A206-A239 (tall
+/// and skinny QR).
 fn factorised(residuals: &DVector<f64>, jacobian: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
     let (rows, n) = jacobian.shape();
     if rows < TALL || n == 0 {

@@ -1,4 +1,5 @@
-//! The seams of mops: study, model, plant, effect, criterion, solver, the min-max problem that a study becomes, and its run.
+//! The seams of mops: study, model, plant, effect, criterion, solver, the min-max problem that a study becomes, and its
+//! run.
 //!
 //! Concrete models, effects, criteria and solvers are not part of this crate; a [`Catalogue`] provides them.
 //!

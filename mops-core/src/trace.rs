@@ -6,9 +6,9 @@ use mops_language::Scalar;
 
 /// A signal as a piecewise quartic over consecutive segments, with jumps allowed between them.
 ///
-/// On segment `i`, from `knots[i]` to `knots[i + 1]`, let `t = knots[i] + s (knots[i + 1] - knots[i])` with `s` in [0, 1].
-/// The value at `t` is `c0 + c1 s + c2 s^2 + c3 s^3 + c4 s^4`: the degree of the dense output of a 5th-order Runge-Kutta step.
-/// At a jump, including a jump at its end, the trace has the later value.
+/// On segment `i`, from `knots[i]` to `knots[i + 1]`, let `t = knots[i] + s (knots[i + 1] - knots[i])` with `s` in [0,
+/// 1]. The value at `t` is `c0 + c1 s + c2 s^2 + c3 s^3 + c4 s^4`: the degree of the dense output of a 5th-order
+/// Runge-Kutta step. At a jump, including a jump at its end, the trace has the later value.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Trace {
     knots: Vec<f64>,
@@ -30,8 +30,8 @@ pub enum Earlier {
     Extrapolated,
 }
 
-/// Weights of the values at [`Trace::NODES`] in their quartic at the first of [`Trace::CHECKS`]: Lagrange's basis. Reversed, they
-/// apply at the same distance from the end.
+/// Weights of the values at [`Trace::NODES`] in their quartic at the first of [`Trace::CHECKS`]: Lagrange's basis.
+/// Reversed, they apply at the same distance from the end.
 const WEIGHTS: [f64; 5] = {
     let mut weights = [1.0; 5];
     let (mut i, mut k) = (0, 0);
@@ -60,11 +60,12 @@ impl Trace {
     pub const NODES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
     /// Positions within a segment, near the extrema of the interpolation error, at which the quartic through values at
-    /// [`Trace::NODES`] is compared with the signal. An irrational fraction avoids periods that coincide with the nodes.
+    /// [`Trace::NODES`] is compared with the signal. An irrational fraction avoids periods that coincide with the
+    /// nodes.
     pub const CHECKS: [f64; 2] = [0.112_701_665_379_258_3, 1.0 - 0.112_701_665_379_258_3];
 
-    /// Returns the largest deviation of the quartic through `values` at [`Trace::NODES`] from the values at [`Trace::CHECKS`]; NaN
-    /// if a value is not finite.
+    /// Returns the largest deviation of the quartic through `values` at [`Trace::NODES`] from the values at
+    /// [`Trace::CHECKS`]; NaN if a value is not finite.
     pub fn deviation(values: [f64; 5], checks: [f64; 2]) -> f64 {
         let quartic = |node: &dyn Fn(usize) -> usize| -> f64 {
             WEIGHTS.iter().enumerate().map(|(k, weight)| weight * values[node(k)]).sum()
@@ -111,11 +112,12 @@ impl Trace {
         self.jumped = Some(value);
     }
 
-    /// Sets the derivatives of the knots of the trace that this one is the derivative of, for derivatives at given times of which the
-    /// times increase. They vary linearly between these times, and vanish at both ends of the trace.
+    /// Sets the derivatives of the knots of the trace that this one is the derivative of, for derivatives at given
+    /// times of which the times increase. They vary linearly between these times, and vanish at both ends of the trace.
     ///
-    /// At a jump or a corner whose time varies, the derivative at a fixed time is that of one side, and a criterion needs the other
-    /// part: the derivative of the time. NaN means that several instants with different derivatives coincide.
+    /// At a jump or a corner whose time varies, the derivative at a fixed time is that of one side, and a criterion
+    /// needs the other part: the derivative of the time. NaN means that several instants with different derivatives
+    /// coincide.
     pub fn move_knots(&mut self, of_times: &[(f64, f64)]) {
         if of_times.iter().all(|&(_, moves)| moves == 0.0) {
             return;
@@ -179,7 +181,8 @@ impl Trace {
         late
     }
 
-    /// Returns the derivative of [`Trace::delayed`], where `tangent` is the derivative of the trace and `late` that of `time`.
+    /// Returns the derivative of [`Trace::delayed`], where `tangent` is the derivative of the trace and `late` that of
+    /// `time`.
     #[must_use]
     pub fn delayed_along(&self, tangent: &Self, (time, late): (f64, f64), earlier: Earlier) -> Self {
         let mut along = tangent.delayed(time, earlier);
@@ -191,7 +194,8 @@ impl Trace {
         along
     }
 
-    /// Returns the part between two times, on a clock that starts at the first of them, or at the start of the trace if that is later.
+    /// Returns the part between two times, on a clock that starts at the first of them, or at the start of the trace if
+    /// that is later.
     #[must_use]
     pub fn between(&self, from: f64, until: f64) -> Self {
         let (from, until) = (from.max(self.start()), until.min(self.end()));
@@ -408,8 +412,8 @@ impl Trace {
         self.segments.iter().all(|c| c.iter().all(|c| c.is_finite())) && self.jumped.is_none_or(f64::is_finite)
     }
 
-    /// Returns the integral of `f(t, |y - level|)` by the quadrature of [`Trace::integral`]. Segments are split at crossings
-    /// of `level`, so that the kink of the absolute value costs no accuracy.
+    /// Returns the integral of `f(t, |y - level|)` by the quadrature of [`Trace::integral`]. Segments are split at
+    /// crossings of `level`, so that the kink of the absolute value costs no accuracy.
     pub fn integral_of_deviation(&self, level: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
         let mut sum = 0.0;
         for piece in self.pieces() {
@@ -438,9 +442,9 @@ impl Trace {
         Self { knots: self.knots.clone(), segments, ..Self::default() }
     }
 
-    /// Returns `y + distance tangent`, for a tangent on the same segments. Knots that vary are moved along their derivatives, and
-    /// with them jumps and corners: on a segment from `a` to `b`, whose derivatives are `a'` and `b'`, the value at the position `s`
-    /// changes by the tangent and by `y' (a' + s (b' - a'))`.
+    /// Returns `y + distance tangent`, for a tangent on the same segments. Knots that vary are moved along their
+    /// derivatives, and with them jumps and corners: on a segment from `a` to `b`, whose derivatives are `a'` and `b'`,
+    /// the value at the position `s` changes by the tangent and by `y' (a' + s (b' - a'))`.
     #[must_use]
     pub fn moved(&self, tangent: &Self, distance: f64) -> Self {
         debug_assert_eq!(self.knots, tangent.knots, "a tangent has the segments of its trace");
@@ -464,8 +468,8 @@ impl Trace {
         moved
     }
 
-    /// Returns the largest distance in either direction by which [`Trace::moved`] at most halves the length of each segment;
-    /// infinity if no segment becomes shorter, NaN if the derivatives of the knots are not known.
+    /// Returns the largest distance in either direction by which [`Trace::moved`] at most halves the length of each
+    /// segment; infinity if no segment becomes shorter, NaN if the derivatives of the knots are not known.
     pub fn room(&self, tangent: &Self) -> f64 {
         if tangent.moves.iter().any(|moves| moves.is_nan()) {
             return f64::NAN;
@@ -516,13 +520,13 @@ fn gauss(a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
 
 /// Returns the roots of `c0 + c1 s + c2 s^2 + c3 s^3` strictly inside (0, 1), increasing.
 ///
-/// A cubic is monotone between the roots of its derivative. Bisection there finds every sign change and needs no special
-/// case for vanishing leading coefficients.
+/// A cubic is monotone between the roots of its derivative. Bisection there finds every sign change and needs no
+/// special case for vanishing leading coefficients.
 fn cubic_roots(c: [f64; 4]) -> impl Iterator<Item = f64> {
     let mut roots = [f64::NAN; 3];
     let inside = |roots: [f64; 3]| roots.into_iter().filter(|s| *s > 0.0 && *s < 1.0);
-    // Most segments are so short relative to the curvature of the signal that their derivative keeps its sign: a polynomial
-    // lies within the convex hull of its Bernstein coefficients.
+    // Most segments are so short relative to the curvature of the signal that their derivative keeps its sign: a
+    // polynomial lies within the convex hull of its Bernstein coefficients.
     let bernstein = [c[0], c[0] + c[1] / 3.0, c[0] + (2.0 * c[1] + c[2]) / 3.0, c[0] + c[1] + c[2] + c[3]];
     if bernstein.iter().all(|b| *b > 0.0) || bernstein.iter().all(|b| *b < 0.0) {
         return inside(roots);
@@ -547,8 +551,8 @@ fn cubic_roots(c: [f64; 4]) -> impl Iterator<Item = f64> {
     inside(roots)
 }
 
-/// Returns a zero of `f` between `a` and `b`, at which `f` has opposite signs or is zero. Uses the Illinois variant of false
-/// position, to the last bits. Source: M. Dowell, P. Jarratt, BIT 11 (1971) 168-174.
+/// Returns a zero of `f` between `a` and `b`, at which `f` has opposite signs or is zero. Uses the Illinois variant of
+/// false position, to the last bits. Source: M. Dowell, P. Jarratt, BIT 11 (1971) 168-174.
 fn bisect(mut a: f64, mut b: f64, f: impl Fn(f64) -> f64) -> f64 {
     let (mut fa, mut fb) = (f(a), f(b));
     if fa == 0.0 {

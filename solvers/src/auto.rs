@@ -34,12 +34,13 @@ use crate::weighted_chebyshev::WeightedChebyshevOptions;
 ///   or lists; otherwise `nsga2` for two criteria and `nsga3` for more.
 ///
 /// Every method for one objective runs from several points (multistart): the initial guess of the study and the best
-/// points of samples of the box, until another optimum is unlikely. Where the best point is then not shown to be stationary,
-/// or the runs have ended at several optima, and the objective is no sum of squares, a pattern search continues from it,
-/// and from the end of the first run if that has not converged: an optimum may lie at a discontinuity (of a settling time,
-/// for example), where gradients are of no use. Unless the objective is a sum of squares, the search ends once the
-/// evaluations since the last decrease of the objective by a thousandth exceed a multiple of those before it: 3 times where
-/// the point is shown to be stationary and no other optimum is known, 60 times elsewhere.
+/// points of samples of the box, until another optimum is unlikely. Where the best point is then not shown to be
+/// stationary, or the runs have ended at several optima, and the objective is no sum of squares, a pattern search
+/// continues from it, and from the end of the first run if that has not converged: an optimum may lie at a
+/// discontinuity (of a settling time, for example), where gradients are of no use. Unless the objective is a sum of
+/// squares, the search ends once the evaluations since the last decrease of the objective by a thousandth exceed a
+/// multiple of those before it: 3 times where the point is shown to be stationary and no other optimum is known, 60
+/// times elsewhere.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct AutoOptions {
@@ -291,9 +292,9 @@ fn has_improved(oracle: &dyn Oracle, previous_objective: f64) -> bool {
     })
 }
 
-/// Largest numbers of criteria and of tuners for `weighted-chebyshev`. On DTLZ2 with 4, 6, 8 and 10 criteria and 6 tuners more than
-/// criteria, from random starts, it found 60 points within 4e-5 of the front in 1,300 to 7,100 evaluations; those of `nsga3` were
-/// up to 0.05 to 0.46 away after 12,000 to 17,000.
+/// Largest numbers of criteria and of tuners for `weighted-chebyshev`. On DTLZ2 with 4, 6, 8 and 10 criteria and 6
+/// tuners more than criteria, from random starts, it found 60 points within 4e-5 of the front in 1,300 to 7,100
+/// evaluations; those of `nsga3` were up to 0.05 to 0.46 away after 12,000 to 17,000.
 const MAX_CHEBYSHEV: [usize; 2] = [10, 50];
 
 /// Chooses the solver for a front: `weighted-chebyshev` for few criteria, otherwise `nsga2` (crowding) for two criteria

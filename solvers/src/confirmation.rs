@@ -7,8 +7,9 @@ use mops_core::{
 
 /// Evaluations of a search up to its last gain, and since then.
 ///
-/// Only further searches can confirm the best point. The evaluations spent on them are limited in proportion to the evaluations up
-/// to the last gain: an optimum that was cheap to find is cheap to confirm. See [`is_gain`] for what counts as a gain.
+/// Only further searches can confirm the best point. The evaluations spent on them are limited in proportion to the
+/// evaluations up to the last gain: an optimum that was cheap to find is cheap to confirm. See [`is_gain`] for what
+/// counts as a gain.
 #[derive(Debug, Clone, Copy)]
 pub struct Confirmation {
     /// Remaining evaluations at the beginning of the search.
@@ -19,21 +20,23 @@ pub struct Confirmation {
     merit: Option<Merit>,
 }
 
-/// Limit on the evaluations since the last gain, relative to those up to it, where the best point is stationary and no search has
-/// ended at another optimum.
+/// Limit on the evaluations since the last gain, relative to those up to it, where the best point is stationary and no
+/// search has ended at another optimum.
 ///
-/// With it, `auto` solves as many problems of the suites `minimax`, `hock-schittkowski` and `control` as without a limit.
+/// With it, `auto` solves as many problems of the suites `minimax`, `hock-schittkowski` and `control` as without a
+/// limit.
 const FACTOR_UNIQUE: usize = 3;
 
-/// Limit on the evaluations since the last gain, relative to those up to it, otherwise. At kinks, discontinuities and in narrow
-/// curved valleys, local searches may end away from an optimum. With 20, one of five seeds misses the minimum settling time under
-/// an overshoot limit.
+/// Limit on the evaluations since the last gain, relative to those up to it, otherwise. At kinks, discontinuities and
+/// in narrow curved valleys, local searches may end away from an optimum. With 20, one of five seeds misses the minimum
+/// settling time under an overshoot limit.
 pub const FACTOR_OTHERWISE: usize = 60;
 
 /// Relative decrease of the violation of an infeasible point that counts as a gain.
 const LESS_VIOLATION: f64 = 1e-3;
 
-/// Number of starting points in a sample of the box, per coordinate and one more. A gain counts as at least two such samples.
+/// Number of starting points in a sample of the box, per coordinate and one more. A gain counts as at least two such
+/// samples.
 pub const SAMPLE: usize = 5;
 
 /// Returns the limit factor of a best point with this merit and classification, given the ends of the searches.
@@ -65,8 +68,8 @@ impl Confirmation {
     }
 }
 
-/// Returns true if a merit is a gain over a known one: the first feasible point, a decrease of the objective by more than a
-/// thousandth, or, without a feasible point, of the violation.
+/// Returns true if a merit is a gain over a known one: the first feasible point, a decrease of the objective by more
+/// than a thousandth, or, without a feasible point, of the violation.
 pub fn is_gain(merit: &Merit, known: &Merit) -> bool {
     match (known.is_feasible(), merit.is_feasible()) {
         (true, true) => merit.is_better_than(known) && Basins::of(*known, &[*merit]).arrived == 0,

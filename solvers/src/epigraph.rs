@@ -61,8 +61,8 @@ impl Subproblem {
         self.solve_while(&|| true, criteria, hessian, [low, high], penalty, into)
     }
 
-    /// Computes the step as [`Subproblem::solve`] does; returns `None` as soon as `goes_on` returns false, which is asked before
-    /// every step of the active-set method.
+    /// Computes the step as [`Subproblem::solve`] does; returns `None` as soon as `goes_on` returns false, which is
+    /// asked before every step of the active-set method.
     #[must_use]
     pub fn solve_while(
         &mut self,

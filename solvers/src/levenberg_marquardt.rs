@@ -19,8 +19,8 @@ use crate::start::usable_start;
 /// Bounds are handled by an active set: tuners that the step would move beyond a bound are fixed there, and the step is
 /// recomputed.
 ///
-/// A logarithmic scale may bend a straight valley: where steps in the scaled tuners bring little, steps in the tuners themselves
-/// are tried as well.
+/// A logarithmic scale may bend a straight valley: where steps in the scaled tuners bring little, steps in the tuners
+/// themselves are tried as well.
 ///
 /// The method runs from the initial guess of the study, then from the best points of a sample of the box. It then
 /// restarts around the best point, until two rounds in succession improve it by less than a thousandth.
@@ -156,12 +156,13 @@ impl Solver for Local {
     }
 }
 
-/// Relative decrease of the sum of squares that counts as small, and number of such steps after which both coordinates are tried.
+/// Relative decrease of the sum of squares that counts as small, and number of such steps after which both coordinates
+/// are tried.
 const SLOW: f64 = 0.1;
 const MANY_SLOW: usize = 3;
 
-/// Coordinates of the steps, in [0, 1]: the tuners themselves, relative to their ranges, where a scale is logarithmic and listed
-/// here; else the scaled tuners.
+/// Coordinates of the steps, in [0, 1]: the tuners themselves, relative to their ranges, where a scale is logarithmic
+/// and listed here; else the scaled tuners.
 struct Coordinates {
     /// Logarithm of the ratio of the bounds of every tuner, 0 for a linear scale; empty for steps in the scaled tuners.
     log_ratios: Vec<f64>,
@@ -215,8 +216,8 @@ fn matrices(at: Linearisation) -> (DMatrix<f64>, DVector<f64>) {
 }
 
 impl State {
-    /// Moves the iterates to a point; `ratios` are those of the coordinates that were `tried`. Creates the second one if it is
-    /// needed from now on.
+    /// Moves the iterates to a point; `ratios` are those of the coordinates that were `tried`. Creates the second one
+    /// if it is needed from now on.
     fn move_to(&mut self, point: &[f64], mut matrices: (DMatrix<f64>, DVector<f64>), tried: &[usize], ratios: &[f64]) {
         /// Ratio that leaves the damping as it is.
         const NEUTRAL: f64 = 0.5;

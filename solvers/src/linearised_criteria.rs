@@ -114,8 +114,8 @@ impl LinearisedCriteria {
         self.equalities.truncate(lengths[2]);
     }
 
-    /// Returns a factor that brings the objective to the order of 1; 1 if its magnitude is 0 or between 1e-3 and 1e3. Scaled
-    /// values are of order 1 unless the demands are far from what is achievable.
+    /// Returns a factor that brings the objective to the order of 1; 1 if its magnitude is 0 or between 1e-3 and 1e3.
+    /// Scaled values are of order 1 unless the demands are far from what is achievable.
     pub fn objective_scale(&self) -> f64 {
         let largest = self.objectives.iter().map(|row| row.value.abs()).fold(0.0, f64::max);
         if (1e-3..1e3).contains(&largest) || largest == 0.0 { 1.0 } else { 1.0 / largest }

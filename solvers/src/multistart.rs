@@ -1,9 +1,9 @@
 //! Multistart of a local solver.
 //!
-//! The first run starts from the initial guess of the study, the next ones from the best points of samples of the box, until an
-//! optimum that is not yet known is unlikely, until the limit of evaluations without a gain is reached (see
-//! [`crate::confirmation`]), or until the residuals of a calibration are noise. A run that comes close to the end of an earlier one
-//! is not continued. If enabled, runs from points around the best one follow until nothing changes.
+//! The first run starts from the initial guess of the study, the next ones from the best points of samples of the box,
+//! until an optimum that is not yet known is unlikely, until the limit of evaluations without a gain is reached (see
+//! [`crate::confirmation`]), or until the residuals of a calibration are noise. A run that comes close to the end of an
+//! earlier one is not continued. If enabled, runs from points around the best one follow until nothing changes.
 
 use mops_core::{
     Evaluation, Halt, Merit, Oracle, Progress, Shape, Solver,
@@ -79,18 +79,19 @@ const AT_ONCE: usize = 2;
 /// Distance along every coordinate, in the unit box, within which a run has arrived at the end of an earlier one.
 const ARRIVED: f64 = 0.01;
 
-/// Decrease of the objective, relative to the objective plus [`SMALL_OBJECTIVE`], up to which a run that is near an earlier end is
-/// no better.
+/// Decrease of the objective, relative to the objective plus [`SMALL_OBJECTIVE`], up to which a run that is near an
+/// earlier end is no better.
 const NO_BETTER: f64 = 1e-6;
 
 /// Largest cost of a run that has found nothing better, relative to that of the run that has found the best point.
 const PATIENCE: f64 = 3.0;
 
-/// Largest cost of such a run where the best point is shown to be stationary, relative to the cost up to the last gain: a run needs
-/// about as much to arrive at the same optimum.
+/// Largest cost of such a run where the best point is shown to be stationary, relative to the cost up to the last gain:
+/// a run needs about as much to arrive at the same optimum.
 const PATIENCE_STATIONARY: f64 = 1.5;
 
-/// Minimum number of runs before the limit of evaluations without a gain applies: three ends at one optimum are not doubted.
+/// Minimum number of runs before the limit of evaluations without a gain applies: three ends at one optimum are not
+/// doubted.
 const MIN_RUNS: usize = 3;
 
 /// Objective that is regarded as zero. A scaled value of 1 is the demand.
@@ -153,8 +154,8 @@ impl Multistart {
         Self { initial_solver: Some(first), ..self }
     }
 
-    /// Sets a solver that continues from the best point of the first run, unless that has converged, before the other starting
-    /// points.
+    /// Sets a solver that continues from the best point of the first run, unless that has converged, before the other
+    /// starting points.
     #[must_use]
     pub fn with_continuation(self, second: Box<dyn Solver>) -> Self {
         Self { continuation_solver: Some(second), ..self }

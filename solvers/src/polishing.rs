@@ -14,7 +14,8 @@ const KEPT: usize = 5;
 /// Number of points that local searches start from.
 const STARTS: usize = 6;
 
-/// Distance between starting points of local searches, in the unit box along a coordinate. Closer ones mostly share a basin.
+/// Distance between starting points of local searches, in the unit box along a coordinate. Closer ones mostly share a
+/// basin.
 const APART: f64 = 0.1;
 
 /// Number of points that are remembered during the global search.
@@ -25,9 +26,9 @@ const LAST_SIZE: f64 = 0.02;
 
 /// Global search, followed by local searches from its best points and a pattern search from the best of all.
 ///
-/// The local searches are those of `levenberg-marquardt` for a sum of squares and of `sqp` otherwise. The pattern search reaches
-/// optima at a discontinuity; it is left out for a sum of squares. The global search ends early enough to leave a fifth of the
-/// budget.
+/// The local searches are those of `levenberg-marquardt` for a sum of squares and of `sqp` otherwise. The pattern
+/// search reaches optima at a discontinuity; it is left out for a sum of squares. The global search ends early enough
+/// to leave a fifth of the budget.
 pub struct Polished {
     search: Box<dyn Solver>,
     stage: Stage,

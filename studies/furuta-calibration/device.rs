@@ -1,11 +1,11 @@
 //! Simulated Furuta pendulum, the device of the shipped measurements. It shares no model and no method with mops.
 //!
-//! The pendulum is a point at its centre of mass with a direction. Let `p` be the point and `n` the unit vector along the
-//! rod. D'Alembert's principle for `m p''` and `J n''` gives mass matrix and forces from the joint axes. (A rod without
-//! inertia about its own axis has the kinetic energy `m |p'|^2/2 + J |n'|^2/2`.)
+//! The pendulum is a point at its centre of mass with a direction. Let `p` be the point and `n` the unit vector along
+//! the rod. D'Alembert's principle for `m p''` and `J n''` gives mass matrix and forces from the joint axes. (A rod
+//! without inertia about its own axis has the kinetic energy `m |p'|^2/2 + J |n'|^2/2`.)
 //!
-//! Moreau's time stepping with steps of 20 microseconds and midpoint forces: friction is an impulse within its limit, found
-//! by projected Gauss-Seidel sweeps.
+//! Moreau's time stepping with steps of 20 microseconds and midpoint forces: friction is an impulse within its limit,
+//! found by projected Gauss-Seidel sweeps.
 //!
 //! Source of the method: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM 302 (1988).
 

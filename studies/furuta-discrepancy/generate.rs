@@ -1,8 +1,8 @@
 //! Generates the measurements of the study `furuta-discrepancy`.
 //!
-//! The device is the driven Furuta pendulum of the test bed without torque, with the dry friction of the test bed in both
-//! bearings. Equations, integrator and friction share no code with mops. The integrator is a Runge-Kutta method of order 4
-//! with 20 steps per sample; steps end where a joint stops or breaks away.
+//! The device is the driven Furuta pendulum of the test bed without torque, with the dry friction of the test bed in
+//! both bearings. Equations, integrator and friction share no code with mops. The integrator is a Runge-Kutta method of
+//! order 4 with 20 steps per sample; steps end where a joint stops or breaks away.
 //!
 //! Sensors: white noise on both angles, an encoder with 2048 lines on the arm, a 12-bit converter over one turn on the
 //! pendulum.

@@ -1,6 +1,7 @@
 //! Remote control of a page in a headless browser: the DevTools protocol over two pipes.
 //!
-//! Source: the Chrome DevTools Protocol (domains Target, Runtime, Log, Input); messages are JSON that ends with a zero byte.
+//! Source: the Chrome DevTools Protocol (domains Target, Runtime, Log, Input); messages are JSON that ends with a zero
+//! byte.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
@@ -88,8 +89,8 @@ impl Page {
         }
     }
 
-    /// Presses the left button at the first place, moves to the second, and releases the button; places are `[x, y]` in the
-    /// viewport.
+    /// Presses the left button at the first place, moves to the second, and releases the button; places are `[x, y]` in
+    /// the viewport.
     #[allow(dead_code)]
     pub fn drag(&mut self, from: [f64; 2], to: [f64; 2], clicks: u32) {
         let middle = [0, 1].map(|i| 0.5 * (from[i] + to[i]));

@@ -138,7 +138,8 @@ fn bare(text: &str) -> Arc<dyn Model> {
 /// Effects of the setups.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Chosen {
-    /// Effects at their own place whose reported derivative is exact: not quantisation, of which that of its mean is reported.
+    /// Effects at their own place whose reported derivative is exact: not quantisation, of which that of its mean is
+    /// reported.
     Differentiable,
     /// All effects, also those of one joint between two.
     All,

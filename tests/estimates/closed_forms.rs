@@ -1,4 +1,5 @@
-//! Standard errors, profiles and bootstrap replicates against closed forms of linear models and of an exponential decay.
+//! Standard errors, profiles and bootstrap replicates against closed forms of linear models and of an exponential
+//! decay.
 
 use mops::{
     CriterionBuilder, TunerBuilder,
@@ -9,8 +10,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::models::{Calibration, Channel, Curve, fit, lines, normalised, parameters, words};
 
-/// Samples of one record: derivatives with respect to the parameters, weights of squared residuals, and the standard deviation
-/// of the noise.
+/// Samples of one record: derivatives with respect to the parameters, weights of squared residuals, and the standard
+/// deviation of the noise.
 pub struct Samples {
     pub slopes: Vec<Vec<f64>>,
     pub weights: Vec<f64>,

@@ -38,7 +38,8 @@ fn hits(calibration: &Calibration, truth: &[(&str, f64)], count: u32) -> Vec<usi
     (0..truth.len()).map(|k| all.iter().filter(|one| one[k]).count()).collect()
 }
 
-/// Checks that the share of all calibrations is within [`RIGHT`]; for fewer, within the bounds of chance (one in a thousand).
+/// Checks that the share of all calibrations is within [`RIGHT`]; for fewer, within the bounds of chance (one in a
+/// thousand).
 fn assert_covers(calibration: &Calibration, truth: &[(&str, f64)]) {
     assert_covers_in(mops_tiers::cases(CALIBRATIONS), calibration, truth);
 }

@@ -29,8 +29,8 @@ fn rank(outcome: &Outcome) -> usize {
     outcome.calibration.as_ref().unwrap().sensitivity.as_ref().unwrap().rank
 }
 
-/// The difference is known to `0.01 / (soft |1 - t mean(t)/mean(t^2)|)`, however stiff the sum; `a` and `b` to about half of it.
-/// Tolerance: three times the 7 % to which 101 samples determine the noise.
+/// The difference is known to `0.01 / (soft |1 - t mean(t)/mean(t^2)|)`, however stiff the sum; `a` and `b` to about
+/// half of it. Tolerance: three times the 7 % to which 101 samples determine the noise.
 #[test]
 fn a_direction_above_the_noise_is_determined_next_to_any_stiffer_one() {
     for power in 0..=6 {

@@ -1,7 +1,7 @@
 //! Derivatives by differences, and their comparison with the reported ones.
 
-/// Distances of the points on both sides, as fractions of the parameter. Central differences use the first and the third, one-sided
-/// ones the first two and the last two.
+/// Distances of the points on both sides, as fractions of the parameter. Central differences use the first and the
+/// third, one-sided ones the first two and the last two.
 pub const STEPS: [f64; 4] = [2.5e-4, 5e-4, 1e-3, 2e-3];
 
 /// Result of a comparison.

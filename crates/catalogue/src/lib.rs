@@ -1,7 +1,7 @@
 //! The built-in catalogue: the kinds that a study file can name without a plug-in.
 //!
-//! [`catalogue`] combines what the crates of kinds list, each in its `kinds`: models, criteria, solvers, tasks and effects, and the
-//! shipped studies. These crates do not depend on each other.
+//! [`catalogue`] combines what the crates of kinds list, each in its `kinds`: models, criteria, solvers, tasks and
+//! effects, and the shipped studies. These crates do not depend on each other.
 
 use mops_core::Catalogue;
 

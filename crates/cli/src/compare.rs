@@ -157,8 +157,8 @@ fn text_table(rows: &Rows) -> String {
     table(&header, &numeric, rows.lines.clone())
 }
 
-/// Returns the responses of the runs at their results, and one sentence for each run without responses; adds the data of the
-/// runs to the inputs.
+/// Returns the responses of the runs at their results, and one sentence for each run without responses; adds the data
+/// of the runs to the inputs.
 fn responses(
     catalogue: &Catalogue,
     runs: &[PastRun],

@@ -31,11 +31,12 @@ pub(super) struct Arguments {
     /// Print the order of persistent excitation of this column as an input.
     #[arg(long, value_name = "COLUMN")]
     excitation: Option<String>,
-    /// Print mean and standard deviation of every column between two times, in the unit of the time column, at which the plant is at
-    /// rest: the noise of the sensors.
+    /// Print mean and standard deviation of every column between two times, in the unit of the time column, at which
+    /// the plant is at rest: the noise of the sensors.
     #[arg(long, num_args = 2, value_names = ["FROM", "TO"], allow_negative_numbers = true, conflicts_with = "excitation")]
     rest: Option<Vec<f64>>,
-    /// Write a plot of every column over time, as SVG or PNG by the extension: columns.svg gives columns-NAME.svg for each of several.
+    /// Write a plot of every column over time, as SVG or PNG by the extension: columns.svg gives columns-NAME.svg for
+    /// each of several.
     #[arg(long, value_name = "FILE", conflicts_with = "excitation")]
     plot: Option<PathBuf>,
 }
@@ -148,8 +149,8 @@ fn excitation(file: &DataFile, time: Option<&str>, name: &str, shown: &str) -> R
     Ok(blocks::text(&excitation::lines_of_inputs(&reports, words)))
 }
 
-/// Largest deviation of a sample from the line through the next two that noise explains, in standard deviations of the noise: with
-/// weights 1, -2 and 1 that is `5 sqrt 6`, where 5 is rare for a normal distribution.
+/// Largest deviation of a sample from the line through the next two that noise explains, in standard deviations of the
+/// noise: with weights 1, -2 and 1 that is `5 sqrt 6`, where 5 is rare for a normal distribution.
 const STARTS: f64 = 12.2;
 
 /// Returns advice on the first samples of a column: how many to skip, and from when on it moves.
@@ -278,15 +279,15 @@ fn sample_time(name: &str, unit: &str, times: &[f64]) -> String {
     )
 }
 
-/// Smallest jump between two samples, as a part of the range of a column, at which a record is divided: a turn of a wrapped angle, or a
-/// placeholder for a missing value.
+/// Smallest jump between two samples, as a part of the range of a column, at which a record is divided: a turn of a
+/// wrapped angle, or a placeholder for a missing value.
 const JUMP: f64 = 0.8;
 
 /// Smallest step of a signal that switches between constant values, as a part of its range.
 const SWITCH: f64 = 0.05;
 
-/// Returns true if a column is constant at most samples and else steps by a considerable part of its range, as an input that a program
-/// sets.
+/// Returns true if a column is constant at most samples and else steps by a considerable part of its range, as an input
+/// that a program sets.
 fn is_switched(values: &[f64]) -> bool {
     let values: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     let mut steps: Vec<f64> =
@@ -303,9 +304,9 @@ fn range(values: &[f64]) -> f64 {
     high - low
 }
 
-/// Estimates the standard deviation of white noise on a smooth signal, in each part of the record between two gaps. Empty cells are
-/// skipped; a distance of more than 1.5 times the median distance between samples is a gap, and so is a jump over most of the range.
-/// `None` if no part has enough samples.
+/// Estimates the standard deviation of white noise on a smooth signal, in each part of the record between two gaps.
+/// Empty cells are skipped; a distance of more than 1.5 times the median distance between samples is a gap, and so is a
+/// jump over most of the range. `None` if no part has enough samples.
 pub(super) fn noise(values: &[f64], times: Option<&[f64]>) -> Option<f64> {
     let times = times.filter(|times| times.len() == values.len());
     #[allow(clippy::cast_precision_loss)]

@@ -1,4 +1,5 @@
-//! Folder of the outputs without `--out`: `results/<study>`. It is never shared by two studies, nor elsewhere through a link.
+//! Folder of the outputs without `--out`: `results/<study>`. It is never shared by two studies, nor elsewhere through a
+//! link.
 
 use std::path::{Path, PathBuf};
 

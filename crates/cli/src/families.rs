@@ -23,8 +23,8 @@ pub(super) fn spelled(first: &str, last: &str) -> String {
     }
 }
 
-/// Merges rows of the same family, by the names in column `name`, if their other cells agree. Of more than six differing rows,
-/// only the first two and the last remain.
+/// Merges rows of the same family, by the names in column `name`, if their other cells agree. Of more than six
+/// differing rows, only the first two and the last remain.
 pub(super) fn folded(rows: Vec<Vec<String>>, name: usize) -> Vec<Vec<String>> {
     let names: Vec<&str> = rows.iter().map(|row| row[name].as_str()).collect();
     let mut folded = Vec::new();

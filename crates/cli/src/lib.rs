@@ -1,7 +1,7 @@
 //! The command line of `mops`.
 //!
-//! [`main`] parses the arguments of a program with a catalogue and performs its command. A command has the module of its name; the
-//! commands of tasks are in `tasks`.
+//! [`main`] parses the arguments of a program with a catalogue and performs its command. A command has the module of
+//! its name; the commands of tasks are in `tasks`.
 //!
 //! | module | content |
 //! |---|---|
@@ -57,8 +57,8 @@ use crate::terminal::{CommandError, print, show_each_panic_once};
 
 /// Multi-objective parameter synthesis: design controllers and identify models from measurements.
 ///
-/// A study (a TOML file, or the name of a shipped study) defines models, cases, tuners (the parameters to be chosen) and
-/// criteria with demands. mops chooses the tuners that minimise the worst scaled criterion (value / demand).
+/// A study (a TOML file, or the name of a shipped study) defines models, cases, tuners (the parameters to be chosen)
+/// and criteria with demands. mops chooses the tuners that minimise the worst scaled criterion (value / demand).
 #[derive(Parser)]
 #[command(
     name = "mops",
@@ -87,8 +87,8 @@ struct Globals {
     /// Folder that contains studies, one subfolder with study.toml each; adds to the folders in MOPS_STUDIES.
     #[arg(long = "studies", value_name = "DIR", global = true, help_heading = "Global options")]
     studies: Vec<PathBuf>,
-    /// Let studies read data files in this folder and below. Without it a study reads its own folder and below, which makes it
-    /// safe to open one from an untrusted source.
+    /// Let studies read data files in this folder and below. Without it a study reads its own folder and below, which
+    /// makes it safe to open one from an untrusted source.
     #[arg(long = "allow-read", value_name = "DIR", global = true, help_heading = "Global options")]
     readable: Vec<PathBuf>,
 }
@@ -134,8 +134,8 @@ enum Command {
 /// Package of the program that has no code of its own.
 const PACKAGE: &str = "mops";
 
-/// Parses the command line of a program and runs the command. A program of another package than `mops`, whatever its name, has
-/// code of its own: its version names that of mops too, and its digest is part of the identity of runs.
+/// Parses the command line of a program and runs the command. A program of another package than `mops`, whatever its
+/// name, has code of its own: its version names that of mops too, and its digest is part of the identity of runs.
 pub fn main(mut catalogue: Catalogue, [package, name]: [&'static str; 2], version: &'static str) -> ExitCode {
     show_each_panic_once();
     let mut program = Arguments::command().name(name).version(version);

@@ -6,8 +6,8 @@ use mops_math as math;
 use mops_math::complex;
 use mops_report::{FrequencyCurve, bode, nyquist};
 
-/// Draws the plots of a single-input, single-output system; returns the kind of each, and the plot or the reason why it is
-/// missing.
+/// Draws the plots of a single-input, single-output system; returns the kind of each, and the plot or the reason why it
+/// is missing.
 pub(super) fn plots(system: &StateSpace, name: &str) -> Vec<(&'static str, Result<Plot, String>)> {
     let mut all = match of_frequencies(system, name) {
         Ok([magnitude, phase, nyquist]) => {
@@ -25,8 +25,8 @@ fn of_frequencies(system: &StateSpace, name: &str) -> Result<[Plot; 3], String> 
     Ok([magnitude, phase, nyquist(&response, None, name)])
 }
 
-/// Draws the poles of the closed loop `k G/(1 + k G)` for gains k from 0 upwards, with negative feedback; those of a sampled system in
-/// z. A delay is ignored.
+/// Draws the poles of the closed loop `k G/(1 + k G)` for gains k from 0 upwards, with negative feedback; those of a
+/// sampled system in z. A delay is ignored.
 fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
     let in_z = system.difference_equation();
     let is_sampled = in_z.is_some();
@@ -110,8 +110,8 @@ fn root_locus(system: &StateSpace, name: &str) -> Result<Plot, String> {
     })
 }
 
-/// Returns half the height of the picture for poles and zeros at these distances from 0. If some lie ten times as far out as
-/// at least two others, the picture covers the neighbourhood of the others.
+/// Returns half the height of the picture for poles and zeros at these distances from 0. If some lie ten times as far
+/// out as at least two others, the picture covers the neighbourhood of the others.
 fn shown(mut distances: Vec<f64>) -> f64 {
     distances.retain(|size| *size > 0.0);
     distances.sort_by(f64::total_cmp);

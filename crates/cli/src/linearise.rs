@@ -31,8 +31,8 @@ pub(super) struct Arguments {
     /// Model; required if the study has several.
     #[arg(long)]
     model: Option<String>,
-    /// Value of a tuner, parameter, state or input: --at theta="180 deg". Other states have their initial value, other inputs
-    /// the initial value of the case.
+    /// Value of a tuner, parameter, state or input: --at theta="180 deg". Other states have their initial value, other
+    /// inputs the initial value of the case.
     #[arg(long = "at", value_name = "NAME=VALUE")]
     at: Vec<String>,
     /// Case that supplies parameters and inputs [default: the first].
@@ -171,8 +171,8 @@ fn channels(
 /// File that contains the parts that are not printed.
 const WHERE: &str = "linearised.json (--out DIR)";
 
-/// Returns the requested model in the requested case. Unless a case is given, it is the first one in which a criterion reads the
-/// model, or else the first of all.
+/// Returns the requested model in the requested case. Unless a case is given, it is the first one in which a criterion
+/// reads the model, or else the first of all.
 fn chosen(study: &Study, arguments: &Arguments) -> Result<JobPlan, Diagnostic> {
     let find = |what: &str, wanted: &str, names: Vec<&str>| {
         names.iter().position(|name| *name == wanted).ok_or_else(|| {

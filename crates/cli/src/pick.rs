@@ -170,7 +170,8 @@ fn written(value: &str) -> String {
     if value.parse::<f64>().is_ok() { value.to_owned() } else { quoted(value) }
 }
 
-/// Returns the index and the evaluation of the point with the smallest worst scaled value under the demands of the problem.
+/// Returns the index and the evaluation of the point with the smallest worst scaled value under the demands of the
+/// problem.
 fn nearest(problem: &Problem, front: &[Value], study: &Path) -> Result<(usize, Evaluation), Diagnostic> {
     let tuners = problem.study().tuners();
     let mut best: Option<(usize, Evaluation)> = None;
@@ -192,7 +193,8 @@ fn nearest(problem: &Problem, front: &[Value], study: &Path) -> Result<(usize, E
     Ok(best.expect("a front has points"))
 }
 
-/// Solves the min-max problem from a point. Returns the better point, if one was found, and how the search stopped, if there was one.
+/// Solves the min-max problem from a point. Returns the better point, if one was found, and how the search stopped, if
+/// there was one.
 fn refined(catalogue: &Catalogue, problem: &Problem, from: &Evaluation) -> (Option<Evaluation>, Option<Stop>) {
     let Some(sqp) = catalogue.solvers.iter().find(|kind| kind.name == "sqp") else { return (None, None) };
     let mut solver = sqp.default_choice().make();

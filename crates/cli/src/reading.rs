@@ -1,5 +1,5 @@
-//! Folders whose files a study may read: its own, those of `--allow-read`, and for a study that mops wrote below the folder of
-//! another one, the folder of that study.
+//! Folders whose files a study may read: its own, those of `--allow-read`, and for a study that mops wrote below the
+//! folder of another one, the folder of that study.
 
 use std::path::{Path, PathBuf};
 
@@ -20,8 +20,8 @@ pub(super) fn folder(catalogue: &Catalogue, file: &Path) -> Folder {
 
 /// Returns the folder of the study whose run wrote into `folder`, if `folder` is below it.
 ///
-/// N.B.: the database of the run only names that study. Its file must be there, and be a study of this name: a folder from an
-/// untrusted source cannot open the folders above it by what its own files say.
+/// N.B.: the database of the run only names that study. Its file must be there, and be a study of this name: a folder
+/// from an untrusted source cannot open the folders above it by what its own files say.
 fn origin(folder: &Path, generations: usize) -> Option<PathBuf> {
     let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let real = here.canonicalize().ok()?;

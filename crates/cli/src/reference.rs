@@ -1,7 +1,7 @@
 //! Generated part of the pages in `docs/reference`: kinds, keys of study files, command line, keys of `result.json`.
 //!
-//! The part of a page above [`MARK`] is written by hand. `REFERENCE=update cargo test -p mops-cli reference` replaces the part
-//! below.
+//! The part of a page above [`MARK`] is written by hand. `REFERENCE=update cargo test -p mops-cli reference` replaces
+//! the part below.
 
 use std::collections::HashMap;
 use std::fs;

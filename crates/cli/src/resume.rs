@@ -16,17 +16,18 @@ use crate::terminal::CommandError;
 /// Options for the use of stored evaluations.
 #[derive(Args)]
 pub(super) struct StartOptions {
-    /// Continue the interrupted or killed run of this study in the output folder, to the result of an uninterrupted run.
+    /// Continue the interrupted or killed run of this study in the output folder, to the result of an uninterrupted
+    /// run.
     ///
-    /// The search is repeated, but points stored in evaluations.sqlite are not simulated again. A larger --max-evaluations
-    /// extends a finished run. If the folder has no run yet, a new run is started.
+    /// The search is repeated, but points stored in evaluations.sqlite are not simulated again. A larger
+    /// --max-evaluations extends a finished run. If the folder has no run yet, a new run is started.
     #[arg(long, conflicts_with = "reuse")]
     resume: bool,
-    /// Reuse the evaluations stored in DIR. Demands, usages, weights, bounds, start values and the solver of that run may
-    /// differ.
+    /// Reuse the evaluations stored in DIR. Demands, usages, weights, bounds, start values and the solver of that run
+    /// may differ.
     ///
-    /// The search starts at the stored point that is best under the demands of this study, and simulates no stored point
-    /// again. `reused` in result.json is the number of stored points that the run used.
+    /// The search starts at the stored point that is best under the demands of this study, and simulates no stored
+    /// point again. `reused` in result.json is the number of stored points that the run used.
     #[arg(long, value_name = "DIR")]
     reuse: Option<PathBuf>,
 }
@@ -50,7 +51,8 @@ impl From<OpenError> for CommandError {
     }
 }
 
-/// Locks the folder of a new run and opens its database. A task that evaluates no points only adds a row to the table of runs.
+/// Locks the folder of a new run and opens its database. A task that evaluates no points only adds a row to the table
+/// of runs.
 pub(super) fn open(
     (folder, start): (&Path, &Start),
     (file, study): (&StudyFile, &StudyArguments),

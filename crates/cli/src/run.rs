@@ -32,7 +32,8 @@ pub(super) struct CommonOptions {
     /// Seed of all random numbers.
     #[arg(long)]
     seed: Option<u64>,
-    /// Number of threads [default: all cores]. The result is identical, bit for bit, for any number and on any processor.
+    /// Number of threads [default: all cores]. The result is identical, bit for bit, for any number and on any
+    /// processor.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
     #[command(flatten)]
@@ -307,8 +308,8 @@ fn watch(study: &Study, options: &Options) -> Result<Page, CommandError> {
     Ok(page)
 }
 
-/// Returns the error for a study that the solver or task refuses. The position in the file is given if there is one; a solver
-/// from the command line has none.
+/// Returns the error for a study that the solver or task refuses. The position in the file is given if there is one; a
+/// solver from the command line has none.
 pub(super) fn refused(why: &StudyError, file: &StudyFile, solver: &str) -> Diagnostic {
     let of_command_line = solver != file.solver.kind && why.path.first().is_some_and(|key| key == "solver");
     if why.path.is_empty() || of_command_line {

@@ -1,5 +1,5 @@
-//! Output files of a run: result, evaluations, report and plots. A diagnosis adds predictions, the repaired study and its
-//! source; a Pareto front adds the study.
+//! Output files of a run: result, evaluations, report and plots. A diagnosis adds predictions, the repaired study and
+//! its source; a Pareto front adds the study.
 
 use std::fs;
 use std::io::{self, ErrorKind, Write};
@@ -96,8 +96,8 @@ pub(super) struct RunFiles<'a> {
 }
 
 impl RunFiles<'_> {
-    /// Writes result.json; an earlier file stays until the new one is on the disk. Waits at most `timeout` for space on a full
-    /// disk.
+    /// Writes result.json; an earlier file stays until the new one is on the disk. Waits at most `timeout` for space on
+    /// a full disk.
     pub(super) fn write_result(&self, timeout: Duration) -> Result<(), CommandError> {
         fs::create_dir_all(self.folder).map_err(CommandError::cannot_write(self.folder))?;
         let path = self.folder.join("result.json");
@@ -116,8 +116,8 @@ impl RunFiles<'_> {
         }
     }
 
-    /// Writes the other files: evaluations, samples, report and plots, and those of the task. Returns the path of the study
-    /// that the task wrote, if any.
+    /// Writes the other files: evaluations, samples, report and plots, and those of the task. Returns the path of the
+    /// study that the task wrote, if any.
     pub(super) fn write_others(&self) -> Result<Option<PathBuf>, CommandError> {
         let Self { folder, outputs, solved, .. } = *self;
         let evaluations = folder.join("evaluations.csv");

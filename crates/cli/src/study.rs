@@ -21,7 +21,8 @@ use super::reading;
 pub(super) struct StudyArguments {
     /// Study file, or name of a shipped study (see `mops list`).
     pub study: String,
-    /// Set a value of the study: --set tuners.k.start=5 --set study.task=sensitivity. A value that is not TOML is a string.
+    /// Set a value of the study: --set tuners.k.start=5 --set study.task=sensitivity. A value that is not TOML is a
+    /// string.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = as_toml)]
     pub settings: Vec<String>,
 }
@@ -58,8 +59,8 @@ pub(super) fn open(catalogue: &Catalogue, arguments: &StudyArguments) -> Result<
     open_as(catalogue, arguments, &[])
 }
 
-/// Converts a setting to TOML: a value that is not TOML becomes a string, `criteria.settling.demand=12 s`. Values that start
-/// like TOML, and numbers with a decimal comma, stay as they are, so that their errors are reported.
+/// Converts a setting to TOML: a value that is not TOML becomes a string, `criteria.settling.demand=12 s`. Values that
+/// start like TOML, and numbers with a decimal comma, stay as they are, so that their errors are reported.
 fn as_toml(setting: &str) -> Result<String, Infallible> {
     let is_toml = toml::de::DeTable::parse(setting).is_ok();
     let Some((key, value)) = setting.split_once('=').filter(|_| !is_toml) else { return Ok(setting.to_owned()) };
@@ -111,8 +112,8 @@ pub(super) fn digest_of_program() -> Result<String, Diagnostic> {
     Ok(mops_file::digest(&bytes))
 }
 
-/// Adds the studies in `folders` to the catalogue: every subfolder that has a `study.toml`. A folder that is given twice is
-/// read once.
+/// Adds the studies in `folders` to the catalogue: every subfolder that has a `study.toml`. A folder that is given
+/// twice is read once.
 ///
 /// # Errors
 /// If a folder cannot be read, or two studies have one name.

@@ -85,7 +85,8 @@ fn without(left_out: &[usize], header: &[&str], mut rows: Vec<Vec<String>>) -> S
     table(&header, &numeric, rows)
 }
 
-/// Formats the outcome of a run, `is_nominal` if what follows is at other values of uncertain parameters: criteria, tuners, calibration errors, failures, warnings and a summary.
+/// Formats the outcome of a run, `is_nominal` if what follows is at other values of uncertain parameters: criteria,
+/// tuners, calibration errors, failures, warnings and a summary.
 pub(super) fn outcome(outcome: &Outcome, room: &dyn Room, is_nominal: bool) -> String {
     let solved = outcome.solver != "none";
     let best_name = if solved { "optimum" } else { "start" };

@@ -5,8 +5,8 @@ use crate::plot::Surface;
 /// Returns the segments of the contour line at `level`, in grid coordinates: column `c` and row `r` are at `(c, r)`.
 /// Squares with a non-finite height are omitted.
 ///
-/// Source: W. E. Lorensen, H. E. Cline, ACM SIGGRAPH Computer Graphics 21 (1987) 163-169, in two dimensions. The mean of the
-/// corners resolves a saddle.
+/// Source: W. E. Lorensen, H. E. Cline, ACM SIGGRAPH Computer Graphics 21 (1987) 163-169, in two dimensions. The mean
+/// of the corners resolves a saddle.
 pub fn contour(heights: &[Vec<f64>], level: f64) -> Vec<[[f64; 2]; 2]> {
     let mut segments = Vec::new();
     for (r, pair) in heights.windows(2).enumerate() {
@@ -48,7 +48,8 @@ pub fn along(places: &[f64], index: f64) -> f64 {
     places[i] + (index - i as f64) * (places[i + 1] - places[i])
 }
 
-/// Returns the contour line of heights over the grid of a surface, as points over x and y with gaps between the segments.
+/// Returns the contour line of heights over the grid of a surface, as points over x and y with gaps between the
+/// segments.
 pub fn border(surface: &Surface, heights: &[Vec<f64>], level: f64) -> Vec<(f64, f64)> {
     let gap = (f64::NAN, f64::NAN);
     let place = |p: [f64; 2]| (along(&surface.x, p[0]), along(&surface.y, p[1]));

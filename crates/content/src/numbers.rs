@@ -88,8 +88,8 @@ pub fn counted(count: usize, noun: &str) -> String {
     }
 }
 
-/// Returns a portable file name: letters and digits of all scripts, `_` and `.` stay, each run of other characters becomes one
-/// `-`.
+/// Returns a portable file name: letters and digits of all scripts, `_` and `.` stay, each run of other characters
+/// becomes one `-`.
 pub fn file_name(name: &str) -> String {
     let mut safe = String::new();
     for c in name.chars() {

@@ -73,8 +73,8 @@ pub struct Level {
     pub value: f64,
 }
 
-/// Bound of the curves, such as a part of an envelope: a straight line with the excluded region beyond. Its line widens the
-/// range as a [`Level`] does.
+/// Bound of the curves, such as a part of an envelope: a straight line with the excluded region beyond. Its line widens
+/// the range as a [`Level`] does.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bound {
     /// Label at its right end; may be empty.
@@ -85,8 +85,8 @@ pub struct Bound {
     pub y: [f64; 2],
     /// Excluded side, drawn as a region.
     pub excluded: Option<Side>,
-    /// Names of the curves that it applies to; empty for all. Otherwise its region is only drawn in a page that hides all other
-    /// curves.
+    /// Names of the curves that it applies to; empty for all. Otherwise its region is only drawn in a page that hides
+    /// all other curves.
     pub applies_to: Vec<String>,
 }
 

@@ -2,7 +2,8 @@
 
 /// Returns the days since 1970-01-01 in the Gregorian calendar; `None` if there is no such day.
 ///
-/// Source: E. G. Richards, Calendars, in: Explanatory Supplement to the Astronomical Almanac, 3rd edition (2013), section 15.11.3.
+/// Source: E. G. Richards, Calendars, in: Explanatory Supplement to the Astronomical Almanac, 3rd edition (2013),
+/// section 15.11.3.
 pub(super) fn days([year, month, day]: [i64; 3]) -> Option<i64> {
     let is_leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
     let length = match month {
@@ -47,7 +48,8 @@ fn is_short_for(text: &str, name: &str, letters: usize) -> bool {
     text.chars().count() >= letters && name.starts_with(text)
 }
 
-/// Returns the number of a month from its name, or from an abbreviation of three letters or more that suits no other month.
+/// Returns the number of a month from its name, or from an abbreviation of three letters or more that suits no other
+/// month.
 pub(super) fn month(text: &str) -> Option<i64> {
     let text = text.to_lowercase();
     let suits = |names: &&str| names.split(' ').any(|name| is_short_for(&text, name, 3));

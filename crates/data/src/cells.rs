@@ -39,8 +39,8 @@ pub(super) fn first_line(text: &str) -> Option<usize> {
     None
 }
 
-/// Returns the separator: a semicolon if the line contains one, else a tab, else a comma, else a blank if the next line has as many
-/// cells between blanks.
+/// Returns the separator: a semicolon if the line contains one, else a tab, else a comma, else a blank if the next line
+/// has as many cells between blanks.
 pub(super) fn separator(text: &str, start: usize) -> u8 {
     let count = |start: usize, separator: u8| cells(text, start, separator).count();
     if let Some(separator) = [b';', b'\t', b','].into_iter().find(|&separator| count(start, separator) > 1) {
@@ -130,8 +130,8 @@ pub(super) fn cells(text: &str, start: usize, separator: u8) -> impl Iterator<It
     })
 }
 
-/// Returns the cell between blanks that starts at `begin` or later in a line, and where the next one starts. A unit in brackets belongs
-/// to the cell before it.
+/// Returns the cell between blanks that starts at `begin` or later in a line, and where the next one starts. A unit in
+/// brackets belongs to the cell before it.
 pub(super) fn cell_between_blanks(bytes: &[u8], begin: usize) -> (Range<usize>, Option<usize>) {
     let is_blank = |at: usize| bytes.get(at) == Some(&BLANK);
     let skip = |mut at: usize| {
@@ -160,8 +160,8 @@ pub(super) fn cell_between_blanks(bytes: &[u8], begin: usize) -> (Range<usize>, 
     (start..end, (!ends_line(next)).then_some(next))
 }
 
-/// Returns true for a date such as `12.03.2026`: three groups of digits between points, none of them three digits long as those of
-/// thousands are.
+/// Returns true for a date such as `12.03.2026`: three groups of digits between points, none of them three digits long
+/// as those of thousands are.
 pub(super) fn is_dotted_date(cell: &[u8]) -> bool {
     let text = cell.trim_ascii();
     let text = text.strip_prefix(b"\"").and_then(|text| text.strip_suffix(b"\"")).unwrap_or(text);

@@ -43,7 +43,8 @@ pub(super) struct Content {
     pub before: Range<usize>,
 }
 
-/// Reads every column that contains numbers or only gaps. If the first line is no header of a table, a later one may be.
+/// Reads every column that contains numbers or only gaps. If the first line is no header of a table, a later one may
+/// be.
 ///
 /// # Errors
 /// If there is no header, no row or no column of numbers, or if a name is repeated. If a row has a different number of
@@ -153,8 +154,9 @@ fn read_stamps<'t>(
     (stamps, skipped)
 }
 
-/// Adds the dates of one column to the times of day of all others. Times of day are skipped if their dates are not read or may be in
-/// several columns, and so are dates without a time beside times that are not read: either would merge different instants.
+/// Adds the dates of one column to the times of day of all others. Times of day are skipped if their dates are not read
+/// or may be in several columns, and so are dates without a time beside times that are not read: either would merge
+/// different instants.
 fn join(stamps: &mut Stamped, skipped: &mut Skipped, names: &[(String, Option<String>)], unread: &[usize]) {
     let name = |cell: usize| names[cell].0.as_str();
     let is_midnight = |column: &stamps::Column| column.reference == Some(Reference::Midnight);
@@ -247,8 +249,8 @@ impl Reading {
         }
     }
 
-    /// Returns the time stamps of a column that has only these and gaps, as [`stamps::column`]. Stamps in digits only are numbers, too:
-    /// the name of the column decides.
+    /// Returns the time stamps of a column that has only these and gaps, as [`stamps::column`]. Stamps in digits only
+    /// are numbers, too: the name of the column decides.
     fn stamps<'t>(
         &self,
         cell: impl Fn(usize) -> &'t str,
@@ -327,7 +329,8 @@ fn blank_lines(text: &str, between: Range<usize>) -> impl Iterator<Item = usize>
     std::iter::from_fn(move || ends.next().filter(|_| ends.peek().is_some()))
 }
 
-/// Marks of thousands in the numbers of a column, as in `993` and `1.535`: some numbers have marks, each followed by three digits.
+/// Marks of thousands in the numbers of a column, as in `993` and `1.535`: some numbers have marks, each followed by
+/// three digits.
 #[derive(Clone, Default)]
 struct Thousands {
     /// Numbers with and without marks.

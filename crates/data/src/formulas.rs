@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-/// Returns a text as it is written into a cell: one that begins with `=`, `+`, `-` or `@` gets a leading apostrophe, with which
-/// a spreadsheet shows it as text. A text that looks like the result of this function gets one more.
+/// Returns a text as it is written into a cell: one that begins with `=`, `+`, `-` or `@` gets a leading apostrophe,
+/// with which a spreadsheet shows it as text. A text that looks like the result of this function gets one more.
 ///
 /// Source: OWASP, CSV injection.
 pub fn as_text(cell: &str) -> Cow<'_, str> {

@@ -55,8 +55,8 @@ impl Header {
     }
 }
 
-/// Splits a label into name and unit: `u [N*m]`, or `u (N*m)`, `u / (N*m)` (ISO 80000-1, 7.1.4), `u in N*m` and `u, N*m` if the rest
-/// is a unit.
+/// Splits a label into name and unit: `u [N*m]`, or `u (N*m)`, `u / (N*m)` (ISO 80000-1, 7.1.4), `u in N*m` and
+/// `u, N*m` if the rest is a unit.
 pub(super) fn label(text: &str) -> Option<(&str, &str)> {
     let text = text.trim();
     let within = |open: char, close: char| {
@@ -131,8 +131,8 @@ const AT_ENDS: [&str; 39] = [
     "kOhm", "Wh", "kWh", "Ah", "mAh",
 ];
 
-/// Units of one letter, which count only if every name of the header ends with a unit, as in `time_s,P_heater_W`: `x_m` may be a
-/// measured `x`.
+/// Units of one letter, which count only if every name of the header ends with a unit, as in `time_s,P_heater_W`: `x_m`
+/// may be a measured `x`.
 const LETTERS: [&str; 11] = ["s", "h", "m", "g", "V", "A", "W", "N", "J", "K", "L"];
 
 /// Adds the units at the ends of names without one; the names keep them.
@@ -249,8 +249,9 @@ fn refuse_duplicates(
 /// Largest number of lines before the header of a file.
 const MOST_LINES: usize = 200;
 
-/// Returns the starts of later lines that may be the header, after lines that an instrument or a spreadsheet has written before it:
-/// names only, as many as there are cells in the next line, which has numbers. No line before is a row of numbers.
+/// Returns the starts of later lines that may be the header, after lines that an instrument or a spreadsheet has
+/// written before it: names only, as many as there are cells in the next line, which has numbers. No line before is a
+/// row of numbers.
 pub(super) fn later_headers(text: &str, first: usize) -> Vec<usize> {
     let mut starts = vec![first];
     while starts.len() <= MOST_LINES {

@@ -337,7 +337,8 @@ impl DataFile {
     }
 }
 
-/// First and last time since 1970 that is taken for one, s: the years 1973 and 2201. In s, these times in ms are 3000 years and more.
+/// First and last time since 1970 that is taken for one, s: the years 1973 and 2201. In s, these times in ms are 3000
+/// years and more.
 const SINCE_1970: [f64; 2] = [1e8, 7.3e9];
 
 /// Returns the unit in which a time without a unit is a usual date since 1970, if that is `ms`, `us` or `ns`.

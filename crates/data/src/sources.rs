@@ -19,7 +19,8 @@ struct Entry {
     sha256: String,
 }
 
-/// Returns where to get a file that is missing, as one sentence, if [`FILE`] in its folder lists it; `shown` is the path of
+/// Returns where to get a file that is missing, as one sentence, if [`FILE`] in its folder lists it; `shown` is the
+/// path of
 /// [`FILE`] and `bytes` its content.
 ///
 /// # Errors

@@ -1,5 +1,5 @@
-//! Time stamps: `2024-05-17T10:30:00.5+02:00`, `17.05.2024 10:30`, `17-May-24`, `5/17/2024 10:30:00 AM`, `20240517T103000`,
-//! `2024-05-17` and `10:30:00.5`.
+//! Time stamps: `2024-05-17T10:30:00.5+02:00`, `17.05.2024 10:30`, `17-May-24`, `5/17/2024 10:30:00 AM`,
+//! `20240517T103000`, `2024-05-17` and `10:30:00.5`.
 
 use mops_language::Unit;
 
@@ -163,8 +163,8 @@ pub(super) struct Column {
     pub is_dates: bool,
 }
 
-/// Reads the cells of a column; an empty cell is `None`. `unit` is that of the header. Returns `None` if a cell is no time stamp, and
-/// the reason if the stamps have no common clock or contradict the header.
+/// Reads the cells of a column; an empty cell is `None`. `unit` is that of the header. Returns `None` if a cell is no
+/// time stamp, and the reason if the stamps have no common clock or contradict the header.
 pub(super) fn column<'t>(
     cells: impl Iterator<Item = Option<&'t str>>,
     unit: Option<&str>,
@@ -233,7 +233,8 @@ fn contradicts(stamp: &Stamp, unit: &str, form: Option<Form>) -> bool {
     }
 }
 
-/// Returns the days since 1970-01-01 of all dates, in each order that suits them, or in that of the header; equal days count once.
+/// Returns the days since 1970-01-01 of all dates, in each order that suits them, or in that of the header; equal days
+/// count once.
 fn readings(dates: &[Date], stated: Option<Order>) -> Vec<(Order, Vec<i64>)> {
     let mut found: Vec<(Order, Vec<i64>)> = Vec::new();
     for order in Order::ALL.into_iter().filter(|order| stated.is_none_or(|stated| stated == *order)) {
@@ -262,7 +263,8 @@ pub(super) fn is_stamp(text: &str) -> bool {
     stamp(text).is_some()
 }
 
-/// Returns true for a text that is meant as a date, whether it can be read or not, such as `31.02.24`, `13/05` or `Mon 13. Mai`.
+/// Returns true for a text that is meant as a date, whether it can be read or not, such as `31.02.24`, `13/05` or
+/// `Mon 13. Mai`.
 pub(super) fn is_like_date(text: &str) -> bool {
     let text = text.trim().trim_matches('"').trim();
     // A colon belongs to a time of day; the words for year, month and day in Chinese and Japanese are marks.
@@ -281,7 +283,8 @@ pub(super) fn is_like_date(text: &str) -> bool {
         }
 }
 
-/// Returns true for a date, and a time of day if there is one, in digits only: `20240517` and `20240517103000` (ISO 8601, basic format).
+/// Returns true for a date, and a time of day if there is one, in digits only: `20240517` and `20240517103000` (ISO
+/// 8601, basic format).
 pub(super) fn is_basic(text: &str, with_time: bool) -> bool {
     let digits = text.trim().split('.').next().unwrap_or_default();
     let fits = if with_time { matches!(digits.len(), 12 | 14) } else { digits.len() == 8 };
@@ -389,7 +392,8 @@ fn date(text: &str) -> Option<(Date, &str, bool)> {
     };
     let parts = [first, second, third];
     let is_short = parts.iter().all(|(_, digits)| *digits <= 2);
-    // Dates with dots are day.month.year (DIN 1355-1), and years of two digits come first between hyphens only (ISO 8601:1988).
+    // Dates with dots are day.month.year (DIN 1355-1), and years of two digits come first between hyphens only (ISO
+    // 8601:1988).
     let orders: &'static [Order] = match (mark, is_named) {
         (_, true) => &Order::ALL,
         ('.', _) => &[Order::Day, Order::Year],

@@ -42,9 +42,9 @@ struct TunerSettings {
     max: Option<Quantity>,
 }
 
-/// Builds a study and applies `settings`, which are `key=value` pairs: `study.task`, `study.objective`, `study.seed`, `start`, `min`
-/// and `max` of tuners, `solver`, and the tables of tasks. The identity of a run includes [`Catalogue::program`]:
-/// stored evaluations of another build are not reused.
+/// Builds a study and applies `settings`, which are `key=value` pairs: `study.task`, `study.objective`, `study.seed`,
+/// `start`, `min` and `max` of tuners, `solver`, and the tables of tasks. The identity of a run includes
+/// [`Catalogue::program`]: stored evaluations of another build are not reused.
 ///
 /// # Errors
 /// The first mistake, in the settings or in the study.
@@ -115,8 +115,8 @@ fn set_tuner(draft: &mut StudyBuilder, name: &str, node: &Node<'_>) -> Result<()
     Ok(())
 }
 
-/// Content of the study as far as it is data, in the layout of a study file: its settings, with the values that they replace.
-/// The digest of the program stands for the rest.
+/// Content of the study as far as it is data, in the layout of a study file: its settings, with the values that they
+/// replace. The digest of the program stands for the rest.
 fn content_of(root: &Node<'_>, study: &Study) -> Value {
     let tuners = study.tuners().iter().map(|tuner| {
         let [min, max] = tuner.bounds;

@@ -49,7 +49,8 @@ pub(super) fn read(name: &str, node: &Node<'_>, files: &dyn Files) -> Result<Vec
     Ok(found)
 }
 
-/// Replaces warnings that differ only in the name of the experiment by one: on all, `NAME-*`, or on the first and the number of others.
+/// Replaces warnings that differ only in the name of the experiment by one: on all, `NAME-*`, or on the first and the
+/// number of others.
 fn share_warnings(found: &mut [CaseBuilder], name: &str) {
     let all = format!("`{name}-*`");
     let common = |case: &CaseBuilder, text: &str| text.replace(&format!("`{}`", case.name), &all);
@@ -452,7 +453,8 @@ impl<'a> Elsewhere<'a> {
         Self { file: file.as_deref(), time: time.as_deref(), unit: unit.as_deref(), sample_time: sample_time.as_ref() }
     }
 
-    /// Returns the table of the other file or the other time axis, on the clock of `main`; `None` if both are those of `main`.
+    /// Returns the table of the other file or the other time axis, on the clock of `main`; `None` if both are those of
+    /// `main`.
     fn table(
         &self,
         place: &Node<'_>,
@@ -541,7 +543,8 @@ fn between(own: Option<Origin>, of_main: Option<Origin>) -> Result<f64, (String,
 /// Names of the two files of a comparison.
 const OF_BOTH: [&str; 2] = ["this file", "the file of the experiment"];
 
-/// Distance of two samples of different files, relative to the mean time between samples, up to which they belong to one instant.
+/// Distance of two samples of different files, relative to the mean time between samples, up to which they belong to
+/// one instant.
 const SAME: f64 = 1e-6;
 
 /// Returns the time by which a column is moved, s.
@@ -630,7 +633,8 @@ impl Table {
         })
     }
 
-    /// Returns the windows into which an experiment is divided, each from its own time 0 on; the whole table without windows.
+    /// Returns the windows into which an experiment is divided, each from its own time 0 on; the whole table without
+    /// windows.
     fn windows(self, node: &Node<'_>, section: &ExperimentSection) -> Result<Vec<Self>, Diagnostic> {
         let Some(length) = read_seconds(node, "windows", section.windows.as_ref())? else { return Ok(vec![self]) };
         let place = node.child("windows").expect("it was just read");
@@ -684,8 +688,9 @@ impl Table {
         Ok(windows)
     }
 
-    /// Returns the rows used for an input whose time stamps are shifted: from the last one before the start of the simulation at 0 s,
-    /// which may precede the first measurement, to those after its end that interpolation needs. `None` if the file starts later.
+    /// Returns the rows used for an input whose time stamps are shifted: from the last one before the start of the
+    /// simulation at 0 s, which may precede the first measurement, to those after its end that interpolation needs.
+    /// `None` if the file starts later.
     fn driven(&self, shift: f64) -> Option<Range<usize>> {
         let before = self.clock.times[self.driving.clone()].partition_point(|t| t - self.clock.zero + shift <= 0.0);
         let start = self.driving.start + before.checked_sub(1)?;
@@ -734,8 +739,8 @@ impl Table {
         self.sampled(place, table, shift, rows)
     }
 
-    /// Returns the last time of an input from another file and the end of the experiment, if the input ends before by more than its
-    /// mean time between samples.
+    /// Returns the last time of an input from another file and the end of the experiment, if the input ends before by
+    /// more than its mean time between samples.
     fn ends_early(&self, input: &Input) -> Option<(f64, f64)> {
         let Input::Sampled { times, .. } = input else { return None };
         let last = *times.last()?;

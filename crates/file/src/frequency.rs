@@ -94,8 +94,8 @@ fn frequencies<'t>(
     Ok(column.values.iter().map(|f| f * factor).collect())
 }
 
-/// Returns the unit in the header of a real or imaginary part or a magnitude. `None` for no unit, or for 1, which is the unit
-/// of the model.
+/// Returns the unit in the header of a real or imaginary part or a magnitude. `None` for no unit, or for 1, which is
+/// the unit of the model.
 fn unit_of(place: &Node<'_>, file: &DataFile, name: &str, unit: Option<&str>) -> Result<Option<Unit>, Diagnostic> {
     let Some(unit) = unit else { return Ok(None) };
     let parsed = Unit::parse(unit).map_err(|_| {

@@ -158,7 +158,8 @@ pub(super) struct SineSection {
     pub offset: Option<Quantity>,
 }
 
-/// Sum of sines of equal amplitude and evenly spaced frequencies, with the phases of Schroeder (1970), which keep its peaks low.
+/// Sum of sines of equal amplitude and evenly spaced frequencies, with the phases of Schroeder (1970), which keep its
+/// peaks low.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct MultisineSection {
@@ -189,7 +190,8 @@ pub(super) struct ChirpSection {
     pub time: Option<Quantity>,
     /// Duration; a number without a unit is in s. Default: to the end of the simulation.
     pub duration: Option<Quantity>,
-    /// Change of the frequency: `linear` in time (default), or `logarithmic`, so that equal times have equal frequency ratios.
+    /// Change of the frequency: `linear` in time (default), or `logarithmic`, so that equal times have equal frequency
+    /// ratios.
     pub sweep: Option<Sweep>,
     /// Mean value; default 0.
     pub offset: Option<Quantity>,
@@ -205,8 +207,8 @@ pub(super) enum Sweep {
     Logarithmic,
 }
 
-/// Pseudo-random binary sequence: `offset + amplitude` or `offset - amplitude` in each interval, from a shift register that starts
-/// with ones. It repeats after `2^stages - 1` intervals.
+/// Pseudo-random binary sequence: `offset + amplitude` or `offset - amplitude` in each interval, from a shift register
+/// that starts with ones. It repeats after `2^stages - 1` intervals.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct PrbsSection {
@@ -231,8 +233,8 @@ pub(super) struct TableSection {
     pub time: Vec<Quantity>,
     /// Values at these times.
     pub value: Vec<Quantity>,
-    /// Values between the samples: `first` (default) is linear, `zero` constant until the next sample, `band-limited` without content
-    /// above half the sampling frequency.
+    /// Values between the samples: `first` (default) is linear, `zero` constant until the next sample, `band-limited`
+    /// without content above half the sampling frequency.
     pub hold: Option<Hold>,
 }
 
@@ -250,8 +252,8 @@ pub(super) struct FileSection {
     pub scale: Option<f64>,
     /// Offset added after scaling, in the unit of the column.
     pub offset: Option<Quantity>,
-    /// Values between the samples: `zero` (default) is constant until the next sample, `first` linear, `band-limited` without content
-    /// above half the sampling frequency.
+    /// Values between the samples: `zero` (default) is constant until the next sample, `first` linear, `band-limited`
+    /// without content above half the sampling frequency.
     pub hold: Option<Hold>,
     /// Time added to the times of the file.
     pub shift: Option<Quantity>,

@@ -53,7 +53,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns a sum. Of temperatures, one term at most is a temperature, wherever it stands, and all others are differences.
+    /// Returns a sum. Of temperatures, one term at most is a temperature, wherever it stands, and all others are
+    /// differences.
     fn sum(&self, parts: &[InputEntry], node: &Node<'_>) -> Result<Input, Diagnostic> {
         let terms = parts.iter().zip(node.elements()).map(|(entry, node)| Term::open(entry, &node, self.files));
         let terms = terms.collect::<Result<Vec<_>, _>>()?;
@@ -64,8 +65,8 @@ impl Reader<'_> {
         terms.into_iter().enumerate().map(convert).collect::<Result<_, _>>().map(Input::Sum)
     }
 
-    /// Returns the term of a sum that is a temperature: the one on a temperature scale. Without one, in an input on a scale, the only
-    /// one in K, unless numbers without a unit are on that scale.
+    /// Returns the term of a sum that is a temperature: the one on a temperature scale. Without one, in an input on a
+    /// scale, the only one in K, unless numbers without a unit are on that scale.
     fn absolute(&self, terms: &[Term<'_, '_>]) -> Result<Option<usize>, Diagnostic> {
         let having = |is_meant: &dyn Fn(Option<&Unit>) -> bool| -> Vec<usize> {
             (0..terms.len()).filter(|&k| terms[k].units().into_iter().any(is_meant)).collect()

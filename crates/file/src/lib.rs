@@ -65,8 +65,8 @@ pub fn read_study(catalogue: &Catalogue, path: impl AsRef<Path>) -> Result<Study
     Ok(read(catalogue, &name, &source.text, &[], &folder)?.study)
 }
 
-/// Reads a study from the text of a study file. Data files are in the working directory and below, or in a folder that the
-/// catalogue names as readable.
+/// Reads a study from the text of a study file. Data files are in the working directory and below, or in a folder that
+/// the catalogue names as readable.
 ///
 /// # Errors
 /// The first mistake with line and column.

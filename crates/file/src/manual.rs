@@ -71,8 +71,8 @@ pub fn describe(name: &str, schema: &Schema) -> String {
     page
 }
 
-/// Returns all places of a key in a schema, at any depth: the keys that lead there, such as `clocks.NAME.filter`, and the
-/// documentation.
+/// Returns all places of a key in a schema, at any depth: the keys that lead there, such as `clocks.NAME.filter`, and
+/// the documentation.
 pub fn places_of(key: &str, schema: &Schema) -> Vec<(String, String)> {
     fn find(key: &str, entries: &[Entry], path: &str, found: &mut Vec<(String, String)>) {
         for entry in entries {

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use mops_language::{Diagnostic, Quantity};
 
-/// Returns the error that stopped the parser, and its location, which is often before the place where the parser stopped.
+/// Returns the error that stopped the parser, and its location, which is often before the place where the parser
+/// stopped.
 pub(super) fn explain(text: &str, error: &toml::de::Error) -> (Diagnostic, Range<usize>) {
     let found = error.span().unwrap_or(0..text.len());
     if let Some((bracket, place)) = unpaired(text).filter(|(_, place)| *place <= found.start) {
@@ -77,8 +78,8 @@ fn unpaired(text: &str) -> Option<(char, usize)> {
     open.pop()
 }
 
-/// Returns the length in bytes of the quoted string at the start of `rest`. `None` if it is not closed, on its line unless
-/// the quote is triple.
+/// Returns the length in bytes of the quoted string at the start of `rest`. `None` if it is not closed, on its line
+/// unless the quote is triple.
 fn end_of_text(rest: &str, quote: char) -> Option<usize> {
     let triple: String = [quote; 3].iter().collect();
     if let Some(inner) = rest.strip_prefix(&triple) {
@@ -97,7 +98,8 @@ fn end_of_text(rest: &str, quote: char) -> Option<usize> {
     None
 }
 
-/// Returns the error for a number with a decimal comma, or for a string without quotes, after the last `=` before `place`.
+/// Returns the error for a number with a decimal comma, or for a string without quotes, after the last `=` before
+/// `place`.
 fn unquoted(text: &str, place: usize) -> Option<(Diagnostic, Range<usize>)> {
     let line = text[..place].rfind('\n').map_or(0, |end| end + 1);
     let after = line + text[line..place].rfind('=')? + 1;

@@ -9,8 +9,8 @@ use super::tree::Node;
 /// Name of the table, which tasks share.
 pub(super) const TABLE: &str = "uncertain";
 
-/// An uncertain parameter of models, or an uncertain tuner. Without a distribution its values are uniform between `min` and
-/// `max`; with one, the distribution is truncated at the bounds.
+/// An uncertain parameter of models, or an uncertain tuner. Without a distribution its values are uniform between `min`
+/// and `max`; with one, the distribution is truncated at the bounds.
 #[derive(Debug, Default, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct UncertainSection {
@@ -18,14 +18,14 @@ pub(super) struct UncertainSection {
     pub min: Option<Quantity>,
     /// Largest value.
     pub max: Option<Quantity>,
-    /// Largest relative deviation of a tuner from its design value, in both directions, instead of `min` and `max`; 0.05 is
-    /// 5 %.
+    /// Largest relative deviation of a tuner from its design value, in both directions, instead of `min` and `max`;
+    /// 0.05 is 5 %.
     pub tolerance: Option<f64>,
-    /// Normal distribution: `{ mean = 1.0, deviation = 0.1 }`, or `{ interval = [0.8, 1.2] }` with the central interval that
-    /// contains 95 % of the values.
+    /// Normal distribution: `{ mean = 1.0, deviation = 0.1 }`, or `{ interval = [0.8, 1.2] }` with the central interval
+    /// that contains 95 % of the values.
     pub normal: Option<NormalTable>,
-    /// Log-normal distribution: `{ median = 1.0, deviation = 0.1 }`, or `{ interval = [0.8, 1.25] }` with the central interval
-    /// that contains 95 % of the values. `deviation` is the standard deviation of the natural logarithm.
+    /// Log-normal distribution: `{ median = 1.0, deviation = 0.1 }`, or `{ interval = [0.8, 1.25] }` with the central
+    /// interval that contains 95 % of the values. `deviation` is the standard deviation of the natural logarithm.
     pub log_normal: Option<LogNormalTable>,
     /// Triangular distribution between `min` and `max`: `{ mode = 1.0 }` is its peak.
     pub triangular: Option<TriangularTable>,

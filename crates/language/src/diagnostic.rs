@@ -84,7 +84,8 @@ impl Diagnostic {
         self
     }
 
-    /// Returns line and column, both from 1, the column counted in characters; `None` if the location is the whole file.
+    /// Returns line and column, both from 1, the column counted in characters; `None` if the location is the whole
+    /// file.
     pub fn line_column(&self) -> Option<(usize, usize)> {
         let (source, span) = self.place.as_ref().filter(|(_, span)| *span != (0..0))?;
         let before = &source.text[..source.text.floor_char_boundary(span.start)];
@@ -114,8 +115,8 @@ impl fmt::Display for Diagnostic {
 
 impl std::error::Error for Diagnostic {}
 
-/// Returns the known name nearest to `given`, if one is close enough. At most about a quarter of its letters may differ, or
-/// it starts with `given`.
+/// Returns the known name nearest to `given`, if one is close enough. At most about a quarter of its letters may
+/// differ, or it starts with `given`.
 pub fn nearest<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let given = given.to_lowercase();
     let length = given.chars().count();

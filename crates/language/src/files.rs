@@ -26,7 +26,8 @@ pub trait Files {
 }
 
 /// Data files in a folder, usually that of the study file, and below. Files elsewhere are read only from folders that
-/// [`Folder::reading`] names: a study may come from an untrusted source. Devices and pipes are refused, as they may have no end.
+/// [`Folder::reading`] names: a study may come from an untrusted source. Devices and pipes are refused, as they may
+/// have no end.
 #[derive(Debug, Clone, Default)]
 pub struct Folder {
     path: PathBuf,
@@ -69,7 +70,8 @@ impl Folder {
         self
     }
 
-    /// Returns the real path of the folder because of which a file may be read; `None` if it may not, or does not exist.
+    /// Returns the real path of the folder because of which a file may be read; `None` if it may not, or does not
+    /// exist.
     pub fn root_of(&self, path: &Path) -> Option<PathBuf> {
         let (own, real) = (self.here().canonicalize().ok()?, path.canonicalize().ok()?);
         if real.starts_with(&own) { Some(own) } else { self.readable_root(&real) }

@@ -24,8 +24,8 @@ pub fn escaped(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
     Cow::Owned(plain)
 }
 
-/// Returns true if a terminal acts on a character instead of showing it, or if XML does not admit it: controls, changes of the text
-/// direction, and two code points that are no characters.
+/// Returns true if a terminal acts on a character instead of showing it, or if XML does not admit it: controls, changes
+/// of the text direction, and two code points that are no characters.
 /// Source: Unicode 16.0, general category Cc; Unicode Standard Annex 9, section 2; XML 1.0, section 2.2.
 pub fn acts(c: char) -> bool {
     (c.is_control() && !matches!(c, '\n' | '\t'))

@@ -128,8 +128,8 @@ impl Scalar for f64 {
 }
 
 /// Number of directions per simulation, a compromise between many and few tuners. Value and tangents are eight numbers,
-/// which fill the vector registers of processors. Only one width is used, because every width is compiled for every model
-/// and compilation takes long.
+/// which fill the vector registers of processors. Only one width is used, because every width is compiled for every
+/// model and compilation takes long.
 pub const DIRECTIONS: usize = 7;
 
 /// Dual number with the tangents of one simulation.

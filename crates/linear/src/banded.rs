@@ -2,7 +2,8 @@
 //!
 //! Source: G. Golub, C. Van Loan, Matrix Computations, 4th edition (2013), section 4.3.5.
 
-/// Matrix of size `n` x `n` with `lower` diagonals below the main diagonal and `upper` above it; first the matrix, then its LU factors.
+/// Matrix of size `n` x `n` with `lower` diagonals below the main diagonal and `upper` above it; first the matrix, then
+/// its LU factors.
 #[derive(Debug, Clone)]
 pub struct Banded {
     n: usize,

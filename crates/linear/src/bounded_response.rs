@@ -15,8 +15,8 @@ const FAINT: f64 = 1e-10;
 /// Number of decades above the highest and below the lowest corner frequency that are always searched.
 const BEYOND: i32 = 4;
 
-/// Largest relative error of the pole-zero form, beside the response that the matrices give: above the error of a pole that is 0 up
-/// to the rounding of the matrices. Wrong poles or zeros cause errors of the magnitude of the response.
+/// Largest relative error of the pole-zero form, beside the response that the matrices give: above the error of a pole
+/// that is 0 up to the rounding of the matrices. Wrong poles or zeros cause errors of the magnitude of the response.
 const INACCURATE: f64 = 1e-6;
 
 /// Part of the sum of the magnitudes of the terms of a response that the rounding of the given matrices may cause.
@@ -28,7 +28,8 @@ const POINTS: u32 = 5;
 /// Rounding error of bounds, rad or relative gain: far above that of a sum over some hundred poles and zeros.
 const ROUNDING: f64 = 1e-12;
 
-/// Single-input, single-output response `L(j w)` by its poles and zeros, which also bound its change between frequencies.
+/// Single-input, single-output response `L(j w)` by its poles and zeros, which also bound its change between
+/// frequencies.
 #[derive(Debug, Clone)]
 pub(super) struct BoundedResponse {
     /// Zeros with weight 1, poles with weight -1.
@@ -51,14 +52,15 @@ enum Numerator {
 impl BoundedResponse {
     /// Computes the bounded response of a system with one input and one output.
     ///
-    /// Poles and zeros are those of the given matrices to all digits, so that their products are accurate where the sums in
-    /// `C (s - A)^-1 B` cancel.
+    /// Poles and zeros are those of the given matrices to all digits, so that their products are accurate where the
+    /// sums in `C (s - A)^-1 B` cancel.
     ///
     /// # Errors
     /// If an entry is not finite, or if poles and zeros do not reproduce the response.
     pub fn new(system: &StateSpace) -> Result<Self, String> {
-        // Sums that the rounding of the matrices explains count as zero, and so do poles. In coordinates of a large condition this may
-        // be found of one of two poles at 0 only, which the response shows: then the numbers count as they stand.
+        // Sums that the rounding of the matrices explains count as zero, and so do poles. In coordinates of a large
+        // condition this may be found of one of two poles at 0 only, which the response shows: then the numbers count
+        // as they stand.
         Self::by_roots(system, zeros(system)?, eigenvalues(&system.a)?)
             .or_else(|_| Self::by_roots(system, zeros_as_given(system)?, eigenvalues_as_given(&system.a)?))
     }
@@ -179,7 +181,8 @@ impl BoundedResponse {
     fn gain_of(&self, system: &StateSpace) -> Result<f64, String> {
         let [low, high] = self.corners;
         // Points of the positive real axis: on the imaginary axis a pole and its mirror image have the same distance.
-        // They begin below the lowest corner and end above the highest, off both: a sampled loop may have its only zero there.
+        // They begin below the lowest corner and end above the highest, off both: a sampled loop may have its only zero
+        // there.
         let [first, last] = [0.37 * low, 2.9 * high];
         let point = |i: u32| first * math::powf(last / first, f64::from(i) / f64::from(POINTS - 1));
         let values: Vec<(Extended, Extended, f64)> = (0..POINTS)
@@ -227,8 +230,8 @@ impl BoundedResponse {
     }
 }
 
-/// Returns `C (s - A)^-1 B + D` of a system with one input and one output at a real point, with twice the digits, and the sum of the
-/// magnitudes of its terms; `None` at a pole.
+/// Returns `C (s - A)^-1 B + D` of a system with one input and one output at a real point, with twice the digits, and
+/// the sum of the magnitudes of its terms; `None` at a pole.
 fn by_matrices(system: &StateSpace, s: f64) -> Option<(Extended, f64)> {
     let n = system.order();
     let entry = |i: usize, j: usize| Extended::from(if i == j { s } else { 0.0 }) - Extended::from(system.a[(i, j)]);
@@ -302,7 +305,8 @@ impl Closed {
     }
 }
 
-/// Returns the bounds of `|1 + z|` over `z` of these sizes, whose angles from the negative real axis have these magnitudes, rad.
+/// Returns the bounds of `|1 + z|` over `z` of these sizes, whose angles from the negative real axis have these
+/// magnitudes, rad.
 fn distance_from_minus_one([low, high]: [f64; 2], [least, most]: [f64; 2]) -> [f64; 2] {
     let distance = |size: f64, angle: f64| {
         let sine = math::sin(0.5 * angle);
@@ -361,7 +365,8 @@ impl Span {
         let angle = complex::arg(-self.response).abs();
         let [least, most] = [(angle - self.turn).max(0.0), (angle + self.turn).min(PI)];
         let [nearest, farthest] = distance_from_minus_one([low, high], [least, most]);
-        // |a + b z| = |b| |z| without a, and |a| |1 + z b/a| with it; with a negative ratio the angles are the supplements.
+        // |a + b z| = |b| |z| without a, and |a| |1 + z b/a| with it; with a negative ratio the angles are the
+        // supplements.
         let [least, most] = if a * b < 0.0 { [PI - most, PI - least] } else { [least, most] };
         let above = if a == 0.0 {
             [b.abs() * low, b.abs() * high]
@@ -385,8 +390,8 @@ impl Span {
         let l = self.response;
         let size = complex::norm(self.slope) + self.rest;
         let growth = math::exp_m1(size);
-        // ln(a + b L) changes by ln(1 + t (exp(e) - 1)), t = b L/(a + b L), if ln L changes by e. Returns t and the bound of
-        // the part that is not linear.
+        // ln(a + b L) changes by ln(1 + t (exp(e) - 1)), t = b L/(a + b L), if ln L changes by e. Returns t and the
+        // bound of the part that is not linear.
         let part = |a: f64, b: f64| {
             let t = l * b / (l * b + a);
             let u = complex::norm(t) * growth;

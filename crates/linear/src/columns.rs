@@ -1,9 +1,11 @@
 //! Columns of a sparse matrix that share no row.
 
-/// Partitions the columns of a square matrix, given by the rows of their nonzero entries, into groups in which no two share a row; each
-/// column joins the first group that fits. Finite differences perturb the columns of a group together.
+/// Partitions the columns of a square matrix, given by the rows of their nonzero entries, into groups in which no two
+/// share a row; each column joins the first group that fits. Finite differences perturb the columns of a group
+/// together.
 ///
-/// Source: A. Curtis, M. Powell, J. Reid, Journal of the Institute of Mathematics and its Applications 13 (1974) 117-119.
+/// Source: A. Curtis, M. Powell, J. Reid, Journal of the Institute of Mathematics and its Applications 13 (1974)
+/// 117-119.
 #[must_use]
 pub fn column_groups(rows: &[Vec<usize>]) -> Vec<Vec<usize>> {
     let mut groups: Vec<(Vec<usize>, Vec<bool>)> = Vec::new();

@@ -8,8 +8,8 @@ use super::{Complex, eigenvalues};
 /// Singular value, relative to the norm of the scaled system, below which an influence counts as zero.
 const SMALL: f64 = 1e-12;
 
-/// Largest number of turns to the nearest mode that the inputs do not reach. Towards a mode of multiplicity k, the singular value falls by
-/// `(1 - 1/k)^k`, which is at most 1/e, so that these reach the rounding error.
+/// Largest number of turns to the nearest mode that the inputs do not reach. Towards a mode of multiplicity k, the
+/// singular value falls by `(1 - 1/k)^k`, which is at most 1/e, so that these reach the rounding error.
 const TURNS: usize = 40;
 
 /// Ratio of the singular values of successive turns above which they do not tend to zero: above 1/e.
@@ -55,7 +55,8 @@ impl Scaled {
         DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / self.states[i] / self.states[j])
     }
 
-    /// Returns true if the inputs leave a mode in the closed right half-plane, or after a change of `A` and `B` by this size.
+    /// Returns true if the inputs leave a mode in the closed right half-plane, or after a change of `A` and `B` by this
+    /// size.
     ///
     /// The staircase loses modes that are much faster than those reached before; single modes have no such limit.
     pub fn leaves_unstable(&self, size: f64) -> Result<bool, String> {
@@ -72,10 +73,12 @@ impl Scaled {
         Ok(Staircase::of(self).leaves_undamped(size)? || modes.any(|mode| self.left(mode, true).0 <= size))
     }
 
-    /// Returns the norm of the smallest change of `A` and `B` after which the inputs leave a mode near this one, and that mode.
+    /// Returns the norm of the smallest change of `A` and `B` after which the inputs leave a mode near this one, and
+    /// that mode.
     ///
-    /// The norm is the smallest singular value of `[A - s, B]`, over s near the mode, or over s on the imaginary axis (Eising). In turns, a
-    /// unit vector y with the least `|y^H [A - s, B]|` is sought for s, and the best s for y, which is `y^H A y`.
+    /// The norm is the smallest singular value of `[A - s, B]`, over s near the mode, or over s on the imaginary axis
+    /// (Eising). In turns, a unit vector y with the least `|y^H [A - s, B]|` is sought for s, and the best s for y,
+    /// which is `y^H A y`.
     ///
     /// Source: R. Eising, Between controllable and uncontrollable, Systems & Control Letters 4 (1984) 263-264.
     fn left(&self, mode: Complex, on_axis: bool) -> (f64, Complex) {

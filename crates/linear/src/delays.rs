@@ -4,7 +4,8 @@ use nalgebra::DMatrix;
 
 use super::StateSpace;
 
-/// Difference, relative to the sum of all delays, up to which two sums of delays are equal: above the rounding of a few additions.
+/// Difference, relative to the sum of all delays, up to which two sums of delays are equal: above the rounding of a few
+/// additions.
 const EQUAL: f64 = 1e-12;
 
 /// An entry of a matrix that is not 0, as an edge from a variable to one that depends on it, with the delay in between.
@@ -27,12 +28,12 @@ struct Graph {
 impl StateSpace {
     /// Returns the system whose last inputs are its last outputs, `delays` later (s), as a system with one delay.
     ///
-    /// The conversion is exact if every path from an input to an output has the same delay: each variable is then counted in a time of its
-    /// own, which is shifted by the delay of the path that leads to it.
+    /// The conversion is exact if every path from an input to an output has the same delay: each variable is then
+    /// counted in a time of its own, which is shifted by the delay of the path that leads to it.
     ///
     /// # Errors
-    /// If a delay lies in a feedback loop, so that the number of poles is infinite, or if paths from the inputs to the outputs have
-    /// different delays.
+    /// If a delay lies in a feedback loop, so that the number of poles is infinite, or if paths from the inputs to the
+    /// outputs have different delays.
     ///
     /// # Panics
     /// If the system has fewer inputs or outputs than delays.
@@ -95,7 +96,8 @@ impl Graph {
         Self { edges, inputs: n..n + m, outputs: n + m..delayed, delayed, size: delayed + 2 * k }
     }
 
-    /// Returns for each variable whether a path leads to it from one of `starts`, or from it to one of them if `backward`.
+    /// Returns for each variable whether a path leads to it from one of `starts`, or from it to one of them if
+    /// `backward`.
     fn reached(&self, starts: impl IntoIterator<Item = usize>, backward: bool) -> Vec<bool> {
         let mut reached = vec![false; self.size];
         let mut open: Vec<usize> = starts.into_iter().collect();
@@ -164,7 +166,8 @@ mod tests {
     use crate::testing::c;
     use mops_math::complex;
 
-    /// A chain `x1' = -x1 + u`, `x2' = -2 x2 + w1`, `y = w2` with `w1 = x1(t - T1)`, `w2 = x2(t - T2)`; `direct` adds `u` to `y`.
+    /// A chain `x1' = -x1 + u`, `x2' = -2 x2 + w1`, `y = w2` with `w1 = x1(t - T1)`, `w2 = x2(t - T2)`; `direct` adds
+    /// `u` to `y`.
     fn chain(direct: f64, back: f64) -> StateSpace {
         let a = DMatrix::from_row_slice(2, 2, &[-1.0, back, 0.0, -2.0]);
         let b = DMatrix::from_row_slice(2, 3, &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);

@@ -14,12 +14,12 @@ const SURE: f64 = 1e-6;
 /// Largest number of frequencies examined; some tens are usual.
 const MOST: usize = 500;
 
-/// Bound of the logarithms of scales. With one-way coupling the optimal ratio of scales is infinite; at this bound the remaining
-/// coupling is below rounding.
+/// Bound of the logarithms of scales. With one-way coupling the optimal ratio of scales is infinite; at this bound the
+/// remaining coupling is below rounding.
 const LARGEST_SCALE: f64 = 30.0;
 
-/// Imbalance of the scaled singular vectors at which the scales are optimal. The relative error of the gain is of the order of its
-/// square.
+/// Imbalance of the scaled singular vectors at which the scales are optimal. The relative error of the gain is of the
+/// order of its square.
 const BALANCED: f64 = 1e-7;
 
 /// Imbalance that suffices at frequencies with less than the largest gain.
@@ -28,23 +28,23 @@ const NEARLY_BALANCED: f64 = 0.03;
 /// Relative error of the gain at which the search for scales ends where the largest singular value is multiple.
 const ACCURATE: f64 = 1e-9;
 
-/// Returns the disk margin of a loop transfer function of one or several loops with unity negative feedback: the largest `alpha`
-/// for which the closed loop stays stable when each loop is multiplied by a factor of its own,
+/// Returns the disk margin of a loop transfer function of one or several loops with unity negative feedback: the
+/// largest `alpha` for which the closed loop stays stable when each loop is multiplied by a factor of its own,
 ///
 /// ```text
 /// f = (1 + (1 - skew)/2 delta)/(1 - (1 + skew)/2 delta),   |delta| < alpha,
 /// ```
 ///
-/// with any stable dynamics `delta`. It is `1/max_w mu(S(j w) + (skew - 1)/2)`, with the structured singular value `mu` for
-/// one complex number per loop. `mu` is computed by its upper bound with scaled loops, which is exact for up to three loops and else
-/// gives a margin that is too small, usually by less than 15 %.
+/// with any stable dynamics `delta`. It is `1/max_w mu(S(j w) + (skew - 1)/2)`, with the structured singular value `mu`
+/// for one complex number per loop. `mu` is computed by its upper bound with scaled loops, which is exact for up to
+/// three loops and else gives a margin that is too small, usually by less than 15 %.
 ///
 /// With one loop, a delay is treated exactly. The maximum is not searched on a grid: the scales that are optimal at one
 /// frequency bound `mu` around it, and these ranges cover all frequencies.
 ///
-/// Sources: P. Seiler, A. Packard, P. Gahinet, An introduction to disk margins, IEEE Control Systems Magazine 40(5) (2020)
-/// 78-95; C. T. Lawrence, A. L. Tits, P. Van Dooren, A fast algorithm for the computation of an upper bound on the mu-norm,
-/// Automatica 36 (2000) 449-456.
+/// Sources: P. Seiler, A. Packard, P. Gahinet, An introduction to disk margins, IEEE Control Systems Magazine 40(5)
+/// (2020) 78-95; C. T. Lawrence, A. L. Tits, P. Van Dooren, A fast algorithm for the computation of an upper bound on
+/// the mu-norm, Automatica 36 (2000) 449-456.
 ///
 /// # Errors
 /// If the closed loop is not stable, if there are not as many outputs as inputs, or if several loops have a delay.
@@ -101,7 +101,8 @@ fn largest_scaled_gain(system: &StateSpace) -> Result<f64, String> {
         let mut crossings = level_frequencies(&scaled, level)?;
         crossings.extend([0.0, f64::INFINITY]);
         crossings.sort_by(f64::total_cmp);
-        // One frequency decides on a range between crossings; those of the poles within guard against crossings that rounding hides.
+        // One frequency decides on a range between crossings; those of the poles within guard against crossings that
+        // rounding hides.
         let below = |[low, high]: [f64; 2]| {
             let within = ends.iter().copied().filter(|end| *end > low && *end < high && end.is_finite());
             within.chain([middle([low, high])]).all(|w| largest_singular_value(&at.on_axis(w)) <= level)
@@ -145,7 +146,8 @@ fn middle([low, high]: [f64; 2]) -> f64 {
     }
 }
 
-/// Returns what remains of a range outside the covered ones. A remainder that rounding leaves between neighbours is dropped.
+/// Returns what remains of a range outside the covered ones. A remainder that rounding leaves between neighbours is
+/// dropped.
 fn without(range: [f64; 2], covered: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut rest = vec![range];
     for &[from, to] in covered {
@@ -167,8 +169,8 @@ fn scaled(system: &StateSpace, logarithms: &[f64]) -> StateSpace {
     system
 }
 
-/// Minimises the largest singular value of `D M D^-1` over positive diagonal matrices `D`. Returns the minimum and the logarithms of
-/// the entries of `D`, in which the logarithm of the value is convex.
+/// Minimises the largest singular value of `D M D^-1` over positive diagonal matrices `D`. Returns the minimum and the
+/// logarithms of the entries of `D`, in which the logarithm of the value is convex.
 ///
 /// Once the value is below `enough`, nearly optimal scales suffice.
 fn scaled_gain(m: &DMatrix<Complex>, enough: f64) -> (f64, Vec<f64>) {
@@ -232,7 +234,8 @@ impl Gain {
         self.slope().iter().fold(0.0, |most, slope| slope.abs().max(most))
     }
 
-    /// Returns the change of the logarithm of a scale after which both vectors have entries of one size, if they do not change.
+    /// Returns the change of the logarithm of a scale after which both vectors have entries of one size, if they do not
+    /// change.
     fn towards_balance(&self, i: usize) -> f64 {
         let least = f64::MIN_POSITIVE;
         (0.5 * math::ln((self.right[i] + least) / (self.left[i] + least))).clamp(-3.0, 3.0)
@@ -241,8 +244,8 @@ impl Gain {
 
 /// Minimises the gain where it has kinks: by bisection for two scales, else by the ellipsoid method.
 ///
-/// Source: S. Boyd, L. El Ghaoui, E. Feron, V. Balakrishnan, Linear Matrix Inequalities in System and Control Theory (1994),
-/// section 2.3.
+/// Source: S. Boyd, L. El Ghaoui, E. Feron, V. Balakrishnan, Linear Matrix Inequalities in System and Control Theory
+/// (1994), section 2.3.
 fn by_cuts(m: &DMatrix<Complex>, start: &[f64]) -> (f64, Vec<f64>) {
     // One scale is arbitrary: the last one stays 1.
     let k = m.nrows() - 1;
@@ -339,8 +342,9 @@ mod tests {
 
     #[test]
     fn a_spinning_body_has_margins_one_loop_at_a_time_but_almost_none_together() {
-        // Example of Seiler, Packard, Gahinet (2020): one loop at a time is 1/s. Together, S - T has the largest singular value
-        // ((1 + (w + 20)^2)/(1 + w^2))^(1/2), whose square is at most 201 + (201^2 - 1)^(1/2); the scales are equal.
+        // Example of Seiler, Packard, Gahinet (2020): one loop at a time is 1/s. Together, S - T has the largest
+        // singular value ((1 + (w + 20)^2)/(1 + w^2))^(1/2), whose square is at most 201 + (201^2 - 1)^(1/2); the
+        // scales are equal.
         let a = 10.0;
         let m = |rows: &[f64]| DMatrix::from_row_slice(2, 2, rows);
         let body = StateSpace::new(m(&[0., a, -a, 0.]), m(&[1., 0., 0., 1.]), m(&[1., a, -a, 1.]), m(&[0.; 4]));
@@ -351,8 +355,8 @@ mod tests {
         }
     }
 
-    /// Largest spectral radius of `M U` over a grid of diagonal phases `U`: a lower bound of mu that needs no scales, and that is
-    /// mu where the grid has the worst phases.
+    /// Largest spectral radius of `M U` over a grid of diagonal phases `U`: a lower bound of mu that needs no scales,
+    /// and that is mu where the grid has the worst phases.
     fn lower_bound(m: &DMatrix<Complex>, angles: u32) -> f64 {
         let n = m.nrows();
         let turn = |k: u32| complex::exp(Complex::new(0.0, std::f64::consts::TAU * f64::from(k) / f64::from(angles)));

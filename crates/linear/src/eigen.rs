@@ -14,8 +14,8 @@ use super::qr_steps::{hessenberg, hessenberg_eigenvalues};
 /// Returns the eigenvalues of a square matrix, complex ones as exact conjugate pairs, upper one first.
 ///
 /// The matrix is split into its strongly connected components. Each is balanced, deflated of zero eigenvalues, reduced
-/// to Hessenberg form and treated by QR steps, with twice the digits of `f64`. The eigenvalue of a component of one state is
-/// its diagonal entry, exactly.
+/// to Hessenberg form and treated by QR steps, with twice the digits of `f64`. The eigenvalue of a component of one
+/// state is its diagonal entry, exactly.
 ///
 /// # Errors
 /// If an entry is not finite or, very rarely, the QR steps do not converge.
@@ -23,7 +23,8 @@ pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex>, String> {
     eigenvalues_of(&extended(a), f64::EPSILON)
 }
 
-/// Returns the eigenvalues of the given numbers as they stand: none is zero because the rounding of the entries explains it, see
+/// Returns the eigenvalues of the given numbers as they stand: none is zero because the rounding of the entries
+/// explains it, see
 /// [`eigenvalues`].
 ///
 /// # Errors
@@ -32,7 +33,8 @@ pub(super) fn eigenvalues_as_given(a: &DMatrix<f64>) -> Result<Vec<Complex>, Str
     eigenvalues_of(&extended(a), Extended::EPSILON)
 }
 
-/// Returns the eigenvalues of a square matrix with the digits of its entries, whose relative rounding error is given, see
+/// Returns the eigenvalues of a square matrix with the digits of its entries, whose relative rounding error is given,
+/// see
 /// [`eigenvalues`].
 ///
 /// # Errors
@@ -82,8 +84,8 @@ impl<T: Real> Block<T> {
     }
 }
 
-/// Returns true if a perturbation of this size moves an eigenvalue onto the imaginary axis: if the smallest singular value of `A - s` is
-/// at most that all the way. Multiple eigenvalues, which rounding moves far, count as one.
+/// Returns true if a perturbation of this size moves an eigenvalue onto the imaginary axis: if the smallest singular
+/// value of `A - s` is at most that all the way. Multiple eigenvalues, which rounding moves far, count as one.
 pub(super) fn is_moved_onto_axis(a: &DMatrix<f64>, root: Complex, size: f64) -> bool {
     let least = |s: Complex| {
         let mut shifted = a.map(|x| Complex::new(x, 0.0));

@@ -54,7 +54,8 @@ const ROUNDING: f64 = 1e-9;
 /// Distances of further initial guesses from the first, relative to a coordinate, or absolute if it is 0.
 const AROUND: [f64; 8] = [1e-6, 1e-4, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e4];
 
-/// Smallest step of a continuation, as part of the way: with smaller ones it would cost more points than the search may evaluate.
+/// Smallest step of a continuation, as part of the way: with smaller ones it would cost more points than the search may
+/// evaluate.
 const SHORTEST: f64 = 1e-3;
 
 /// Maximum number of points evaluated before the search fails.
@@ -209,7 +210,8 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
         Err(no_equilibrium(&here))
     }
 
-    /// Returns the equilibrium that is reached as the fixed coordinates grow from 0 to their values, from an equilibrium near the start.
+    /// Returns the equilibrium that is reached as the fixed coordinates grow from 0 to their values, from an
+    /// equilibrium near the start.
     ///
     /// Each step follows the tangent, so that limits that are inactive along the way stay so.
     ///

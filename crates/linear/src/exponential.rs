@@ -4,11 +4,11 @@ use nalgebra::DMatrix;
 
 use super::eigen::balance;
 
-/// Returns the exponential of a square matrix minus 1, without cancellation for a small matrix: the Taylor series of a part whose
-/// norm is at most 1/2, squared repeatedly.
+/// Returns the exponential of a square matrix minus 1, without cancellation for a small matrix: the Taylor series of a
+/// part whose norm is at most 1/2, squared repeatedly.
 ///
-/// Source: C. Moler, C. Van Loan, Nineteen dubious ways to compute the exponential of a matrix, twenty-five years later, SIAM
-/// Review 45 (2003) 3-49, method 3.
+/// Source: C. Moler, C. Van Loan, Nineteen dubious ways to compute the exponential of a matrix, twenty-five years
+/// later, SIAM Review 45 (2003) 3-49, method 3.
 ///
 /// # Panics
 /// If the matrix is not square.

@@ -1,7 +1,7 @@
 //! Numbers with twice the digits of `f64`, and what the algorithms for eigenvalues need of a number.
 //!
-//! Multiple poles move by a root of the rounding error, and cancellation in badly scaled coordinates costs further digits. With about
-//! 32 digits both are far below the rounding of the given matrices.
+//! Multiple poles move by a root of the rounding error, and cancellation in badly scaled coordinates costs further
+//! digits. With about 32 digits both are far below the rounding of the given matrices.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -82,9 +82,9 @@ impl Real for f64 {
 
 /// Number as a sum of two `f64`, the second at most half a unit in the last place of the first.
 ///
-/// Source: D. E. Knuth, The Art of Computer Programming 2, 3rd edition (1997), section 4.2.2; T. J. Dekker, A floating-point technique
-/// for extending the available precision, Numerische Mathematik 18 (1971) 224-242; Y. Hida, X. S. Li, D. H. Bailey, Library for
-/// double-double and quad-double arithmetic (2007).
+/// Source: D. E. Knuth, The Art of Computer Programming 2, 3rd edition (1997), section 4.2.2; T. J. Dekker, A
+/// floating-point technique for extending the available precision, Numerische Mathematik 18 (1971) 224-242; Y. Hida, X.
+/// S. Li, D. H. Bailey, Library for double-double and quad-double arithmetic (2007).
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub(super) struct Extended {
     high: f64,
@@ -299,7 +299,8 @@ mod tests {
 
     #[test]
     fn a_hilbert_matrix_is_solved_to_all_digits() {
-        // The inverse of the Hilbert matrix of order 8 is one of integers; its first entry is 64. The condition is 1.5e10.
+        // The inverse of the Hilbert matrix of order 8 is one of integers; its first entry is 64. The condition is
+        // 1.5e10.
         let n = 8;
         let hilbert = DMatrix::from_fn(n, n, |i, j| Extended::from(1.0) / Extended::from((i + j + 1) as f64));
         let inverse = solved(hilbert, extended(&DMatrix::identity(n, n))).unwrap();

@@ -40,21 +40,24 @@ pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Stri
 /// Relative difference of the two Gramian results from which on the H2 norm is rejected.
 const DIFFERENT: f64 = 1e-6;
 
-/// Returns the H2 norm, `sqrt(1/(2 pi) integral |G(j w)|_F^2 dw)`; of a system sampled with the period T, `sqrt(T/(2 pi) integral
+/// Returns the H2 norm, `sqrt(1/(2 pi) integral |G(j w)|_F^2 dw)`; of a system sampled with the period T,
+/// `sqrt(T/(2 pi) integral
 /// |G(e^(j w T))|_F^2 dw)` up to half of the sampling frequency.
 ///
-/// The H2 norm is the root mean square of the outputs for white noise of unit intensity at the inputs, or for independent
-/// samples of unit variance. The delay has no influence. Both the controllability and the observability Gramian are used, as a check.
+/// The H2 norm is the root mean square of the outputs for white noise of unit intensity at the inputs, or for
+/// independent samples of unit variance. The delay has no influence. Both the controllability and the observability
+/// Gramian are used, as a check.
 ///
 /// Source: K. Zhou, J. C. Doyle, Essentials of Robust Control (1998), section 4.3; for sampled systems section 21.5.
 ///
 /// # Errors
-/// If the system is not stable, or is continuous and has direct feedthrough: the norm is infinite. If the results from the two Gramians
-/// differ.
+/// If the system is not stable, or is continuous and has direct feedthrough: the norm is infinite. If the results from
+/// the two Gramians differ.
 pub fn h2_norm(system: &StateSpace) -> Result<f64, String> {
     check_stable(system, "H2 norm")?;
     if let Some(period) = system.period {
-        // With w = 2/T tan(omega T/2), d omega is dw/(1 + (w T/2)^2): the norm of G(w)/(1 + w T/2) as a continuous system.
+        // With w = 2/T tan(omega T/2), d omega is dw/(1 + (w T/2)^2): the norm of G(w)/(1 + w T/2) as a continuous
+        // system.
         let image = StateSpace { period: None, ..system.clone() };
         let (m, rate) = (system.outputs.len(), 2.0 / period);
         let one = DMatrix::<f64>::identity(m, m);

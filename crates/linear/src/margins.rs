@@ -17,8 +17,8 @@ pub(super) const STRONG: f64 = 1e10;
 /// Crossing of a level or of the negative real axis by the response of a loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
-    /// Angular frequency, rad/s. 0 and infinity, or half of the sampling frequency, also count as crossings if the response ends on
-    /// the negative real axis.
+    /// Angular frequency, rad/s. 0 and infinity, or half of the sampling frequency, also count as crossings if the
+    /// response ends on the negative real axis.
     pub frequency: f64,
     /// Loop transfer function at the crossing.
     pub response: Complex,
@@ -115,7 +115,8 @@ impl Loop {
                 true
             },
         )?;
-        // A sampled response ends at half of the sampling frequency. At infinite frequency a response with delay turns on a circle, and crosses the axis on both sides.
+        // A sampled response ends at half of the sampling frequency. At infinite frequency a response with delay turns
+        // on a circle, and crosses the axis on both sides.
         let end = self.system.d[(0, 0)];
         let end = if self.system.delay > 0.0 { -end.abs() } else { end };
         if end < 0.0 {
@@ -194,8 +195,8 @@ impl Loop {
         Ok(if both { up.min(decibel(1.0 / above.get())) } else { up })
     }
 
-    /// Returns the gain crossover that determines the phase margin of a stable loop, and the phase crossover that determines
-    /// its gain margin; `None` for an infinite margin.
+    /// Returns the gain crossover that determines the phase margin of a stable loop, and the phase crossover that
+    /// determines its gain margin; `None` for an infinite margin.
     ///
     /// # Errors
     /// If the bounds of the response cannot be computed.
@@ -220,8 +221,8 @@ impl Loop {
 
     /// Returns the delay margin, s: the smallest additional delay that makes the closed loop unstable, or infinity.
     ///
-    /// For a sampled loop, the delay of the sampled values; it is exact for whole periods, and between them takes the values as those
-    /// of a signal without frequencies above half of the sampling frequency.
+    /// For a sampled loop, the delay of the sampled values; it is exact for whole periods, and between them takes the
+    /// values as those of a signal without frequencies above half of the sampling frequency.
     ///
     /// For an unstable loop: minus the smallest change of the delay, of either sign, that makes it stable. A reduction
     /// may exceed the delay of the loop.

@@ -76,9 +76,10 @@ impl Mask {
         if self.is_upper { gain / bound } else { bound / gain }
     }
 
-    /// Returns the largest ratio of the gain to the bound if it is an upper one, of the bound to the gain if it is a lower one, and the
-    /// angular frequency, rad/s: 1 where the gain touches its bound. Of a sampled system, frequencies up to half of the sampling frequency
-    /// count. It is located by bounds of the response over ranges of frequencies.
+    /// Returns the largest ratio of the gain to the bound if it is an upper one, of the bound to the gain if it is a
+    /// lower one, and the angular frequency, rad/s: 1 where the gain touches its bound. Of a sampled system,
+    /// frequencies up to half of the sampling frequency count. It is located by bounds of the response over ranges of
+    /// frequencies.
     ///
     /// # Errors
     /// If the system has several inputs or outputs, or the closed loop is not stable.
@@ -136,7 +137,8 @@ mod tests {
         let upper = Mask::new(&[[1.0, 1.0], [10.0, 1.0]], true).unwrap();
         let (ratio, w) = upper.largest_ratio(&lag(), Masked::System).unwrap();
         assert!((ratio - 2f64.sqrt()).abs() < 1e-9 && (w - 1.0).abs() < 1e-9, "{ratio} {w}");
-        // A lower bound of slope -1 from (0.1, 4) to (10, 0.04): 0.4/w over |G| is 0.2 sqrt(1 + 1/w^2), largest at 0.1 rad/s.
+        // A lower bound of slope -1 from (0.1, 4) to (10, 0.04): 0.4/w over |G| is 0.2 sqrt(1 + 1/w^2), largest at 0.1
+        // rad/s.
         let lower = Mask::new(&[[0.1, 4.0], [10.0, 0.04]], false).unwrap();
         let (ratio, w) = lower.largest_ratio(&lag(), Masked::System).unwrap();
         assert!((ratio - 0.2 * 101f64.sqrt()).abs() < 1e-9 && (w - 0.1).abs() < 1e-9, "{ratio} {w}");

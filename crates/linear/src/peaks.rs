@@ -36,7 +36,8 @@ impl Loop {
         if !self.is_stable() {
             return Err("the closed loop is not stable".to_owned());
         }
-        // At infinite frequency L equals D. With a delay it turns on a circle about 0, and the gain is largest on the real axis.
+        // At infinite frequency L equals D. With a delay it turns on a circle about 0, and the gain is largest on the
+        // real axis.
         let end = self.system.d[(0, 0)];
         let ends = if self.system.delay > 0.0 { [end, -end] } else { [end, end] };
         let (peak, _) = highest(&self.response, |_, l| what.gain(l), |span| span.closed(what))?;

@@ -36,7 +36,8 @@ impl StateSpace {
     }
 }
 
-/// Points of the imaginary axis, relative to the size of the poles, at which a response that is not zero everywhere is not zero.
+/// Points of the imaginary axis, relative to the size of the poles, at which a response that is not zero everywhere is
+/// not zero.
 const LOOKED_AT: [f64; 3] = [0.37, 1.3, 7.1];
 
 /// Magnitude of a response, relative to its terms, that is a rounding error.
@@ -73,8 +74,8 @@ impl StateSpace {
 }
 
 impl FrequencyResponse {
-    /// Returns `(C (s - A)^-1 B + D) exp(-s delay)`, outputs x inputs; not finite at a pole. For a sampled system, s is the variable of
-    /// the bilinear image.
+    /// Returns `(C (s - A)^-1 B + D) exp(-s delay)`, outputs x inputs; not finite at a pole. For a sampled system, s is
+    /// the variable of the bilinear image.
     pub fn at(&self, s: Complex) -> DMatrix<Complex> {
         let rational = self.c.map(|x| Complex::new(x, 0.0)) * self.states(s) + self.d.map(|x| Complex::new(x, 0.0));
         if self.delay == 0.0 { rational } else { rational * complex::exp(-s * self.delay) }

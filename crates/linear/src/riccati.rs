@@ -8,9 +8,9 @@ use super::{Complex, Schur, eigenvalues, lyapunov, undecided};
 /// Relative residual up to which a Riccati equation counts as solved.
 const SOLVED: f64 = 1e-8;
 
-/// Part of the norm of the scaled matrix by which a mode without weight, or without input, may lie off the imaginary axis: the errors of
-/// its separation from the others. The Hamiltonian matrix has a double eigenvalue there, which rounding moves by the square root, and
-/// a multiple one by higher roots, to either side.
+/// Part of the norm of the scaled matrix by which a mode without weight, or without input, may lie off the imaginary
+/// axis: the errors of its separation from the others. The Hamiltonian matrix has a double eigenvalue there, which
+/// rounding moves by the square root, and a multiple one by higher roots, to either side.
 const UNDECIDED: f64 = 1e-12;
 
 /// Maximum number of Newton steps. Each doubles the number of correct digits, so further steps bring no gain.

@@ -6,10 +6,12 @@
 //! w = 2/T (z - 1)/(z + 1)
 //! ```
 //!
-//! with the sampling period T. The image has the same stability, and at `j 2/T tan(omega T/2)` the response of the sampled
-//! system at `omega`, so that the methods for continuous systems apply exactly, and only frequencies are converted.
+//! with the sampling period T. The image has the same stability, and at `j 2/T tan(omega T/2)` the response of the
+//! sampled system at `omega`, so that the methods for continuous systems apply exactly, and only frequencies are
+//! converted.
 //!
-//! Source: K. J. Åström, B. Wittenmark, Computer-Controlled Systems, 3rd edition (1997), sections 2.3 (sampling), 3.2 (stability).
+//! Source: K. J. Åström, B. Wittenmark, Computer-Controlled Systems, 3rd edition (1997), sections 2.3 (sampling), 3.2
+//! (stability).
 
 mod equivalent;
 
@@ -47,16 +49,16 @@ pub const NEXT: &str = "next ";
 pub const OWN: &str = "own ";
 
 impl StateSpace {
-    /// Returns the discrete equivalent of a system with clocks, for inputs that are constant between its instants. The rows of
-    /// memory in `A` and `B` are the changes at an instant of its clock.
+    /// Returns the discrete equivalent of a system with clocks, for inputs that are constant between its instants. The
+    /// rows of memory in `A` and `B` are the changes at an instant of its clock.
     ///
-    /// Without a cut, its instants are those of the slowest clock, or every few of them, so that all clocks repeat. Inputs change at an
-    /// instant, and outputs are read after the clocks due at this instant have computed. For a cut loop, whose outputs
-    /// depend on the memory of one clock only, the instants are those at which this memory changes: the outputs are read, and
-    /// the inputs take their place.
+    /// Without a cut, its instants are those of the slowest clock, or every few of them, so that all clocks repeat.
+    /// Inputs change at an instant, and outputs are read after the clocks due at this instant have computed. For a cut
+    /// loop, whose outputs depend on the memory of one clock only, the instants are those at which this memory changes:
+    /// the outputs are read, and the inputs take their place.
     ///
-    /// The last inputs are the last outputs, `delays` later (s). Each delayed quantity either changes at instants only, or acts on
-    /// memory only.
+    /// The last inputs are the last outputs, `delays` later (s). Each delayed quantity either changes at instants only,
+    /// or acts on memory only.
     ///
     /// # Errors
     /// If the equivalent is not time-invariant or has infinitely many states, or if it has a pole at z = -1.
@@ -69,13 +71,14 @@ impl StateSpace {
         bilinear(&difference, system)
     }
 
-    /// Returns the angular frequency, rad/s, of a point `j v` of the imaginary axis; of a continuous system, `v` itself.
+    /// Returns the angular frequency, rad/s, of a point `j v` of the imaginary axis; of a continuous system, `v`
+    /// itself.
     pub(super) fn frequency(&self, v: f64) -> f64 {
         self.period.map_or(v, |period| 2.0 / period * math::atan(0.5 * period * v))
     }
 
-    /// Returns the point `j v` of the imaginary axis that belongs to an angular frequency, rad/s. The response of a sampled system
-    /// repeats above half of the sampling frequency.
+    /// Returns the point `j v` of the imaginary axis that belongs to an angular frequency, rad/s. The response of a
+    /// sampled system repeats above half of the sampling frequency.
     pub(super) fn on_axis(&self, frequency: f64) -> f64 {
         on_axis(self.period, frequency)
     }
@@ -90,15 +93,16 @@ impl StateSpace {
         Complex::new(math::ln(complex::norm(z)), complex::arg(z)) / period
     }
 
-    /// Returns poles or zeros of `A`, 1/s; those of a sampled system as `ln(z)/T`, without the poles and zeros at z = 0 or infinity.
+    /// Returns poles or zeros of `A`, 1/s; those of a sampled system as `ln(z)/T`, without the poles and zeros at z = 0
+    /// or infinity.
     pub fn in_seconds(&self, roots: Vec<Complex>) -> Vec<Complex> {
         let Some(period) = self.period else { return roots };
         let finite = roots.into_iter().map(|root| Self::logarithm(Self::z(root, period), period));
         finite.filter(|s| s.is_finite()).collect()
     }
 
-    /// Returns the matrices of `x[k+1] = A x[k] + B u[k]`, `y[k] = C x[k] + D u[k]` of a sampled system; `None` for a continuous
-    /// one.
+    /// Returns the matrices of `x[k+1] = A x[k] + B u[k]`, `y[k] = C x[k] + D u[k]` of a sampled system; `None` for a
+    /// continuous one.
     pub fn difference_equation(&self) -> Option<Self> {
         let half = 0.5 * self.period?;
         let n = self.order();
@@ -133,7 +137,8 @@ fn without_rounding(matrix: DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// Returns the bilinear image of a sampled system, with the given `A - 1` and the other matrices of its difference equation.
+/// Returns the bilinear image of a sampled system, with the given `A - 1` and the other matrices of its difference
+/// equation.
 ///
 /// Its entries are rounded once, so that zeros stay zeros, and poles that are equal, or equal to 1, stay so.
 fn bilinear(difference: &DMatrix<f64>, of: StateSpace) -> Result<StateSpace, String> {

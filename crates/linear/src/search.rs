@@ -69,8 +69,8 @@ pub(super) fn passes(
     Ok(())
 }
 
-/// Returns the highest value of the response from frequency 0 to the highest relevant one, and its frequency. The value may depend on
-/// the frequency, rad/s, too.
+/// Returns the highest value of the response from frequency 0 to the highest relevant one, and its frequency. The value
+/// may depend on the frequency, rad/s, too.
 ///
 /// `bounds` encloses the logarithm of the value over a range of frequencies. The remaining ranges exceed the best value
 /// by at most 1e-6 (relative) and are refined.

@@ -1,7 +1,9 @@
-//! Margins of 2,000 random loops, sampled ones with memory in units of its own and continuous ones in dense coordinates, against an
-//! independent computation: L in double-double numbers or by its factors, on a dense grid, and the argument principle.
+//! Margins of 2,000 random loops, sampled ones with memory in units of its own and continuous ones in dense
+//! coordinates, against an independent computation: L in double-double numbers or by its factors, on a dense grid, and
+//! the argument principle.
 //!
-//! The quick tier tries 20 loops, the full tier 200; `MOPS_LOOPS=2000 cargo test -p mops-core --lib series -- --nocapture` all.
+//! The quick tier tries 20 loops, the full tier 200;
+//! `MOPS_LOOPS=2000 cargo test -p mops-core --lib series -- --nocapture` all.
 
 mod on_grid;
 mod random_loop;

@@ -36,7 +36,8 @@ impl StateSpace {
         Ok(self.in_seconds(eigenvalues(&self.a)?))
     }
 
-    /// Returns the poles, 1/s, of the closed loop with unity negative feedback, when the loop transfer function is multiplied by `gain`.
+    /// Returns the poles, 1/s, of the closed loop with unity negative feedback, when the loop transfer function is
+    /// multiplied by `gain`.
     ///
     /// # Errors
     /// See [`StateSpace::complementary_sensitivity`].
@@ -44,7 +45,8 @@ impl StateSpace {
         Ok(self.in_seconds(self.closed_loop_eigenvalues(gain)?))
     }
 
-    /// Returns the eigenvalues of `A - gain B (1 + gain D)^-1 C`, whose rounding errors would move poles in badly scaled coordinates.
+    /// Returns the eigenvalues of `A - gain B (1 + gain D)^-1 C`, whose rounding errors would move poles in badly
+    /// scaled coordinates.
     pub(super) fn closed_loop_eigenvalues(&self, gain: f64) -> Result<Vec<Complex>, String> {
         self.check_closable()?;
         let by = |m: &DMatrix<f64>| m.map(|x| Extended::from(x) * Extended::from(gain));
@@ -170,8 +172,8 @@ impl StateSpace {
         })
     }
 
-    /// Returns the loop transfer function at one input while all other loops are closed by unity negative feedback, each output to
-    /// the input with its index.
+    /// Returns the loop transfer function at one input while all other loops are closed by unity negative feedback,
+    /// each output to the input with its index.
     ///
     /// # Errors
     /// If the system has a delay, so that the number of states is infinite, or if the closed loops are not well-posed.

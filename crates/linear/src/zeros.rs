@@ -9,18 +9,19 @@ use super::qr_steps::reflection;
 use super::system::above;
 use super::{Complex, StateSpace};
 
-/// Relative rounding error of the given entries, up to which their sums count as zero: some tens of the standard deviation of a
-/// rounding, which is `2^-53/sqrt(3)`.
+/// Relative rounding error of the given entries, up to which their sums count as zero: some tens of the standard
+/// deviation of a rounding, which is `2^-53/sqrt(3)`.
 const GIVEN: f64 = 1e-14;
 
-/// Relative error of the computation itself, up to which sums of numbers that count as exact are zero: some hundred roundings.
+/// Relative error of the computation itself, up to which sums of numbers that count as exact are zero: some hundred
+/// roundings.
 const COMPUTED: f64 = 100.0 * <Extended as Entry>::EPSILON;
 
 /// Matrix with twice the digits.
 type Matrix = DMatrix<Extended>;
 
-/// Matrix with the squares of the errors that the rounding of the given entries causes in its own. The errors are independent, so that
-/// the squares add up.
+/// Matrix with the squares of the errors that the rounding of the given entries causes in its own. The errors are
+/// independent, so that the squares add up.
 #[derive(Clone)]
 struct Known {
     entries: Matrix,
@@ -108,7 +109,8 @@ pub fn zeros(system: &StateSpace) -> Result<Vec<Complex>, String> {
     zeros_up_to(system, GIVEN)
 }
 
-/// Returns the zeros of the given numbers as they stand, also those that only their rounding causes, far above all poles. See [`zeros`].
+/// Returns the zeros of the given numbers as they stand, also those that only their rounding causes, far above all
+/// poles. See [`zeros`].
 ///
 /// # Errors
 /// See [`zeros`].
@@ -212,10 +214,11 @@ impl Quadruple {
     }
 }
 
-/// Returns the reflections after which `m` has its independent rows first and rows that are zero up to the errors after them; as many as
-/// its rank.
+/// Returns the reflections after which `m` has its independent rows first and rows that are zero up to the errors after
+/// them; as many as its rank.
 ///
-/// Source: G. H. Golub, C. F. Van Loan, Matrix Computations, 4th edition (2013), section 5.4.2 (reflections with column pivoting).
+/// Source: G. H. Golub, C. F. Van Loan, Matrix Computations, 4th edition (2013), section 5.4.2 (reflections with column
+/// pivoting).
 fn row_compression(m: &Known) -> Vec<Reflection> {
     let (mut m, n) = (m.clone(), m.entries.nrows());
     let mut found = Vec::new();

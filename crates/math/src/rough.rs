@@ -1,5 +1,5 @@
-//! Elementary functions of low accuracy, for where no higher one is needed at every step: sums and products alone, with the same
-//! bits on every machine.
+//! Elementary functions of low accuracy, for where no higher one is needed at every step: sums and products alone, with
+//! the same bits on every machine.
 
 /// Returns the base-2 logarithm of a normal positive number, to 0.0011. Adds to its exponent a cubic of its mantissa
 /// that is exact at powers of 2.

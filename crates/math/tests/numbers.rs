@@ -1,5 +1,5 @@
-//! Complex functions against those of real numbers, rough functions against accurate ones, and normal random numbers against their
-//! distribution.
+//! Complex functions against those of real numbers, rough functions against accurate ones, and normal random numbers
+//! against their distribution.
 
 use mops_math::{self as math, complex, rough};
 use nalgebra::Complex;

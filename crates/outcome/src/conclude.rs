@@ -36,8 +36,8 @@ pub struct Ending {
     pub seconds: f64,
 }
 
-/// Concludes a run: estimates the local tuners of selection and validation experiments, and fills in the outcome. Returns
-/// the outcome with the evaluation it reports.
+/// Concludes a run: estimates the local tuners of selection and validation experiments, and fills in the outcome.
+/// Returns the outcome with the evaluation it reports.
 ///
 /// A cancelled run reports the available results. Remaining simulations run until cancellation is insisted on
 /// ([`mops_core::Cancellation::insist`]); a warning reports missing parts.
@@ -168,8 +168,8 @@ fn whole(problem: &Problem, known: Evaluation, ended_early: bool) -> Evaluation 
 /// Maximum number of points of a Pareto front in a result.
 const LONGEST_FRONT: usize = 200;
 
-/// Returns the points of the Pareto front in order of the first criterion, thinned evenly if there are many. For a single
-/// design, returns the design itself.
+/// Returns the points of the Pareto front in order of the first criterion, thinned evenly if there are many. For a
+/// single design, returns the design itself.
 fn front_points(run: &Run<'_>, best: &Evaluation) -> Vec<Design> {
     let problem = run.problem();
     let front = run.front();

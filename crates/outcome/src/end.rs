@@ -31,8 +31,8 @@ const AT_JUMP: &str = "At a jump: a criterion is discontinuous beside the point,
                        with another solver or seed.";
 
 impl End {
-    /// Returns what is known of a point with this merit and classification, after local searches that ended with the given
-    /// merits. `is_noise`: the residuals are noise, see [`mops_core::Shape::is_noise`].
+    /// Returns what is known of a point with this merit and classification, after local searches that ended with the
+    /// given merits. `is_noise`: the residuals are noise, see [`mops_core::Shape::is_noise`].
     #[must_use]
     pub fn new(point: Optimality, best: Merit, ends: &[Merit], stop: Stop, is_noise: bool) -> Self {
         let mut end = Self { point, basins: Basins::of(best, ends), doubt: None, words: Vec::new() };
@@ -42,8 +42,8 @@ impl End {
         end
     }
 
-    /// Returns the end of a search with an equally good point elsewhere, described by a sentence: a reason to doubt the point. Searches that
-    /// ended at the same value then did not all end here.
+    /// Returns the end of a search with an equally good point elsewhere, described by a sentence: a reason to doubt the
+    /// point. Searches that ended at the same value then did not all end here.
     #[must_use]
     pub fn with_twin(mut self, sentence: String) -> Self {
         self.words = self.words_of_point().into_iter().collect();
@@ -51,7 +51,8 @@ impl End {
         self
     }
 
-    /// Returns the end where simulations contradict the derivatives, as a sentence states: what follows from derivatives is not shown.
+    /// Returns the end where simulations contradict the derivatives, as a sentence states: what follows from
+    /// derivatives is not shown.
     #[must_use]
     pub fn with_contradiction(mut self, sentence: String) -> Self {
         let of_point = self.words_of_point();
@@ -60,8 +61,8 @@ impl End {
         self
     }
 
-    /// Returns the end of a search whose point lies beside a jump: first-order conditions show nothing there. A jump to a better value is a
-    /// reason to doubt the point.
+    /// Returns the end of a search whose point lies beside a jump: first-order conditions show nothing there. A jump to
+    /// a better value is a reason to doubt the point.
     #[must_use]
     pub fn beside_jump(mut self, to_better: bool) -> Self {
         let of_point = self.words_of_point();
@@ -76,7 +77,8 @@ impl End {
         self
     }
 
-    /// Returns the end of a search for less than the study states, as a sentence says: the first reason to doubt the point.
+    /// Returns the end of a search for less than the study states, as a sentence says: the first reason to doubt the
+    /// point.
     #[must_use]
     pub fn with_first_doubt(mut self, sentence: &str) -> Self {
         self.doubt = Some(self.doubt.map_or_else(|| sentence.to_owned(), |doubt| format!("{sentence} {doubt}")));

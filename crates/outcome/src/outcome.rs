@@ -116,9 +116,9 @@ pub struct Design {
     /// Values of all criteria, by `case/criterion`.
     #[schemars(with = "BTreeMap<String, f64>")]
     pub criteria: Map<String, Value>,
-    /// Values of the objectives of a Pareto front: of every minimised criterion in its worst case, which has the largest weighted
-    /// scaled value, by name; under `per-case`, by `case/criterion` where a criterion is minimised in several cases. Absent for a
-    /// single design.
+    /// Values of the objectives of a Pareto front: of every minimised criterion in its worst case, which has the
+    /// largest weighted scaled value, by name; under `per-case`, by `case/criterion` where a criterion is minimised in
+    /// several cases. Absent for a single design.
     #[schemars(with = "BTreeMap<String, f64>")]
     #[serde(skip_serializing_if = "Map::is_empty")]
     pub objectives: Map<String, Value>,
@@ -146,14 +146,14 @@ pub struct CriterionReport {
     pub bad: Option<f64>,
     /// Value; null if the condition of the criterion was never reached, or if the value could not be computed.
     pub value: f64,
-    /// Scaled value, at most 1 if the demand is met. A demand `d` is the upper limit `c <= d` if less is better, with the
-    /// scaled value `c/d`. It is the lower limit `c >= d` if more is better, with the scaled value `1 + (d - c)/|d|`. A pair
-    /// scales to `(c - good)/(bad - good)`.
+    /// Scaled value, at most 1 if the demand is met. A demand `d` is the upper limit `c <= d` if less is better, with
+    /// the scaled value `c/d`. It is the lower limit `c >= d` if more is better, with the scaled value
+    /// `1 + (d - c)/|d|`. A pair scales to `(c - good)/(bad - good)`.
     ///
-    /// A condition that was never reached scales to `max(1, h/d) (1 + e/(e + b))`. Under a pair, and for a criterion that is
-    /// not a time, it scales to `1 + e/(e + b)`. `h` is the time available to reach the condition. `e` is the mean distance
-    /// of the signal from its target over the last tenth of that time. `b` is the half-width of the band (for levels 1 % of
-    /// the step).
+    /// A condition that was never reached scales to `max(1, h/d) (1 + e/(e + b))`. Under a pair, and for a criterion
+    /// that is not a time, it scales to `1 + e/(e + b)`. `h` is the time available to reach the condition. `e` is the
+    /// mean distance of the signal from its target over the last tenth of that time. `b` is the half-width of the band
+    /// (for levels 1 % of the step).
     pub scaled: f64,
     /// Unit of the value.
     pub unit: String,
@@ -218,8 +218,8 @@ pub struct ParameterReport {
     pub value: f64,
     /// Standard error to first order; null if the data do not determine the parameter.
     pub std_error: f64,
-    /// 95 % confidence interval: estimate +- t quantile times standard error, clamped to the bounds. Null if the data do not
-    /// determine the parameter.
+    /// 95 % confidence interval: estimate +- t quantile times standard error, clamped to the bounds. Null if the data
+    /// do not determine the parameter.
     pub interval95: [f64; 2],
     /// Unit of the estimate, error and interval.
     pub unit: String,

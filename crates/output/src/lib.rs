@@ -1,7 +1,7 @@
 //! Output files: each is written completely or not at all, and none replaces an input of the same command.
 //!
-//! A file is written under a temporary name in its folder and then renamed. [`Outputs`] writes the files of a command, and refuses to
-//! write ([`Overwrites`]) where one of its [`Inputs`] is. [`AtomicFile`] is one file being written.
+//! A file is written under a temporary name in its folder and then renamed. [`Outputs`] writes the files of a command,
+//! and refuses to write ([`Overwrites`]) where one of its [`Inputs`] is. [`AtomicFile`] is one file being written.
 
 mod inputs;
 
@@ -12,12 +12,12 @@ use std::path::{Path, PathBuf};
 
 pub use inputs::Inputs;
 
-/// Prefix of a file name during writing. The name is fixed, so that the next process replaces the remains of a killed one;
-/// only one process at a time writes in the folder of a run.
+/// Prefix of a file name during writing. The name is fixed, so that the next process replaces the remains of a killed
+/// one; only one process at a time writes in the folder of a run.
 const TEMPORARY_PREFIX: &str = ".new-";
 
-/// Writer of all output files of a command. It refuses to replace a file that the command reads, and follows no symbolic link
-/// below the folder of the outputs: a link is replaced.
+/// Writer of all output files of a command. It refuses to replace a file that the command reads, and follows no
+/// symbolic link below the folder of the outputs: a link is replaced.
 #[derive(Debug, Default)]
 pub struct Outputs {
     inputs: Inputs,

@@ -43,9 +43,9 @@ impl FrequencyCurve {
     }
 }
 
-/// Returns angular frequencies, rad/s, from two decades below the lowest corner frequency to two decades above the highest.
-/// They are dense around sharp resonances. A delay limits the highest frequency, and a sampled system ends at half of the sampling
-/// frequency.
+/// Returns angular frequencies, rad/s, from two decades below the lowest corner frequency to two decades above the
+/// highest. They are dense around sharp resonances. A delay limits the highest frequency, and a sampled system ends at
+/// half of the sampling frequency.
 pub(super) fn frequencies(system: &StateSpace) -> Result<Vec<f64>, String> {
     let corners = [system.poles()?, system.in_seconds(zeros(system)?)].concat();
     let largest = corners.iter().map(|z| complex::norm(*z)).fold(0.0, f64::max);

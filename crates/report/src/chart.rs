@@ -16,13 +16,14 @@ use super::clip::{Point, simplified};
 use super::range::{drawable, x_range, y_range};
 use super::svg::class;
 
-/// Style sheet and scripts of pages with interactive plots. uPlot 1.6.32: <https://github.com/leeoniya/uPlot>, MIT licence.
+/// Style sheet and scripts of pages with interactive plots. uPlot 1.6.32: <https://github.com/leeoniya/uPlot>, MIT
+/// licence.
 pub const STYLE: &str = include_str!("../assets/uPlot.min.css");
 /// Scripts of pages with interactive plots.
 pub const SCRIPTS: [&str; 2] = [include_str!("../assets/uPlot.iife.min.js"), include_str!("charts.js")];
 
-/// Largest distance of a simplified line from the original, as a share of the ranges of the axes. At a magnification of 20 it
-/// is less than a quarter of a pixel of a plot 1000 pixels wide.
+/// Largest distance of a simplified line from the original, as a share of the ranges of the axes. At a magnification of
+/// 20 it is less than a quarter of a pixel of a plot 1000 pixels wide.
 const TOLERANCE: f64 = 1e-5;
 
 /// Returns the plot as an SVG, with the data of the interactive plot if it is one of curves over x.
@@ -39,7 +40,8 @@ pub(super) fn markup(plot: &Plot) -> Markup {
     }
 }
 
-/// Returns the data of an interactive plot as text, in which escaped characters are shown as in the other text of the page.
+/// Returns the data of an interactive plot as text, in which escaped characters are shown as in the other text of the
+/// page.
 fn text(plot: &Plot) -> String {
     escaped(&data(plot).to_string(), |c| format!("\\\\{}", &c.escape_unicode().to_string()[1..])).into_owned()
 }

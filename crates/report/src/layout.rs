@@ -180,8 +180,8 @@ fn longest<'a>(labels: impl Iterator<Item = &'a str>) -> f64 {
     labels.map(|label| label.chars().count()).max().unwrap_or(0) as f64
 }
 
-/// Returns the line of a bound within the range of x, with points where it crosses the lower or the upper edge of the frame;
-/// empty outside. Other points may lie above or below the frame.
+/// Returns the line of a bound within the range of x, with points where it crosses the lower or the upper edge of the
+/// frame; empty outside. Other points may lie above or below the frame.
 fn edge(bound: &Bound, (x, y): (&Axis, &Axis), frame: Frame) -> Vec<Point> {
     let [Some(start), Some(end)] = bound.y.map(|value| y.position(value)) else { return Vec::new() };
     let whole = [x.position(bound.x[0]).unwrap_or(0.0), x.position(bound.x[1]).unwrap_or(1.0)];

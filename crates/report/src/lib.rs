@@ -1,6 +1,7 @@
 //! Reports: one HTML page of a solved study, and its plots as SVG and PNG.
 //!
-//! [`Report`] writes the files of a run. [`Draw`] draws any plot, [`page()`] wraps any HTML in the style of the reports.
+//! [`Report`] writes the files of a run. [`Draw`] draws any plot, [`page()`] wraps any HTML in the style of the
+//! reports.
 //!
 //! | module | content |
 //! |---|---|
@@ -92,8 +93,8 @@ impl Report<'_> {
         self.write_by(folder, &Outputs::default()).map(|_| ())
     }
 
-    /// Writes as [`Report::write`], but no file that is an input of the command. Returns the number of plots that were not written,
-    /// as the run was asked to stop; it is asked before every plot.
+    /// Writes as [`Report::write`], but no file that is an input of the command. Returns the number of plots that were
+    /// not written, as the run was asked to stop; it is asked before every plot.
     ///
     /// # Errors
     /// As [`Report::write`].

@@ -7,8 +7,8 @@ use mops_outcome::{CriterionReport, Outcome};
 
 use super::markup::scrolling;
 
-/// Returns the table: a row for every case, a column for every criterion, and the worst of each. `None` for fewer than two
-/// cases with demands.
+/// Returns the table: a row for every case, a column for every criterion, and the worst of each. `None` for fewer than
+/// two cases with demands.
 pub(super) fn section(outcome: &Outcome) -> Option<Markup> {
     let counts = |c: &&CriterionReport| c.demand.is_some() || (c.good.is_some() && c.bad.is_some());
     let all: Vec<&CriterionReport> = outcome.criteria.iter().filter(counts).collect();

@@ -7,8 +7,8 @@ use mops_math::complex;
 
 use super::bode::FrequencyCurve;
 
-/// Returns the plot of a response at increasing frequencies, in the neighbourhood of -1, and of the static gain if that is
-/// moderate. With the maximum sensitivity Ms it has the circle of radius 1/Ms about -1, which the curve touches.
+/// Returns the plot of a response at increasing frequencies, in the neighbourhood of -1, and of the static gain if that
+/// is moderate. With the maximum sensitivity Ms it has the circle of radius 1/Ms about -1, which the curve touches.
 pub fn nyquist(response: &FrequencyCurve, peak: Option<f64>, name: &str) -> Plot {
     let FrequencyCurve { values, static_gain, .. } = response;
     let limit = if static_gain.is_finite() { static_gain.clamp(1.5, 8.0) * 1.1 } else { 3.0 };

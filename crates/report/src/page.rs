@@ -1,5 +1,5 @@
-//! Page of the report: one HTML file without external resources. Without scripts it has the same content: they make plots and
-//! tables interactive.
+//! Page of the report: one HTML file without external resources. Without scripts it has the same content: they make
+//! plots and tables interactive.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use mops_content::{

@@ -37,7 +37,8 @@ impl Scene {
     }
 }
 
-/// Shortens a name to `room` letters (at least 4). The end is kept: the criterion follows the case and distinguishes better.
+/// Shortens a name to `room` letters (at least 4). The end is kept: the criterion follows the case and distinguishes
+/// better.
 fn shortened(name: &str, room: usize) -> String {
     let count = name.chars().count();
     if count <= room.max(4) {

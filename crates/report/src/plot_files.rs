@@ -1,5 +1,5 @@
-//! Plot files of a report: files of an earlier report that the present one does not write are removed. Other files in the
-//! folder stay.
+//! Plot files of a report: files of an earlier report that the present one does not write are removed. Other files in
+//! the folder stay.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -1,4 +1,5 @@
-//! Scene as a PNG: strokes with anti-aliasing by distance, letters in the bundled font, so that no system font is needed.
+//! Scene as a PNG: strokes with anti-aliasing by distance, letters in the bundled font, so that no system font is
+//! needed.
 
 use std::io;
 use std::sync::Once;

@@ -31,8 +31,8 @@ pub(super) fn x_range(plot: &Plot) -> Option<[f64; 2]> {
     range_of(xs.filter_map(|x| drawable(x, plot.log_x)))
 }
 
-/// Returns the range of y in the window. It contains the curves that may not leave the frame; other curves and levels widen it at most to
-/// three times that range.
+/// Returns the range of y in the window. It contains the curves that may not leave the frame; other curves and levels
+/// widen it at most to three times that range.
 pub(super) fn y_range(plot: &Plot) -> Option<[f64; 2]> {
     let values = |may_leave: bool| {
         let curves = plot.shown().filter(move |c| c.may_leave == may_leave).flat_map(|c| &c.points);
@@ -56,7 +56,8 @@ pub(super) fn y_range(plot: &Plot) -> Option<[f64; 2]> {
     Some([range[0] - margin, range[1] + margin])
 }
 
-/// Returns ranges of x and y with equal scales and a margin, for a frame with the aspect ratio `shape` (width / height).
+/// Returns ranges of x and y with equal scales and a margin, for a frame with the aspect ratio `shape` (width /
+/// height).
 pub(super) fn equal(x: [f64; 2], y: [f64; 2], shape: f64) -> [[f64; 2]; 2] {
     let about = |[low, high]: [f64; 2], room: f64| [0.5 * (low + high - room), 0.5 * (low + high + room)];
     let height = (1.05 * (y[1] - y[0])).max(1.05 * (x[1] - x[0]) / shape);

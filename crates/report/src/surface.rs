@@ -18,8 +18,8 @@ const COLORS: usize = 32;
 /// Number of intervals between contour lines.
 const LINES: usize = 8;
 
-/// Quantile of the values at which the colour scale ends. Values above it have the same colour, as large values next to a
-/// failure would compress the scale.
+/// Quantile of the values at which the colour scale ends. Values above it have the same colour, as large values next to
+/// a failure would compress the scale.
 const HIGHEST: f64 = 0.9;
 /// Largest number of decades of a logarithmic colour scale.
 const DECADES: f64 = 4.0;

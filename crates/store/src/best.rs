@@ -5,8 +5,8 @@ use mops_core::{Merit, Problem};
 use super::bytes;
 use super::database::Points;
 
-/// Returns the best stored point under the demands of the problem, as a point of the unit box. Points outside the bounds, or
-/// with other values of inactive tuners, are excluded.
+/// Returns the best stored point under the demands of the problem, as a point of the unit box. Points outside the
+/// bounds, or with other values of inactive tuners, are excluded.
 pub(super) fn best(points: &Points, problem: &Problem) -> Option<Vec<f64>> {
     let mut best: Option<(Merit, &Vec<u64>, Vec<f64>)> = None;
     for (key, known) in points {
@@ -29,8 +29,8 @@ pub(super) fn best(points: &Points, problem: &Problem) -> Option<Vec<f64>> {
     Some(best?.2)
 }
 
-/// Returns the position of a tuner value in the unit interval, exact to the bit: the position that maps to this very value, if
-/// one exists.
+/// Returns the position of a tuner value in the unit interval, exact to the bit: the position that maps to this very
+/// value, if one exists.
 fn position(problem: &Problem, tuner: usize, value: f64) -> f64 {
     let tuner = &problem.study().tuners()[tuner];
     let near = tuner.position_of(value);

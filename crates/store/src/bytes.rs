@@ -13,7 +13,8 @@ pub(super) fn numbers(bytes: &[u8]) -> Vec<f64> {
     bytes.chunks_exact(8).map(number).collect()
 }
 
-/// Returns the key of a point: the bits of its tuners, with negative zero, to which small numbers round, replaced by zero.
+/// Returns the key of a point: the bits of its tuners, with negative zero, to which small numbers round, replaced by
+/// zero.
 pub(super) fn key(tuners: &[f64]) -> Vec<u64> {
     tuners.iter().map(|value| (value + 0.0).to_bits()).collect()
 }

@@ -60,8 +60,8 @@ pub(super) fn columns(known: &Known, rows: usize) -> Columns {
     )
 }
 
-/// Converts the columns of a point to its values. A job is known if it failed, or for those of its rows that have a value or a
-/// reason for a missing one.
+/// Converts the columns of a point to its values. A job is known if it failed, or for those of its rows that have a
+/// value or a reason for a missing one.
 pub(super) fn known(
     row: &Row<'_>,
     study: &Study,

@@ -12,8 +12,8 @@ pub(super) fn with_companions(path: &Path) -> [PathBuf; 4] {
     })
 }
 
-/// Returns the first of a database and its companion files that is not a regular file: SQLite would wait for the writer of a pipe, and
-/// a device may have no end.
+/// Returns the first of a database and its companion files that is not a regular file: SQLite would wait for the writer
+/// of a pipe, and a device may have no end.
 pub(super) fn obstacle(path: &Path) -> Option<PathBuf> {
     with_companions(path).into_iter().find(|name| fs::metadata(name).is_ok_and(|file| !file.is_file()))
 }

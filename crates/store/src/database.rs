@@ -119,8 +119,8 @@ impl Database {
         Ok(Some(Self { connection, place }))
     }
 
-    /// Switches to a write-ahead log, for frequent writes. A killed process loses no committed data; a loss of power may lose
-    /// the last moments.
+    /// Switches to a write-ahead log, for frequent writes. A killed process loses no committed data; a loss of power
+    /// may lose the last moments.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -166,7 +166,8 @@ impl Database {
         let sql = "UPDATE runs SET ended = ?, state = ?, reused = ?, \
                    evaluations = CASE WHEN evaluations = 0 THEN ? ELSE evaluations END WHERE id = ?";
         self.connection.execute(sql, params![now(), state.name(), integer(reused), integer(points), run])?;
-        // Merges the log into one file, which is readable from a read-only folder. Has no effect while another program reads.
+        // Merges the log into one file, which is readable from a read-only folder. Has no effect while another program
+        // reads.
         let _ = self.connection.pragma_update(None, "journal_mode", "DELETE");
         Ok(())
     }
@@ -268,7 +269,8 @@ pub(super) fn is_temporary(error: &rusqlite::Error) -> bool {
     error.sqlite_error_code().is_some_and(|code| passing.contains(&code))
 }
 
-/// Returns true for an error that says nothing about the content of a database: of the disk, of its permissions, or temporary.
+/// Returns true for an error that says nothing about the content of a database: of the disk, of its permissions, or
+/// temporary.
 pub(super) fn is_of_machine(error: &rusqlite::Error) -> bool {
     let of_machine = [
         ErrorCode::SystemIoFailure,

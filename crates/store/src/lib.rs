@@ -1,7 +1,8 @@
-//! Storage of the evaluations of a run in `evaluations.sqlite` in its folder. A killed run can be resumed, and a study with
-//! other demands can reuse the points. `docs/reference/run-files.md` describes the tables.
+//! Storage of the evaluations of a run in `evaluations.sqlite` in its folder. A killed run can be resumed, and a study
+//! with other demands can reuse the points. `docs/reference/run-files.md` describes the tables.
 //!
-//! [`Recorder::open`] locks the folder and opens the database for a run with an [`Identity`]; [`Recorder::run`] stores its points, and
+//! [`Recorder::open`] locks the folder and opens the database for a run with an [`Identity`]; [`Recorder::run`] stores
+//! its points, and
 //! [`FinishedRun`] writes its end. [`last_run`] reads the row of the last run in a folder.
 //!
 //! | module | content |

@@ -45,7 +45,8 @@ impl FolderLock {
         }
     }
 
-    /// Locks the folder again if the folder or the lock file was removed; returns `false` if another run has locked it since.
+    /// Locks the folder again if the folder or the lock file was removed; returns `false` if another run has locked it
+    /// since.
     ///
     /// # Errors
     /// As [`FolderLock::take`].
@@ -77,7 +78,8 @@ impl FolderLock {
     }
 }
 
-/// Opens or creates the lock file. A symbolic link of its name is replaced; a pipe, which would be waited for, is refused.
+/// Opens or creates the lock file. A symbolic link of its name is replaced; a pipe, which would be waited for, is
+/// refused.
 fn open(path: &Path) -> io::Result<File> {
     loop {
         match OpenOptions::new().write(true).create_new(true).open(path) {
@@ -105,7 +107,8 @@ fn is_named(file: &File, path: &Path) -> bool {
 
 impl Drop for FolderLock {
     fn drop(&mut self) {
-        // The file is removed before the lock is released, so that no other process locks a file that is about to vanish.
+        // The file is removed before the lock is released, so that no other process locks a file that is about to
+        // vanish.
         if self.is_valid() {
             let _ = fs::remove_file(self.folder.join(FILE));
             if self.created {

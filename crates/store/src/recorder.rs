@@ -219,8 +219,8 @@ impl Drop for End<'_> {
 }
 
 impl FinishedRun {
-    /// Restores the folder and the database before the result is written, if they were removed during the run. Returns a note
-    /// for the user.
+    /// Restores the folder and the database before the result is written, if they were removed during the run. Returns
+    /// a note for the user.
     ///
     /// # Errors
     /// If another run has locked the folder, or the folder cannot be created again.
@@ -255,7 +255,8 @@ impl FinishedRun {
         self.unwritten.is_none()
     }
 
-    /// Writes the end of the run and the number of its points; returns an error message if part of the run is not stored.
+    /// Writes the end of the run and the number of its points; returns an error message if part of the run is not
+    /// stored.
     pub fn end(self, state: RunState, evaluations: usize) -> Option<String> {
         let until = Instant::now() + WRITE_TIMEOUT;
         let ended = loop {

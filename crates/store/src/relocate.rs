@@ -28,8 +28,8 @@ impl Database {
         }
     }
 
-    /// Creates a new database that contains only this run, under a temporary name and in one transaction. [`Draft::commit`]
-    /// renames it, so that no incomplete database is ever visible.
+    /// Creates a new database that contains only this run, under a temporary name and in one transaction.
+    /// [`Draft::commit`] renames it, so that no incomplete database is ever visible.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -44,8 +44,8 @@ impl Database {
         Ok(Draft { temporary, path: path.to_owned(), run })
     }
 
-    /// Returns true if the database contains no run. Earlier versions created the database in several steps and left such a
-    /// file when killed at the start.
+    /// Returns true if the database contains no run. Earlier versions created the database in several steps and left
+    /// such a file when killed at the start.
     pub(super) fn is_blank(path: &Path) -> bool {
         if obstacle(path).is_some() {
             return false;

@@ -1,5 +1,5 @@
-//! Replacement of an existing database by that of a new run. A finished run of this version is replaced, any other file is
-//! renamed.
+//! Replacement of an existing database by that of a new run. A finished run of this version is replaced, any other file
+//! is renamed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -79,8 +79,8 @@ pub(super) fn make_room(folder: &Path) -> Result<Option<String>, OpenError> {
     )))
 }
 
-/// Returns true if no other program has the foreign database open, or if the file is not a database. All of the database is
-/// then in one file, as the last connection that closes merges the log of SQLite into it.
+/// Returns true if no other program has the foreign database open, or if the file is not a database. All of the
+/// database is then in one file, as the last connection that closes merges the log of SQLite into it.
 fn is_alone(path: &Path) -> bool {
     let Ok(connection) = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE) else { return true };
     let tried = connection

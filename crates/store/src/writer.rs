@@ -48,8 +48,8 @@ struct Writer<'w> {
     is_temporary: bool,
 }
 
-/// Writes all messages, then retries unwritten points for at most `timeout`. Returns the database, and the points that could
-/// not be written.
+/// Writes all messages, then retries unwritten points for at most `timeout`. Returns the database, and the points that
+/// could not be written.
 pub(super) fn write(
     (database, run, rows): (Database, i64, usize),
     messages: &Receiver<Message>,
@@ -115,7 +115,8 @@ impl Writer<'_> {
         }
     }
 
-    /// Writes the pending points, then reports the progress. After an error, points stay pending and nothing is reported.
+    /// Writes the pending points, then reports the progress. After an error, points stay pending and nothing is
+    /// reported.
     fn commit(&mut self) {
         self.tried = Instant::now();
         if let Err(error) = self.write_all() {

@@ -11,8 +11,8 @@ pub(super) struct Stage<'a> {
     pub to: f64,
 }
 
-/// Applies `work` to every item. Returns the results in the order of the items; after a stop request, only the first ones. The
-/// results do not depend on the number of threads, bit for bit.
+/// Applies `work` to every item. Returns the results in the order of the items; after a stop request, only the first
+/// ones. The results do not depend on the number of threads, bit for bit.
 #[allow(clippy::cast_precision_loss)]
 pub(super) fn each<T: Sync, R: Send>(
     items: &[T],

@@ -1,5 +1,5 @@
-//! Store of a study, adapted to a problem derived from it. Simulations of the problem are those of the study, some of them at
-//! other values of the uncertain parameters.
+//! Store of a study, adapted to a problem derived from it. Simulations of the problem are those of the study, some of
+//! them at other values of the uncertain parameters.
 
 use std::sync::Arc;
 
@@ -11,14 +11,15 @@ use mops_core::{
 
 use crate::search::Options;
 
-/// Store for a derived problem. The key of a point is the values of all tuners, followed by those of the uncertain parameters
-/// if they are set.
+/// Store for a derived problem. The key of a point is the values of all tuners, followed by those of the uncertain
+/// parameters if they are set.
 ///
 /// A part of the problem is the set of its jobs with the same values of the uncertain parameters.
 #[derive(Clone)]
 pub(super) struct Copies {
     store: Arc<dyn Store>,
-    /// Values of the uncertain parameters of each part, see [`Scenario::values`]; empty for the cases of the study itself.
+    /// Values of the uncertain parameters of each part, see [`Scenario::values`]; empty for the cases of the study
+    /// itself.
     parts: Vec<Vec<f64>>,
     /// Tuner to whose value that of an uncertain parameter is relative, if any.
     relative_to: Vec<Option<usize>>,
@@ -31,8 +32,8 @@ pub(super) struct Copies {
 }
 
 impl Copies {
-    /// Returns the store of the options for a problem with the study `made`, derived from `study` with these scenarios. Returns
-    /// `None` without a store, or if the store belongs to another study.
+    /// Returns the store of the options for a problem with the study `made`, derived from `study` with these scenarios.
+    /// Returns `None` without a store, or if the store belongs to another study.
     pub fn of(options: &Options, study: &Study, made: &Study, scenarios: &[Scenario]) -> Option<Self> {
         let keeping = options.keeping.as_ref().filter(|keeping| keeping.study.measures_as(study))?;
         let mut parts: Vec<Vec<f64>> = Vec::new();

@@ -12,14 +12,15 @@ use mops_core::{
     solver::{Linearisation, Oracle, SMALL_OBJECTIVE},
 };
 
-/// Distances of the compared points, in the unit box, of ratio 10: a change that does not shrink with the distance is a jump. At the
-/// smaller one, differences of values that repeat to 1e-9 are accurate to 1e-5.
+/// Distances of the compared points, in the unit box, of ratio 10: a change that does not shrink with the distance is a
+/// jump. At the smaller one, differences of values that repeat to 1e-9 are accurate to 1e-5.
 const STEPS: [f64; 2] = [2e-4, 2e-3];
 
 /// Distance, in the unit box, at which a tuner without derivatives is also moved.
 const TENTH: f64 = 0.1;
 
-/// Deviation of a derivative from the differences on both sides, relative to the largest of them, up to which it is theirs.
+/// Deviation of a derivative from the differences on both sides, relative to the largest of them, up to which it is
+/// theirs.
 const DEVIATION: f64 = 0.02;
 
 /// Difference of two differences on one side, relative to the larger one, up to which they are a derivative.
@@ -28,12 +29,14 @@ const AGREEMENT: f64 = 0.1;
 /// Change at the smaller distance, relative to that at the larger one, from which a criterion jumps.
 const JUMP: f64 = 0.5;
 
-/// The block `derivatives` of a result: the derivatives at the reported point, compared with differences of simulations.
+/// The block `derivatives` of a result: the derivatives at the reported point, compared with differences of
+/// simulations.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct DerivativesReport {
     /// Number of points evaluated for the comparison.
     pub evaluations: usize,
-    /// Number of compared directions: that of the gradient, a random one, and the axis of each tuner whose derivatives are all 0.
+    /// Number of compared directions: that of the gradient, a random one, and the axis of each tuner whose derivatives
+    /// are all 0.
     pub directions: usize,
     /// Number of directions that the budget did not cover.
     pub left_out: usize,
@@ -141,8 +144,9 @@ impl Direction {
 }
 
 impl DerivativesReport {
-    /// Compares exact derivatives at a point with differences: along the gradient of the objective, in a random direction, and along the
-    /// axis of each tuner whose derivatives are all 0. Directions beyond the budget of the oracle are left out.
+    /// Compares exact derivatives at a point with differences: along the gradient of the objective, in a random
+    /// direction, and along the axis of each tuner whose derivatives are all 0. Directions beyond the budget of the
+    /// oracle are left out.
     pub fn of(problem: &Problem, oracle: &mut dyn Oracle, found: &Linearisation) -> Self {
         let mut report = Self::default();
         let (point, study) = (&found.at.point, problem.study());
@@ -217,7 +221,8 @@ impl DerivativesReport {
 }
 
 impl DerivativesReport {
-    /// Moves a tuner without derivatives by a tenth of its range, and notes the criterion that changes most, if one does.
+    /// Moves a tuner without derivatives by a tenth of its range, and notes the criterion that changes most, if one
+    /// does.
     fn move_far(&mut self, problem: &Problem, oracle: &mut dyn Oracle, at: &Evaluation, rows: &[usize], j: usize) {
         let mut point = at.point.clone();
         point[j] += if point[j] > 0.5 { -TENTH } else { TENTH };

@@ -1,7 +1,7 @@
 //! Tasks above the core: performing them, what they find, and how it is shown.
 //!
-//! [`solve`] performs the task of a study. Each task is one room: a file or folder of its name with a type that implements [`Room`],
-//! and one line in [`kinds`]. Its options are in `mops_core::task`.
+//! [`solve`] performs the task of a study. Each task is one room: a file or folder of its name with a type that
+//! implements [`Room`], and one line in [`kinds`]. Its options are in `mops_core::task`.
 //!
 //! | module | content |
 //! |---|---|

@@ -229,7 +229,8 @@ pub struct Origin<'a> {
 }
 
 impl Origin<'_> {
-    /// Returns the data files of a study whose files are in the program: a study in the folder of the run reads them there.
+    /// Returns the data files of a study whose files are in the program: a study in the folder of the run reads them
+    /// there.
     pub fn data(&self) -> Vec<OutputFile> {
         let is_data =
             |name: &str| ["csv", "mat"].iter().any(|end| Path::new(name).extension().is_some_and(|e| e == *end));

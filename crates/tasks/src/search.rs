@@ -25,8 +25,8 @@ pub struct Options {
     pub solver: SolverChoice,
     /// Largest number of evaluated points.
     pub max_evaluations: usize,
-    /// Number of evaluated points at which the run ends although its solver counts on `max_evaluations`: where an unfinished run is
-    /// replayed.
+    /// Number of evaluated points at which the run ends although its solver counts on `max_evaluations`: where an
+    /// unfinished run is replayed.
     pub replayed: Option<usize>,
     /// Patience with a search that hardly improves any more; without limit if absent.
     pub patience: Option<Patience>,
@@ -36,7 +36,8 @@ pub struct Options {
     pub tasks: Vec<TaskKind>,
     /// Candidate effects of a diagnosis.
     pub effects: Vec<Arc<dyn Effect>>,
-    /// Store of evaluated points, read and extended by the run. The result does not depend on it, bit for bit, except for
+    /// Store of evaluated points, read and extended by the run. The result does not depend on it, bit for bit, except
+    /// for
     /// [`EvaluationStore::begin`].
     pub keeping: Option<EvaluationStore>,
     /// Handle that stops the run, also within a simulation.
@@ -50,8 +51,8 @@ pub struct EvaluationStore {
     pub study: Study,
     /// Store of the points.
     pub store: Arc<dyn Store>,
-    /// Initial guess in the unit box, instead of the start values of the study. If set, the outcome reports the number of
-    /// reused points.
+    /// Initial guess in the unit box, instead of the start values of the study. If set, the outcome reports the number
+    /// of reused points.
     pub begin: Option<Vec<f64>>,
 }
 
@@ -104,7 +105,8 @@ pub struct Solved {
     pub front: Vec<Evaluation>,
 }
 
-/// Reason why the solver or the task cannot handle the study, with a remedy and, if known, the key path in the study file.
+/// Reason why the solver or the task cannot handle the study, with a remedy and, if known, the key path in the study
+/// file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SolveError(pub StudyError);
 
@@ -328,8 +330,8 @@ fn twin(run: &Run<'_>, best: &Evaluation) -> Option<String> {
     ))
 }
 
-/// Lowers the criteria of the best point that do not decide its objective, while the others stay. Returns true if there is such a
-/// point.
+/// Lowers the criteria of the best point that do not decide its objective, while the others stay. Returns true if there
+/// is such a point.
 fn remove_slack(run: &mut Run<'_>) -> bool {
     let Some(best) = run.best().cloned() else { return false };
     // Without a result at the end of the budget, the point stays.
@@ -363,12 +365,12 @@ pub(crate) fn evaluate_start(study: Study, options: &Options, watch: &dyn Watch)
     Solved { outcome, problem, best, archive, front: Vec::new() }
 }
 
-/// Difference step of the derivatives at the reported point, in the unit box. Equal to that of the Pareto certificate, whose
-/// derivatives are then reused.
+/// Difference step of the derivatives at the reported point, in the unit box. Equal to that of the Pareto certificate,
+/// whose derivatives are then reused.
 const NEAR: f64 = 1e-4;
 
-/// Returns values and derivatives at a point, and whether these are exact; `None` if a simulation near it fails, if no tuner can be
-/// changed, or after a stop request.
+/// Returns values and derivatives at a point, and whether these are exact; `None` if a simulation near it fails, if no
+/// tuner can be changed, or after a stop request.
 pub(crate) fn linearised(at: &Evaluation, probe: &mut Run<'_>, watch: &dyn Watch) -> Option<(Linearisation, bool)> {
     if at.scaled.is_none() || at.point.is_empty() || watch.wants_stop() {
         return None;

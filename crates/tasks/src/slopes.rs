@@ -24,18 +24,18 @@ pub struct SlopesReport {
 pub struct CriterionSlopes {
     /// Key, `case/criterion`.
     pub key: String,
-    /// Derivative of the scaled value with respect to the position of each tuner within its bounds. The position is 0 at the
-    /// lower and 1 at the upper bound, logarithmic for logarithmic tuners. A hundredth of the derivative is the first-order
-    /// change for a step of 1 % of the range.
+    /// Derivative of the scaled value with respect to the position of each tuner within its bounds. The position is 0
+    /// at the lower and 1 at the upper bound, logarithmic for logarithmic tuners. A hundredth of the derivative is the
+    /// first-order change for a step of 1 % of the range.
     pub slopes: Vec<f64>,
-    /// Derivatives to the left and to the right for each tuner, where they differ: at a kink, or at a jump, where they grow without
-    /// limit. Null where they agree; absent for a criterion without such a tuner.
+    /// Derivatives to the left and to the right for each tuner, where they differ: at a kink, or at a jump, where they
+    /// grow without limit. Null where they agree; absent for a criterion without such a tuner.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sides: Option<Vec<Option<[f64; 2]>>>,
 }
 
-/// Distance of the points that separate the derivatives of both sides, in the unit box: differences of values that repeat to 1e-9 are
-/// accurate to 1e-5.
+/// Distance of the points that separate the derivatives of both sides, in the unit box: differences of values that
+/// repeat to 1e-9 are accurate to 1e-5.
 const BESIDE: f64 = 2e-4;
 
 /// Difference of the derivatives of both sides, relative to the larger one, from which they are reported apart.
@@ -44,8 +44,8 @@ const APART: f64 = 0.1;
 /// Ratio of the two steps that distinguish a kink from a strong curvature.
 const CLOSER: f64 = 4.0;
 
-/// Part of the difference of the sides that remains at the shorter step where a smooth criterion is curved, ideally a quarter. At a kink or
-/// a jump more remains, and less at a kink beside the point.
+/// Part of the difference of the sides that remains at the shorter step where a smooth criterion is curved, ideally a
+/// quarter. At a kink or a jump more remains, and less at a kink beside the point.
 const CURVED: [f64; 2] = [0.15, 0.4];
 
 /// Ratio of the differences at both steps from which the criterion jumps, where it is ideally [`CLOSER`].
@@ -68,9 +68,9 @@ impl SlopesReport {
         }
     }
 
-    /// Adds the derivatives of both sides where they differ, by differences with two steps: the difference of the sides of a smooth
-    /// criterion shrinks with the step, that at a kink remains, and that at a jump grows. Takes two points for every tuner, and two more
-    /// for every tuner with different sides. Without enough budget, nothing is added.
+    /// Adds the derivatives of both sides where they differ, by differences with two steps: the difference of the sides
+    /// of a smooth criterion shrinks with the step, that at a kink remains, and that at a jump grows. Takes two points
+    /// for every tuner, and two more for every tuner with different sides. Without enough budget, nothing is added.
     pub fn add_sides(&mut self, problem: &Problem, oracle: &mut dyn Oracle, at: &Evaluation) {
         let tuners: Vec<usize> = (0..at.point.len()).collect();
         let Some(wide) = pairs(oracle, at, &tuners, BESIDE) else { return };
@@ -115,7 +115,8 @@ impl Pair {
         Some([(here - value(&self.below, row)?) / step, (value(&self.above, row)? - here) / step])
     }
 
-    /// Returns the derivatives between these points and those of a closer pair: at a kink within the closer pair they are exact.
+    /// Returns the derivatives between these points and those of a closer pair: at a kink within the closer pair they
+    /// are exact.
     fn beyond(&self, closer: &Self, row: usize) -> Option<[f64; 2]> {
         let step = BESIDE - BESIDE / CLOSER;
         let between = |a: &Evaluation, b: &Evaluation| Some((value(b, row)? - value(a, row)?) / step);
@@ -131,8 +132,8 @@ fn distance([left, right]: &[f64; 2]) -> f64 {
     (right - left).abs()
 }
 
-/// Evaluates the points at a step on both sides along the tuners, without those that are closer to a bound. Returns `None` if the budget
-/// does not suffice.
+/// Evaluates the points at a step on both sides along the tuners, without those that are closer to a bound. Returns
+/// `None` if the budget does not suffice.
 fn pairs(oracle: &mut dyn Oracle, at: &Evaluation, tuners: &[usize], step: f64) -> Option<Vec<Pair>> {
     let moved = |j: usize, step: f64| {
         let mut point = at.point.clone();

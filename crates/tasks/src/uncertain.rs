@@ -209,8 +209,8 @@ pub struct RobustReport {
     pub rounds: Vec<RoundReport>,
     /// Index of the reported round: the one with the best worst case.
     pub chosen: usize,
-    /// True if a complete search of the box found no case in which the reported design is worse than in the cases that it was designed
-    /// for by more than the tolerance.
+    /// True if a complete search of the box found no case in which the reported design is worse than in the cases that
+    /// it was designed for by more than the tolerance.
     pub settled: bool,
     /// Tolerance, in scaled values.
     pub tolerance: f64,
@@ -250,7 +250,8 @@ pub struct AddedReport {
     pub name: String,
     /// Criterion for which it is a worst case.
     pub criterion: String,
-    /// Scaled value of the criterion in the case; null for a case beyond the edge of a jump, at which the criterion was not computed.
+    /// Scaled value of the criterion in the case; null for a case beyond the edge of a jump, at which the criterion was
+    /// not computed.
     pub scaled: Option<f64>,
     /// Values of the uncertain parameters.
     pub at: Vec<CoordinateReport>,

@@ -35,7 +35,8 @@ pub fn verdict(of: &Solution<'_>, room: &dyn Room) -> Verdict {
     doubted(of, of_point)
 }
 
-/// Returns a verdict after the reason to doubt the design that it rests on, and after what cut off the work that follows the design.
+/// Returns a verdict after the reason to doubt the design that it rests on, and after what cut off the work that
+/// follows the design.
 fn doubted(of: &Solution<'_>, verdict: Verdict) -> Verdict {
     let (outcome, task) = (of.outcome, of.problem.study().task());
     let Verdict { tone, text } = verdict;
@@ -54,7 +55,8 @@ fn doubted(of: &Solution<'_>, verdict: Verdict) -> Verdict {
     }
 }
 
-/// Returns the criteria with this usage in the problem. Criteria of data that are not calibration data are only reported.
+/// Returns the criteria with this usage in the problem. Criteria of data that are not calibration data are only
+/// reported.
 pub(crate) fn used_as<'a>(of: &Solution<'a>, usage: Usage) -> Vec<&'a CriterionReport> {
     let rows = of.outcome.criteria.iter().zip(&of.problem.shape().rows);
     rows.filter(|(_, (used, _))| *used == usage).map(|(criterion, _)| criterion).collect()

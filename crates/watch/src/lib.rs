@@ -1,8 +1,8 @@
 //! Live page of a run on localhost, `http://127.0.0.1:PORT/TOKEN/`. The page is read-only.
 //!
-//! The operating system chooses the port. The token has 128 random bits, so that other pages and users cannot guess the URL.
-//! The run only publishes its latest state. Each viewer reads it on a thread of its own; a slow viewer misses states and
-//! delays neither the run nor other viewers.
+//! The operating system chooses the port. The token has 128 random bits, so that other pages and users cannot guess the
+//! URL. The run only publishes its latest state. Each viewer reads it on a thread of its own; a slow viewer misses
+//! states and delays neither the run nor other viewers.
 //!
 //! [`Page`] is the page, and [`Both`] the observer of a run that publishes to it.
 //!

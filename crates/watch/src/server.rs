@@ -1,4 +1,5 @@
-//! Server of the live page: one thread per connection, a time limit for requests and answers, and a limit on connections.
+//! Server of the live page: one thread per connection, a time limit for requests and answers, and a limit on
+//! connections.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -14,8 +15,8 @@ use super::state::Live;
 /// Largest number of simultaneous viewers: connections that have requested the URL.
 const CONNECTIONS: usize = 32;
 
-/// Largest number of connections without a request. The oldest of more is closed, so that idle connections block nobody: a
-/// browser sends its request at once.
+/// Largest number of connections without a request. The oldest of more is closed, so that idle connections block
+/// nobody: a browser sends its request at once.
 const PENDING: usize = 32;
 
 /// Time limit for a request, and for the viewer to receive a part of the answer.
@@ -77,7 +78,8 @@ impl Server {
         format!("http://127.0.0.1:{}/{}/", self.port, self.token)
     }
 
-    /// Stops the server. Streams receive the last state and responses within [`FAREWELL`]; other connections are not awaited.
+    /// Stops the server. Streams receive the last state and responses within [`FAREWELL`]; other connections are not
+    /// awaited.
     pub fn close(self) {
         let until = Instant::now() + FAREWELL;
         while self.shared.streams.load(Ordering::Relaxed) > 0 && Instant::now() < until {
@@ -152,7 +154,8 @@ fn serve(mut stream: TcpStream, (port, token): (u16, &str), number: u64, shared:
     let request = read(&mut stream, port, token);
     shared.remove_pending(number);
     let request = request?;
-    // A viewer with the right URL takes a slot; without a free slot the connection is dropped, and the viewer reconnects.
+    // A viewer with the right URL takes a slot; without a free slot the connection is dropped, and the viewer
+    // reconnects.
     let authorised = !matches!(request, Answer::Refused(..) | Answer::More);
     let _slot = match authorised.then(|| Slot::take(shared)) {
         Some(None) => return Ok(()),
@@ -218,7 +221,8 @@ fn whole(stream: &mut TcpStream, status: &str, kind: &str, body: &str) -> io::Re
     stream.write_all([head.as_bytes(), body.as_bytes()].concat().as_slice())
 }
 
-/// Writes server-sent events: states, and the responses of each new best point. Source: HTML Living Standard, section 9.2.
+/// Writes server-sent events: states, and the responses of each new best point. Source: HTML Living Standard, section
+/// 9.2.
 fn events(stream: &mut TcpStream, shared: &Shared) -> io::Result<()> {
     let _open = Open::start(&shared.streams);
     let head = format!("HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\n{HEADERS}\r\n");

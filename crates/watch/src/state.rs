@@ -129,8 +129,8 @@ impl Live {
         drop(self.changed.wait_timeout_while(self.newest(), time, in_progress));
     }
 
-    /// Waits until the state is newer than version `seen`, at most for `timeout`. Returns the version, true if the run is over,
-    /// and the state as JSON.
+    /// Waits until the state is newer than version `seen`, at most for `timeout`. Returns the version, true if the run
+    /// is over, and the state as JSON.
     pub fn after(&self, seen: u64, timeout: Duration) -> (u64, bool, String) {
         let newest = self.newest();
         let is_old = |newest: &mut Newest| newest.version <= seen;
@@ -139,9 +139,9 @@ impl Live {
         (newest.version, newest.over.is_some(), self.json(&newest).to_string())
     }
 
-    /// Returns the number of the best point and its responses as JSON, if it is later than point `drawn`. During the run
-    /// simulations for viewers take at most one [`SHARE`]th of the time; until the next one is due, the responses are those of
-    /// an earlier point.
+    /// Returns the number of the best point and its responses as JSON, if it is later than point `drawn`. During the
+    /// run simulations for viewers take at most one [`SHARE`]th of the time; until the next one is due, the responses
+    /// are those of an earlier point.
     pub fn responses(&self, drawn: u64) -> Option<(u64, String)> {
         // One viewer simulates, the others wait for its result.
         let mut last = self.responses.lock().unwrap_or_else(PoisonError::into_inner);

@@ -36,8 +36,8 @@ pub struct Channel {
 }
 
 impl Channel {
-    /// Selects the channel by names, which may be omitted if the model has one input, or one output, or if the input is that of a
-    /// cut loop.
+    /// Selects the channel by names, which may be omitted if the model has one input, or one output, or if the input is
+    /// that of a cut loop.
     pub fn bind(model: &Interface, input: Option<&String>, output: Option<&String>) -> Result<Self, StudyError> {
         let input = pick("input", input, &model.inputs)?;
         let output = if model.is_cut && output.is_none() { input } else { pick("output", output, &model.signals)? };

@@ -60,8 +60,8 @@ impl Candidate {
     }
 }
 
-/// Returns every effect at every place of the model, and at every signal that is measured; what happens once in every calibration
-/// record.
+/// Returns every effect at every place of the model, and at every signal that is measured; what happens once in every
+/// calibration record.
 pub fn candidates(subject: &Subject, effects: &[Arc<dyn Effect>]) -> Vec<Candidate> {
     let interface = subject.model.interface();
     let is_measured = |output: &String| subject.measurements.iter().flat_map(|m| &m.series).any(|s| s.name == *output);
@@ -118,8 +118,8 @@ pub fn numbered(mut all: Vec<Candidate>) -> Vec<Candidate> {
     all
 }
 
-/// Whether what a process takes from an input could be what its state is, such as a temperature: both have the same unit. All
-/// else goes together.
+/// Whether what a process takes from an input could be what its state is, such as a temperature: both have the same
+/// unit. All else goes together.
 fn could_be_alike(port: &Port, companion: &Port, interface: &Interface) -> bool {
     let (Port::Process { state, .. }, Port::Actuator { input }) = (port, companion) else { return true };
     let start = interface.states.iter().find(|s| s.name == *state).map(|s| &s.start);

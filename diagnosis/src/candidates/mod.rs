@@ -1,4 +1,5 @@
-//! Candidates: every effect of the catalogue at every place that it fits, and the values of its parameters that are tried first.
+//! Candidates: every effect of the catalogue at every place that it fits, and the values of its parameters that are
+//! tried first.
 
 mod candidate;
 mod sizes;

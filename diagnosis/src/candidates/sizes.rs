@@ -35,8 +35,8 @@ const PER_STEP: u32 = 4;
 pub struct Sizes {
     /// Of what an effect adds.
     pub output: f64,
-    /// Rate of the state per unit of the added term, at the parameters for which the sizes were determined; 1 at inputs and
-    /// sensors.
+    /// Rate of the state per unit of the added term, at the parameters for which the sizes were determined; 1 at inputs
+    /// and sensors.
     pub mobility: f64,
     /// Of the position about its middle.
     pub position: f64,
@@ -52,7 +52,8 @@ pub struct Sizes {
     pub record: f64,
     /// Time between samples, s.
     pub sample: f64,
-    /// Size of the steps in which samples come, finer than those that are tried; `None` where they do not, or nobody looked.
+    /// Size of the steps in which samples come, finer than those that are tried; `None` where they do not, or nobody
+    /// looked.
     pub quantum: Option<f64>,
     /// A gap that samples show; `None` where they do not, or nobody looked.
     pub gap: Option<Gap>,
@@ -93,10 +94,10 @@ impl Sizes {
             * power(self.time, dimension.time)
     }
 
-    /// Smallest and largest value of a strength in a fit: those that physics allows. A shape that is tried at multiples of its
-    /// typical size is besides no more than `farthest` times the largest of them, and one that is tried within a range is
-    /// no more than so many widths beyond it: farther off it does nothing, or stands for something else, as a force stands for
-    /// a constant one that would yield after a path much longer than the motion.
+    /// Smallest and largest value of a strength in a fit: those that physics allows. A shape that is tried at multiples
+    /// of its typical size is besides no more than `farthest` times the largest of them, and one that is tried within a
+    /// range is no more than so many widths beyond it: farther off it does nothing, or stands for something else, as a
+    /// force stands for a constant one that would yield after a path much longer than the motion.
     pub fn bounds(&self, strength: &EffectParameter) -> [f64; 2] {
         let [low, high] = strength.bounds;
         let [least, most] = match (strength.null_value, strength.grid) {
@@ -118,9 +119,9 @@ impl Sizes {
         if least.max(low) < most.min(high) { [least.max(low), most.min(high)] } else { strength.bounds }
     }
 
-    /// Smallest and largest value that the records can show: enough periods of what repeats, an event of some samples that is not
-    /// most of the record, a time constant that is not much less than a sample, a stop that is left again, a force that builds up
-    /// within the motion: beyond, it is a spring.
+    /// Smallest and largest value that the records can show: enough periods of what repeats, an event of some samples
+    /// that is not most of the record, a time constant that is not much less than a sample, a stop that is left again,
+    /// a force that builds up within the motion: beyond, it is a spring.
     #[allow(clippy::cast_precision_loss)]
     fn covered(&self, parameter: &EffectParameter) -> [f64; 2] {
         let periods = |length: f64| std::f64::consts::TAU * self.coverage.periods / length.max(f64::MIN_POSITIVE);
@@ -146,8 +147,8 @@ impl Sizes {
         }
     }
 
-    /// Returns true if the records show a value of a parameter: it is not at an end of what they cover, beyond which the effect would
-    /// be another one. A time that is shorter or longer than they show is still a time.
+    /// Returns true if the records show a value of a parameter: it is not at an end of what they cover, beyond which
+    /// the effect would be another one. A time that is shorter or longer than they show is still a time.
     pub fn shows(&self, parameter: &EffectParameter, value: f64) -> bool {
         let [low, high] = self.covered(parameter);
         let is_time = matches!(parameter.kind, ParameterKind::Steepness | ParameterKind::Duration);
@@ -204,7 +205,8 @@ impl Sizes {
         (0.5 * std::f64::consts::PI / self.sample).min(std::f64::consts::TAU * MOST_PERIODS / self.record)
     }
 
-    /// The typical size of a lag or delay: a tenth of the time in which the place moves, or ten samples if that is more, s.
+    /// The typical size of a lag or delay: a tenth of the time in which the place moves, or ten samples if that is
+    /// more, s.
     pub fn lag(&self) -> f64 {
         (0.1 * self.time).max(10.0 * self.sample)
     }

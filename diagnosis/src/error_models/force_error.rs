@@ -1,5 +1,5 @@
-//! Smooth random force at the balances of a plant, with white noise of the sensors: filter, likelihood and smoother along a
-//! linearised motion.
+//! Smooth random force at the balances of a plant, with white noise of the sensors: filter, likelihood and smoother
+//! along a linearised motion.
 
 use mops_language::{Dual, Scalar};
 use mops_math as math;
@@ -9,10 +9,11 @@ use super::output_error::matern_penalty;
 use super::process::{Matern32, Process, Steps};
 use crate::fit::dot;
 
-/// Motion of a plant over one record, linearised from sample to sample: `x[k+1] = F[k] x[k] + G[k] f[k]`, `r = H x + D f`.
+/// Motion of a plant over one record, linearised from sample to sample: `x[k+1] = F[k] x[k] + G[k] f[k]`,
+/// `r = H x + D f`.
 ///
-/// `x` is the deviation of the states, `f[k]` the forces kept from sample `k` to the next one, in units of the nominal forces of
-/// their balances, and `r` what they add to the residuals.
+/// `x` is the deviation of the states, `f[k]` the forces kept from sample `k` to the next one, in units of the nominal
+/// forces of their balances, and `r` what they add to the residuals.
 #[derive(Debug, Clone, Default)]
 pub struct LinearisedMotion {
     /// Sample times of all channels, increasing, s.
@@ -36,8 +37,8 @@ pub struct Measured {
     pub channel: usize,
     /// Index among the residuals of the record.
     pub residual: usize,
-    /// Derivatives of the residual with respect to the states (a row of `H`), then to each force (a row of `D`) and its rate,
-    /// which is 0; without forces that act on the output, those of the states suffice.
+    /// Derivatives of the residual with respect to the states (a row of `H`), then to each force (a row of `D`) and its
+    /// rate, which is 0; without forces that act on the output, those of the states suffice.
     pub slopes: Vec<f64>,
 }
 
@@ -73,8 +74,8 @@ impl LinearisedMotion {
     }
 }
 
-/// Random forces, independent Matern-3/2 processes of one deviation and one correlation length, plus white noise of the sensors.
-/// One for all records.
+/// Random forces, independent Matern-3/2 processes of one deviation and one correlation length, plus white noise of the
+/// sensors. One for all records.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ForceError {
     /// Standard deviation of the forces, in nominal forces.
@@ -86,8 +87,9 @@ pub struct ForceError {
 }
 
 impl ForceError {
-    /// Returns the log-likelihood of the residuals of a record, with its derivatives with respect to the hyperparameters: the
-    /// logarithms of deviation, length and each noise, in this order; derivatives beyond these are 0.
+    /// Returns the log-likelihood of the residuals of a record, with its derivatives with respect to the
+    /// hyperparameters: the logarithms of deviation, length and each noise, in this order; derivatives beyond these are
+    /// 0.
     ///
     /// # Panics
     /// `N` is less than the number of hyperparameters.
@@ -113,8 +115,8 @@ impl ForceError {
         likelihood
     }
 
-    /// Replaces columns over the residuals of a record by their innovations, divided by the standard deviations of these. Returns
-    /// the sum of `ln S + ln 2 pi` over the variances `S`, see [`super::OutputError::whiten`].
+    /// Replaces columns over the residuals of a record by their innovations, divided by the standard deviations of
+    /// these. Returns the sum of `ln S + ln 2 pi` over the variances `S`, see [`super::OutputError::whiten`].
     pub fn whiten<'a>(&self, motion: &LinearisedMotion, columns: impl Iterator<Item = &'a mut [f64]>) -> f64 {
         let process = Matern32 { deviation: self.deviation, length: self.length };
         let mut columns: Vec<&mut [f64]> = columns.collect();
@@ -140,7 +142,8 @@ impl ForceError {
         sum
     }
 
-    /// Returns `f' K^-1 f` for forces `f` with the covariance `K` at the samples of a motion: the penalty of the forces.
+    /// Returns `f' K^-1 f` for forces `f` with the covariance `K` at the samples of a motion: the penalty of the
+    /// forces.
     pub fn penalty(&self, motion: &LinearisedMotion, forces: &[f64]) -> f64 {
         let of = |j: usize| {
             let values: Vec<f64> = forces.iter().skip(j).step_by(motion.forces).copied().collect();
@@ -149,18 +152,18 @@ impl ForceError {
         (0..motion.forces).map(of).sum()
     }
 
-    /// Returns the most probable forces behind the residuals of a record, in nominal forces: those of each sample one after the
-    /// other.
+    /// Returns the most probable forces behind the residuals of a record, in nominal forces: those of each sample one
+    /// after the other.
     ///
-    /// Source: G. Bierman, Fixed interval smoothing with discrete measurements, International Journal of Control 18 (1973) 65
-    /// (modified Bryson-Frazier smoother).
+    /// Source: G. Bierman, Fixed interval smoothing with discrete measurements, International Journal of Control 18
+    /// (1973) 65 (modified Bryson-Frazier smoother).
     pub fn smooth(&self, motion: &LinearisedMotion, residuals: &[f64]) -> Vec<f64> {
         let process = Matern32 { deviation: self.deviation, length: self.length };
         let (states, forces, count) = (motion.states, motion.forces, motion.times.len());
         let size = states + 2 * forces;
         let mut state = vec![0.0; size];
-        // Of each measured value the gain and the innovation over its variance; of each sample the predicted forces with their
-        // rows of the covariance, and the transition that follows.
+        // Of each measured value the gain and the innovation over its variance; of each sample the predicted forces
+        // with their rows of the covariance, and the transition that follows.
         let (mut updates, mut predictions, mut kernels) = (Vec::new(), Vec::new(), Vec::new());
         let mut recursion = Recursion::new(motion, &process, &self.noise);
         let mut predicted = |state: &[f64], p: &[f64]| {
@@ -262,7 +265,8 @@ impl<'a, S: Scalar, P: Process<S, 2>> Recursion<'a, S, P> {
         }
     }
 
-    /// Updates the covariance with a measured value; returns the variance of its innovation, and leaves its gain in `self.gain`.
+    /// Updates the covariance with a measured value; returns the variance of its innovation, and leaves its gain in
+    /// `self.gain`.
     fn measure(&mut self, m: &Measured) -> S {
         let size = self.gain.len();
         let noise = self.noise[m.channel];
@@ -279,7 +283,8 @@ impl<'a, S: Scalar, P: Process<S, 2>> Recursion<'a, S, P> {
                 self.covariance[b * size + a] = value;
             }
         }
-        // Joseph's form corrects what the subtraction lost. Source: R. Bucy, P. Joseph, Filtering for Stochastic Processes (1968).
+        // Joseph's form corrects what the subtraction lost. Source: R. Bucy, P. Joseph, Filtering for Stochastic
+        // Processes (1968).
         let rows = self.covariance.chunks_exact(size).zip(&self.gain);
         lost.iter_mut().zip(rows).for_each(|(lost, (row, &gain))| *lost = weighted(&m.slopes, row) - noise * gain);
         for a in 0..size {

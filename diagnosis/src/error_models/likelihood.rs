@@ -8,11 +8,11 @@ pub(super) const LN_TWO_PI: f64 = 1.837_877_066_409_345_3;
 
 /// Log-likelihood of innovations `v` with variances `S`: the sum of `-(v^2/S + ln S + ln 2 pi)/2`.
 ///
-/// The tangents of the scalar are those with respect to the hyperparameters of an error model. Their Fisher information is the
-/// sum of `dv dv'/S + dS dS'/(2 S^2)`.
+/// The tangents of the scalar are those with respect to the hyperparameters of an error model. Their Fisher information
+/// is the sum of `dv dv'/S + dS dS'/(2 S^2)`.
 ///
-/// Source: F. Schweppe, IEEE Transactions on Automatic Control 11 (1965) 61 (likelihood by innovations); N. Gupta, R. Mehra, IEEE
-/// Transactions on Automatic Control 19 (1974) 774 (information matrix).
+/// Source: F. Schweppe, IEEE Transactions on Automatic Control 11 (1965) 61 (likelihood by innovations); N. Gupta, R.
+/// Mehra, IEEE Transactions on Automatic Control 19 (1974) 774 (information matrix).
 #[derive(Debug, Clone)]
 pub struct Likelihood<S> {
     log: S,

@@ -34,8 +34,8 @@ impl OutputError {
 
     /// Returns the log-likelihood of one channel of a record, with its derivatives with respect to the hyperparameters.
     ///
-    /// `times` increase (s); `residuals` has as many values. Exact, in a time that grows linearly with the number of samples;
-    /// sample times may be irregular.
+    /// `times` increase (s); `residuals` has as many values. Exact, in a time that grows linearly with the number of
+    /// samples; sample times may be irregular.
     pub fn likelihood(&self, times: &[f64], residuals: &[f64]) -> Likelihood<Dual<3>> {
         let [deviation, length, noise] = [self.deviation, self.length, self.noise].map(math::ln);
         let exponential = |logarithm, index| Dual::<3>::variable(logarithm, index).exp();
@@ -54,8 +54,8 @@ impl OutputError {
         likelihood
     }
 
-    /// Replaces columns over the samples of one channel of a record by their innovations, divided by the standard deviations of
-    /// these. Returns the sum of `ln S + ln 2 pi` over the variances `S`.
+    /// Replaces columns over the samples of one channel of a record by their innovations, divided by the standard
+    /// deviations of these. Returns the sum of `ln S + ln 2 pi` over the variances `S`.
     ///
     /// With white residuals `r` the log-likelihood is `-(r'r + sum)/2`.
     pub fn whiten<'a>(&self, times: &[f64], columns: impl Iterator<Item = &'a mut [f64]>) -> f64 {
@@ -69,7 +69,8 @@ impl OutputError {
     }
 }
 
-/// Returns `f' K^-1 f` for values `f` of a Matern-3/2 process with covariance `K` at these times: the penalty of the values.
+/// Returns `f' K^-1 f` for values `f` of a Matern-3/2 process with covariance `K` at these times: the penalty of the
+/// values.
 pub(super) fn matern_penalty(deviation: f64, length: f64, times: &[f64], values: &[f64]) -> f64 {
     let mut penalty = 0.0;
     let filter = Filter::new(&Matern32 { deviation, length }, 0.0, times);
@@ -101,7 +102,8 @@ impl<S: Scalar, const D: usize> Filter<S, D> {
             }
             let variance = p[0][0] + noise;
             let gain: [S; D] = std::array::from_fn(|a| p[a][0] / variance);
-            // The covariance with the value shrinks by noise/variance, a product that cannot lose digits by subtraction.
+            // The covariance with the value shrinks by noise/variance, a product that cannot lose digits by
+            // subtraction.
             let share = noise / variance;
             let first: [S; D] = std::array::from_fn(|b| p[0][b]);
             for a in 1..D {

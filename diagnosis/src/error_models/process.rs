@@ -1,7 +1,7 @@
 //! Stationary Gaussian processes as linear state-space models driven by white noise.
 //!
-//! Source: J. Hartikainen, S. Sarkka, Kalman filtering and smoothing solutions to temporal Gaussian process regression models, IEEE
-//! International Workshop on Machine Learning for Signal Processing (2010).
+//! Source: J. Hartikainen, S. Sarkka, Kalman filtering and smoothing solutions to temporal Gaussian process regression
+//! models, IEEE International Workshop on Machine Learning for Signal Processing (2010).
 
 use mops_language::Scalar;
 
@@ -68,8 +68,8 @@ impl<S: Scalar> Process<S, 1> for OrnsteinUhlenbeck<S> {
     }
 }
 
-/// Matern-3/2 process: covariance `deviation^2 (1 + a) exp(-a)` with `a = sqrt(3) d/length` at the distance `d` in s. States: value
-/// and rate.
+/// Matern-3/2 process: covariance `deviation^2 (1 + a) exp(-a)` with `a = sqrt(3) d/length` at the distance `d` in s.
+/// States: value and rate.
 #[derive(Debug, Clone, Copy)]
 pub struct Matern32<S> {
     /// Standard deviation.
@@ -78,8 +78,8 @@ pub struct Matern32<S> {
     pub length: S,
 }
 
-/// Value of `2 lambda dt` below which the integrals of [`Matern32::noise`] are summed as a series: from there on the closed form
-/// loses less than two bits.
+/// Value of `2 lambda dt` below which the integrals of [`Matern32::noise`] are summed as a series: from there on the
+/// closed form loses less than two bits.
 const SERIES: f64 = 2.0;
 
 /// Terms of the series: at `2 lambda dt = 2` the last one is below 1e-17 of the sum.
@@ -92,8 +92,8 @@ impl<S: Scalar> Matern32<S> {
 
     /// Returns the integrals of `s^k exp(-2 lambda s)` over `[0, dt]` for `k` = 0, 1, 2.
     ///
-    /// All terms of the series and of the downward recursion are positive, so that nothing cancels for short steps. Source: NIST
-    /// Digital Library of Mathematical Functions, equations 8.7.1 and 8.8.1 (incomplete gamma function).
+    /// All terms of the series and of the downward recursion are positive, so that nothing cancels for short steps.
+    /// Source: NIST Digital Library of Mathematical Functions, equations 8.7.1 and 8.8.1 (incomplete gamma function).
     fn integrals(&self, dt: f64) -> [S; 3] {
         let twice = self.rate() * 2.0;
         let x = twice * dt;

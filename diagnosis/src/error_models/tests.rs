@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::*;
 
-/// Generator of uniform numbers in [-1, 1). Source: G. Steele, D. Lea, C. Flood, Fast splittable pseudorandom number generators,
-/// OOPSLA (2014).
+/// Generator of uniform numbers in [-1, 1). Source: G. Steele, D. Lea, C. Flood, Fast splittable pseudorandom number
+/// generators, OOPSLA (2014).
 struct SplitMix(u64);
 
 impl SplitMix {
@@ -91,8 +91,8 @@ fn relative(a: f64, b: f64) -> f64 {
     (a - b).abs() / b.abs().max(1.0)
 }
 
-// Log-likelihoods of the same series by an independent implementation in Python, computed once: (seed, samples, regular),
-// (deviation, length, noise), Ornstein-Uhlenbeck, Matern-3/2.
+// Log-likelihoods of the same series by an independent implementation in Python, computed once: (seed, samples,
+// regular), (deviation, length, noise), Ornstein-Uhlenbeck, Matern-3/2.
 type Reference = ((u64, usize, bool), [f64; 3], f64, f64);
 const OUTPUT: [Reference; 4] = [
     ((1, 200, true), [1.4, 0.4, 0.3], -194.473_747_499_378_08, -212.215_458_838_753_48),
@@ -298,8 +298,8 @@ fn smoothed_forces_are_the_dense_conditional_mean() {
 
 #[test]
 fn innovations_stay_right_where_sensors_are_far_better_than_the_model() {
-    // A force 1e5 noises large: the filter against the dense density, whose Cholesky factor is accurate to 1e-16 times the
-    // condition number, 1e10.
+    // A force 1e5 noises large: the filter against the dense density, whose Cholesky factor is accurate to 1e-16 times
+    // the condition number, 1e10.
     let (motion, residuals) = motion(16, 40, 2, 1, 1);
     let error = ForceError { deviation: 1e4, length: 0.3, noise: vec![1e-2] };
     let (count, forces) = (motion.times.len(), motion.forces);

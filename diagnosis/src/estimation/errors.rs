@@ -224,8 +224,8 @@ impl Errors {
         }
     }
 
-    /// Fits the hyperparameters of a kind to what was observed, from `before` and, where `thoroughly`, from both ends of
-    /// the correlation length. `motions` are needed for a force, and residuals are then those without it.
+    /// Fits the hyperparameters of a kind to what was observed, from `before` and, where `thoroughly`, from both ends
+    /// of the correlation length. `motions` are needed for a force, and residuals are then those without it.
     pub fn fit(
         kind: ErrorModel,
         observed: Observed<'_>,
@@ -311,7 +311,8 @@ struct Prior {
 }
 
 impl Prior {
-    /// The deviation is normal and taken at the centre, the correlation length uniform, each noise normal about that of the sensor.
+    /// The deviation is normal and taken at the centre, the correlation length uniform, each noise normal about that of
+    /// the sensor.
     fn new(lengths: [f64; 2], noise: &[f64], settings: &Settings) -> Self {
         let Settings { deviation_prior, noise_prior, .. } = settings;
         let half = 0.5 * math::ln(std::f64::consts::TAU);
@@ -325,7 +326,8 @@ impl Prior {
         }
     }
 
-    /// Log-determinant of the information with the precision of the prior; the information has that of the noise already.
+    /// Log-determinant of the information with the precision of the prior; the information has that of the noise
+    /// already.
     fn log_determinant(&self, information: &DMatrix<f64>, channels: usize) -> f64 {
         debug_assert_eq!(information.nrows(), 2 + channels);
         let mut with = information.clone();

@@ -59,8 +59,8 @@ pub struct Prior {
     pub stretch: f64,
     /// Standard deviation in that coordinate.
     pub deviation: f64,
-    /// Centre of a normal prior in the unit of the unknown; `None` if the density is that at the centre, wherever the unknown
-    /// is.
+    /// Centre of a normal prior in the unit of the unknown; `None` if the density is that at the centre, wherever the
+    /// unknown is.
     pub centre: Option<f64>,
     /// True if only one side of the centre is possible, which doubles the density.
     pub half: bool,
@@ -120,19 +120,20 @@ impl Estimation<'_> {
         self.with(&Errors::White, start, ITERATIONS)
     }
 
-    /// Fits parameters and initial states under an error model at the outputs whose hyperparameters are given, in at most so many
-    /// iterations. The evidence is that for these hyperparameters.
+    /// Fits parameters and initial states under an error model at the outputs whose hyperparameters are given, in at
+    /// most so many iterations. The evidence is that for these hyperparameters.
     pub fn with(&self, errors: &Errors, start: Point, iterations: usize) -> Option<Estimate> {
         self.given(errors, self.descend(self.fit, errors, Begin::at(start), Effort::of(iterations))?)
     }
 
-    /// Returns the log-likelihood at a point under an error model at the outputs whose hyperparameters are given; `None` if a
-    /// simulation fails.
+    /// Returns the log-likelihood at a point under an error model at the outputs whose hyperparameters are given;
+    /// `None` if a simulation fails.
     pub fn log_likelihood(&self, errors: &Errors, point: &Point) -> Option<f64> {
         Some(errors.log_likelihood(&self.fit.pieces, &self.channels, self.fit.all(point)?))
     }
 
-    /// Fits like [`Estimation::with`], but roughly, and gives up where the log-likelihood cannot become as large as `least`.
+    /// Fits like [`Estimation::with`], but roughly, and gives up where the log-likelihood cannot become as large as
+    /// `least`.
     pub fn roughly(&self, errors: &Errors, start: Point, least: f64) -> Option<Estimate> {
         let effort =
             Effort { iterations: ITERATIONS / 2, negligible: 2.0 * ROUGHLY, least, stalls: |sum| STALLS * sum };
@@ -145,8 +146,8 @@ impl Estimation<'_> {
         Some(self.concluded(log_likelihood, found, given))
     }
 
-    /// Fits parameters, initial states and hyperparameters of an error model; `before` is one of the kind to start from, and `known`
-    /// are the residuals with their slopes at the start, which only the force error computes itself.
+    /// Fits parameters, initial states and hyperparameters of an error model; `before` is one of the kind to start
+    /// from, and `known` are the residuals with their slopes at the start, which only the force error computes itself.
     pub fn under(
         &self,
         kind: ErrorModel,
@@ -160,8 +161,8 @@ impl Estimation<'_> {
         let mut fit = self.fit.clone();
         let mut point = start;
         let mut damping = None;
-        // Where the likelihood is largest so far. That of a force counts along the motion that it has smoothed, not along the
-        // first one without it.
+        // Where the likelihood is largest so far. That of a force counts along the motion that it has smoothed, not
+        // along the first one without it.
         let mut best: Option<(f64, Point, Fitted, Vec<Residuals>)> = None;
         let mut errors: Option<Errors> = None;
         let mut trials = 0;
@@ -209,9 +210,9 @@ impl Estimation<'_> {
         Some(self.concluded(found.log_likelihood(), found, fitted))
     }
 
-    /// Returns the linearised motion of each record under the most probable force, found by Gauss-Newton iterations: simulate with
-    /// the force, linearise there, smooth again. Writes the force to the records of the fit. Without an error model there is no
-    /// force.
+    /// Returns the linearised motion of each record under the most probable force, found by Gauss-Newton iterations:
+    /// simulate with the force, linearise there, smooth again. Writes the force to the records of the fit. Without an
+    /// error model there is no force.
     ///
     /// Source: B. Bell, The iterated Kalman smoother as a Gauss-Newton method, SIAM J. Optim. 4 (1994) 626.
     fn motions(&self, fit: &mut Fit<'_>, point: &Point, errors: Option<&Errors>) -> Option<Vec<Motion>> {
@@ -236,8 +237,8 @@ impl Estimation<'_> {
         Some(motions)
     }
 
-    /// Returns a motion with a more probable force, and the decrease of the joint penalty of force and residuals; `None` if none
-    /// is found.
+    /// Returns a motion with a more probable force, and the decrease of the joint penalty of force and residuals;
+    /// `None` if none is found.
     fn smoothed(
         &self,
         fit: &mut Fit<'_>,
@@ -377,8 +378,8 @@ impl Estimation<'_> {
         fit
     }
 
-    /// Returns the derivatives of the residuals of a record by the free unknowns that move it, each with its position among
-    /// the free ones.
+    /// Returns the derivatives of the residuals of a record by the free unknowns that move it, each with its position
+    /// among the free ones.
     pub fn moving<'f>(
         &self,
         free: &'f [usize],
@@ -397,8 +398,8 @@ impl Estimation<'_> {
         free.iter().enumerate().filter_map(moves)
     }
 
-    /// Minimises the sum of squares of the whitened residuals in linear, scaled coordinates, with that of the distances of unknowns
-    /// from the centres of their priors.
+    /// Minimises the sum of squares of the whitened residuals in linear, scaled coordinates, with that of the distances
+    /// of unknowns from the centres of their priors.
     fn descend(&self, fit: &Fit<'_>, errors: &Errors, begin: Begin, effort: Effort) -> Option<Found> {
         let unknowns = self.unknowns();
         let free = self.free();
@@ -488,8 +489,8 @@ impl Estimation<'_> {
         Some(Found { point: self.point(&values), all, iterate, free, scale, logarithms, samples, first, converged })
     }
 
-    /// Returns the sum of logarithms of variances, the whitened residuals of all records, and their derivatives by the free
-    /// unknowns.
+    /// Returns the sum of logarithms of variances, the whitened residuals of all records, and their derivatives by the
+    /// free unknowns.
     fn whitened(
         &self,
         errors: &Errors,

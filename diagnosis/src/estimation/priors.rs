@@ -16,8 +16,9 @@ use crate::records::{Local, Subject};
 /// Standard deviation of a uniform distribution in its width: `1/sqrt(12)`.
 const UNIFORM: f64 = 0.288_675_134_594_812_9;
 
-/// Returns the priors of the shared parameters, then of the initial states of each record, near a point. A force is expected to
-/// be as large as those that move the plant as it is there: the rate that a typical force adds is the same wherever the plant is.
+/// Returns the priors of the shared parameters, then of the initial states of each record, near a point. A force is
+/// expected to be as large as those that move the plant as it is there: the rate that a typical force adds is the same
+/// wherever the plant is.
 pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Added], point: &Point) -> Vec<Prior> {
     let parameters = fit.parameters(0, point);
     let piece = &fit.pieces[0];
@@ -102,7 +103,8 @@ fn force_of(port: &Port, variant: &Variant) -> Option<usize> {
     processes.into_iter().position(|state| state == acts_on)
 }
 
-/// Returns the nominal rate of each balance of a model, in the order of its forces: the root mean square along the motion.
+/// Returns the nominal rate of each balance of a model, in the order of its forces: the root mean square along the
+/// motion.
 #[allow(clippy::cast_precision_loss)]
 pub fn nominal_rates(variant: &Variant, trajectories: &[Trajectory]) -> Vec<f64> {
     let ports = &variant.model.model().interface().ports;

@@ -34,11 +34,11 @@ pub struct Maximum {
 /// Damping, in shares of the diagonal of the information, beyond which no step can make progress.
 const MOST_DAMPING: f64 = 1e9;
 
-/// Maximises a log-likelihood of logarithms from a start, by Fisher scoring with Marquardt's damping. Coordinates at a bound
-/// that the gradient presses against stay there. `None` if the likelihood is not finite at the start.
+/// Maximises a log-likelihood of logarithms from a start, by Fisher scoring with Marquardt's damping. Coordinates at a
+/// bound that the gradient presses against stay there. `None` if the likelihood is not finite at the start.
 ///
-/// Source: D. Bertsekas, Projected Newton methods for optimization problems with simple constraints, SIAM J. Control Optim. 20
-/// (1982) 221.
+/// Source: D. Bertsekas, Projected Newton methods for optimization problems with simple constraints, SIAM J. Control
+/// Optim. 20 (1982) 221.
 pub fn maximise(start: &[f64], bounds: &[[f64; 2]], at: impl Fn(&[f64]) -> Score) -> Option<Maximum> {
     let mut point: Vec<f64> = start.iter().zip(bounds).map(|(x, b)| x.clamp(b[0], b[1])).collect();
     let mut score = at(&point);

@@ -1,5 +1,5 @@
-//! Search over parameters that no derivative determines, as samples jump: the size of steps, the width of a gap, the force at which
-//! a joint breaks away.
+//! Search over parameters that no derivative determines, as samples jump: the size of steps, the width of a gap, the
+//! force at which a joint breaks away.
 
 use mops_math as math;
 
@@ -22,12 +22,13 @@ pub const TURNS: usize = 3;
 /// Bisections in the search for the end of an interval. Basis: an assumption.
 const BISECTIONS: usize = 6;
 
-/// Decrease of log-likelihood at the ends of a 95 % interval: half the quantile of chi-squared with one degree of freedom.
+/// Decrease of log-likelihood at the ends of a 95 % interval: half the quantile of chi-squared with one degree of
+/// freedom.
 pub const FALL: f64 = 1.920_729;
 
 impl Estimation<'_> {
-    /// Improves an estimate by least squares by a compass search over the parameters that no derivative determines, in turns with
-    /// the others.
+    /// Improves an estimate by least squares by a compass search over the parameters that no derivative determines, in
+    /// turns with the others.
     ///
     /// Source: T. G. Kolda, R. M. Lewis, V. Torczon, Optimization by direct search, SIAM Review 45 (2003) 385.
     pub fn with_steps(&self, found: Estimate) -> Estimate {
@@ -61,8 +62,8 @@ impl Estimation<'_> {
         best
     }
 
-    /// Returns the 95 % interval of a parameter that no derivative determines, the others following: its ends by strides that
-    /// double, then by bisection; `None` if the log-likelihood is unknown at the estimate.
+    /// Returns the 95 % interval of a parameter that no derivative determines, the others following: its ends by
+    /// strides that double, then by bisection; `None` if the log-likelihood is unknown at the estimate.
     pub fn stepped_interval(&self, estimate: &Estimate, k: usize) -> Option<[f64; 2]> {
         let global = &self.fit.globals[k];
         let value = estimate.point.globals[k];

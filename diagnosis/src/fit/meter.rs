@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use mops_core::Watch;
 
-/// Counts simulations. Once its watch wants an end it admits none: every fit that is under way then fails. What has been found is
-/// still reported on.
+/// Counts simulations. Once its watch wants an end it admits none: every fit that is under way then fails. What has
+/// been found is still reported on.
 pub struct Meter<'a> {
     count: AtomicUsize,
     is_reporting: AtomicBool,

@@ -1,5 +1,5 @@
-//! Least squares over pieces of experiments: residuals in units of the noise, with exact slopes, bounds and start values of
-//! each piece.
+//! Least squares over pieces of experiments: residuals in units of the noise, with exact slopes, bounds and start
+//! values of each piece.
 
 use std::sync::Arc;
 

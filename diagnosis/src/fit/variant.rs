@@ -57,8 +57,8 @@ impl Added {
         named
     }
 
-    /// Takes what a solution says of the effect `index` of a variant: its strengths, and in the experiments of the fit those of
-    /// its own there and the start values of its states.
+    /// Takes what a solution says of the effect `index` of a variant: its strengths, and in the experiments of the fit
+    /// those of its own there and the start values of its states.
     pub fn take(&mut self, index: usize, variant: &Variant, fit: &Fit<'_>, point: &Point) {
         let count = self.candidate.effect.parameters().len();
         let in_piece = |m: usize| fit.pieces.iter().position(|p| p.measurement == m);
@@ -76,7 +76,8 @@ impl Added {
         }
     }
 
-    /// Returns the names of the simpler effects that it is: where a parameter beside the first is at an end, and determined.
+    /// Returns the names of the simpler effects that it is: where a parameter beside the first is at an end, and
+    /// determined.
     pub fn simpler(&self, is_open: impl Fn(usize) -> bool) -> Vec<&'static str> {
         let parameters = self.candidate.effect.parameters().iter().zip(&self.strengths).enumerate().skip(1);
         let of = |(k, (parameter, value)): (usize, (&EffectParameter, &f64))| {
@@ -87,8 +88,8 @@ impl Added {
         parameters.flat_map(of).collect()
     }
 
-    /// Whether its first strength stands at a finite bound that is not neutral: more is no effect but a mistake, as the gain of
-    /// a sensor is that is off by half. An actuator may well be at such a limit: dead, or acting one way only.
+    /// Whether its first strength stands at a finite bound that is not neutral: more is no effect but a mistake, as the
+    /// gain of a sensor is that is off by half. An actuator may well be at such a limit: dead, or acting one way only.
     pub fn is_at_limit(&self) -> bool {
         let (first, value) = (&self.candidate.effect.parameters()[0], self.strengths[0]);
         let is_limit = |end: &f64| end.is_finite() && first.null_value != Some(*end);
@@ -96,8 +97,8 @@ impl Added {
             && first.bounds.iter().filter(|e| is_limit(e)).any(|&e| e == value)
     }
 
-    /// Returns the effect at every shape that is tried, at the strengths from which a fit is restarted: multiples of the typical
-    /// size, and the declared stiffness for an effect that takes the place of a declared spring.
+    /// Returns the effect at every shape that is tried, at the strengths from which a fit is restarted: multiples of
+    /// the typical size, and the declared stiffness for an effect that takes the place of a declared spring.
     pub fn restarts(&self) -> Vec<Self> {
         let effect = self.candidate.effect.as_ref();
         let first = &effect.parameters()[0];
@@ -170,8 +171,8 @@ fn is_log(strength: &EffectParameter, value: f64) -> bool {
         && value > 0.0
 }
 
-/// What is known of the start values of an effect's states in pieces: those of the same pieces, else those of the beginnings of
-/// the experiments.
+/// What is known of the start values of an effect's states in pieces: those of the same pieces, else those of the
+/// beginnings of the experiments.
 fn known_starts<'a>(added: &'a Added, pieces: &[Piece]) -> Vec<Option<&'a Vec<f64>>> {
     let of = |index: usize| {
         let measurement = pieces[index].measurement;
@@ -184,8 +185,8 @@ fn known_starts<'a>(added: &'a Added, pieces: &[Piece]) -> Vec<Option<&'a Vec<f6
     (0..pieces.len()).map(of).collect()
 }
 
-/// The problem of fitting a variant to pieces of experiments; `tuners` are the globals of the study and `locals` the start
-/// values of the pieces to begin with; those in `fixed` stay where they are.
+/// The problem of fitting a variant to pieces of experiments; `tuners` are the globals of the study and `locals` the
+/// start values of the pieces to begin with; those in `fixed` stay where they are.
 pub fn problem<'a>(
     subject: &'a Subject,
     added: &[Added],

@@ -1,8 +1,8 @@
-//! Multiple shooting: a record cut into windows, each with start values of its own, so that a poor guess neither drifts out
-//! of phase nor runs away.
+//! Multiple shooting: a record cut into windows, each with start values of its own, so that a poor guess neither drifts
+//! out of phase nor runs away.
 //!
-//! Source: H. G. Bock, Recent advances in parameter identification techniques for ODE, in Numerical Treatment of Inverse
-//! Problems (1983) 95.
+//! Source: H. G. Bock, Recent advances in parameter identification techniques for ODE, in Numerical Treatment of
+//! Inverse Problems (1983) 95.
 
 use mops_core::{Case, Model};
 use mops_math as math;
@@ -22,8 +22,8 @@ pub fn whole(index: usize, measurement: &Measurement) -> Piece {
     }
 }
 
-/// The experiment in `count` windows of equal length; all states with a start value are free in each, but at the beginning of
-/// the record only those that are free there or measured.
+/// The experiment in `count` windows of equal length; all states with a start value are free in each, but at the
+/// beginning of the record only those that are free there or measured.
 #[allow(clippy::cast_precision_loss)]
 pub fn cut(index: usize, measurement: &Measurement, model: &dyn Model, count: usize) -> Vec<Piece> {
     let length = measurement.horizon / count as f64;

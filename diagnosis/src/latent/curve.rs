@@ -1,7 +1,9 @@
-//! The free curve: on which coordinate, and at which place, a missing force or a change of an input depends, without a catalogue.
+//! The free curve: on which coordinate, and at which place, a missing force or a change of an input depends, without a
+//! catalogue.
 //!
-//! Over each coordinate a force is a sum of bumps with free weights, over a delayed input a sum of delayed copies. The weights are
-//! small and normal beforehand and are integrated out; so is what parameters and initial states can take up.
+//! Over each coordinate a force is a sum of bumps with free weights, over a delayed input a sum of delayed copies. The
+//! weights are small and normal beforehand and are integrated out; so is what parameters and initial states can take
+//! up.
 
 use std::f64::consts::TAU;
 
@@ -41,7 +43,8 @@ const STILL: f64 = 1e-12;
 const POINTS: usize = 41;
 
 impl Estimation<'_> {
-    /// Returns the free curves on top of an estimate, the one with the largest gain first; `None` if a simulation fails.
+    /// Returns the free curves on top of an estimate, the one with the largest gain first; `None` if a simulation
+    /// fails.
     pub fn curves(&self, estimate: &Estimate) -> Option<Vec<Dependence>> {
         let fit = self.along(&estimate.errors);
         let mut slopes = fit.slopes(&estimate.point)?;
@@ -132,7 +135,8 @@ struct Shape<'c> {
 }
 
 impl<'c> Shape<'c> {
-    /// Places the bumps over the visited values; `None` if the coordinate does not move, or does not cover so many turns.
+    /// Places the bumps over the visited values; `None` if the coordinate does not move, or does not cover so many
+    /// turns.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     fn new(coordinate: &'c Coordinate, trajectories: &[Trajectory], turns: f64) -> Option<Self> {
         let moments = || trajectories.iter().flat_map(|t| &t.moments);
@@ -225,8 +229,8 @@ struct Reduced {
 }
 
 impl Reduced {
-    /// Returns minus twice the log-evidence with a curve whose weights have this deviation, none if `None`, and the most probable
-    /// weights. The gain of an input is free in both.
+    /// Returns minus twice the log-evidence with a curve whose weights have this deviation, none if `None`, and the
+    /// most probable weights. The gain of an input is free in both.
     fn with_curve(&self, curve: usize, deviation: Option<f64>) -> Option<(f64, Vec<f64>)> {
         let (at, last) = (COLUMNS * curve, self.rest.nrows() - 1);
         let deviation = |b: usize| if b == BUMPS { self.input_gain } else { deviation.unwrap_or(0.0) };

@@ -1,9 +1,11 @@
-//! Course of what is missing at a place: the smooth force of the force error at a balance, the smooth error at a sensor.
+//! Course of what is missing at a place: the smooth force of the force error at a balance, the smooth error at a
+//! sensor.
 //!
-//! Where effects were added, their formulas are drawn beside formula plus remainder: a component-plus-residual plot. Where the formula
-//! is right, the points lie about its curve.
+//! Where effects were added, their formulas are drawn beside formula plus remainder: a component-plus-residual plot.
+//! Where the formula is right, the points lie about its curve.
 //!
-//! Source: F. R. Wood, The use of individual effects and residuals in fitting equations to data, Technometrics 15 (1973) 677.
+//! Source: F. R. Wood, The use of individual effects and residuals in fitting equations to data, Technometrics 15
+//! (1973) 677.
 
 use mops_core::effect::Port;
 use mops_language::Unit;
@@ -20,8 +22,8 @@ use crate::selection::FittedSet;
 /// Points of a course that are kept; more are thinned out evenly.
 const POINTS: usize = 800;
 
-/// Returns the latent inputs at places, by their ports: on top of a set, with its effects there, or of the declared model where it
-/// has none or they cannot be drawn. A place without balance and sensor has none.
+/// Returns the latent inputs at places, by their ports: on top of a set, with its effects there, or of the declared
+/// model where it has none or they cannot be drawn. A place without balance and sensor has none.
 pub fn latent_inputs(ports: &[&Port], [declared, set]: [&FittedSet<'_>; 2], nominal: &[f64]) -> Vec<LatentInput> {
     let of = |port: &&Port| {
         let here: Vec<usize> = (0..set.added.len()).filter(|&k| set.added[k].candidate.port == **port).collect();
@@ -34,8 +36,8 @@ pub fn latent_inputs(ports: &[&Port], [declared, set]: [&FittedSet<'_>; 2], nomi
     ports.iter().filter_map(of).collect()
 }
 
-/// Returns true if the formula of an effect can be drawn along a motion that has it already: inertia adds to the acceleration that
-/// it changes, and the states of others begin where a fit put them.
+/// Returns true if the formula of an effect can be drawn along a motion that has it already: inertia adds to the
+/// acceleration that it changes, and the states of others begin where a fit put them.
 fn can_be_drawn(candidate: &Candidate) -> bool {
     let effect = candidate.effect.as_ref();
     !effect.is_inertial() && effect.states() == 0
@@ -140,8 +142,8 @@ impl Course<'_, '_> {
         }
     }
 
-    /// Returns what the effects add in a record with the parameters of a point, in the unit of the place, at the nodes of its motion or
-    /// the samples of its sensor.
+    /// Returns what the effects add in a record with the parameters of a point, in the unit of the place, at the nodes
+    /// of its motion or the samples of its sensor.
     fn added(&self, fit: &Fit<'_>, piece: usize, trajectory: &Trajectory, point: &Point) -> Option<Vec<f64>> {
         let (set, mut sum) = (self.set, Vec::new());
         for &index in self.effects {
@@ -202,7 +204,8 @@ impl Course<'_, '_> {
         Some(Remainder { times: samples.times.clone(), missing, fitted, found })
     }
 
-    /// Returns what is computed at the optimum under an error model and at that of least squares; nothing without effects.
+    /// Returns what is computed at the optimum under an error model and at that of least squares; nothing without
+    /// effects.
     fn with_effects(&self, of: impl Fn(&Point) -> Option<Vec<f64>>, kind: ErrorModel) -> Option<[Vec<f64>; 2]> {
         if self.effects.is_empty() {
             return Some([Vec::new(), Vec::new()]);

@@ -1,5 +1,5 @@
-//! Latent force: what is missing, without a catalogue. Free curves show on which coordinate and at which place it depends;
-//! smoothed forces and output errors show its course.
+//! Latent force: what is missing, without a catalogue. Free curves show on which coordinate and at which place it
+//! depends; smoothed forces and output errors show its course.
 
 mod coordinates;
 mod curve;

@@ -1,5 +1,5 @@
-//! Place, coordinate and course of what is missing, on a mass with spring and damper behind a slow motor; the data come from
-//! equations of their own.
+//! Place, coordinate and course of what is missing, on a mass with spring and damper behind a slow motor; the data come
+//! from equations of their own.
 
 use mops_core::{Input, case::Hold};
 use mops_math as math;
@@ -61,8 +61,8 @@ fn plant(hidden: Hidden, label: &str) -> Subject {
     subject(PLANT, &guess, 3, vec![record])
 }
 
-/// Returns the free curves on the declared model under its likeliest error model, the one with the largest gain first, and the
-/// course at a place.
+/// Returns the free curves on the declared model under its likeliest error model, the one with the largest gain first,
+/// and the course at a place.
 fn missing(subject: &Subject, place: &str) -> (Vec<Dependence>, LatentInput) {
     let simulations = Meter::new(&());
     let (refit, mut declared) = prepare(subject, &[], &simulations).expect("it simulates");

@@ -21,8 +21,8 @@ const SLIGHT: f64 = 1e-3;
 /// Relative difference of two slopes up to which they are the same: rounding.
 const RECIPROCAL: f64 = 1e-6;
 
-/// Returns true if the records show what a candidate needs: the term of the declared model that it modifies, an angle, a
-/// limit that was touched, visible steps.
+/// Returns true if the records show what a candidate needs: the term of the declared model that it modifies, an angle,
+/// a limit that was touched, visible steps.
 pub fn is_covered(
     candidate: &Candidate,
     model: &WithEffects,
@@ -82,8 +82,9 @@ fn is_angle(port: &Port, model: &WithEffects) -> bool {
     unit.is_none_or(|unit| unit.is_angle() || unit.dimension().is_none())
 }
 
-/// Returns true if the declared force at a joint depends on its position, or on that of the companion. Without a companion it is a
-/// spring to the ground: a shift of all joints alike, which no spring between joints resists, changes the force.
+/// Returns true if the declared force at a joint depends on its position, or on that of the companion. Without a
+/// companion it is a spring to the ground: a shift of all joints alike, which no spring between joints resists, changes
+/// the force.
 fn has_spring(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> bool {
     let Some(piece) = pieces.first() else { return false };
     let Some(PortIndex::Joint(_, position, speed)) = port_index(&candidate.port, model, piece) else { return false };
@@ -109,8 +110,8 @@ fn positions_like(position: usize, model: &WithEffects, piece: &Piece) -> Vec<us
     positions.filter(|&other| states[other].unit == states[position].unit).collect()
 }
 
-/// Returns true if the declared model has a spring or a damper between the joints of a candidate: the force on each depends on the
-/// position or the speed of the other, by the same slope (reciprocity).
+/// Returns true if the declared model has a spring or a damper between the joints of a candidate: the force on each
+/// depends on the position or the speed of the other, by the same slope (reciprocity).
 fn has_coupling(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> bool {
     let Some(piece) = pieces.first() else { return false };
     let ports = &model.model().interface().ports;
@@ -125,7 +126,8 @@ fn has_coupling(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], al
     let Some((first, second)) = index(&candidate.port).zip(candidate.companion.as_ref().and_then(index)) else {
         return false;
     };
-    // Slopes of the forces on both by the position or the speed of the other, from the accelerations by the mass matrix.
+    // Slopes of the forces on both by the position or the speed of the other, from the accelerations by the mass
+    // matrix.
     let cross = |along: &Trajectory, m: &Moment, [of_first, of_second]: [usize; 2]| {
         let mobility = DMatrix::from_fn(joints.len(), joints.len(), |i, j| {
             let force = joints[j].1;
@@ -144,7 +146,8 @@ fn has_coupling(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], al
     is_coupled([joints[first].2, joints[second].2]) || is_coupled([joints[first].3, joints[second].3])
 }
 
-/// Returns true if a motion shows stops: it turns back at both ends, or comes to rest. A falling body turns back at its top only.
+/// Returns true if a motion shows stops: it turns back at both ends, or comes to rest. A falling body turns back at its
+/// top only.
 fn shows_stops(
     candidate: &Candidate,
     model: &WithEffects,

@@ -1,5 +1,5 @@
-//! The motion of a fitted model, linearised along it: what forces and candidates change in the outputs, and what the records can
-//! show of them.
+//! The motion of a fitted model, linearised along it: what forces and candidates change in the outputs, and what the
+//! records can show of them.
 
 mod coverage;
 mod ports;

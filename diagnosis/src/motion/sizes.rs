@@ -13,7 +13,8 @@ use crate::fit::Piece;
 use crate::records::gap;
 use crate::settings::Coverage;
 
-/// Returns the root of twice the mean square about the middle: of a sine its amplitude. About 0 where nothing but rounding moves.
+/// Returns the root of twice the mean square about the middle: of a sine its amplitude. About 0 where nothing but
+/// rounding moves.
 #[allow(clippy::cast_precision_loss)]
 fn amplitude(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let n = values.clone().count().max(1) as f64;
@@ -136,8 +137,8 @@ pub fn sizes(
     Some(Sizes { output: positive(sizes.output), ..sizes })
 }
 
-/// Returns the typical sizes at a joint, with position and speed relative to those of another: of shafts that turn together, by how
-/// much one is ahead.
+/// Returns the typical sizes at a joint, with position and speed relative to those of another: of shafts that turn
+/// together, by how much one is ahead.
 pub fn relative_sizes(
     joint: &Port,
     other: &Port,
@@ -183,8 +184,8 @@ pub fn sizes_by_samples(sizes: Sizes, candidate: &Candidate, model: &WithEffects
     Sizes { quantum, gap, ..sizes }
 }
 
-/// Returns the typical sizes for a candidate: at its port, between two joints relative to each other; of a joint that is the companion of an
-/// actuator or sensor the position and speed.
+/// Returns the typical sizes for a candidate: at its port, between two joints relative to each other; of a joint that
+/// is the companion of an actuator or sensor the position and speed.
 pub fn sizes_for(
     candidate: &Candidate,
     model: &WithEffects,

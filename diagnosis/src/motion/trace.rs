@@ -1,4 +1,5 @@
-//! The trace of a candidate: what it would add to the residuals, to first order in its size, along the motion of the model.
+//! The trace of a candidate: what it would add to the residuals, to first order in its size, along the motion of the
+//! model.
 
 use mops_core::{
     Input,
@@ -12,7 +13,8 @@ use super::trajectory::Trajectory;
 use crate::candidates::Candidate;
 use crate::fit::Piece;
 
-/// Returns the value at a time, along straight lines from sample to sample; before the first and after the last sample theirs.
+/// Returns the value at a time, along straight lines from sample to sample; before the first and after the last sample
+/// theirs.
 pub fn between(times: &[f64], values: &[f64], at: f64) -> f64 {
     let next = times.partition_point(|&t| t < at);
     match (next.checked_sub(1), values.get(next)) {
@@ -143,7 +145,8 @@ impl<'a> View<'a> {
             return Some(vec![0.0; total]);
         }
         let effect = self.candidate.effect.as_ref();
-        // What inertia adds changes the acceleration that it adds to: proportional to the strength only where that is small.
+        // What inertia adds changes the acceleration that it adds to: proportional to the strength only where that is
+        // small.
         let small = if effect.is_inertial() { 1e-6 } else { 1.0 };
         let mut strengths = strengths.to_vec();
         strengths[0] *= small;
@@ -164,8 +167,8 @@ impl<'a> View<'a> {
         Some(response)
     }
 
-    /// What the candidate at these strengths adds at its place, at the nodes of the motion or at the samples of a sensor, in the
-    /// unit of the place, forces forward; `None` where that is not finite.
+    /// What the candidate at these strengths adds at its place, at the nodes of the motion or at the samples of a
+    /// sensor, in the unit of the place, forces forward; `None` where that is not finite.
     pub fn added(&self, strengths: &[f64]) -> Option<Vec<f64>> {
         let acting = self.candidate.effect.bind(strengths);
         let sign = match self.here {
@@ -222,8 +225,8 @@ impl<'a> View<'a> {
         signal.iter().any(|s| *s != 0.0).then(|| (self.along.inputs() + w, signal))
     }
 
-    /// What is made of each moment, of the value of the effect there and of its states, which move on from moment to moment;
-    /// `delayed` is what came so much earlier.
+    /// What is made of each moment, of the value of the effect there and of its states, which move on from moment to
+    /// moment; `delayed` is what came so much earlier.
     fn followed(
         &self,
         acting: &dyn BoundEffect<f64>,
@@ -256,7 +259,8 @@ impl<'a> View<'a> {
         self.seen.iter().enumerate().map(one).collect()
     }
 
-    /// What came to an actuator before the window of a record, where it bends or jumps: there from the left and from the right.
+    /// What came to an actuator before the window of a record, where it bends or jumps: there from the left and from
+    /// the right.
     fn before(&self) -> Vec<PortState<'a, f64>> {
         let begins = self.piece.case.begins;
         let (Some(input), Some(first)) = (self.input, self.seen.first()) else { return Vec::new() };

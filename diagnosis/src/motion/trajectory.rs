@@ -1,8 +1,9 @@
-//! A model's motion in an experiment with its linear system along it: what any small force at a port does to the outputs,
-//! for the price of a few multiplications per sample.
+//! A model's motion in an experiment with its linear system along it: what any small force at a port does to the
+//! outputs, for the price of a few multiplications per sample.
 //!
-//! Between samples the linear system is solved with two Gauss nodes and a fourth-order Magnus expansion (S. Blanes, F. Casas,
-//! J. Oteo, J. Ros, The Magnus expansion and some of its applications, Physics Reports 470 (2009) 151, section 5).
+//! Between samples the linear system is solved with two Gauss nodes and a fourth-order Magnus expansion (S. Blanes, F.
+//! Casas, J. Oteo, J. Ros, The Magnus expansion and some of its applications, Physics Reports 470 (2009) 151, section
+//! 5).
 
 use mops_core::{Failure, Job, effect::Port};
 use mops_models::{Along, Moment, WithEffects};
@@ -87,7 +88,8 @@ impl Trajectory {
         let mut intervals: Vec<Interval> =
             knots.windows(2).zip(moments.chunks(2)).map(|(ends, m)| interval(ends[1] - ends[0], m)).collect();
         for (k, interval) in intervals.iter_mut().enumerate() {
-            // A switch between the nodes of an interval counts from its end on, one before its first node from its beginning on.
+            // A switch between the nodes of an interval counts from its end on, one before its first node from its
+            // beginning on.
             if let Some(jump) = jump(&moments[2 * k], &moments[2 * k + 1]) {
                 interval.transition = &jump * &interval.transition;
                 interval.gains[0] = &jump * &interval.gains[0];
@@ -158,8 +160,8 @@ impl Trajectory {
         self.inputs
     }
 
-    /// Returns the motion linearised from sample to sample, with forces in units of those that add the `nominal` rates at the
-    /// beginning, one for each force of the model; `channels` are those of the series.
+    /// Returns the motion linearised from sample to sample, with forces in units of those that add the `nominal` rates
+    /// at the beginning, one for each force of the model; `channels` are those of the series.
     pub fn linearised(&self, nominal: &[f64], channels: &[usize]) -> LinearisedMotion {
         let (states, forces) = (self.states, nominal.len());
         let nominal: Vec<f64> = nominal.iter().zip(&self.mobilities).map(|(rate, mobility)| rate / mobility).collect();
@@ -298,10 +300,12 @@ where
     Interval { transition: DMatrix::from_column_slice(n.value(), n.value(), transition.as_slice()), gains }
 }
 
-/// Returns the jump of small deviations of the states where a joint with dry friction comes to rest or turns between two nodes: with
-/// rates `f-` before, `f+` after and the event `v = 0`, `I + (f+ - f-) e_v'/(e_v' f-)`. `None` if no joint does.
+/// Returns the jump of small deviations of the states where a joint with dry friction comes to rest or turns between
+/// two nodes: with rates `f-` before, `f+` after and the event `v = 0`, `I + (f+ - f-) e_v'/(e_v' f-)`. `None` if no
+/// joint does.
 ///
-/// Source: M. di Bernardo, C. Budd, A. Champneys, P. Kowalczyk, Piecewise-smooth Dynamical Systems (Springer 2008), section 2.5.
+/// Source: M. di Bernardo, C. Budd, A. Champneys, P. Kowalczyk, Piecewise-smooth Dynamical Systems (Springer 2008),
+/// section 2.5.
 fn jump(before: &Moment, after: &Moment) -> Option<DMatrix<f64>> {
     let mut all: Option<DMatrix<f64>> = None;
     for (was, is) in before.sliding.iter().zip(&after.sliding) {

@@ -1,5 +1,5 @@
-//! A gap in measured values: many samples at one value, and next to none on either side of it, as where a potentiometer is
-//! open.
+//! A gap in measured values: many samples at one value, and next to none on either side of it, as where a potentiometer
+//! is open.
 
 /// Noises within which samples show one value, the middle of a gap. Basis: 99 % of a normal error.
 const GAP_CORE: f64 = 2.5;

@@ -6,8 +6,8 @@ use mops_math as math;
 /// studies.
 const QUANTISED: f64 = 0.9;
 
-/// Returns the standard deviation of the noise of a sensor from its records: the median of that of each, at least that of its
-/// quantisation. `None` if there are too few samples, or they never change.
+/// Returns the standard deviation of the noise of a sensor from its records: the median of that of each, at least that
+/// of its quantisation. `None` if there are too few samples, or they never change.
 pub fn noise_of(records: &[(&[f64], &[f64])]) -> Option<f64> {
     let mut all: Vec<f64> = records.iter().filter_map(|(times, values)| noise_of_record(times, values)).collect();
     all.sort_by(f64::total_cmp);
@@ -16,11 +16,12 @@ pub fn noise_of(records: &[(&[f64], &[f64])]) -> Option<f64> {
     Some(step(records).map_or(median, |step| median.max(step / 12.0_f64.sqrt())))
 }
 
-/// Returns the standard deviation of the noise of a record: what local parabolas over seven samples leave, by the median absolute
-/// deviation, so that a few jumps do not count.
+/// Returns the standard deviation of the noise of a record: what local parabolas over seven samples leave, by the
+/// median absolute deviation, so that a few jumps do not count.
 ///
 /// Source: T. Gasser, L. Sroka, C. Jennen-Steinmetz, Residual variance and residual pattern in nonlinear regression,
-/// Biometrika 73 (1986) 625; P. Rousseeuw, A. Leroy, Robust Regression and Outlier Detection (1987), section 4.4 (1.4826).
+/// Biometrika 73 (1986) 625; P. Rousseeuw, A. Leroy, Robust Regression and Outlier Detection (1987), section 4.4
+/// (1.4826).
 #[allow(clippy::cast_precision_loss)]
 fn noise_of_record(times: &[f64], values: &[f64]) -> Option<f64> {
     let of = |i: usize| {
@@ -32,8 +33,8 @@ fn noise_of_record(times: &[f64], values: &[f64]) -> Option<f64> {
     let mut left: Vec<f64> = (3..values.len().saturating_sub(3)).filter_map(of).collect();
     left.sort_by(f64::total_cmp);
     let median = left.get(left.len() / 2)?;
-    // Coarse quantisation leaves many exact zeros: then the root mean square says more, without the largest twentieth, where samples
-    // that stand alone are; with it only if nothing else is left.
+    // Coarse quantisation leaves many exact zeros: then the root mean square says more, without the largest twentieth,
+    // where samples that stand alone are; with it only if nothing else is left.
     let rms = |of: &[f64]| (of.iter().map(|r| r * r).sum::<f64>() / of.len() as f64).sqrt();
     let trimmed = rms(&left[..left.len() - left.len() / 20]);
     let rms = if trimmed > 0.0 { trimmed } else { rms(&left) };
@@ -46,7 +47,8 @@ fn noise_of_record(times: &[f64], values: &[f64]) -> Option<f64> {
 /// Share of the largest value up to which a difference is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Returns the quantisation step of records: the smallest difference of two samples, if most differences are multiples of it.
+/// Returns the quantisation step of records: the smallest difference of two samples, if most differences are multiples
+/// of it.
 #[allow(clippy::cast_precision_loss)]
 fn step(records: &[(&[f64], &[f64])]) -> Option<f64> {
     let largest = records.iter().flat_map(|(_, values)| *values).fold(0.0, |m: f64, v| m.max(v.abs()));
@@ -81,8 +83,9 @@ fn parabola(chosen: &[usize], x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
     Some((value, leverage))
 }
 
-/// The samples without those that stand alone, more than ten times the noise from what their neighbours on both sides lead
-/// to, and how many those were. The first and the last have neighbours on one side alone: there it may be a transient.
+/// The samples without those that stand alone, more than ten times the noise from what their neighbours on both sides
+/// lead to, and how many those were. The first and the last have neighbours on one side alone: there it may be a
+/// transient.
 pub fn without_spikes(times: &[f64], values: &[f64], noise: f64) -> (Vec<f64>, Vec<f64>, usize) {
     let n = values.len();
     let alone = |i: usize| {

@@ -1,4 +1,5 @@
-//! What was measured: experiments with their channels, noise and unknown initial states, and what the samples alone show.
+//! What was measured: experiments with their channels, noise and unknown initial states, and what the samples alone
+//! show.
 
 mod gap;
 mod hygiene;

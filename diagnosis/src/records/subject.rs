@@ -91,7 +91,8 @@ pub struct Subject {
     pub settings: Settings,
 }
 
-/// Returns the relative tolerance of simulations that the noise of the most precise sensor, relative to its largest value, wants.
+/// Returns the relative tolerance of simulations that the noise of the most precise sensor, relative to its largest
+/// value, wants.
 fn tolerance(measurements: &[Measurement]) -> f64 {
     let of = |s: &Series| s.noise / s.values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     let finest = measurements.iter().flat_map(|m| &m.series).map(of).fold(f64::INFINITY, f64::min);
@@ -107,7 +108,8 @@ impl Subject {
     /// Takes it from a study.
     ///
     /// # Errors
-    /// No experiment for calibration, no channels, several models, or a model without places for effects or without a linearisation.
+    /// No experiment for calibration, no channels, several models, or a model without places for effects or without a
+    /// linearisation.
     pub fn new(study: &Study, settings: &Settings) -> Result<Self, StudyError> {
         let measured = |job: &usize| {
             let case = &study.cases()[study.jobs()[*job].case];
@@ -147,7 +149,8 @@ impl Subject {
             let cases = jobs.iter().map(|&job| &study.cases()[study.jobs()[job].case]);
             cases.flat_map(|case| case.experiment.iter().flat_map(|e| &e.channels).map(move |channel| (case, channel)))
         };
-        // One noise for each sensor, for all experiments that give none. Validation decides nothing, unless there is nothing else.
+        // One noise for each sensor, for all experiments that give none. Validation decides nothing, unless there is
+        // nothing else.
         let estimated = |signal: &str| {
             let of_roles = |only_validation: bool| {
                 let is_of = |case: &Case| {

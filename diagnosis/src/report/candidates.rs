@@ -10,8 +10,8 @@ use crate::selection::{Conclusion, FittedSet, Key, STRONG, Screening, without};
 const SCREENED: usize = 20;
 
 impl<'a> Findings<'_, 'a> {
-    /// Returns the candidates that were fitted: the effects found first, then by probability and evidence; then those that were only
-    /// screened.
+    /// Returns the candidates that were fitted: the effects found first, then by probability and evidence; then those
+    /// that were only screened.
     pub(super) fn ranked(&self) -> Vec<Ranked> {
         let (sets, verdict) = (&self.sets, &self.verdict);
         let mut indices: Vec<usize> = sets.sets.iter().flat_map(|set| set.key.iter().copied()).collect();

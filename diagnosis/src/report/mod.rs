@@ -145,8 +145,8 @@ impl<'a> Findings<'_, 'a> {
         is_supported && made.converged && !made.is_stopped
     }
 
-    /// Returns the probability of the verdict: of class and place of the least certain claim, or that nothing is missing; NaN if
-    /// something is missing that is not explained.
+    /// Returns the probability of the verdict: of class and place of the least certain claim, or that nothing is
+    /// missing; NaN if something is missing that is not explained.
     fn probability(&self, found: &[Found]) -> f64 {
         match self.verdict.conclusion {
             Conclusion::Effect => {
@@ -158,8 +158,8 @@ impl<'a> Findings<'_, 'a> {
         }
     }
 
-    /// Returns the posterior probability that an effect is missing; NaN if no set that holds it passed, or more is missing than what
-    /// these describe.
+    /// Returns the posterior probability that an effect is missing; NaN if no set that holds it passed, or more is
+    /// missing than what these describe.
     fn probability_of(&self, index: usize) -> f64 {
         if self.verdict.is_refused || self.verdict.is_description {
             return f64::NAN;
@@ -216,8 +216,8 @@ impl<'a> Findings<'_, 'a> {
         [Role::Selection, Role::Validation].into_iter().filter_map(of).collect()
     }
 
-    /// Returns the experiment that would best separate the set from the most probable one with other classes or places, or from
-    /// the first alternative at the same place.
+    /// Returns the experiment that would best separate the set from the most probable one with other classes or places,
+    /// or from the first alternative at the same place.
     fn next_experiment(&self, set: &FittedSet<'a>) -> Option<String> {
         let entries = |set: &FittedSet<'a>| {
             let mut all: Vec<_> = set.added.iter().map(|added| entry(&self.sets, &added.candidate)).collect();
@@ -244,8 +244,8 @@ impl<'a> Findings<'_, 'a> {
         next_experiment::separating(set, rival, [&names(set, rival), &names(rival, set)])
     }
 
-    /// Returns the course of what is missing at the places of the effects found, or else at the place with the largest gain, of the
-    /// declared model and a repaired one.
+    /// Returns the course of what is missing at the places of the effects found, or else at the place with the largest
+    /// gain, of the declared model and a repaired one.
     fn latent(&self, sets: [&FittedSet<'a>; 2], made: &Diagnosis) -> Vec<LatentInput> {
         let at_effects = sets[1].added.iter().map(|added| added.candidate.place());
         let first = made.places.first().filter(|_| sets[1].added.is_empty()).map(|curve| curve.place.clone());
@@ -353,8 +353,8 @@ fn unexplained(curve: &Dependence) -> Unexplained {
     Unexplained { place: curve.place.clone(), over: curve.coordinate.clone(), table: curve.curve.clone() }
 }
 
-/// Returns the share of the squared error of the declared model that a repaired one removes from validation records, else from
-/// selection records.
+/// Returns the share of the squared error of the declared model that a repaired one removes from validation records,
+/// else from selection records.
 fn explained_share(before: &Records<'_, '_>, after: &Records<'_, '_>) -> Option<f64> {
     let share = |role| {
         let [before, after] = [before, after].map(|records| records.sum_of_squares(role));

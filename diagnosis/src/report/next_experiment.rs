@@ -1,5 +1,5 @@
-//! The experiment that would separate two models that the data cannot distinguish: variations of the existing ones, compared by
-//! the distance of the predictions.
+//! The experiment that would separate two models that the data cannot distinguish: variations of the existing ones,
+//! compared by the distance of the predictions.
 
 use mops_core::{Case, Job};
 use mops_math as math;
@@ -16,8 +16,8 @@ const WORTH: f64 = 1.5;
 /// Largest angle that start values are varied to, rad: a turn further is the same.
 const HALF_A_TURN: f64 = std::f64::consts::PI;
 
-/// Returns in words the experiment that would separate two models fitted to the same data; `None` if no variation does better
-/// than the experiments themselves, or well enough to distinguish the two.
+/// Returns in words the experiment that would separate two models fitted to the same data; `None` if no variation does
+/// better than the experiments themselves, or well enough to distinguish the two.
 pub fn separating(a: &FittedSet<'_>, b: &FittedSet<'_>, names: [&str; 2]) -> Option<String> {
     let mut best: Option<(f64, f64, String)> = None;
     for piece in 0..a.fit.pieces.len() {

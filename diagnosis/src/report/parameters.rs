@@ -11,8 +11,8 @@ use crate::selection::{FittedSet, estimation};
 /// Standard normal quantile at 0.975.
 const QUANTILE: f64 = 1.959_964;
 
-/// Returns the parameters of an effect of a set: values from least squares, standard errors and intervals from the likeliest error
-/// model. An interval holds both estimates; a parameter at a bound has none.
+/// Returns the parameters of an effect of a set: values from least squares, standard errors and intervals from the
+/// likeliest error model. An interval holds both estimates; a parameter at a bound has none.
 pub fn strengths(set: &FittedSet<'_>, index: usize) -> Vec<StrengthValue> {
     let added = &set.start_at(&set.least_squares.point).added[index];
     let likeliest = set.likeliest().map(|(_, likeliest)| likeliest);
@@ -39,8 +39,8 @@ pub fn strengths(set: &FittedSet<'_>, index: usize) -> Vec<StrengthValue> {
     all
 }
 
-/// Returns the 95 % confidence interval of a parameter under an error model, widened to the value by least squares; `None` at a bound,
-/// or if the records do not determine it.
+/// Returns the 95 % confidence interval of a parameter under an error model, widened to the value by least squares;
+/// `None` at a bound, or if the records do not determine it.
 pub fn interval(global: &Global, value: f64, estimate: &Estimate, index: usize) -> Option<[f64; 2]> {
     let (centre, error) = (estimate.point.globals[index], estimate.deviations[index]);
     let is_at_bound = global.bounds.contains(&centre) || global.bounds.contains(&value);
@@ -48,8 +48,8 @@ pub fn interval(global: &Global, value: f64, estimate: &Estimate, index: usize) 
     (error > 0.0 && error.is_finite() && !is_at_bound).then(|| [end(-1.0).min(value), end(1.0).max(value)])
 }
 
-/// Returns the range of the values of a parameter that no fit moves that the records allow, everything else fitted again; `None` if
-/// only one is allowed.
+/// Returns the range of the values of a parameter that no fit moves that the records allow, everything else fitted
+/// again; `None` if only one is allowed.
 fn allowed(set: &FittedSet<'_>, index: usize, k: usize) -> Option<[f64; 2]> {
     let outputs = set.under.iter().filter(|(kind, _)| *kind != ErrorModel::Force);
     let (_, estimate) = outputs.max_by(|a, b| a.1.log_likelihood.total_cmp(&b.1.log_likelihood))?;

@@ -28,8 +28,8 @@ struct Predicted {
     starts: Vec<(String, f64)>,
 }
 
-/// A model with its parameters from least squares on the calibration records, and what it predicts for every record, initial
-/// states fitted.
+/// A model with its parameters from least squares on the calibration records, and what it predicts for every record,
+/// initial states fitted.
 pub struct Records<'s, 'a> {
     set: &'s FittedSet<'a>,
     all: Vec<Predicted>,
@@ -92,8 +92,8 @@ impl<'s, 'a> Records<'s, 'a> {
         (!squares.is_empty()).then(|| squares.iter().sum())
     }
 
-    /// Returns the errors of a record in windows of a few periods of its liveliest channel, each with initial states of its own;
-    /// `None` if it has too few periods for two, or a window cannot be simulated.
+    /// Returns the errors of a record in windows of a few periods of its liveliest channel, each with initial states of
+    /// its own; `None` if it has too few periods for two, or a window cannot be simulated.
     #[allow(clippy::cast_precision_loss)]
     fn in_windows(&self, index: usize) -> Option<WindowErrors> {
         let (subject, m) = (self.subject(), &self.subject().measurements[index]);
@@ -142,8 +142,8 @@ impl<'s, 'a> Records<'s, 'a> {
         self.subject().measurements.iter().enumerate().flat_map(of).collect()
     }
 
-    /// Returns the initial states of every record: record, parameter, value. Those of effects carry the names that these have in
-    /// the report.
+    /// Returns the initial states of every record: record, parameter, value. Those of effects carry the names that
+    /// these have in the report.
     pub fn starts(&self, names: &[String]) -> Vec<(String, String, f64)> {
         // The augmented model numbers its effects from 1: `+1.start1`.
         let renamed = |name: &String| {
@@ -185,8 +185,8 @@ impl<'s, 'a> Records<'s, 'a> {
         (0..subject.globals.len()).any(|k| !removed.contains(&k) && is_at_bound(k))
     }
 
-    /// Returns a note for each parameter of the study at a bound in this model or a repaired one, without the terms that the
-    /// repaired one has not.
+    /// Returns a note for each parameter of the study at a bound in this model or a repaired one, without the terms
+    /// that the repaired one has not.
     pub fn at_bounds(&self, after: &Self, removed: &[usize]) -> Vec<String> {
         let subject = self.subject();
         let one = |k: usize| {

@@ -1,5 +1,5 @@
-//! Declared terms that the effects found replace, and their places: a term acts where an effect of the catalogue changes the outputs
-//! as it does.
+//! Declared terms that the effects found replace, and their places: a term acts where an effect of the catalogue
+//! changes the outputs as it does.
 
 use mops_outcome::diagnosis::Removed;
 

@@ -1,4 +1,5 @@
-//! Alignment: recorded inputs that act earlier than their time stamps, or that are interpolated otherwise between their samples.
+//! Alignment: recorded inputs that act earlier than their time stamps, or that are interpolated otherwise between their
+//! samples.
 //!
 //! An input that acts later is a delay, which is an effect.
 
@@ -29,9 +30,9 @@ impl Subject {
     }
 }
 
-/// Returns the subject with the alignment of its inputs that describes the calibration records better than the declared one does with
-/// any single effect, and that forecasts better than the declared one; `None` if there is none. The effects have been added to
-/// the declared model one by one.
+/// Returns the subject with the alignment of its inputs that describes the calibration records better than the declared
+/// one does with any single effect, and that forecasts better than the declared one; `None` if there is none. The
+/// effects have been added to the declared model one by one.
 pub fn align(sets: &FittedSets<'_, '_>) -> Option<(Subject, Vec<Alignment>)> {
     let declared = sets.get(&Key::new()).filter(|declared| sets.lacks_something(declared))?;
     let likelier = likelier_output(declared)?;
@@ -66,7 +67,8 @@ pub fn align(sets: &FittedSets<'_, '_>) -> Option<(Subject, Vec<Alignment>)> {
     is_better.then(|| (aligned, inputs.clone()))
 }
 
-/// Returns the alignments that are tried: of each recorded input, and of all together, with the same time between samples in mind.
+/// Returns the alignments that are tried: of each recorded input, and of all together, with the same time between
+/// samples in mind.
 fn alternatives(subject: &Subject) -> Vec<Vec<Alignment>> {
     let mut inputs: Vec<(&String, Hold, f64)> = Vec::new();
     for (name, input) in subject.measurements.iter().flat_map(|m| &m.case.inputs) {

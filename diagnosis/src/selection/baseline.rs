@@ -31,11 +31,11 @@ struct Fitted {
     sum: f64,
 }
 
-/// Fits the declared model by multiple shooting that grows to whole records, from the start of the study and from spread ones;
-/// `None` if no simulation succeeds.
+/// Fits the declared model by multiple shooting that grows to whole records, from the start of the study and from
+/// spread ones; `None` if no simulation succeeds.
 ///
-/// Source: H. G. Bock, Recent advances in parameter identification techniques for ODE, in Numerical Treatment of Inverse
-/// Problems (1983) 95.
+/// Source: H. G. Bock, Recent advances in parameter identification techniques for ODE, in Numerical Treatment of
+/// Inverse Problems (1983) 95.
 pub fn baseline(subject: &Subject, simulations: &Meter<'_>) -> Option<Start> {
     let whole = pieces::pieces(subject, |role| role == Role::Calibration);
     let in_windows = |count: usize| -> Vec<Piece> {
@@ -91,8 +91,8 @@ fn begin_of_records(whole: &[Piece], windows: &[Piece], fitted: &[Vec<f64>]) -> 
     starts
 }
 
-/// Returns starts from the box of the bounds by a Sobol sequence, in logarithms where the study looks for those; where the box has
-/// no end, from as far to both sides of the start as the start is large.
+/// Returns starts from the box of the bounds by a Sobol sequence, in logarithms where the study looks for those; where
+/// the box has no end, from as far to both sides of the start as the start is large.
 fn spread(subject: &Subject) -> Vec<Vec<f64>> {
     let globals = pieces::globals(subject);
     let start = subject.start();

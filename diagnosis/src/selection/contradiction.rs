@@ -6,8 +6,8 @@ use super::fitted_set::{FittedSet, estimation, rms, surprise};
 use crate::estimation::ErrorModel;
 use crate::fit::{Fit, Point, pieces, problem};
 
-/// Returns true if the errors of calibration and selection records, fitted together, are larger than those of the calibration records
-/// alone, and other than the set and its error model expect.
+/// Returns true if the errors of calibration and selection records, fitted together, are larger than those of the
+/// calibration records alone, and other than the set and its error model expect.
 pub fn is_contradicted(set: &FittedSet<'_>) -> bool {
     *set.contradicted.get_or_init(|| contradicts(set))
 }

@@ -109,16 +109,16 @@ impl FittedSet<'_> {
         most + math::ln(sum / count)
     }
 
-    /// Returns by how much correlated errors are likelier than white noise of fitted size, nats: what shows that the model still
-    /// lacks something. `None` if the set cannot be simulated or no error model could be fitted.
+    /// Returns by how much correlated errors are likelier than white noise of fitted size, nats: what shows that the
+    /// model still lacks something. `None` if the set cannot be simulated or no error model could be fitted.
     pub fn lack_of_fit(&self) -> Option<f64> {
         let (_, likeliest) = self.likeliest()?;
         let white = white_log_likelihood(&self.fit.pieces, &self.fit.all(&self.least_squares.point)?);
         Some(likeliest.log_likelihood - white)
     }
 
-    /// Returns the standard deviation of the white noise of each sensor in noise levels, under the likelier of the smooth error models:
-    /// a rough one takes part of it for an error of the model.
+    /// Returns the standard deviation of the white noise of each sensor in noise levels, under the likelier of the
+    /// smooth error models: a rough one takes part of it for an error of the model.
     pub fn noises(&self) -> Vec<(String, f64)> {
         let smooth =
             self.under.iter().filter(|(kind, _)| *kind != ErrorModel::RoughOutput).map(|(_, estimate)| estimate);
@@ -183,8 +183,9 @@ fn squares(pieces: &[Piece], residuals: &[Vec<f64>]) -> Vec<(f64, f64)> {
     sums
 }
 
-/// Returns by how much residuals of other records are likelier under white noise of their own size than under that of given ones,
-/// nats; channels of smaller residuals do not count. Channels without counterpart are compared with the noise of their sensors.
+/// Returns by how much residuals of other records are likelier under white noise of their own size than under that of
+/// given ones, nats; channels of smaller residuals do not count. Channels without counterpart are compared with the
+/// noise of their sensors.
 pub fn growth(given: (&[Piece], &[Vec<f64>]), others: (&[Piece], &[Vec<f64>])) -> f64 {
     let mean = |(square, count): &(f64, f64)| if *count > 0.0 { square / count } else { 1.0 };
     let known: Vec<f64> = squares(given.0, given.1).iter().map(mean).collect();
@@ -195,8 +196,8 @@ pub fn growth(given: (&[Piece], &[Vec<f64>]), others: (&[Piece], &[Vec<f64>])) -
     squares(others.0, others.1).iter().enumerate().map(of).sum()
 }
 
-/// Returns the log-likelihood of given residuals of records under the likelier error model at the outputs that is fitted to them;
-/// `None` if neither can be fitted.
+/// Returns the log-likelihood of given residuals of records under the likelier error model at the outputs that is
+/// fitted to them; `None` if neither can be fitted.
 fn correlated_log_likelihood(pieces: &[Piece], residuals: &[Vec<f64>], settings: &Settings) -> Option<f64> {
     let channels = Channels::new(pieces);
     let observed = Observed { pieces, channels: &channels, residuals, settings };
@@ -207,14 +208,14 @@ fn correlated_log_likelihood(pieces: &[Piece], residuals: &[Vec<f64>], settings:
     [ErrorModel::SmoothOutput, ErrorModel::RoughOutput].into_iter().filter_map(log).max_by(f64::total_cmp)
 }
 
-/// Returns by how much correlated errors at the outputs are likelier than white noise of fitted size for given residuals of records,
-/// nats; `None` if neither can be fitted.
+/// Returns by how much correlated errors at the outputs are likelier than white noise of fitted size for given
+/// residuals of records, nats; `None` if neither can be fitted.
 pub fn correlation(pieces: &[Piece], residuals: &[Vec<f64>], settings: &Settings) -> Option<f64> {
     Some(correlated_log_likelihood(pieces, residuals, settings)? - white_log_likelihood(pieces, residuals))
 }
 
-/// Returns by how much residuals of other records are likelier under an error model of their own than under a given one at the
-/// outputs, nats; `None` if none can be fitted, or the records have other channels.
+/// Returns by how much residuals of other records are likelier under an error model of their own than under a given one
+/// at the outputs, nats; `None` if none can be fitted, or the records have other channels.
 pub fn surprise(errors: &Errors, pieces: &[Piece], residuals: &[Vec<f64>], settings: &Settings) -> Option<f64> {
     let channels = Channels::new(pieces);
     let is_of_all = matches!(errors, Errors::Output(errors) if errors.len() == channels.count);

@@ -37,8 +37,8 @@ pub struct Forecasts {
 }
 
 impl Forecasts {
-    /// Forecasts with sets, the most probable first, until what follows does not count; fits those with one effect less that this
-    /// needs. Forecasts other records if there are any, else the ends of the calibration records.
+    /// Forecasts with sets, the most probable first, until what follows does not count; fits those with one effect less
+    /// that this needs. Forecasts other records if there are any, else the ends of the calibration records.
     pub fn of<'r, 'a>(mut sets: FittedSets<'r, 'a>) -> (FittedSets<'r, 'a>, Self) {
         let declared = sets.log_posterior(sets.declared());
         let all = sets.sets.iter().filter(|set| !set.key.is_empty());
@@ -104,7 +104,8 @@ impl Forecasts {
         self.tested.get(key).copied()
     }
 
-    /// Returns the smallest share of the mean square error above noise of a set with one effect less that a set removes.
+    /// Returns the smallest share of the mean square error above noise of a set with one effect less that a set
+    /// removes.
     pub fn share(&self, sets: &FittedSets<'_, '_>, key: &Key) -> Option<f64> {
         let kind = self.kinds[0];
         let own = self.error(sets, key, kind)?;
@@ -119,8 +120,8 @@ impl Forecasts {
         Some(share(self.error(sets, key, kind)?, self.error(sets, &Vec::new(), kind)?))
     }
 
-    /// Returns the root mean square error of a set on the records of a role, in noises; `None` if there are none, or the forecast
-    /// fails.
+    /// Returns the root mean square error of a set on the records of a role, in noises; `None` if there are none, or
+    /// the forecast fails.
     pub fn error_on(set: &FittedSet<'_>, role: Role) -> Option<f64> {
         let pieces = pieces::pieces(set.fit.subject, |of| of == role);
         free_run(set, &set.least_squares.point, pieces).map(f64::sqrt)
@@ -189,8 +190,8 @@ pub fn free_run(set: &FittedSet<'_>, point: &Point, pieces: Vec<Piece>) -> Optio
     mean_square(fit.all(&point)?.into_iter().flatten())
 }
 
-/// Fits the initial states of records, with the parameters of a point, to whole records and to beginnings that grow: the better of
-/// both; `None` if there are none, or they cannot be simulated.
+/// Fits the initial states of records, with the parameters of a point, to whole records and to beginnings that grow:
+/// the better of both; `None` if there are none, or they cannot be simulated.
 pub fn with_free_starts<'a>(set: &FittedSet<'a>, point: &Point, pieces: Vec<Piece>) -> Option<(Fit<'a>, Point)> {
     if pieces.is_empty() {
         return None;
@@ -235,7 +236,8 @@ fn beginning<'a>(fit: &Fit<'a>, share: f64) -> Fit<'a> {
     beginning
 }
 
-/// Returns the mean square error in noises at the ends of the calibration records, run on from least squares on their beginnings.
+/// Returns the mean square error in noises at the ends of the calibration records, run on from least squares on their
+/// beginnings.
 fn run_on(set: &FittedSet<'_>) -> Option<f64> {
     let beginning = beginning(&set.fit, set.fit.subject.settings.beginning);
     let ends: Vec<f64> = beginning.pieces.iter().map(|piece| piece.horizon).collect();

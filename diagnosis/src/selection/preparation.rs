@@ -16,8 +16,8 @@ use crate::fit::{Added, Meter};
 use crate::motion::is_covered;
 use crate::records::Subject;
 
-/// Adds effects that the study gives, `effect@place` each, to the fitted declared model, and fits it under the error models: the first
-/// of the sets, whose effects all others have.
+/// Adds effects that the study gives, `effect@place` each, to the fitted declared model, and fits it under the error
+/// models: the first of the sets, whose effects all others have.
 ///
 /// # Errors
 /// An effect that is no candidate or that cannot be fitted, or a model that cannot be fitted under any error model.

@@ -100,8 +100,8 @@ impl<'a> Refit<'a> {
         })
     }
 
-    /// Fits a set roughly under an error model at the outputs whose hyperparameters are given, from the most promising of the starts;
-    /// `None` if all fail. Gives up where the log-likelihood cannot become as large as `least`.
+    /// Fits a set roughly under an error model at the outputs whose hyperparameters are given, from the most promising
+    /// of the starts; `None` if all fail. Gives up where the log-likelihood cannot become as large as `least`.
     pub fn roughly(&self, starts: &[Start], errors: &Errors, least: f64) -> Option<Rough> {
         let mut left = starts.to_vec();
         let mut iterations = 0;
@@ -132,9 +132,10 @@ impl<'a> Refit<'a> {
         Some(Rough { log_likelihood: best.1.log_likelihood, log_evidence: evidence(&best.1), start: best.0 })
     }
 
-    /// Returns a start with other initial states of effects that no derivative has moved from 0, where these describe the records
-    /// clearly better; `None` if there are none. An actuator of limited rate that begins at its command follows at once:
-    /// started beside it, it catches up in a time in proportion to the distance, so that what it adds is of second order.
+    /// Returns a start with other initial states of effects that no derivative has moved from 0, where these describe
+    /// the records clearly better; `None` if there are none. An actuator of limited rate that begins at its command
+    /// follows at once: started beside it, it catches up in a time in proportion to the distance, so that what it adds
+    /// is of second order.
     pub fn with_moved_states(&self, start: &Start) -> Option<Start> {
         let (fit, point, variant) = self.problem(start);
         let declared = self.subject.model.interface().parameters.len();
@@ -170,10 +171,10 @@ impl<'a> Refit<'a> {
         compute(&estimation, &variant, point)
     }
 
-    /// Fits a set under all error models, from its optimum by least squares and from those of the other error models, and makes
-    /// sure that it fits no worse than the sets that it contains.
-    /// The force error, which costs most, is left out if even with the most that it has gained so far over the others the evidence
-    /// would stay below `least`.
+    /// Fits a set under all error models, from its optimum by least squares and from those of the other error models,
+    /// and makes sure that it fits no worse than the sets that it contains.
+    /// The force error, which costs most, is left out if even with the most that it has gained so far over the others
+    /// the evidence would stay below `least`.
     pub fn under_error_models(&self, set: &mut FittedSet<'a>, nested: &[&FittedSet<'a>], least: f64) {
         let estimation = set.estimation(&self.nominal);
         let start = set.least_squares.point.clone();
@@ -264,8 +265,9 @@ impl<'a> Refit<'a> {
         (set.under, set.least_squares) = (under, least_squares);
     }
 
-    /// Returns a set without the declared terms that its effects make superfluous, and their positions among the parameters of the
-    /// study: factors that may be 0, are no larger than their uncertainty, and without which the evidence is larger.
+    /// Returns a set without the declared terms that its effects make superfluous, and their positions among the
+    /// parameters of the study: factors that may be 0, are no larger than their uncertainty, and without which the
+    /// evidence is larger.
     pub fn without_terms(&self, set: &FittedSet<'a>) -> (FittedSet<'a>, Vec<usize>) {
         let (mut set, mut fixed) = (set.clone(), Vec::new());
         for k in 0..if set.key.is_empty() { 0 } else { self.subject.globals.len() } {

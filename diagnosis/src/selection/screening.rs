@@ -21,14 +21,15 @@ const NEAR_GUESS: f64 = 0.3;
 pub struct Screened {
     /// Index of the candidate.
     pub index: usize,
-    /// The candidate with the likeliest of the initial guesses, then with other values of the parameters that no fit moves.
+    /// The candidate with the likeliest of the initial guesses, then with other values of the parameters that no fit
+    /// moves.
     pub guesses: Vec<Added>,
     /// Gain in log-likelihood under each error model, nats.
     pub gains: Vec<f64>,
     /// Share of the squared response in white noise that the unknowns absorb.
     pub absorbed: f64,
-    /// First parameter for which the gain under the likelier correlated error model is half a nat, if the response is in proportion
-    /// to it.
+    /// First parameter for which the gain under the likelier correlated error model is half a nat, if the response is
+    /// in proportion to it.
     pub detectable: Option<f64>,
     /// For each error model the direction of the response.
     directions: Vec<Direction>,
@@ -58,8 +59,8 @@ impl Screened {
     }
 }
 
-/// Returns the position and the value of the largest gain under the correlated error models, which follow the white one; alone
-/// that counts.
+/// Returns the position and the value of the largest gain under the correlated error models, which follow the white
+/// one; alone that counts.
 fn correlated(gains: &[f64]) -> (usize, f64) {
     let counted = gains.iter().copied().enumerate().skip(usize::from(gains.len() > 1));
     counted.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
@@ -150,7 +151,8 @@ impl<'s> Screening<'s> {
         self.projections.iter().map(|p| -0.5 * dot(&p.residuals, &p.residuals)).collect()
     }
 
-    /// Screens candidates by index, the best first, at this point and at another one of the same set: each where it explains more.
+    /// Screens candidates by index, the best first, at this point and at another one of the same set: each where it
+    /// explains more.
     pub fn screen_with(&self, other: &Self, candidates: &[Candidate], wanted: &[usize]) -> Vec<Screened> {
         let bases = [self, other].map(Self::bases);
         let of = |screening: &Self, own: &[f64], theirs: &[f64]| {
@@ -292,7 +294,8 @@ impl<'s> Screening<'s> {
 }
 
 impl Projection<'_> {
-    /// Returns the length of what the unknowns leave of a whitened response, and its direction; `None` if next to nothing is left.
+    /// Returns the length of what the unknowns leave of a whitened response, and its direction; `None` if next to
+    /// nothing is left.
     fn left(&self, mut response: Vec<f64>) -> Option<(f64, Vec<f64>)> {
         let size = dot(&response, &response);
         for _ in 0..2 {
@@ -316,8 +319,8 @@ fn take_out(direction: &[f64], vector: &mut [f64]) {
     }
 }
 
-/// Returns the gain of a pair in log-likelihood, by its normal equations: the larger one of the correlated error models. A
-/// strength of one sign whose sign would be wrong stays out.
+/// Returns the gain of a pair in log-likelihood, by its normal equations: the larger one of the correlated error
+/// models. A strength of one sign whose sign would be wrong stays out.
 pub fn pair_gain(a: &Screened, b: &Screened) -> f64 {
     let of = |(a_direction, b_direction): (&Direction, &Direction)| {
         let (cosine, pa, pb) = (dot(&a_direction.values, &b_direction.values), a_direction.along, b_direction.along);

@@ -22,8 +22,8 @@ const AT_A_TIME: usize = 4;
 const PER_PARAMETER: f64 = 3.0;
 
 impl<'a> FittedSets<'_, 'a> {
-    /// Returns true if a set explains most of the mean square error of the declared model above noise: otherwise its effects describe
-    /// what is missing roughly, whatever their names.
+    /// Returns true if a set explains most of the mean square error of the declared model above noise: otherwise its
+    /// effects describe what is missing roughly, whatever their names.
     fn explains_most(&self, set: &FittedSet<'_>) -> bool {
         let above = |set: &FittedSet<'_>| set.error().map(|error| error * error - 1.0);
         let both = above(set).zip(self.get(&Key::new()).and_then(above));
@@ -39,8 +39,8 @@ impl<'a> FittedSets<'_, 'a> {
         self
     }
 
-    /// Expands the most probable sets until they have all been; the declared model has been. Then exchanges their effects for others of
-    /// their class.
+    /// Expands the most probable sets until they have all been; the declared model has been. Then exchanges their
+    /// effects for others of their class.
     #[must_use]
     pub fn searched(mut self) -> Self {
         // Of sets with the same classes at the same places one is expanded.
@@ -104,7 +104,8 @@ impl<'a> FittedSets<'_, 'a> {
         if key.is_empty() {
             self.screened.clone_from(&screened);
         }
-        // What explains less than it costs is not fitted. On the declared model all may be nonlinear in what it explains.
+        // What explains less than it costs is not fitted. On the declared model all may be nonlinear in what it
+        // explains.
         let price = price(kinds(all));
         let pays = |gain: f64| ALLOWANCE * gain > price;
         let paying = || screened.iter().filter(|screened| pays(screened.correlated()));
@@ -120,7 +121,8 @@ impl<'a> FittedSets<'_, 'a> {
                 singles.push(other);
             }
         }
-        // An edge or a stop bounds the motion on which its first order rests. Where nobody measures that motion, it is tried.
+        // An edge or a stop bounds the motion on which its first order rests. Where nobody measures that motion, it is
+        // tried.
         let bounds = |single: &&Screened| {
             is_missed && all[single.index].has_restarts() && !self.refit.subject.is_measured(&all[single.index].port)
         };
@@ -179,15 +181,16 @@ impl<'a> FittedSets<'_, 'a> {
             let wanted = with(&others, key[k]);
             let Some(screening) = Screening::new(&rest, &[Errors::White]) else { continue };
             let screened = screening.screen(all, &wanted);
-            // The first-order gains of the others are trusted only if that of the effect itself predicts its actual gain.
+            // The first-order gains of the others are trusted only if that of the effect itself predicts its actual
+            // gain.
             let own = screened.iter().find(|own| own.index == key[k]);
             let is_predicted = own.is_some_and(|own| ALLOWANCE * own.gains[0] > white);
             let is_near = |single: &&Screened| {
                 let gain = ALLOWANCE * single.gains[0];
                 single.index != key[k] && (!is_predicted || gain > white - HOPELESS)
             };
-            // Each is fitted with hyperparameters of its own: those of the set are narrow around its own optimum. Where the set
-            // lacks nothing, squares decide. A fit below the set without the effect has failed.
+            // Each is fitted with hyperparameters of its own: those of the set are narrow around its own optimum. Where
+            // the set lacks nothing, squares decide. A fit below the set without the effect has failed.
             let own = self.get(key).filter(|set| !self.lacks_something(set));
             let least = own.map_or(f64::NEG_INFINITY, |set| set.least_squares.log_likelihood - HOPELESS);
             let least = least.max(parent.least_squares.log_likelihood);
@@ -207,8 +210,8 @@ impl<'a> FittedSets<'_, 'a> {
         self.sort();
     }
 
-    /// Fits sets with more effects roughly, by least squares and under the likelier output error of their parent, then those of
-    /// highest evidence under all error models.
+    /// Fits sets with more effects roughly, by least squares and under the likelier output error of their parent, then
+    /// those of highest evidence under all error models.
     fn fit_best(&mut self, parent: &FittedSet<'a>, new: &[Vec<&Screened>], full: usize) {
         let unknown = |new: &&Vec<&Screened>| !self.is_known(&larger(parent, new));
         let new: Vec<&Vec<&Screened>> = new.iter().filter(unknown).collect();
@@ -259,8 +262,8 @@ impl<'a> FittedSets<'_, 'a> {
         self.add_all(sets, HOPELESS);
     }
 
-    /// Fits a set with more effects roughly by least squares: from the optimum of its parent by least squares, and from other
-    /// starts. Gives up where the log-likelihood cannot become as large as `least`.
+    /// Fits a set with more effects roughly by least squares: from the optimum of its parent by least squares, and from
+    /// other starts. Gives up where the log-likelihood cannot become as large as `least`.
     fn by_squares(&self, parent: &FittedSet<'a>, new: &[&Screened], others: &[Start], least: f64) -> Option<Rough> {
         let mut from = starts(parent, &parent.least_squares.point, new);
         from.extend_from_slice(others);

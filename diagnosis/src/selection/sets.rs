@@ -42,9 +42,9 @@ pub struct FittedSets<'r, 'a> {
 }
 
 impl<'r, 'a> FittedSets<'r, 'a> {
-    /// Begins with the declared model, fitted by least squares. A lack of fit is significant if it occurs by chance with
-    /// probability `level`: twice its log-likelihood ratio is chi-squared with two degrees of freedom, the further parameters of
-    /// one error model.
+    /// Begins with the declared model, fitted by least squares. A lack of fit is significant if it occurs by chance
+    /// with probability `level`: twice its log-likelihood ratio is chi-squared with two degrees of freedom, the further
+    /// parameters of one error model.
     pub fn new(refit: &'r Refit<'a>, mut declared: FittedSet<'a>, most: usize, level: f64) -> Self {
         refit.under_error_models(&mut declared, &[], f64::NEG_INFINITY);
         let significant = -math::ln(level);
@@ -74,8 +74,8 @@ impl<'r, 'a> FittedSets<'r, 'a> {
         self.get(&Key::new()).expect("it was fitted first")
     }
 
-    /// Returns the free curves on top of a set under its likeliest error model, the one with the largest gain first; none if a
-    /// simulation fails.
+    /// Returns the free curves on top of a set under its likeliest error model, the one with the largest gain first;
+    /// none if a simulation fails.
     pub fn free_curves(&self, key: &Key) -> Vec<Dependence> {
         let set = self.get(key);
         let likeliest = set.and_then(FittedSet::likeliest).map(|(_, estimate)| estimate);
@@ -91,8 +91,8 @@ impl<'r, 'a> FittedSets<'r, 'a> {
         set.log_evidence() - size * price(kinds(&self.refit.candidates))
     }
 
-    /// Returns true if correlated errors are significantly likelier than white noise at the optimum of a set, or selection records
-    /// contradict it.
+    /// Returns true if correlated errors are significantly likelier than white noise at the optimum of a set, or
+    /// selection records contradict it.
     pub fn lacks_something(&self, set: &FittedSet<'_>) -> bool {
         set.lack_of_fit().is_none_or(|nats| nats > self.significant) || is_contradicted(set)
     }
@@ -122,7 +122,8 @@ impl<'r, 'a> FittedSets<'r, 'a> {
         })
     }
 
-    /// Returns true if an effect of a set is as strong as is physically possible, or at an end of what the records cover.
+    /// Returns true if an effect of a set is as strong as is physically possible, or at an end of what the records
+    /// cover.
     pub fn is_at_limit(&self, set: &FittedSet<'a>) -> bool {
         let motion = OnceCell::new();
         let sizes = |added: &Added| {
@@ -139,8 +140,8 @@ impl<'r, 'a> FittedSets<'r, 'a> {
         set.start_at(&set.least_squares.point).added.iter().any(|added| added.is_at_limit() || !is_shown(added))
     }
 
-    /// Returns the set in whose name a set counts, if that was fitted: the one with a simpler effect in place of one that is this at an
-    /// end of one of its parameters, by least squares or under the likeliest error model.
+    /// Returns the set in whose name a set counts, if that was fitted: the one with a simpler effect in place of one
+    /// that is this at an end of one of its parameters, by least squares or under the likeliest error model.
     pub fn simpler(&self, set: &FittedSet<'a>) -> Option<Key> {
         let likeliest = set.likeliest().map(|(_, estimate)| estimate);
         let estimates = [&set.least_squares].into_iter().chain(likeliest);
@@ -160,7 +161,8 @@ impl<'r, 'a> FittedSets<'r, 'a> {
         })
     }
 
-    /// Returns true if the records allow most values that are tried of a parameter of an effect that no derivative determines.
+    /// Returns true if the records allow most values that are tried of a parameter of an effect that no derivative
+    /// determines.
     fn is_wide(&self, set: &FittedSet<'a>, added: &Added, parameter: usize) -> bool {
         let of = &added.candidate.effect.parameters()[parameter];
         let sets = Sets::Parameter(set.variant.first[Self::position(set, added.candidate.index)] + parameter);
@@ -186,7 +188,8 @@ impl<'r, 'a> FittedSets<'r, 'a> {
         }
     }
 
-    /// Makes sure that sets are fitted under all error models, from sets with one effect more. Returns false if one cannot be.
+    /// Makes sure that sets are fitted under all error models, from sets with one effect more. Returns false if one
+    /// cannot be.
     pub fn ensure(&mut self, keys: &[Key]) -> bool {
         let unknown: Vec<&Key> = keys.iter().filter(|key| self.get(key).is_none()).collect();
         let fitted = |key: &&Key| {
@@ -202,8 +205,8 @@ impl<'r, 'a> FittedSets<'r, 'a> {
         is_complete
     }
 
-    /// Fits those of some sets again that describe the records worse than a probable set with one effect more does without that
-    /// effect: these were in another basin.
+    /// Fits those of some sets again that describe the records worse than a probable set with one effect more does
+    /// without that effect: these were in another basin.
     pub fn correct(&mut self, keys: &[Key]) {
         let best = self.sets.first().map_or(f64::NEG_INFINITY, |first| self.log_posterior(first));
         let corrected = |key: &Key| {
@@ -243,7 +246,8 @@ impl<'r, 'a> FittedSets<'r, 'a> {
         }
     }
 
-    /// Fits sets under the error models that can bring them within a margin of the highest evidence, nats, and adds them.
+    /// Fits sets under the error models that can bring them within a margin of the highest evidence, nats, and adds
+    /// them.
     fn add(&mut self, sets: Vec<FittedSet<'a>>, margin: f64) {
         let best = self.sets.iter().map(FittedSet::log_evidence).fold(f64::NEG_INFINITY, f64::max);
         self.add_under(sets, best - margin);
@@ -272,7 +276,8 @@ impl<'r, 'a> FittedSets<'r, 'a> {
         nested.iter().copied().chain(declared).collect()
     }
 
-    /// Returns the values of a set at its optimum without the effect that another one lacks; `None` if that is not one effect less.
+    /// Returns the values of a set at its optimum without the effect that another one lacks; `None` if that is not one
+    /// effect less.
     fn reduced(&self, larger: &FittedSet<'a>, key: &Key) -> Option<Start> {
         let is_extra = |added: &Added| !key.contains(&added.candidate.index);
         let contains = key.iter().all(|k| larger.key.contains(k)) && larger.key.len() == key.len() + 1;
@@ -309,7 +314,8 @@ pub fn without(key: &Key, index: usize) -> Key {
     smaller
 }
 
-/// Returns the number of candidates that the prior counts: one that acts in a single record counts once for all records.
+/// Returns the number of candidates that the prior counts: one that acts in a single record counts once for all
+/// records.
 pub fn kinds(candidates: &[Candidate]) -> usize {
     let same = |a: &Candidate, b: &Candidate| {
         a.effect.name() == b.effect.name() && a.port == b.port && a.companion == b.companion

@@ -35,7 +35,8 @@ const NOISE: f64 = 5e-3;
 const STEP: f64 = 0.05;
 const COUNT: usize = 300;
 
-/// Oscillator with a further force, driven by two sines, measured with white noise and an error that is correlated over 0.5 s.
+/// Oscillator with a further force, driven by two sines, measured with white noise and an error that is correlated over
+/// 0.5 s.
 fn recorded(force: fn(x: f64, v: f64) -> f64, correlated: f64, roles: &[Role], start: &[f64; 4]) -> Subject {
     let record = |number: usize| {
         #[allow(clippy::cast_precision_loss)]

@@ -51,11 +51,13 @@ pub struct Verdict {
     pub set: Key,
     /// Sets with an effect that does nothing or is at a limit, and those that are simpler ones in all but name.
     pub excluded: Vec<Key>,
-    /// Sets that passed, with their posterior probabilities; those that are simpler ones in all but name under the keys of these.
+    /// Sets that passed, with their posterior probabilities; those that are simpler ones in all but name under the keys
+    /// of these.
     pub passed: Vec<(Key, f64)>,
     /// True if selection records contradict what the set and its error model expect.
     pub is_contradicted: bool,
-    /// True if most remains: a free curve on top of the set shows it, selection records contradict, or the set is not first.
+    /// True if most remains: a free curve on top of the set shows it, selection records contradict, or the set is not
+    /// first.
     pub is_refused: bool,
     /// True if a free curve on top of the set fires: its effects are the best description of what is missing, no more.
     pub is_description: bool,
@@ -69,8 +71,8 @@ pub struct Verdict {
     pub is_first: bool,
     /// Curves on top of the set under its likeliest error model, that with the largest gain first; none without a set.
     pub remaining: Vec<Dependence>,
-    /// Gain of correlated errors over white noise of fitted size in log-likelihood at the declared model on calibration records,
-    /// nats.
+    /// Gain of correlated errors over white noise of fitted size in log-likelihood at the declared model on calibration
+    /// records, nats.
     pub lack_of_fit: f64,
 }
 
@@ -180,8 +182,8 @@ pub fn decide(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> Verdict {
     }
 }
 
-/// Returns classes and places of effects that the records cannot distinguish from those of an entry of a set: in place of one of them, what
-/// they change in the outputs is the same.
+/// Returns classes and places of effects that the records cannot distinguish from those of an entry of a set: in place
+/// of one of them, what they change in the outputs is the same.
 fn alike(sets: &FittedSets<'_, '_>, set: &Key, own: &Entry, weights: &[(Key, f64)]) -> Vec<Entry> {
     let candidates = &sets.refit.candidates;
     let mut all: Vec<Entry> = Vec::new();
@@ -195,8 +197,8 @@ fn alike(sets: &FittedSets<'_, '_>, set: &Key, own: &Entry, weights: &[(Key, f64
     all
 }
 
-/// Returns the effect of a set and that of another one in its place if nothing else differs, and the records cannot distinguish what the two
-/// change in the outputs.
+/// Returns the effect of a set and that of another one in its place if nothing else differs, and the records cannot
+/// distinguish what the two change in the outputs.
 fn swapped(sets: &FittedSets<'_, '_>, set: &Key, other: &Key) -> Option<[usize; 2]> {
     let only = |a: &Key, b: &Key| {
         let mut own = a.iter().filter(|k| !b.contains(k));
@@ -224,8 +226,9 @@ fn entries_of(sets: &FittedSets<'_, '_>, key: &Key) -> Vec<Entry> {
     entries
 }
 
-/// Returns the first of the sets that passed, or the simplest one that says the same, unless the evidence for the first is strong: with the fewest parameters
-/// among those of the same classes and places, and those that the records cannot distinguish from it.
+/// Returns the first of the sets that passed, or the simplest one that says the same, unless the evidence for the first
+/// is strong: with the fewest parameters among those of the same classes and places, and those that the records cannot
+/// distinguish from it.
 fn simplest(sets: &FittedSets<'_, '_>, passed: &[Key]) -> Key {
     let Some(first) = passed.first() else { return Key::new() };
     let log = |key: &Key| sets.get(key).map_or(f64::NEG_INFINITY, |set| sets.log_posterior(set));
@@ -240,8 +243,9 @@ fn simplest(sets: &FittedSets<'_, '_>, passed: &[Key]) -> Key {
     passed.iter().filter(is_alike).min_by_key(|key| parameters(key)).unwrap_or(first).clone()
 }
 
-/// Returns the lack of fit of a model and its largest error of a record: on calibration records, then on these and selection records
-/// together, if any. There it is either correlation, or errors that are larger than on the former alone.
+/// Returns the lack of fit of a model and its largest error of a record: on calibration records, then on these and
+/// selection records together, if any. There it is either correlation, or errors that are larger than on the former
+/// alone.
 fn lacks(set: &FittedSet<'_>) -> Vec<(f64, f64)> {
     let on_calibration = (set.lack_of_fit().unwrap_or(f64::INFINITY), set.largest_error().unwrap_or(f64::INFINITY));
     if !set.fit.subject.measurements.iter().any(|m| m.role == Role::Selection) {

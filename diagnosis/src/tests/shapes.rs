@@ -1,5 +1,5 @@
-//! Shapes: of those that no fit moves the value that the screening likes best need not be the right one, and the data may
-//! allow several; a wave along a rail need not be a whole number.
+//! Shapes: of those that no fit moves the value that the screening likes best need not be the right one, and the data
+//! may allow several; a wave along a rail need not be a whole number.
 
 use std::f64::consts::TAU;
 

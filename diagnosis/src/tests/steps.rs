@@ -1,4 +1,5 @@
-//! Stairs have no slope: the size of steps is searched for, and a gain that makes up for a wrong size does not hide the right one.
+//! Stairs have no slope: the size of steps is searched for, and a gain that makes up for a wrong size does not hide the
+//! right one.
 
 use mops_core::{Input, case::Hold};
 use mops_effects::effects;
@@ -25,7 +26,8 @@ fn stairs(value: f64, size: f64) -> f64 {
     if size > 0.0 { size * (value / size).round() } else { value }
 }
 
-/// What a search finds first, its strength and what it leaves, where input and measurement come in steps of these sizes.
+/// What a search finds first, its strength and what it leaves, where input and measurement come in steps of these
+/// sizes.
 fn found(input: f64, measurement: f64) -> (String, f64, f64) {
     let held = |t: f64| command((t / STEP).floor() * STEP);
     let rates = |t: f64, x: &[f64; 1]| [1.3 * stairs(held(t), input) - 0.9 * x[0]];

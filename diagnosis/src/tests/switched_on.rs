@@ -15,8 +15,8 @@ der        = { x = "x' = k*u - d*x" }
 /// V/s.
 const RATE: f64 = 2.0;
 
-/// A record in which the command is `first` for 4 s, then `next`, and the pump, which follows no faster than [`RATE`], begins at
-/// `begins`.
+/// A record in which the command is `first` for 4 s, then `next`, and the pump, which follows no faster than [`RATE`],
+/// begins at `begins`.
 fn pumped(begins: f64, first: f64, next: f64) -> Record {
     let command = |t: f64| if t < 4.0 { first } else { next };
     let rates = |t: f64, x: &[f64; 2]| {

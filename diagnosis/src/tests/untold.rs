@@ -16,7 +16,8 @@ der        = { th = "w", w = "w' = -g*sin(th) - b*w" }
 const NOISE: f64 = 0.002;
 const FRICTION: f64 = 0.8;
 
-/// The pendulum let go at an angle, with dry friction of the same size at rest as in motion, for so many samples with this noise.
+/// The pendulum let go at an angle, with dry friction of the same size at rest as in motion, for so many samples with
+/// this noise.
 fn let_go(samples: usize, noise: &str) -> Diagnosis {
     let rates =
         |_: f64, x: &[f64; 2]| [x[1], -17.7 * math::sin(x[0]) - 0.15 * x[1] - FRICTION * math::tanh(x[1] / 1e-3)];

@@ -5,8 +5,9 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Random search in a shrinking box: each iteration draws points from a box around the best one, evaluates all of them in one
-/// batch, and moves to the best. If none is better, the box shrinks. Uses no gradients, and accepts criteria of any kind.
+/// Random search in a shrinking box: each iteration draws points from a box around the best one, evaluates all of them
+/// in one batch, and moves to the best. If none is better, the box shrinks. Uses no gradients, and accepts criteria of
+/// any kind.
 ///
 /// Source: R. Luus, T. H. I. Jaakola, AIChE Journal 19 (1973) 760-766.
 /// N.B.: there the box shrinks after every iteration; here only after one without improvement.

@@ -1,7 +1,7 @@
 //! The study `suspension`, built in Rust: its model and one of its criteria are closures.
 //!
-//! A wheel `m x'' = -k x - d x'` is hit by a pothole that gives it a speed of 1 m/s. Spring and damper shall let it settle soon
-//! and shake its load little.
+//! A wheel `m x'' = -k x - d x'` is hit by a pothole that gives it a speed of 1 m/s. Spring and damper shall let it
+//! settle soon and shake its load little.
 
 use mops::{criteria::settling_time::SettlingTime, prelude::*};
 

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 /// How far each tuner can move from its value, alone and in each direction, until a demand is missed.
 ///
-/// Each limit is found by halving the distance to the bound of the tuner. A demand that is missed and met again farther away is not
-/// noticed.
+/// Each limit is found by halving the distance to the bound of the tuner. A demand that is missed and met again farther
+/// away is not noticed.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct TolerancesTask {

@@ -172,7 +172,8 @@ impl Lowering<'_> {
         }
     }
 
-    /// Adds a selection of a function: `a` if `condition` is positive, else `b`. One that varies is noted, as it may open a loop.
+    /// Adds a selection of a function: `a` if `condition` is positive, else `b`. One that varies is noted, as it may
+    /// open a loop.
     fn select(&mut self, text: &Text, function: Function, condition: Id, [a, b]: [Id; 2]) -> Id {
         let taken = self.graph.choose(condition, a, b);
         if self.graph.level(condition) == Level::Variable && a != b {

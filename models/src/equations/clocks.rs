@@ -22,8 +22,9 @@ impl<S> Ticking<S> {
         Self { next: None, pending: None }
     }
 
-    /// Begins at `t`, s, with the first instant from then on: a simulation that begins in the middle of a record continues with the phase
-    /// of its clock. Returns the time at which the values of the instant before it reach the memory, if that is later.
+    /// Begins at `t`, s, with the first instant from then on: a simulation that begins in the middle of a record
+    /// continues with the phase of its clock. Returns the time at which the values of the instant before it reach the
+    /// memory, if that is later.
     fn begin(&mut self, clock: &Clock, t: f64) -> Option<f64> {
         let at = |number: f64| clock.offset + number * clock.period;
         // Rounding may have passed an instant that is due.
@@ -42,7 +43,8 @@ impl<S> Ticking<S> {
         self.pending.as_ref().map_or(tick, |(at, _)| at.min(tick))
     }
 
-    /// Returns the time at which computed values reach the memory, if an instant is due at `t`, and moves on to the next one.
+    /// Returns the time at which computed values reach the memory, if an instant is due at `t`, and moves on to the
+    /// next one.
     fn tick(&mut self, clock: &Clock, t: f64) -> Option<f64> {
         let Some(next) = self.next else { return self.begin(clock, t).or_else(|| self.tick(clock, t)) };
         let is_due = is_due(clock.offset + next * clock.period, t);
@@ -52,7 +54,8 @@ impl<S> Ticking<S> {
 }
 
 impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
-    /// Changes the memory of all clocks that are due. Values that were computed earlier reach the memory before it is read.
+    /// Changes the memory of all clocks that are due. Values that were computed earlier reach the memory before it is
+    /// read.
     pub(super) fn tick(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
         let model = self.model;
         for (clock, ticking) in model.clocks.iter().zip(&mut self.ticking) {

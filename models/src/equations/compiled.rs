@@ -104,8 +104,8 @@ pub struct Compiled {
     pub switches: Vec<Switch>,
     /// Arguments that must increase: description and whether strictly; computes pairs of low and high.
     pub orders: (Vec<(String, bool)>, Program),
-    /// Places of the values that conditions select, with the rates and delayed quantities that they act on; computes each value and the
-    /// other one.
+    /// Places of the values that conditions select, with the rates and delayed quantities that they act on; computes
+    /// each value and the other one.
     pub selections: (Vec<(String, Vec<usize>)>, Program),
     /// Joints with dry friction.
     pub joints: Vec<Joint>,

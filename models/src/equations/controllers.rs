@@ -238,8 +238,8 @@ fn is_plain(options: &EquationsOptions) -> bool {
         && texts.all(|text| !text.contains(" [") && !text.contains('"'))
 }
 
-/// Returns the unit of a number without one: that of the output for its limits, that of the measured quantity for the setpoint,
-/// s for times. `None` for the unit that the equations require, which counts in SI units.
+/// Returns the unit of a number without one: that of the output for its limits, that of the measured quantity for the
+/// setpoint, s for times. `None` for the unit that the equations require, which counts in SI units.
 fn unit_of_number(
     options: &EquationsOptions,
     pid: &Pid,

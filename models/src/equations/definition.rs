@@ -421,8 +421,8 @@ impl Definition {
 }
 
 impl Definition {
-    /// Cuts the loop at a named expression, which has this unit unless an output declares it, or at the memory of a clock: an input of
-    /// this name acts in its place; the output that follows the others is minus the expression.
+    /// Cuts the loop at a named expression, which has this unit unless an output declares it, or at the memory of a
+    /// clock: an input of this name acts in its place; the output that follows the others is minus the expression.
     ///
     /// # Errors
     /// There is no such variable.
@@ -476,8 +476,8 @@ impl Definition {
         found.map(|state| state.name.as_str())
     }
 
-    /// Cuts the loop at the memory of a clock, which keeps its value under another name. Its own next value is computed from it, for
-    /// example by an increment; all others use the input.
+    /// Cuts the loop at the memory of a clock, which keeps its value under another name. Its own next value is computed
+    /// from it, for example by an increment; all others use the input.
     fn cut_memory(&mut self, state: usize) {
         let declared = &mut self.states[state];
         let (name, unit, path) = (declared.name.clone(), declared.unit.difference(), declared.path.clone());

@@ -72,8 +72,9 @@ fn add(clock: &mut Clock, output: &str, filter: &Filter) -> Result<(), StudyErro
     Ok(())
 }
 
-/// Returns the difference equations of `y(z) = (b0 + b1/z + ..)/(1 + a1/z + ..) e(z)` in the transposed direct form II: `y = b0 e + m1`,
-/// then `m1 = b1 e - a1 y + m2` and so on. The coefficients are in descending powers of z, of equal number; `None` for zero.
+/// Returns the difference equations of `y(z) = (b0 + b1/z + ..)/(1 + a1/z + ..) e(z)` in the transposed direct form II:
+/// `y = b0 e + m1`, then `m1 = b1 e - a1 y + m2` and so on. The coefficients are in descending powers of z, of equal
+/// number; `None` for zero.
 ///
 /// Source: A. V. Oppenheim, R. W. Schafer, Discrete-Time Signal Processing, 3rd edition (2010), section 6.3.4.
 fn direct_form(above: &[Option<String>], below: &[Option<String>], e: &str, memory: Memory<'_>) -> Difference {
@@ -155,21 +156,23 @@ fn checked(of: &Polynomials, key: &str) -> Result<(), StudyError> {
     Ok(())
 }
 
-/// Returns the bilinear (Tustin) transform: `s = K (z - 1)/(z + 1)` with `K = 2/T`, or `K = w/tan(w T/2)`, so that the gain at the
-/// angular frequency `w` is that of the continuous filter.
+/// Returns the bilinear (Tustin) transform: `s = K (z - 1)/(z + 1)` with `K = 2/T`, or `K = w/tan(w T/2)`, so that the
+/// gain at the angular frequency `w` is that of the continuous filter.
 ///
-/// The filter `(b0 s^n + b1 s^(n-1) + ..)/(a0 s^n + ..)` is a chain of integrators in observer form, integrated by the trapezoidal rule.
-/// With `B_k = (b_k K^(n-k) + .. + b_n)/S`, `A_k` alike of the denominator and `S` so that `A_0 = 1`, it is
+/// The filter `(b0 s^n + b1 s^(n-1) + ..)/(a0 s^n + ..)` is a chain of integrators in observer form, integrated by the
+/// trapezoidal rule. With `B_k = (b_k K^(n-k) + .. + b_n)/S`, `A_k` alike of the denominator and `S` so that `A_0 = 1`,
+/// it is
 ///
 /// ```text
 /// y = B_0 e + m1 + .. + mn,   mk[next] = mk + 2 (B_k e - A_k y + m(k+1) + .. + mn)
 /// ```
 ///
-/// The memory changes by small amounts where the sampling is fast. The coefficients of the polynomials in z would lose digits there, all
-/// beyond `1e-16/(w T)^n`.
+/// The memory changes by small amounts where the sampling is fast. The coefficients of the polynomials in z would lose
+/// digits there, all beyond `1e-16/(w T)^n`.
 ///
-/// Sources: K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd edition (1997), section 8.3; G. C. Goodwin, R. H. Middleton,
-/// H. V. Poor, High-speed digital signal processing and control, Proceedings of the IEEE 80 (1992) 240-259 (changes, not shifts).
+/// Sources: K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd edition (1997), section 8.3; G. C. Goodwin,
+/// R. H. Middleton, H. V. Poor, High-speed digital signal processing and control, Proceedings of the IEEE 80 (1992)
+/// 240-259 (changes, not shifts).
 fn bilinear(
     clock: &Clock,
     filter: &Filter,
@@ -234,8 +237,8 @@ pub(super) fn in_brackets(time: &Formula) -> String {
 
 /// Returns a frequency as an angular frequency in an expression.
 ///
-/// The factor of the transform is positive below half of the sampling frequency only. If the period depends on parameters, a
-/// frequency above makes the filter undefined.
+/// The factor of the transform is positive below half of the sampling frequency only. If the period depends on
+/// parameters, a frequency above makes the filter undefined.
 fn angular(frequency: &Quantity, clock: &Clock) -> Result<String, StudyError> {
     let value = frequency.to(&Unit::known("rad/s")).map_err(|why| StudyError::new("prewarp", why))?;
     let value = if frequency.unit.is_none() { std::f64::consts::TAU * frequency.number } else { value };
@@ -265,8 +268,8 @@ fn in_seconds(coefficient: &Formula, power: usize) -> String {
     }
 }
 
-/// Returns the list with a number as coefficient of `s^n`, n above 0, beside formulas, which may have the unit of another convention,
-/// and how to write the number then.
+/// Returns the list with a number as coefficient of `s^n`, n above 0, beside formulas, which may have the unit of
+/// another convention, and how to write the number then.
 pub(super) fn number_before_formulas(filter: &Filter) -> Option<(&'static str, String)> {
     let of = filter.continuous.as_ref()?;
     let is_number = |coefficient: &Formula| coefficient.0.trim().parse::<f64>().is_ok();
@@ -286,7 +289,8 @@ pub(super) fn number_before_formulas(filter: &Filter) -> Option<(&'static str, S
     })
 }
 
-/// Returns the filter whose output at the instants is that of the continuous one for an input that is constant in between.
+/// Returns the filter whose output at the instants is that of the continuous one for an input that is constant in
+/// between.
 ///
 /// Source: K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd edition (1997), section 2.3.
 fn step_invariant(

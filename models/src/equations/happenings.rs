@@ -27,7 +27,8 @@ pub(super) enum Phase {
 /// remains after accumulated events (see [`crate::kernel`]), so that a wrong rest state is detected.
 const NEAR: f64 = 1e-6;
 
-/// Size of a guard after an event, relative to the largest state, that counts as 0: above the rounding of a zero crossing.
+/// Size of a guard after an event, relative to the largest state, that counts as 0: above the rounding of a zero
+/// crossing.
 const AT_ZERO: f64 = 1e-9;
 
 impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
@@ -94,8 +95,9 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
     }
 
     /// Arms an event if its guard is positive or increases. After a reset that reverses the guard, rounding may leave
-    /// the guard negative; if nothing moves any more, the guard is 0. A guard that stays negative, as after a jump of an input, arms the
-    /// event when it is positive again. A guard that the reset itself `places` at 0 happens again if it falls: the events accumulate.
+    /// the guard negative; if nothing moves any more, the guard is 0. A guard that stays negative, as after a jump of
+    /// an input, arms the event when it is positive again. A guard that the reset itself `places` at 0 happens again if
+    /// it falls: the events accumulate.
     fn arm(&mut self, k: usize, event: &EventInstant<'_, S>, x: &[S], places: bool) {
         self.phases[k] = Phase::Armed(0.0);
         let at = Instant { x, ..event.at };

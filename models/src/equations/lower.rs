@@ -102,7 +102,8 @@ enum Meaning {
 pub(super) enum Kinks {
     ByMode,
     AsTheyStand,
-    /// Kinks and jumps by the current values, without events: the expression is evaluated at the instants of a clock only.
+    /// Kinks and jumps by the current values, without events: the expression is evaluated at the instants of a clock
+    /// only.
     Sampled,
 }
 
@@ -291,8 +292,8 @@ impl<'d> Lowering<'d> {
         ))
     }
 
-    /// Lowers a delayed quantity: an input after the declared ones and the forces. Its expression is lowered later, so that it may
-    /// depend on itself.
+    /// Lowers a delayed quantity: an input after the declared ones and the forces. Its expression is lowered later, so
+    /// that it may depend on itself.
     pub(super) fn delayed(&mut self, text: &Text, arguments: &[Node]) -> Result<Id, StudyError> {
         let [of, time] = arguments else { unreachable!("the parser requires two arguments") };
         let is_same = |delayed: &Delayed| {

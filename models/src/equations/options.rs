@@ -31,12 +31,12 @@ use crate::kernel::Tolerance;
 /// `> >= < <=`, `and`, `or`, `not`. A step of the integrator ends where a function with kinks or jumps, a table or an
 /// `if` changes its branch. So no step crosses a kink or a jump.
 ///
-/// `tables.torque = { file = "motor.csv", x = "speed", y = "torque" }` makes `torque(w)` a lookup table, linear or a monotone spline
-/// between its points; `eta(w, T)` has two arguments.
+/// `tables.torque = { file = "motor.csv", x = "speed", y = "torque" }` makes `torque(w)` a lookup table, linear or a
+/// monotone spline between its points; `eta(w, T)` has two arguments.
 ///
-/// `delay(x, "50 ms")` is the value of `x` at an earlier time; `x` is any expression, and before the start it is constant. The
-/// time is a quantity, or an expression of parameters and constants. A step ends where a jump of `x` or of its
-/// derivatives arrives.
+/// `delay(x, "50 ms")` is the value of `x` at an earlier time; `x` is any expression, and before the start it is
+/// constant. The time is a quantity, or an expression of parameters and constants. A step ends where a jump of `x` or
+/// of its derivatives arrives.
 ///
 /// Expressions use coherent SI units for all quantities, whatever unit they are declared in, and their dimensions are
 /// checked. A number in a product is a pure number. A number that is a whole term has the SI unit of the other terms.
@@ -57,22 +57,22 @@ use crate::kernel::Tolerance;
 /// control = { every = "10 ms", delay = "2 ms", memory = { u = "N m", i = "rad" }, next = { i = "i + e", u = "k*e + ki*i" } }
 /// ```
 ///
-/// At the instants `offset + k every`, the values `next` are computed from the states and memory just before, and the inputs
-/// then; the memory takes them after `delay`, and is constant in between. Clocks that are due at the same instant read the same values.
-/// A memory is a signal and has an initial value, like a state. `next = { y_k = "y" }` keeps a sample of `y`. A controller may also
-/// be given by its transfer function, in z or in s: `filter = { u = { of = "r - y", continuous = { numerator = ["k*Ti", "k"],
-/// denominator = ["Ti", 0] }, method = "tustin", prewarp = "5 Hz" } }`; its memory is added.
+/// At the instants `offset + k every`, the values `next` are computed from the states and memory just before, and the
+/// inputs then; the memory takes them after `delay`, and is constant in between. Clocks that are due at the same
+/// instant read the same values. A memory is a signal and has an initial value, like a state. `next = { y_k = "y" }`
+/// keeps a sample of `y`. A controller may also be given by its transfer function, in z or in s:
+/// `filter = { u = { of = "r - y", continuous = { numerator = ["k*Ti", "k"], denominator = ["Ti", 0] }, method = "tustin", prewarp = "5 Hz" } }`; its memory is added.
 ///
-/// `pid.u = { setpoint = "r", measured = "y", k = "k", Ti = "Ti" }` is a PID controller, continuous or sampled, whose output takes
-/// the place of the input `u`.
+/// `pid.u = { setpoint = "r", measured = "y", k = "k", Ti = "Ti" }` is a PID controller, continuous or sampled, whose
+/// output takes the place of the input `u`.
 ///
 /// A state whose derivative is another state, such as `th` above, is a joint. Its friction is given as
 /// `friction.th = { coulomb = "c" }`; a stuck joint is exactly at rest. The places of possible missing effects are
 /// the joints, the equations of the states, the inputs and the signals.
 ///
-/// The linearisation of a model with clocks is its discrete equivalent, for inputs that are constant between the instants of the slowest
-/// clock. A loop is cut with `open` at the memory of the slowest clock, or at an expression of `let` that depends on
-/// it only.
+/// The linearisation of a model with clocks is its discrete equivalent, for inputs that are constant between the
+/// instants of the slowest clock. A loop is cut with `open` at the memory of the slowest clock, or at an expression of
+/// `let` that depends on it only.
 ///
 /// Source: F. Cellier, E. Kofman, Continuous System Simulation (2006), chapters 7 (sorting and solving equations) and 9
 /// (discontinuities); A. Bellen, M. Zennaro, Numerical Methods for Delay Differential Equations (2003), section 3.2.
@@ -118,8 +118,8 @@ pub struct EquationsOptions {
     /// "-k*x" } }`.
     #[serde(default)]
     pub(super) clocks: Entries<Clock>,
-    /// PID controllers: `pid.u = { setpoint = "r", measured = "y", k = "k", Ti = "Ti", limit = ["-24 V", "24 V"] }` computes `u`,
-    /// in place of the input `u` if there is one.
+    /// PID controllers: `pid.u = { setpoint = "r", measured = "y", k = "k", Ti = "Ti", limit = ["-24 V", "24 V"] }`
+    /// computes `u`, in place of the input `u` if there is one.
     #[serde(default)]
     pub(super) pid: Entries<Pid>,
     /// Lookup tables, used as functions in expressions: `torque = { file = "motor.csv", x = "speed", y = "torque" }`.
@@ -252,7 +252,8 @@ pub(super) struct Clock {
     /// New values of the memory, computed from the states and memory just before the instant and the inputs then.
     #[serde(default)]
     pub next: Entries<Formula>,
-    /// Memory that is the output of a filter: `u = { of = "r - y", continuous = { numerator = ["k*Ti", "k"], denominator =
+    /// Memory that is the output of a filter:
+    /// `u = { of = "r - y", continuous = { numerator = ["k*Ti", "k"], denominator =
     /// ["Ti", 0] } }`.
     #[serde(default)]
     pub filter: Entries<Filter>,
@@ -262,14 +263,15 @@ pub(super) struct Clock {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct Table {
-    /// Data file: CSV, or MATLAB level 4 or 5; `x`, `y` and `z` are then names of columns. Units are those of its header.
+    /// Data file: CSV, or MATLAB level 4 or 5; `x`, `y` and `z` are then names of columns. Units are those of its
+    /// header.
     pub file: Option<String>,
     /// Values of the argument, increasing; numbers without a unit are in SI units.
     pub x: Points,
     /// Values of the table, or with `z` those of the second argument.
     pub y: Points,
-    /// Values of a table with two arguments: one row for every `y`, with one value for every `x`; in a file, one value per row of the
-    /// file, for every pair of `x` and `y`.
+    /// Values of a table with two arguments: one row for every `y`, with one value for every `x`; in a file, one value
+    /// per row of the file, for every pair of `x` and `y`.
     pub z: Option<Grid>,
     /// `linear` (default), or `monotone`: a cubic spline that has no extrema between the points; with one argument.
     #[serde(default)]
@@ -331,16 +333,17 @@ pub(super) struct Filter {
     pub z: Option<Polynomials>,
     /// Transfer function in s, which `method` makes discrete.
     pub continuous: Option<Polynomials>,
-    /// `tustin` (default): bilinear transform. `zero-order-hold`: exact for an input that is constant between the instants.
+    /// `tustin` (default): bilinear transform. `zero-order-hold`: exact for an input that is constant between the
+    /// instants.
     pub method: Option<Method>,
     /// Frequency at which the bilinear transform keeps the frequency response; a number without a unit is in Hz.
     pub prewarp: Option<Quantity>,
 }
 
 /// PID controller with filtered derivative:
-/// `v = k (wp r - y + 1/(Ti s) (r - y) + Td s/(Td/Nd s + 1) (wd r - y)) + feedforward`, and the output is `v` within its limits.
-/// Values are quantities or expressions. A number without a unit is in the unit of the output for `limit` and `feedforward`, in that
-/// of the measured quantity for `setpoint`, in s for times, and in SI units for `k`.
+/// `v = k (wp r - y + 1/(Ti s) (r - y) + Td s/(Td/Nd s + 1) (wd r - y)) + feedforward`, and the output is `v` within
+/// its limits. Values are quantities or expressions. A number without a unit is in the unit of the output for `limit`
+/// and `feedforward`, in that of the measured quantity for `setpoint`, in s for times, and in SI units for `k`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct Pid {
@@ -382,7 +385,8 @@ pub(super) struct Pid {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct Polynomials {
-    /// Coefficients in descending powers: numbers, or expressions of parameters and constants. A number before `s^n` is in `s^n`.
+    /// Coefficients in descending powers: numbers, or expressions of parameters and constants. A number before `s^n` is
+    /// in `s^n`.
     pub numerator: Vec<Formula>,
     /// Coefficients in descending powers, at least as many as in the numerator.
     pub denominator: Vec<Formula>,

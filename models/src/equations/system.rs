@@ -222,8 +222,8 @@ impl System {
         })
     }
 
-    /// Returns the selections that act on rates, on new values of memory or on delayed quantities, with the numbers of these: those of the
-    /// states, then the delayed quantities.
+    /// Returns the selections that act on rates, on new values of memory or on delayed quantities, with the numbers of
+    /// these: those of the states, then the delayed quantities.
     pub fn acting_selections(&self) -> Vec<(&Selection, Vec<usize>)> {
         let of_memory = self.clocks.iter().flat_map(|clock| clock.memory.clone().zip(clock.next.iter().copied()));
         let first = self.derivatives.len();

@@ -192,9 +192,9 @@ impl Lookup {
 
     /// Returns the monotone cubic spline, with straight lines beyond its ends.
     ///
-    /// Source: F. N. Fritsch, R. E. Carlson, Monotone piecewise cubic interpolation, SIAM Journal on Numerical Analysis 17 (1980)
-    /// 238-246; slopes at the points: F. N. Fritsch, J. Butland, A method for constructing local monotone piecewise cubic
-    /// interpolants, SIAM Journal on Scientific and Statistical Computing 5 (1984) 300-304.
+    /// Source: F. N. Fritsch, R. E. Carlson, Monotone piecewise cubic interpolation, SIAM Journal on Numerical Analysis
+    /// 17 (1980) 238-246; slopes at the points: F. N. Fritsch, J. Butland, A method for constructing local monotone
+    /// piecewise cubic interpolants, SIAM Journal on Scientific and Statistical Computing 5 (1984) 300-304.
     fn spline(&self, at: &Node, span: &std::ops::Range<usize>) -> Node {
         let node = |form: Form| Node { form, span: span.clone() };
         let (x, y) = (&self.x.values, &self.y.values);
@@ -231,8 +231,8 @@ impl Lookup {
     }
 }
 
-/// Returns the slopes of the monotone spline at its points: weighted harmonic means of the secants, 0 at extrema; secants at the
-/// ends.
+/// Returns the slopes of the monotone spline at its points: weighted harmonic means of the secants, 0 at extrema;
+/// secants at the ends.
 fn slopes(x: &[f64], y: &[f64]) -> Vec<f64> {
     let secant = |k: usize| (y[k + 1] - y[k]) / (x[k + 1] - x[k]);
     let last = x.len() - 1;

@@ -1,8 +1,8 @@
 //! Explicit Runge-Kutta method of Dormand and Prince: order 5(4), dense output of order 4.
 //!
 //! Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition (1993), table
-//! II.5.2 (coefficients), section II.6 (dense output); E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd
-//! edition (1996), section IV.2 (largest eigenvalue from the last two stages, which belong to one time).
+//! II.5.2 (coefficients), section II.6 (dense output); E. Hairer, G. Wanner, Solving Ordinary Differential Equations
+//! II, 2nd edition (1996), section IV.2 (largest eigenvalue from the last two stages, which belong to one time).
 
 use mops_core::{Plant, model::Work};
 use mops_language::Scalar;
@@ -12,11 +12,12 @@ use super::integrable::{Integrable, WithInputs};
 use super::integrate::{Attempt, Method};
 use super::weights::Weights;
 
-/// Longest stable step times the size of a decaying eigenvalue. The method is stable up to 3.3 along the real axis; at 2.5 it
-/// multiplies a mode by 0.24.
+/// Longest stable step times the size of a decaying eigenvalue. The method is stable up to 3.3 along the real axis; at
+/// 2.5 it multiplies a mode by 0.24.
 const STABLE: f64 = 2.5;
 
-/// Difference of the last two stages, relative to the states, from which it shows an eigenvalue: rounding is far smaller.
+/// Difference of the last two stages, relative to the states, from which it shows an eigenvalue: rounding is far
+/// smaller.
 const SEEN: f64 = 1e-9;
 
 /// Multiple of the measured effect of rounding on a rate up to which a difference of rates is rounding.

@@ -12,7 +12,8 @@ use super::integrable::Integrable;
 use super::integrate::Attempt;
 use super::{Step, common, next_of, shift};
 
-/// Plant with its inputs and the forces on it. The plant comes last so that it can be of any kind: `dyn Integrable` too.
+/// Plant with its inputs and the forces on it. The plant comes last so that it can be of any kind: `dyn Integrable`
+/// too.
 pub struct Driven<'a, S, P: ?Sized> {
     inputs: Inputs<'a, S>,
     /// State that each signal equals, if any; signals beyond are computed.
@@ -25,8 +26,8 @@ pub struct Driven<'a, S, P: ?Sized> {
 }
 
 impl<'a, S: Scalar, P: Plant<S>> Driven<'a, S, P> {
-    /// Combines the plant with its inputs; `shows` gives for each signal the state that it equals. Signals beyond the length of `shows`
-    /// are computed.
+    /// Combines the plant with its inputs; `shows` gives for each signal the state that it equals. Signals beyond the
+    /// length of `shows` are computed.
     pub fn new(plant: P, mut inputs: Inputs<'a, S>, shows: &[Option<usize>]) -> Self {
         inputs.delay(|input| plant.dead_time(input));
         Self { inputs, shows: shows.to_vec(), delay: S::from(0.0), has_started: false, plant }
@@ -57,7 +58,8 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
         Ok(x)
     }
 
-    /// Passes on the past before the start: what is known of the inputs, as far back as it matters, with the states at rest.
+    /// Passes on the past before the start: what is known of the inputs, as far back as it matters, with the states at
+    /// rest.
     fn recall(&mut self, x: &mut [S]) {
         let Some(reach) = self.plant.memory().map(|memory| memory.reach()) else { return };
         let mut from = self.inputs.first_known().max(-reach);
@@ -93,8 +95,8 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
         }
     }
 
-    /// Evaluates a function of the plant just before the start, at the states `start` and in its mode there; after [`Driven::begin`] and
-    /// before a simulation.
+    /// Evaluates a function of the plant just before the start, at the states `start` and in its mode there; after
+    /// [`Driven::begin`] and before a simulation.
     fn look_before<R>(&mut self, start: &[S], of: impl FnOnce(&Self, &Instant<'_, S>) -> R) -> R {
         let [u, w] = self.inputs_at(0.0);
         let at = Instant { t: self.inputs.time(0.0), x: start, u: &u, w: &w };
@@ -111,7 +113,8 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
         })
     }
 
-    /// Returns the rate that a unit of each force adds to a state just before the start, given the state of each force; after
+    /// Returns the rate that a unit of each force adds to a state just before the start, given the state of each force;
+    /// after
     /// [`Driven::begin`] and before a simulation.
     pub fn mobilities(&mut self, start: &[S], states: &[usize]) -> Vec<S> {
         self.look_before(start, |of, at| {
@@ -194,8 +197,8 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
         self.inputs.over(time, x, |over| bounds.of_signal(signal, over))
     }
 
-    /// Sets the derivatives of the time of the events that follow, with value 0: the time and the inputs that resets read move with the
-    /// event.
+    /// Sets the derivatives of the time of the events that follow, with value 0: the time and the inputs that resets
+    /// read move with the event.
     pub(super) fn delay_events(&mut self, delay: S) {
         self.delay = delay;
     }
@@ -229,8 +232,8 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
         self.plant.memory().is_some_and(|memory| !memory.delays().is_empty())
     }
 
-    /// Handles a break, and is called once at the start: inputs take their new values, then the plant passes its own breaks. Returns the
-    /// derivatives of the time of the break along the directions of the scalar, with value 0.
+    /// Handles a break, and is called once at the start: inputs take their new values, then the plant passes its own
+    /// breaks. Returns the derivatives of the time of the break along the directions of the scalar, with value 0.
     pub(super) fn pass_break(&mut self, t: f64, x: &mut [S]) -> S {
         let of_inputs = self.jump_inputs(t, x);
         self.inputs.settle(t);
@@ -254,8 +257,8 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
         moves
     }
 
-    /// Lets the inputs jump that do so at `t`: those without a dead time, then each of the others at its own time. Returns the
-    /// derivatives of the time of the latter.
+    /// Lets the inputs jump that do so at `t`: those without a dead time, then each of the others at its own time.
+    /// Returns the derivatives of the time of the latter.
     fn jump_inputs(&mut self, t: f64, x: &mut [S]) -> Option<S> {
         if self.inputs.jumps_at(t) {
             self.jump(t, x, S::from(0.0), |inputs| inputs.pass(t));
@@ -268,8 +271,8 @@ impl<S: Scalar, P: Plant<S> + ?Sized> Driven<'_, S, P> {
         moves
     }
 
-    /// Passes a jump of inputs whose time has the derivatives `late`: the state moves along the rates before the jump, and back along
-    /// those after it.
+    /// Passes a jump of inputs whose time has the derivatives `late`: the state moves along the rates before the jump,
+    /// and back along those after it.
     fn jump(&mut self, t: f64, x: &mut [S], late: S, pass: impl FnOnce(&mut Inputs<'_, S>)) {
         let moves = late.tangents().iter().any(|&tangent| tangent != 0.0);
         let mut rates = if moves { x.to_vec() } else { Vec::new() };

@@ -7,8 +7,9 @@
 //! Tangents are computed from the same equations. Once the value of a stage has converged it is frozen. The tangents
 //! obey linear equations with the same matrix and are iterated to convergence, so they do not change any value.
 //!
-//! Source: C. Kennedy, M. Carpenter, Applied Numerical Mathematics 44 (2003) 139-181, appendix C (coefficients); E. Hairer,
-//! G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996), section IV.8 (Newton's method, error).
+//! Source: C. Kennedy, M. Carpenter, Applied Numerical Mathematics 44 (2003) 139-181, appendix C (coefficients); E.
+//! Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd edition (1996), section IV.8 (Newton's method,
+//! error).
 
 use mops_core::model::Work;
 use mops_language::Scalar;

@@ -1,16 +1,16 @@
 //! Events: when they occur, in which order, and how often.
 //!
 //! **Guards.** A mode is active while its guards are not negative. An event is the first instant at which a guard is
-//! negative. [`mops_core::plant::Events::switch`] then changes the mode, and the state where it jumps. Events do not depend on where
-//! steps end.
+//! negative. [`mops_core::plant::Events::switch`] then changes the mode, and the state where it jumps. Events do not
+//! depend on where steps end.
 //!
 //! **Location.** Within a step the state is a polynomial in time, so that every guard is a function of time.
-//! [`mops_core::plant::Bounds::of_guard`] may give bounds of a guard and of its rate over a part of the step. The first zero
-//! crossing is then found by branch and bound. A part whose bounds exclude negative values is discarded. A part over
-//! which the guard is monotone is decided by its ends. Any other part is halved, the earlier half first. This finds a
-//! guard that is negative only briefly, however long the step is. The guard may depend on states, on inputs or on time.
-//! Models written in Rust have no bounds; their guards vary as smoothly as their states. Their guards are evaluated at
-//! four nodes of a step and at a minimum below 0 of the quartic through these values.
+//! [`mops_core::plant::Bounds::of_guard`] may give bounds of a guard and of its rate over a part of the step. The first
+//! zero crossing is then found by branch and bound. A part whose bounds exclude negative values is discarded. A part
+//! over which the guard is monotone is decided by its ends. Any other part is halved, the earlier half first. This
+//! finds a guard that is negative only briefly, however long the step is. The guard may depend on states, on inputs or
+//! on time. Models written in Rust have no bounds; their guards vary as smoothly as their states. Their guards are
+//! evaluated at four nodes of a step and at a minimum below 0 of the quartic through these values.
 //!
 //! **Event time.** A zero is located to the resolution of the clock. The event occurs at the end of the bracket where
 //! the guard *is* negative. So rounding cannot leave the guard positive, and one crossing is never found twice. A guard
@@ -18,20 +18,20 @@
 //! from there.
 //!
 //! **Simultaneous events.** Instants closer than the resolution count as one. At an instant inputs and clocks first
-//! take their new values ([`mops_core::plant::Breaks::pass`]). Then the negative guard with the lowest index switches, until no
-//! guard is negative. An event therefore sees the inputs that are valid from its instant on, at all rates of samples
-//! and events.
+//! take their new values ([`mops_core::plant::Breaks::pass`]). Then the negative guard with the lowest index switches,
+//! until no guard is negative. An event therefore sees the inputs that are valid from its instant on, at all rates of
+//! samples and events.
 //!
 //! **Arming.** The state of a guard after its event, armed or not, is part of the mode and decided by the plant.
 //!
 //! **Accumulation (Zeno behaviour).** The events of a guard accumulate if it switches [`REPEATS`] times in succession
 //! at decreasing intervals below [`CLOSE`] of the simulated time. Intervals below [`NONE`] of the simulated time count
-//! as zero. [`mops_core::plant::Events::rest`] may then move the state to its rest state; otherwise the simulation fails, as it cannot
-//! proceed beyond that instant.
+//! as zero. [`mops_core::plant::Events::rest`] may then move the state to its rest state; otherwise the simulation
+//! fails, as it cannot proceed beyond that instant.
 //!
-//! Source: T. Park, P. Barton, State event location in differential-algebraic models, ACM TOMACS 6 (1996) 137-165; J. Esposito,
-//! V. Kumar, G. Pappas, Accurate event detection for simulating hybrid systems, HSCC 2001, 204-217; J. Zhang, K. Johansson,
-//! J. Lygeros, S. Sastry, Zeno hybrid systems, Int. J. Robust Nonlinear Control 11 (2001) 435-451.
+//! Source: T. Park, P. Barton, State event location in differential-algebraic models, ACM TOMACS 6 (1996) 137-165; J.
+//! Esposito, V. Kumar, G. Pappas, Accurate event detection for simulating hybrid systems, HSCC 2001, 204-217; J. Zhang,
+//! K. Johansson, J. Lygeros, S. Sastry, Zeno hybrid systems, Int. J. Robust Nonlinear Control 11 (2001) 435-451.
 
 use mops_core::{Failure, Plant};
 use mops_language::{Scalar, enclosure::Enclosure};
@@ -113,9 +113,9 @@ impl<S: Scalar> Events<S> {
         !self.values.is_empty()
     }
 
-    /// Handles all events of an instant: the negative guard with the lowest index switches, until no guard is negative. Each event occurs
-    /// at the time of its own crossing, the events that it causes at the same time: for the derivatives, the state is moved there before
-    /// an event, and back after the last one.
+    /// Handles all events of an instant: the negative guard with the lowest index switches, until no guard is negative.
+    /// Each event occurs at the time of its own crossing, the events that it causes at the same time: for the
+    /// derivatives, the state is moved there before an event, and back after the last one.
     pub(super) fn settle<P: Integrable<S> + ?Sized>(
         &mut self,
         system: &mut Driven<'_, S, P>,
@@ -250,9 +250,10 @@ impl<S: Scalar> Events<S> {
     }
 }
 
-/// Returns true if the bounds of a guard over narrow parts of a step are narrower than those over the whole, so that halving the step
-/// decides where the guard is negative. A jump or a pole may prevent bounds over the whole. Bounds that stay as they are come from a
-/// quantity without bounds, such as a delayed one, in a function that has bounds everywhere.
+/// Returns true if the bounds of a guard over narrow parts of a step are narrower than those over the whole, so that
+/// halving the step decides where the guard is negative. A jump or a pole may prevent bounds over the whole. Bounds
+/// that stay as they are come from a quantity without bounds, such as a delayed one, in a function that has bounds
+/// everywhere.
 fn bounds_narrow(whole: Enclosure, enclose: &mut impl FnMut(f64, f64) -> Enclosure) -> bool {
     // Irregularly placed, and far narrower than the time between jumps.
     const WIDTH: f64 = 1e-6;

@@ -21,7 +21,8 @@ pub struct Inputs<'a, S> {
     ahead: Vec<f64>,
     /// Inputs with a dead time.
     late: Vec<Late<S>>,
-    /// Forces from outside, one for each force of the plant if there are any, each with its unit and the next time at which it jumps.
+    /// Forces from outside, one for each force of the plant if there are any, each with its unit and the next time at
+    /// which it jumps.
     pushes: Vec<(Drive<'a, S>, S, f64)>,
     /// Time of the plant at the start, s.
     begins: f64,
@@ -74,8 +75,8 @@ impl<S: Scalar> Late<S> {
 }
 
 impl<'a, S: Scalar> Inputs<'a, S> {
-    /// Creates the inputs just before the start, in the order of [`mops_core::Interface::inputs`]. `forces` is the number of forces of
-    /// the plant.
+    /// Creates the inputs just before the start, in the order of [`mops_core::Interface::inputs`]. `forces` is the
+    /// number of forces of the plant.
     pub fn new(drives: Vec<Drive<'a, S>>, forces: usize) -> Self {
         let values = RefCell::new(vec![S::from(0.0); drives.len()]);
         let still = vec![S::from(0.0); forces];
@@ -112,7 +113,8 @@ impl<'a, S: Scalar> Inputs<'a, S> {
         Self { pushes: pushes.into_iter().map(|(drive, unit)| (drive, unit, f64::NEG_INFINITY)).collect(), ..self }
     }
 
-    /// Sets the dead times of inputs, by `dead_time`. Such an input is at first as it was before anything of it is known.
+    /// Sets the dead times of inputs, by `dead_time`. Such an input is at first as it was before anything of it is
+    /// known.
     pub(super) fn delay(&mut self, dead_time: impl Fn(usize) -> Option<S>) {
         let late = |(input, drive): (usize, &Drive<'a, S>)| {
             let time = dead_time(input)?;
@@ -277,8 +279,8 @@ impl<'a, S: Scalar> Inputs<'a, S> {
         }
     }
 
-    /// Returns the next input with a dead time that jumps at `t`, as its number among those, with the derivatives of the time of the
-    /// jump.
+    /// Returns the next input with a dead time that jumps at `t`, as its number among those, with the derivatives of
+    /// the time of the jump.
     pub(super) fn late_at(&self, t: f64) -> Option<(usize, S)> {
         let due = self.late.iter().enumerate().find(|(_, late)| is_due(late.next_break(), t));
         due.map(|(k, late)| (k, late.moves()))

@@ -7,10 +7,12 @@ use super::dormand_prince::DormandPrince;
 use super::inputs::Inputs;
 use super::integrate::Attempt;
 
-/// Plant that can be integrated: every plant. The loop over steps is compiled once for all plants; what it does many times in a step is
-/// compiled with the equations of each. As calls, the stages take 6 % of the instructions of `pid-design`.
+/// Plant that can be integrated: every plant. The loop over steps is compiled once for all plants; what it does many
+/// times in a step is compiled with the equations of each. As calls, the stages take 6 % of the instructions of
+/// `pid-design`.
 pub trait Integrable<S: Scalar>: Plant<S> {
-    /// Attempts a step of the explicit method: writes the state after the step to `next` and returns its weighted error norm.
+    /// Attempts a step of the explicit method: writes the state after the step to `next` and returns its weighted error
+    /// norm.
     #[doc(hidden)]
     fn attempt(&self, inputs: &Inputs<'_, S>, method: &mut DormandPrince<S>, at: Attempt<'_, S>, next: &mut [S])
     -> f64;

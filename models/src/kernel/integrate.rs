@@ -47,8 +47,8 @@ pub(super) trait Method<S: Scalar> {
         work: &mut Work,
     ) -> f64;
 
-    /// Returns the longest step that damps all modes, estimated from the step last attempted; `None` for a method that damps them
-    /// in every step, or if the step does not show it.
+    /// Returns the longest step that damps all modes, estimated from the step last attempted; `None` for a method that
+    /// damps them in every step, or if the step does not show it.
     fn stable_step(&self, _next: &[S], _weights: &Weights) -> Option<f64> {
         None
     }
@@ -145,8 +145,8 @@ fn run<S: Scalar, P: Integrable<S> + ?Sized, M: Method<S>>(
     // Rejected attempts at the current step.
     let mut rejected = 0;
     let damped = if M::IS_EXPLICIT { system.plant.damped_step() } else { f64::INFINITY };
-    // Longest step that damps all modes, as far as the accepted steps show it. The error alone does not limit a step at rest: there
-    // the tangents would grow while the state does not.
+    // Longest step that damps all modes, as far as the accepted steps show it. The error alone does not limit a step at
+    // rest: there the tangents would grow while the state does not.
     let mut stable = f64::INFINITY;
     let longest = system.longest_step().min(damped).min(tolerance.max_step.unwrap_or(f64::INFINITY));
 
@@ -254,8 +254,8 @@ fn values<S: Scalar, P: Integrable<S> + ?Sized>(f: &Driven<'_, S, P>, t: f64, x:
     x.iter().chain(&*dx).map(|value| value.value()).collect()
 }
 
-/// Sets the inputs to their values at the break. At the end of the simulation, reports them to the sink. Returns the derivatives of
-/// the time of the break.
+/// Sets the inputs to their values at the break. At the end of the simulation, reports them to the sink. Returns the
+/// derivatives of the time of the break.
 fn pass_break<S: Scalar, P: Integrable<S> + ?Sized>(
     system: &mut Driven<'_, S, P>,
     (t, end): (f64, f64),

@@ -19,8 +19,8 @@ pub fn rests<S: Scalar>(at_rest: bool, speed: S) -> bool {
     at_rest || speed.value().abs() <= STILL
 }
 
-/// Values of the equations at an operating point: rates of the states, or changes of memory at an instant, then the signals, then the
-/// quantities whose past matters.
+/// Values of the equations at an operating point: rates of the states, or changes of memory at an instant, then the
+/// signals, then the quantities whose past matters.
 fn look<S: Scalar>(model: &impl PlantModel, at: &OperatingPoint<'_, S>) -> Result<(Vec<S>, LeftOut<S>), Failure> {
     let mut plant = model.plant(at.parameters)?;
     if let Some(memory) = plant.memory_mut() {

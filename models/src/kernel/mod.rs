@@ -120,8 +120,8 @@ pub trait Sink<S: Scalar, P: ?Sized> {
     fn end(&mut self, _t: f64, _x: &[S], _system: &Driven<'_, S, P>) {}
     /// Handles a change of the mode.
     fn event(&mut self, _t: f64, _what: &str) {}
-    /// Handles the end of a step by an event or a break. `moves` are the derivatives of its time along the directions of the
-    /// scalar, with value 0.
+    /// Handles the end of a step by an event or a break. `moves` are the derivatives of its time along the directions
+    /// of the scalar, with value 0.
     fn restart(&mut self, _t: f64, _moves: S) {}
 }
 

@@ -81,8 +81,8 @@ pub trait PlantModel: Send + Sync {
     }
 }
 
-/// Returns the interface of a model whose loop is cut at the signal `at`, and the ends of the cut: the last input acts in the place
-/// of the signal, and the last signal is minus the value that the model computes.
+/// Returns the interface of a model whose loop is cut at the signal `at`, and the ends of the cut: the last input acts
+/// in the place of the signal, and the last signal is minus the value that the model computes.
 ///
 /// # Errors
 /// `variables` are not this signal alone.

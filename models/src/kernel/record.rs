@@ -49,8 +49,8 @@ pub struct Wanted {
     pub signals: Vec<(usize, String)>,
     /// Requests the end of the simulation.
     pub cancellation: Cancellation,
-    /// Limit on the size of the recording in bytes, tangents included. A segment of a trace is 7 numbers of 8 bytes: its end, five
-    /// coefficients, and the derivative of its end.
+    /// Limit on the size of the recording in bytes, tangents included. A segment of a trace is 7 numbers of 8 bytes:
+    /// its end, five coefficients, and the derivative of its end.
     pub room: usize,
 }
 
@@ -108,22 +108,24 @@ struct Resolved {
     looks: usize,
 }
 
-/// Width of the bounds of a signal over a part of a step, as a multiple of the spread of its values there, from which something narrow may
-/// hide between them, such as a pulse over a position. Bounds of products and quotients of smooth quantities are a few times too wide.
+/// Width of the bounds of a signal over a part of a step, as a multiple of the spread of its values there, from which
+/// something narrow may hide between them, such as a pulse over a position. Bounds of products and quotients of smooth
+/// quantities are a few times too wide.
 const WIDE: f64 = 8.0;
 
-/// Width of bounds, as a part of the largest width so far, up to which nothing hides: what bounds are too wide by shrinks with the part,
-/// and what is sought is as high as the bounds of the first part that contains it.
+/// Width of bounds, as a part of the largest width so far, up to which nothing hides: what bounds are too wide by
+/// shrinks with the part, and what is sought is as high as the bounds of the first part that contains it.
 const NARROW: f64 = 1e-3;
 
 /// Change of a signal between two neighbouring states, relative to its changes over a part, from which it jumps there.
 const ROUGH: f64 = 0.25;
 
-/// Number of parts of a signal that are halved in vain in a simulation; each place found gives as many again. A pulse of 1 ms in a step of
-/// 10 s takes some 30.
+/// Number of parts of a signal that are halved in vain in a simulation; each place found gives as many again. A pulse
+/// of 1 ms in a step of 10 s takes some 30.
 const LOOKS: usize = 64;
 
-/// Part of the simulated time up to which nothing is sought within a step, which bounds the number of bounds that are computed.
+/// Part of the simulated time up to which nothing is sought within a step, which bounds the number of bounds that are
+/// computed.
 const SHORT: f64 = 2e-3;
 
 /// Permitted deviation of the quartic in units of the tolerance: the dense output of the states is no more accurate.
@@ -138,8 +140,8 @@ pub(crate) fn allowed(tolerance: &Tolerance, largest: f64, size: f64) -> f64 {
     OFF * (absolute.unwrap_or(SHARE * relative * largest) + relative * size) + SMALLEST
 }
 
-/// Limit on the number of halvings of a step for a signal: parts as short as the resolution of the clock. Rounding ends them before, and
-/// so does the size of the recording.
+/// Limit on the number of halvings of a step for a signal: parts as short as the resolution of the clock. Rounding ends
+/// them before, and so does the size of the recording.
 const HALVINGS: u32 = 40;
 
 /// Ratio to the longest compared step beyond which a step is compared again.
@@ -169,8 +171,8 @@ impl<S: Scalar> Recorder<'_, S> {
     }
 
     /// Returns true if the quartic through the values agrees with the signal near both ends, up to the rounding of the
-    /// signal. Values that are not finite count as agreeing. `signal` returns the signal at a position, at the state or at
-    /// the [`perturbed`] state.
+    /// signal. Values that are not finite count as agreeing. `signal` returns the signal at a position, at the state or
+    /// at the [`perturbed`] state.
     fn agrees(&self, index: usize, values: &[S; 5], mut signal: impl FnMut(f64, At) -> S) -> bool {
         self.fit(index, values, &mut signal) != Fit::Off
     }
@@ -204,8 +206,8 @@ impl<S: Scalar> Recorder<'_, S> {
         length > LONGER * self.resolved[index].longest || off.is_nan() || off > self.allowed(index, largest(values))
     }
 
-    /// Returns true if the bounds of a signal over the part `[from, to]` of a step are so much wider than the values there that something
-    /// may hide between them.
+    /// Returns true if the bounds of a signal over the part `[from, to]` of a step are so much wider than the values
+    /// there that something may hide between them.
     fn hides<P: Integrable<S> + ?Sized>(
         &mut self,
         (step, system): (&Step<S>, &Driven<'_, S, P>),
@@ -234,7 +236,8 @@ impl<S: Scalar> Recorder<'_, S> {
         hides
     }
 
-    /// Finds the size of what hides in the part `[from, to]` of a step: the accuracy of a signal is relative to its size.
+    /// Finds the size of what hides in the part `[from, to]` of a step: the accuracy of a signal is relative to its
+    /// size.
     fn measure<P: Integrable<S> + ?Sized>(
         &mut self,
         (step, system): (&Step<S>, &Driven<'_, S, P>),
@@ -396,8 +399,8 @@ impl<S: Scalar, P: Integrable<S> + ?Sized> Sink<S, P> for Recorder<'_, S> {
 
     fn end(&mut self, t: f64, x: &[S], system: &Driven<'_, S, P>) {
         for (i, (signal, _)) in self.signals.iter().enumerate() {
-            // An input jump at the end of the simulation appears in the signals that depend on it directly; a sampled state may jump
-            // itself.
+            // An input jump at the end of the simulation appears in the signals that depend on it directly; a sampled
+            // state may jump itself.
             let value = self.shows[i].map_or_else(|| system.signal(*signal, t, x), |state| x[state]);
             let before = self.traces[0][i].last();
             if (value.value() - before).abs() > self.allowed(i, before.abs().max(value.value().abs())) {

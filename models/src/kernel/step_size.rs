@@ -40,8 +40,8 @@ impl StepSizes {
         Self { order, last: SMALL }
     }
 
-    /// Returns the ratio of the next step size to that of the step accepted with this error: from 0.2 to 10, and at most 1 if the step
-    /// was rejected before.
+    /// Returns the ratio of the next step size to that of the step accepted with this error: from 0.2 to 10, and at
+    /// most 1 if the step was rejected before.
     #[inline]
     pub fn after_acceptance(&mut self, error: f64, was_rejected: bool) -> f64 {
         let error = log2(error.max(1e-10));

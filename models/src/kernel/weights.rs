@@ -93,9 +93,9 @@ impl Weights {
     }
 
     /// Measures the roughness of the rates, after every [`OFTEN`] attempts and after the third rejection of a step. The
-    /// rates are compared with those of a [`perturbed`] state. After the third rejection, the state after a step of length `h` along
-    /// the rates counts as well: states that are 0 before the step have no rounding errors yet. Returns the number of
-    /// evaluations of the rates.
+    /// rates are compared with those of a [`perturbed`] state. After the third rejection, the state after a step of
+    /// length `h` along the rates counts as well: states that are 0 before the step have no rounding errors yet.
+    /// Returns the number of evaluations of the rates.
     pub(super) fn feel<S: Scalar, P: Integrable<S> + ?Sized>(
         &mut self,
         f: &Driven<'_, S, P>,
@@ -120,7 +120,8 @@ impl Weights {
         if rejected == 3 { 4 } else { 2 }
     }
 
-    /// Raises the roughness to the difference of the rates at a state and at the perturbed state. `here` becomes the rates.
+    /// Raises the roughness to the difference of the rates at a state and at the perturbed state. `here` becomes the
+    /// rates.
     fn compare<S: Scalar, P: Integrable<S> + ?Sized>(
         &mut self,
         f: &Driven<'_, S, P>,

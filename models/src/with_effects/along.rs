@@ -14,8 +14,8 @@ use crate::kernel::{Driven, Sink, Step, integrate_for, is_due};
 
 /// Simulation with its linearisation along it.
 ///
-/// The linearised states are those of the plant, those of the effects, 8 for every delayed quantity, and the values that clocks have
-/// computed and not yet passed on to their memory.
+/// The linearised states are those of the plant, those of the effects, 8 for every delayed quantity, and the values
+/// that clocks have computed and not yet passed on to their memory.
 #[derive(Debug, Clone)]
 pub struct Along {
     /// Chosen times.
@@ -24,8 +24,8 @@ pub struct Along {
     pub ticks: Vec<Tick>,
 }
 
-/// Time of a simulation with its linearisation `dz' = A dz + B db`, `dy = C dz + D db`. The vector `z` contains the linearised states, `b`
-/// the commanded inputs, then the forces.
+/// Time of a simulation with its linearisation `dz' = A dz + B db`, `dy = C dz + D db`. The vector `z` contains the
+/// linearised states, `b` the commanded inputs, then the forces.
 #[derive(Debug, Clone)]
 pub struct Moment {
     /// Time, s.
@@ -40,8 +40,8 @@ pub struct Moment {
     pub y: Vec<f64>,
     /// Joints with dry friction.
     pub sliding: Vec<Sliding>,
-    /// State matrix `A`. A stuck joint creeps: it slides with a friction proportional to the speed that reaches the largest
-    /// holding force at 1e-4 of its typical speed. A joint that takes no force could never break loose.
+    /// State matrix `A`. A stuck joint creeps: it slides with a friction proportional to the speed that reaches the
+    /// largest holding force at 1e-4 of its typical speed. A joint that takes no force could never break loose.
     pub a: DMatrix<f64>,
     /// Input matrix `B`.
     pub b: DMatrix<f64>,
@@ -182,7 +182,8 @@ impl WithEffects {
         Ok(instants(&clocks, job.case.begins, job.horizon).into_iter().map(|due| due.t).collect())
     }
 
-    /// Linearises the model at increasing times along a simulation, for the signals of the job, and at the instants of its clocks.
+    /// Linearises the model at increasing times along a simulation, for the signals of the job, and at the instants of
+    /// its clocks.
     ///
     /// # Errors
     /// The failure of the simulation.
@@ -274,7 +275,8 @@ impl Layout {
 /// Number of states of a delay line: the Pade approximant of this order is accurate to 1 % up to `w T` of about 8.
 const LINE: usize = 8;
 
-/// Returns the rate of state `i` of a delay line with a delay of 1 s, `m_i' = sum_j A_ij m_j + B_i z`; the output is the sum of the states.
+/// Returns the rate of state `i` of a delay line with a delay of 1 s, `m_i' = sum_j A_ij m_j + B_i z`; the output is
+/// the sum of the states.
 ///
 /// Source: A. Voelker, I. Kajic, C. Eliasmith, Legendre memory units, NeurIPS 2019, equation 2.
 fn line_rate(i: usize) -> ([f64; LINE], f64) {
@@ -298,7 +300,8 @@ struct Linear<'l, 'a> {
 }
 
 impl Linear<'_, '_> {
-    /// Returns the derivatives of what `of` evaluates with respect to the states, inputs, forces and delayed values, and its values.
+    /// Returns the derivatives of what `of` evaluates with respect to the states, inputs, forces and delayed values,
+    /// and its values.
     fn slopes(
         &mut self,
         look: &Look,

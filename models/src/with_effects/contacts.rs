@@ -47,7 +47,8 @@ impl Contacts {
         self.joints.iter().any(|joint| joint.contact == Contact::Stuck)
     }
 
-    /// Returns for each joint its speed, as a state, and its direction: 1 if it slides forward, -1 if backward, 0 if it is stuck.
+    /// Returns for each joint its speed, as a state, and its direction: 1 if it slides forward, -1 if backward, 0 if it
+    /// is stuck.
     pub(super) fn directions(&self) -> impl Iterator<Item = (usize, f64)> {
         let direction = |joint: &Joint| if joint.contact == Contact::Stuck { 0.0 } else { joint.contact.sign() };
         self.joints.iter().map(move |joint| (joint.velocity, direction(joint)))

@@ -1,4 +1,5 @@
-//! Edges of effects, at which their laws change, and hysteresis states: their guards, what happens there, and how they start.
+//! Edges of effects, at which their laws change, and hysteresis states: their guards, what happens there, and how they
+//! start.
 
 use mops_core::{
     Failure, Instant,
@@ -9,14 +10,17 @@ use mops_core::{
 use super::Site;
 use super::plant::{Affected, PlacedEffect, fixed, with_states};
 
-/// Half the time over which the rate of a value at an actuator or a sensor is a difference, as a fraction of the horizon: it resolves
-/// 10,000 oscillations, and rounding of the value changes the rate by 1e-9 of the value per horizon.
+/// Half the time over which the rate of a value at an actuator or a sensor is a difference, as a fraction of the
+/// horizon: it resolves 10,000 oscillations, and rounding of the value changes the rate by 1e-9 of the value per
+/// horizon.
 pub(super) const BLINK: f64 = 1e-7;
 
-/// Change of a value at an edge, relative to the value, that is more than rounding: an edge is located to some 1e-12 of a step.
+/// Change of a value at an edge, relative to the value, that is more than rounding: an edge is located to some 1e-12 of
+/// a step.
 const JUMP: f64 = 1e-6;
 
-/// Number of parts of a time span before time 0, at whose ends hysteresis guards are read: commands are polynomials within it.
+/// Number of parts of a time span before time 0, at whose ends hysteresis guards are read: commands are polynomials
+/// within it.
 const RUN_UP_PARTS: f64 = 16.0;
 
 /// Width of the bracket in which a hysteresis guard crosses zero before time 0, relative to a part.
@@ -79,7 +83,8 @@ impl<S: PlantScalar> Affected<'_, S> {
         self.effects.iter().any(|e| !e.hysteresis.is_empty() || e.is_at_actuator() && e.closed.is_some())
     }
 
-    /// Returns the index of an effect with a gap, or of one with a hysteresis state, by the number of the edge: first the gaps.
+    /// Returns the index of an effect with a gap, or of one with a hysteresis state, by the number of the edge: first
+    /// the gaps.
     fn of_edge(&self, number: usize) -> (usize, bool) {
         let all = || self.effects.iter().enumerate();
         let gaps = all().filter(|(_, effect)| effect.closed.is_some()).map(|(index, _)| (index, true));
@@ -99,7 +104,8 @@ impl<S: PlantScalar> Affected<'_, S> {
         }
     }
 
-    /// Returns what an effect with an edge receives; for an effect with a hysteresis state with the rate of its value, per s.
+    /// Returns what an effect with an edge receives; for an effect with a hysteresis state with the rate of its value,
+    /// per s.
     fn at_edge(&self, index: usize, here: &EventInstant<'_, S>) -> PortState<'static, S> {
         let effect = &self.effects[index];
         let at = self.at(effect, here, &[], self.arriving(index, here));
@@ -160,8 +166,8 @@ impl<S: PlantScalar> Affected<'_, S> {
         self.effects[index].closed = gap.map(|gap| gap.value() < 0.0);
     }
 
-    /// Takes the effects from `first` on to the values that they receive after a jump, in their order, as each receives the output of those
-    /// before it: their hysteresis states, and of some the side of the edge.
+    /// Takes the effects from `first` on to the values that they receive after a jump, in their order, as each receives
+    /// the output of those before it: their hysteresis states, and of some the side of the edge.
     pub(super) fn follow_jump(
         &mut self,
         here: &EventInstant<'_, S>,
@@ -189,7 +195,8 @@ impl<S: PlantScalar> Affected<'_, S> {
         let before = self.onward_of(index, event);
         self.cross(index);
         if (self.onward_of(index, event) - before).value().abs() > JUMP * before.value().abs() {
-            // The value that is passed on jumps, as that of a sensor with a gap: what comes after goes up to the jump, then over it.
+            // The value that is passed on jumps, as that of a sensor with a gap: what comes after goes up to the jump,
+            // then over it.
             self.cross(index);
             self.update_hysteresis(event, |_| true);
             self.cross(index);
@@ -236,8 +243,8 @@ impl<S: PlantScalar> Affected<'_, S> {
         }
     }
 
-    /// Updates the hysteresis states of the effects at actuators up to the end of a stretch of the past, also where their laws change
-    /// within it.
+    /// Updates the hysteresis states of the effects at actuators up to the end of a stretch of the past, also where
+    /// their laws change within it.
     pub(super) fn run_up(&mut self, over: &Stretch<'_, S>) {
         fn look<S: PlantScalar, R>(over: &Stretch<'_, S>, t: f64, of: impl FnOnce(&EventInstant<'_, S>) -> R) -> R {
             let [u, w] = (over.at)(t);
@@ -285,10 +292,11 @@ impl<S: PlantScalar> Affected<'_, S> {
         (0..self.effects.len()).filter(|&index| self.effects[index].is_at_actuator()).collect()
     }
 
-    /// Initialises the states of an effect at an actuator, as if the value that reaches it had been constant for long. Returns what
-    /// reaches it.
+    /// Initialises the states of an effect at an actuator, as if the value that reaches it had been constant for long.
+    /// Returns what reaches it.
     ///
-    /// N.B.: effects before it on the same actuator that depend on the state of the plant, or have states, are evaluated as at the start.
+    /// N.B.: effects before it on the same actuator that depend on the state of the plant, or have states, are
+    /// evaluated as at the start.
     fn start_actuator(&mut self, index: usize, at: &Instant<'_, S>, x: &mut [S]) {
         let now = x.to_vec();
         let state = self.at_edge(index, &with_states(&fixed(at), &now));
@@ -307,7 +315,8 @@ impl<S: PlantScalar> Affected<'_, S> {
         }
     }
 
-    /// Initialises the effects at actuators just before the start, with their offsets; their hysteresis states have followed the past.
+    /// Initialises the effects at actuators just before the start, with their offsets; their hysteresis states have
+    /// followed the past.
     pub(super) fn start_actuators(&mut self, at: &Instant<'_, S>, x: &mut [S]) {
         for index in self.at_actuators() {
             self.start_actuator(index, at, x);
@@ -322,7 +331,8 @@ impl<S: PlantScalar> Affected<'_, S> {
         }
     }
 
-    /// Initialises the states of all other effects and finds the joints with dry friction; `u` are the inputs that reach the plant.
+    /// Initialises the states of all other effects and finds the joints with dry friction; `u` are the inputs that
+    /// reach the plant.
     ///
     /// # Errors
     /// Dry friction acts elsewhere.

@@ -386,8 +386,8 @@ fn unit_of_place(port: &Port, companion: Option<&Port>, interface: &Interface) -
     all.find(|v| v.name == *name).map_or_else(Unit::one, |v| v.unit.clone())
 }
 
-/// Returns the absolute temperature at the zero of the scale of a place, in the unit of its differences; `None` if the place is on
-/// no scale.
+/// Returns the absolute temperature at the zero of the scale of a place, in the unit of its differences; `None` if the
+/// place is on no scale.
 fn zero_of_scale(port: &Port, interface: &Interface) -> Option<f64> {
     let unit = unit_of_place(port, None, interface);
     (unit.zero() != 0.0).then(|| unit.zero() / unit.factor())

@@ -31,8 +31,8 @@ pub(super) struct PlacedEffect<S> {
     pub(super) inertial: bool,
 }
 
-/// Plant with effects. The state consists of the states of the plant, then those of the effects; the inputs are commands, which the
-/// effects of actuators change before they reach the plant.
+/// Plant with effects. The state consists of the states of the plant, then those of the effects; the inputs are
+/// commands, which the effects of actuators change before they reach the plant.
 pub(super) struct Affected<'a, S> {
     pub(super) plant: Box<dyn Plant<S> + 'a>,
     pub(super) effects: Vec<PlacedEffect<S>>,
@@ -79,7 +79,8 @@ pub(super) fn with_states<'h, S: Copy>(here: &EventInstant<'h, S>, x: &'h [S]) -
 }
 
 impl<'a, S: PlantScalar> Affected<'a, S> {
-    /// Puts effects around a plant with this number of states and of forces; `shows` gives for each signal the state that it equals.
+    /// Puts effects around a plant with this number of states and of forces; `shows` gives for each signal the state
+    /// that it equals.
     pub(super) fn new(
         plant: Box<dyn Plant<S> + 'a>,
         effects: Vec<PlacedEffect<S>>,
@@ -195,8 +196,8 @@ impl<'a, S: PlantScalar> Affected<'a, S> {
         }
     }
 
-    /// Computes the forces from outside and of the effects, without those proportional to the acceleration and without the friction of
-    /// stuck joints.
+    /// Computes the forces from outside and of the effects, without those proportional to the acceleration and without
+    /// the friction of stuck joints.
     fn forces(&self, here: &EventInstant<'_, S>, u: &[S], w: &mut Vec<S>) {
         w.clear();
         w.extend_from_slice(here.at.w);
@@ -228,8 +229,8 @@ impl<'a, S: PlantScalar> Affected<'a, S> {
         self.plant.rates(&self.inner(at, u, w), dx);
     }
 
-    /// Computes the rates of the plant, after adding the forces proportional to the acceleration: with the masses `m` that effects add
-    /// to joints, the forces `w` are `-m q''`, where `q'' = a + B w`.
+    /// Computes the rates of the plant, after adding the forces proportional to the acceleration: with the masses `m`
+    /// that effects add to joints, the forces `w` are `-m q''`, where `q'' = a + B w`.
     pub(super) fn moved(&self, here: &EventInstant<'_, S>, u: &[S], w: &mut [S], dx: &mut [S]) {
         self.own_rates(&here.at, u, w, dx);
         let mut joints: Vec<(usize, usize)> = Vec::new();
@@ -290,7 +291,8 @@ impl<'a, S: PlantScalar> Affected<'a, S> {
         Vec::new()
     }
 
-    /// Calls a function with the inputs that reach the plant, the forces on it, and the friction of each contact if a joint is stuck.
+    /// Calls a function with the inputs that reach the plant, the forces on it, and the friction of each contact if a
+    /// joint is stuck.
     pub(super) fn balanced_with<R>(&self, here: &EventInstant<'_, S>, of: impl FnOnce(&[S], &[S], Vec<S>) -> R) -> R {
         // Taken and not borrowed: the function may evaluate the plant again.
         let mut scratch = self.scratch.take();
@@ -312,8 +314,8 @@ impl<'a, S: PlantScalar> Affected<'a, S> {
         self.balanced(here, |u, w| [u.to_vec(), w.to_vec()])
     }
 
-    /// Returns the value of a signal after the effects at its sensor whose index is below `end`; effects with a delay act after the
-    /// simulation.
+    /// Returns the value of a signal after the effects at its sensor whose index is below `end`; effects with a delay
+    /// act after the simulation.
     pub(super) fn seen(&self, signal: usize, end: usize, here: &EventInstant<'_, S>) -> S {
         let at_sensor = |effect: &&PlacedEffect<S>| effect.is_at_sensor_of(signal);
         let simple = |effect: &PlacedEffect<S>| effect.place.companion.is_none();
@@ -654,7 +656,8 @@ impl<S: PlantScalar> Memory<S> for Affected<'_, S> {
 }
 
 impl<S: PlantScalar> Affected<'_, S> {
-    /// Calls a function with the bounds of the plant, over what reaches it: inputs with effects, and forces, are unbounded.
+    /// Calls a function with the bounds of the plant, over what reaches it: inputs with effects, and forces, are
+    /// unbounded.
     fn bounded(&self, over: &Span<'_>, of: impl FnOnce(&dyn Bounds, &Span<'_>) -> Enclosure) -> Enclosure {
         let Some(bounds) = self.plant.bounds() else { return Enclosure::UNKNOWN };
         let acts_on =

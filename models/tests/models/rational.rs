@@ -16,7 +16,8 @@ fn linear(analysis: &Analysis) -> &StateSpace {
     analysis.linear().expect("it is a linear system")
 }
 
-/// Returns the coefficients of the denominator in ascending powers without the leading 1: the canonical form has them in its last row.
+/// Returns the coefficients of the denominator in ascending powers without the leading 1: the canonical form has them
+/// in its last row.
 fn denominator(system: &StateSpace) -> Vec<f64> {
     let last = system.a.nrows() - 1;
     system.a.row(last).iter().map(|entry| -entry).collect()

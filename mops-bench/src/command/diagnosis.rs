@@ -29,10 +29,10 @@ pub(super) struct Arguments {
     outside: usize,
     /// Kinds of cases with another noise and with a model error in the background, in place of the four above.
     ///
-    /// A: nothing is missing, white noise. B: nothing is missing, a model error in the background: a random force, a drifting
-    /// parameter or correlated noise of a sensor. C: one missing effect, white noise. D: one missing effect and a background of
-    /// 5 to 20 % of its size. S: a background that is the same function of the state in all experiments. Records are for
-    /// calibration, selection and validation.
+    /// A: nothing is missing, white noise. B: nothing is missing, a model error in the background: a random force, a
+    /// drifting parameter or correlated noise of a sensor. C: one missing effect, white noise. D: one missing effect
+    /// and a background of 5 to 20 % of its size. S: a background that is the same function of the state in all
+    /// experiments. Records are for calibration, selection and validation.
     #[arg(long, value_delimiter = ',', value_name = "KINDS", ignore_case = true,
           conflicts_with_all = ["cases", "two", "none", "outside", "sizes", "folder"])]
     kinds: Vec<Letter>,
@@ -53,8 +53,8 @@ pub(super) struct Arguments {
     seed: u64,
     /// Run only the cases with these names, as listed in cases.csv of an earlier run with the same options.
     ///
-    /// Their studies and data are also written to the folder. Use another folder than that of the earlier run, as its tables
-    /// would be overwritten.
+    /// Their studies and data are also written to the folder. Use another folder than that of the earlier run, as its
+    /// tables would be overwritten.
     #[arg(long, value_delimiter = ',', value_name = "NAMES", conflicts_with = "folder")]
     only: Vec<String>,
     /// Number of parallel cases, each on one thread [default: all cores].

@@ -1,5 +1,5 @@
-//! Table of the diagnosis by kind of case, over cases with and without a model error in the background. Rates are counts with
-//! their 95 % intervals in %.
+//! Table of the diagnosis by kind of case, over cases with and without a model error in the background. Rates are
+//! counts with their 95 % intervals in %.
 
 use mops::{core::Role, outcome::diagnosis::Verdict, terminal::table};
 
@@ -160,8 +160,8 @@ impl<'a> Case<'a> {
         if self.row.truth.is_empty() { !self.claims() } else { self.entry_right() }
     }
 
-    /// Returns the stated probability and whether the statement is right: class and place of the first effect found, else the
-    /// verdict.
+    /// Returns the stated probability and whether the statement is right: class and place of the first effect found,
+    /// else the verdict.
     fn stated(&self) -> Option<(f64, bool)> {
         let stated = match self.statements().first() {
             Some(statement) => (statement.probability, self.entry_right()),

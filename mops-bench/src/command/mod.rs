@@ -40,8 +40,9 @@ struct Arguments {
 enum Benchmark {
     /// Find missing effects in simulated experiments: rates, reliability of probabilities, coverage of intervals, time.
     ///
-    /// The experiments come from a simulator that shares no code with models and effects. Parameters of the plants and places
-    /// of the effects are random. The size of an effect is the error of the refitted nominal model in units of the noise.
+    /// The experiments come from a simulator that shares no code with models and effects. Parameters of the plants and
+    /// places of the effects are random. The size of an effect is the error of the refitted nominal model in units of
+    /// the noise.
     ///
     /// Ctrl-C ends the benchmark and keeps the finished cases.
     Diagnosis(diagnosis::Arguments),

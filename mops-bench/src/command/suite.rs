@@ -143,7 +143,8 @@ pub(super) fn bench(catalogue: &Catalogue, chosen: &Chosen) -> Result<ExitCode, 
     Ok(progress.status())
 }
 
-/// Formats the known solution of a problem: minima, with the tuners at the optimum of a study, or the hypervolume of a front.
+/// Formats the known solution of a problem: minima, with the tuners at the optimum of a study, or the hypervolume of a
+/// front.
 fn solution(subject: &solvers::Subject) -> String {
     let list = |values: &[f64]| values.iter().copied().map(number).collect::<Vec<_>>().join(", ");
     match subject.answer() {
@@ -197,7 +198,8 @@ fn problems(suite: &Suite, asked: &[String]) -> Result<Vec<String>, Diagnostic> 
     }
 }
 
-/// Checks that the suite supports the options: studies have fixed gradients and noise, and fronts are not measured under noise.
+/// Checks that the suite supports the options: studies have fixed gradients and noise, and fronts are not measured
+/// under noise.
 fn check_options(suite: &Suite, arguments: &Arguments) -> Result<(), Diagnostic> {
     let is_noisy = arguments.noise != 0.0;
     let subjects = suite.subjects();

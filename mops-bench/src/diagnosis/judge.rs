@@ -32,8 +32,8 @@ impl Covered {
 pub(crate) struct Judgement {
     /// True if the verdict is correct.
     pub verdict: bool,
-    /// True if the decision is correct: the verdict is correct and, if an effect is missing, a true effect or an equivalent one
-    /// is ranked first.
+    /// True if the decision is correct: the verdict is correct and, if an effect is missing, a true effect or an
+    /// equivalent one is ranked first.
     pub decision: bool,
     /// True if a true effect, or an equivalent one, is ranked first at a correct place.
     pub first: bool,
@@ -54,14 +54,15 @@ pub(crate) struct Judgement {
 pub(crate) struct Stated {
     /// True if a true effect, or an equivalent one, is the first one found, claimed or proposed.
     pub name: bool,
-    /// For each effect found: true if class and place, or others that the data cannot distinguish, are those of a true effect or of
-    /// an equivalent one.
+    /// For each effect found: true if class and place, or others that the data cannot distinguish, are those of a true
+    /// effect or of an equivalent one.
     pub entries: Vec<bool>,
     /// For each effect found: true if the class is that of a true effect or of an equivalent one, at any place.
     pub classes: Vec<bool>,
     /// For each effect found: true if it is a true effect, or an equivalent one, at its place.
     pub names: Vec<bool>,
-    /// True if a true effect, or an equivalent one, is among the effects that the data cannot distinguish from the first one.
+    /// True if a true effect, or an equivalent one, is among the effects that the data cannot distinguish from the
+    /// first one.
     pub in_set: bool,
     /// True if what is missing depends on the stated coordinate; `None` if none is stated, or if it depends on none.
     pub coordinate: Option<bool>,
@@ -82,8 +83,8 @@ pub(crate) struct Row {
     pub plant: String,
     /// Kind of the case.
     pub kind: Kind,
-    /// Requested size; 0 if nothing is missing. For the kinds with settings: the error of the refitted nominal model, in units of the
-    /// noise.
+    /// Requested size; 0 if nothing is missing. For the kinds with settings: the error of the refitted nominal model,
+    /// in units of the noise.
     pub size: f64,
     /// Model error in the background.
     pub background: Option<Disturbance>,

@@ -110,7 +110,8 @@ fn only(catalogue: &Catalogue, trial: &Trial) -> Catalogue {
     catalogue
 }
 
-/// Returns the catalogue without the missing effects and those equivalent to them, under all names that are accepted for them.
+/// Returns the catalogue without the missing effects and those equivalent to them, under all names that are accepted
+/// for them.
 fn without_truth(catalogue: &Catalogue, trial: &Trial) -> Catalogue {
     let truth = &trial.truth;
     let is_true = |name: &str| truth.effects.iter().any(|e| names::names(&e.class, &e.strengths).contains(&name));

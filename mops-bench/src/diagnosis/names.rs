@@ -29,8 +29,8 @@ pub(crate) fn class_of(name: &str) -> Option<&'static str> {
     effects().iter().find(|effect| effect.name() == name).map(|effect| effect.class().name())
 }
 
-/// Returns the coordinates on which the force of an effect of the test bed, or the change of its input, depends; empty if there is
-/// none.
+/// Returns the coordinates on which the force of an effect of the test bed, or the change of its input, depends; empty
+/// if there is none.
 pub(crate) fn coordinates(class: &str) -> &'static [&'static str] {
     match class {
         "coulomb-friction"

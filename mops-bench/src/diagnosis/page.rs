@@ -11,7 +11,8 @@ pub(crate) fn page(tables: &str, stated: &[(&str, Vec<(f64, bool)>)]) -> String 
     crate::page::page("Benchmark of the diagnosis", "Stated probabilities", &pictures, tables, "cases.csv")
 }
 
-/// Plots the observed frequency, with its interval, over the stated probability; calibrated probabilities are on the diagonal.
+/// Plots the observed frequency, with its interval, over the stated probability; calibrated probabilities are on the
+/// diagonal.
 fn plot(of: &str, bins: &[Bin]) -> Plot {
     let points: Vec<(f64, f64)> = bins.iter().map(|bin| (bin.stated, bin.observed.share())).collect();
     let dots =

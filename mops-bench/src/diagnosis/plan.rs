@@ -108,8 +108,8 @@ impl Plan {
 
     /// Generates the case; returns `None` if no plant reaches the size with a plausible parameter.
     ///
-    /// Cases cycle through the effects, then through the sizes, so that every effect occurs at every size. The plant is drawn
-    /// from those that the effect fits.
+    /// Cases cycle through the effects, then through the sizes, so that every effect occurs at every size. The plant is
+    /// drawn from those that the effect fits.
     pub fn make(&self, wish: &Wish) -> Option<Trial> {
         let Wish { kind, number } = *wish;
         if let Kind::Setting(setting) = kind {

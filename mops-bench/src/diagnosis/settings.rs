@@ -15,8 +15,8 @@ pub(crate) fn names() -> Vec<String> {
     all
 }
 
-/// Returns the settings with one of them multiplied by a factor, whole numbers rounded and at least 1; `None` if there is none of
-/// this name.
+/// Returns the settings with one of them multiplied by a factor, whole numbers rounded and at least 1; `None` if there
+/// is none of this name.
 pub(crate) fn scaled(settings: &Settings, name: &str, factor: f64) -> Option<Settings> {
     let mut tree = Value::Object(tree(settings));
     let value = tree.pointer_mut(&format!("/{}", name.replace('.', "/")))?;

@@ -25,8 +25,8 @@ impl Rate {
 
     /// Returns an interval that contains the true rate with probability at least 0.95.
     ///
-    /// Source: C. J. Clopper, E. S. Pearson, The use of confidence or fiducial limits illustrated in the case of the binomial,
-    /// Biometrika 26 (1934).
+    /// Source: C. J. Clopper, E. S. Pearson, The use of confidence or fiducial limits illustrated in the case of the
+    /// binomial, Biometrika 26 (1934).
     pub fn interval95(self) -> [f64; 2] {
         let Self { hits, of } = self;
         let low = if hits == 0 { 0.0 } else { root(|p| at_least(hits, of, p) - 0.025) };
@@ -95,9 +95,9 @@ pub(crate) fn brier(stated: &[(f64, bool)]) -> f64 {
     stated.iter().map(|(p, so)| math::powi(p - f64::from(u8::from(*so)), 2)).sum::<f64>() / stated.len() as f64
 }
 
-/// Returns the Kolmogorov-Smirnov distance between the values and the uniform distribution on [0, 1], and its 5 % critical value
-/// for this sample size. Source: M. A. Stephens, EDF statistics for goodness of fit and some comparisons, JASA 69 (1974),
-/// table 1A.
+/// Returns the Kolmogorov-Smirnov distance between the values and the uniform distribution on [0, 1], and its 5 %
+/// critical value for this sample size. Source: M. A. Stephens, EDF statistics for goodness of fit and some
+/// comparisons, JASA 69 (1974), table 1A.
 #[allow(clippy::cast_precision_loss)]
 pub(crate) fn uniformity(values: &[f64]) -> (f64, f64) {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();

@@ -54,7 +54,8 @@ pub(crate) fn csv(rows: &[Row]) -> String {
     written(HEADER, rows.iter().map(cells))
 }
 
-/// Returns the parameters of true effects that were found as CSV: case, size, parameter, true value, estimate, interval.
+/// Returns the parameters of true effects that were found as CSV: case, size, parameter, true value, estimate,
+/// interval.
 pub(crate) fn strengths(rows: &[Row]) -> String {
     let lines = rows.iter().flat_map(|row| {
         row.judgement.covered.iter().map(|c| {

@@ -246,7 +246,8 @@ impl Answer {
         self.verdict == other.verdict && named(self) == named(other)
     }
 
-    /// Returns the ratio of the errors after and before on the experiments of a role; `None` without experiments or effects.
+    /// Returns the ratio of the errors after and before on the experiments of a role; `None` without experiments or
+    /// effects.
     pub fn change(&self, role: Role) -> Option<f64> {
         let own = || self.records.iter().filter(|record| record.role == role);
         let squares = |error: fn(&RecordError) -> f64| own().map(|record| math::powi(error(record), 2)).sum::<f64>();
@@ -254,9 +255,9 @@ impl Answer {
         is_known.then(|| (squares(|record| record.after) / squares(|record| record.before)).sqrt())
     }
 
-    /// Returns true if the declared model exceeds the noise level on a calibration record by more than a tenth, beyond chance: three
-    /// standard deviations of the root mean square of as many independent normal numbers. N.B.: on other records, errors of the
-    /// parameters alone may be larger than the noise.
+    /// Returns true if the declared model exceeds the noise level on a calibration record by more than a tenth, beyond
+    /// chance: three standard deviations of the root mean square of as many independent normal numbers. N.B.: on other
+    /// records, errors of the parameters alone may be larger than the noise.
     #[allow(clippy::cast_precision_loss)]
     pub fn exceeds_noise(&self) -> bool {
         let chance = |samples: usize| 3.0 / (2.0 * samples as f64).sqrt();

@@ -9,8 +9,8 @@ pub struct Known {
     pub study: Shipped,
     /// Minimum of the objective.
     pub minimum: f64,
-    /// Tuners at the optimum, in order. Empty if only the objective is known, or if the optimum is at a discontinuity, which
-    /// rounded values miss.
+    /// Tuners at the optimum, in order. Empty if only the objective is known, or if the optimum is at a discontinuity,
+    /// which rounded values miss.
     pub tuners: &'static [f64],
     /// Source of the solution.
     pub source: &'static str,
@@ -29,8 +29,8 @@ macro_rules! control {
     };
 }
 
-/// Returns the studies of the suite: designs and a calibration from the thesis, then problems with closed-form, published or
-/// independently computed solutions.
+/// Returns the studies of the suite: designs and a calibration from the thesis, then problems with closed-form,
+/// published or independently computed solutions.
 pub fn control() -> Vec<Known> {
     let of_shipped = |name: &str| {
         mops::studies::shipped().into_iter().find(|study| study.name == name).expect("the study is shipped")

@@ -56,11 +56,11 @@ fn statistics(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     [mean, square.sqrt()]
 }
 
-/// Returns the mean hypervolume of pymoo 0.6.2 under the same conditions, and the inverted generational distance. The latter is
-/// `None` if it was not computed with equally many points of the true front.
+/// Returns the mean hypervolume of pymoo 0.6.2 under the same conditions, and the inverted generational distance. The
+/// latter is `None` if it was not computed with equally many points of the true front.
 ///
-/// Settings: NSGA-II with 100 members and 250 generations for two objectives; NSGA-III with 92 members and 250 (DTLZ1: 400)
-/// generations for three; 7 seeds.
+/// Settings: NSGA-II with 100 members and 250 generations for two objectives; NSGA-III with 92 members and 250 (DTLZ1:
+/// 400) generations for three; 7 seeds.
 pub(crate) fn published(problem: &str) -> Option<(f64, Option<f64>)> {
     const TABLE: [(&str, f64, Option<f64>); 7] = [
         ("ZDT1", 0.869_70, Some(0.0048)),

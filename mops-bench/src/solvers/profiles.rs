@@ -1,7 +1,7 @@
 //! Data and performance profiles.
 //!
-//! Source: J. J. More, S. M. Wild, Benchmarking derivative-free optimization algorithms, SIAM Journal on Optimization 20
-//! (2009) 172-191; E. D. Dolan, J. J. More, Mathematical Programming 91 (2002) 201-213.
+//! Source: J. J. More, S. M. Wild, Benchmarking derivative-free optimization algorithms, SIAM Journal on Optimization
+//! 20 (2009) 172-191; E. D. Dolan, J. J. More, Mathematical Programming 91 (2002) 201-213.
 
 use super::results::{Results, Row};
 
@@ -19,16 +19,16 @@ impl Score {
     }
 }
 
-/// Returns the data profile: share of runs solved within a number of simplex gradients (`n + 1` evaluations), as the corners of
-/// a step function.
+/// Returns the data profile: share of runs solved within a number of simplex gradients (`n + 1` evaluations), as the
+/// corners of a step function.
 #[allow(clippy::cast_precision_loss)]
 pub(crate) fn data_profile(scores: &[Score]) -> Vec<(f64, f64)> {
     let spent = |score: &Score| score.evaluations.map(|count| count as f64 / score.simplex as f64);
     staircase(scores.iter().map(spent).collect())
 }
 
-/// Returns the performance profile of every solver: share of runs solved within a multiple of the evaluations of the best
-/// solver.
+/// Returns the performance profile of every solver: share of runs solved within a multiple of the evaluations of the
+/// best solver.
 #[allow(clippy::cast_precision_loss)]
 pub(crate) fn performance_profile(solvers: &[Vec<Score>]) -> Vec<Vec<(f64, f64)>> {
     let runs = solvers.iter().map(Vec::len).min().unwrap_or(0);

@@ -1,7 +1,8 @@
 //! Problems without a known minimum: each run is compared with the best of all runs.
 //!
-//! Solved to `tau`: `f(x0) - f >= (1 - tau)(f(x0) - f_L)`. `f_L` is the smallest value of all runs of the benchmark and of five
-//! additional solvers, with the same budget and finite differences. If the published minimum is smaller, `f_L` is that minimum.
+//! Solved to `tau`: `f(x0) - f >= (1 - tau)(f(x0) - f_L)`. `f_L` is the smallest value of all runs of the benchmark and
+//! of five additional solvers, with the same budget and finite differences. If the published minimum is smaller, `f_L`
+//! is that minimum.
 //!
 //! Source: J. J. More, S. M. Wild, SIAM Journal on Optimization 20 (2009) 172-191, section 2.
 

@@ -149,8 +149,8 @@ mod tests {
             let problem = posing(&catalogue, known, 1);
             let merit = problem.evaluate_at(known.tuners).merit;
             let gap = (merit.objective - known.minimum).abs() / known.minimum.abs().max(1.0);
-            // At the optima of the designs of the thesis, extrema touch their bands: times change there with the square root of
-            // the last digit of the tuners.
+            // At the optima of the designs of the thesis, extrema touch their bands: times change there with the square
+            // root of the last digit of the tuners.
             let shipped = mops::studies::shipped().iter().any(|study| study.name == known.study.name);
             let tolerance = if shipped { 2e-4 } else { 1e-5 };
             assert!(gap < tolerance, "{}: {merit:?} {}", known.study.name, known.minimum);

@@ -10,9 +10,9 @@ pub const EVEN: f64 = 0.01;
 
 /// Weights of the neighbours at 1, 2, .. samples in the first and the second derivative, for a step of 1, by reach.
 ///
-/// Weights of the maximally flat differentiator: exact for polynomials of degree `2 reach`, equal to sinc interpolation in
-/// the limit. Source: B. Fornberg, Generation of finite difference formulas on arbitrarily spaced grids, Mathematics of
-/// Computation 51 (1988) 699.
+/// Weights of the maximally flat differentiator: exact for polynomials of degree `2 reach`, equal to sinc interpolation
+/// in the limit. Source: B. Fornberg, Generation of finite difference formulas on arbitrarily spaced grids, Mathematics
+/// of Computation 51 (1988) 699.
 struct Weights {
     first: Vec<f64>,
     second: Vec<f64>,
@@ -52,10 +52,11 @@ impl Weights {
     }
 }
 
-/// Returns the coefficients `c0 + c1 s + .. + c5 s^5` of the signal from sample `k` (s = 0) to the next (s = 1). The values
-/// and first two derivatives are those of the band-limited signal through evenly spaced samples.
+/// Returns the coefficients `c0 + c1 s + .. + c5 s^5` of the signal from sample `k` (s = 0) to the next (s = 1). The
+/// values and first two derivatives are those of the band-limited signal through evenly spaced samples.
 ///
-/// Below half of the Nyquist frequency the error is less than 0.1 % of the amplitude, except near the ends of the record.
+/// Below half of the Nyquist frequency the error is less than 0.1 % of the amplitude, except near the ends of the
+/// record.
 ///
 /// # Panics
 /// Panics if there is no sample `k + 1`.

@@ -16,12 +16,12 @@ pub struct Case {
     pub name: String,
     /// Parameter values of this case, in the units of the models.
     pub parameters: Vec<(String, f64)>,
-    /// Inputs that are not zero, by name, in the units of the models. In a window of a record, negative times contain the
-    /// input before the window, for actuators with memory or delay.
+    /// Inputs that are not zero, by name, in the units of the models. In a window of a record, negative times contain
+    /// the input before the window, for actuators with memory or delay.
     pub inputs: Vec<(String, Input)>,
-    /// Disturbances of balances, by the state whose equation contains them: external forces, each as the rate that it adds to the
-    /// state at the beginning of the simulation, in the unit of that rate. So a disturbance does not depend on the inertia. Only
-    /// models with open equations and effects read them; all others refuse them.
+    /// Disturbances of balances, by the state whose equation contains them: external forces, each as the rate that it
+    /// adds to the state at the beginning of the simulation, in the unit of that rate. So a disturbance does not depend
+    /// on the inertia. Only models with open equations and effects read them; all others refuse them.
     pub disturbances: Vec<(String, Input)>,
     /// Measurement, if there is one.
     pub experiment: Option<Experiment>,

@@ -65,12 +65,12 @@ impl ModelBuilder {
 }
 
 impl Catalogue {
-    /// Returns a model with effects at its places. Each effect parameter is a model parameter `name.parameter`, at its null
-    /// value by default.
+    /// Returns a model with effects at its places. Each effect parameter is a model parameter `name.parameter`, at its
+    /// null value by default.
     ///
     /// # Errors
-    /// Returns an error for an unknown kind of effect or place, and for an effect that does not act there. The error has the
-    /// effect's name as its first key.
+    /// Returns an error for an unknown kind of effect or place, and for an effect that does not act there. The error
+    /// has the effect's name as its first key.
     pub fn with_effects(&self, model: Arc<dyn Model>, effects: &[EffectBuilder]) -> Result<Box<dyn Model>, StudyError> {
         let placement = |draft: &EffectBuilder| {
             draft.placement(self, model.interface()).map_err(|mistake| mistake.within(&draft.name))

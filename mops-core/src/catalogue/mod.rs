@@ -267,15 +267,17 @@ impl Catalogue {
         self
     }
 
-    /// Adds a study: files in the program ([`crate::catalogue::Shipped`]), a folder ([`crate::catalogue::StudyFolder`]), or one built in Rust
-    /// ([`crate::catalogue::BuiltStudy`]). Names must be unique: see [`Self::check_names`].
+    /// Adds a study: files in the program ([`crate::catalogue::Shipped`]), a folder
+    /// ([`crate::catalogue::StudyFolder`]), or one built in Rust ([`crate::catalogue::BuiltStudy`]). Names must be
+    /// unique: see [`Self::check_names`].
     #[must_use]
     pub fn with_study(mut self, study: impl Into<CatalogueStudy>) -> Self {
         self.studies.push(study.into());
         self
     }
 
-    /// Checks that no two kinds of one sort and no two studies have the same name; the command line calls it before every command.
+    /// Checks that no two kinds of one sort and no two studies have the same name; the command line calls it before
+    /// every command.
     ///
     /// # Errors
     /// Returns an error that names the two.

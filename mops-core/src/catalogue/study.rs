@@ -8,7 +8,8 @@ use mops_language::files::Files;
 
 use crate::study::StudyBuilder;
 
-/// Study that a catalogue knows by name: `mops list` shows it, and every command that takes a study file takes the name.
+/// Study that a catalogue knows by name: `mops list` shows it, and every command that takes a study file takes the
+/// name.
 #[derive(Clone)]
 #[non_exhaustive]
 pub enum CatalogueStudy {
@@ -72,8 +73,8 @@ impl CatalogueStudy {
 }
 
 impl StudyFolder {
-    /// Returns the study in a folder that has a `study.toml`; `None` for other folders. Without a readable name in the file,
-    /// the study has the name of the folder, and its errors are reported when it is read.
+    /// Returns the study in a folder that has a `study.toml`; `None` for other folders. Without a readable name in the
+    /// file, the study has the name of the folder, and its errors are reported when it is read.
     pub fn open(path: &Path) -> Option<Self> {
         let file = path.join("study.toml");
         let folder = path.file_name()?.to_str()?;
@@ -99,8 +100,8 @@ fn name_in(file: &Path) -> Option<String> {
 }
 
 impl BuiltStudy {
-    /// Creates a study of this name. `about` is one sentence for `mops list`; `draft` describes the study each time it is
-    /// opened, and its errors are reported then.
+    /// Creates a study of this name. `about` is one sentence for `mops list`; `draft` describes the study each time it
+    /// is opened, and its errors are reported then.
     pub fn new(
         name: impl Into<String>,
         about: impl Into<String>,

@@ -30,8 +30,8 @@ pub struct Scaled {
 }
 
 impl Demand {
-    /// Returns the scaled value of a number. The formulas for `c` are `c/d` for at most `d`, `1 + (d - c)/|d|` for at least
-    /// `d`, and `(c - good)/(bad - good)` for a pair.
+    /// Returns the scaled value of a number. The formulas for `c` are `c/d` for at most `d`, `1 + (d - c)/|d|` for at
+    /// least `d`, and `(c - good)/(bad - good)` for a pair.
     pub fn scale(&self, value: f64) -> f64 {
         match *self {
             Self::AtMost(demand) => value / demand,
@@ -51,9 +51,9 @@ impl Demand {
         }
     }
 
-    /// Returns the scaled value of a criterion. A missed criterion counts as `max(1, h/d) (1 + e/(e + b))` for a time at
-    /// most `d` with the horizon `h`. Any other missed criterion counts as `1 + e/(e + b)`. Both exceed 1; [`Missed`]
-    /// defines `e` and `b`.
+    /// Returns the scaled value of a criterion. A missed criterion counts as `max(1, h/d) (1 + e/(e + b))` for a time
+    /// at most `d` with the horizon `h`. Any other missed criterion counts as `1 + e/(e + b)`. Both exceed 1;
+    /// [`Missed`] defines `e` and `b`.
     pub fn scaled(&self, value: &Value) -> Scaled {
         let unit = match (value.missed, *self) {
             (_, Self::None) => return Scaled { value: f64::NAN, slope: f64::NAN },
@@ -94,8 +94,8 @@ impl Demand {
         }
     }
 
-    /// Returns the demand for one number `d` of a criterion with this sense. `None` if the sense needs more than a number,
-    /// or if the number is 0 or has the wrong sign. `equal` demands the number itself.
+    /// Returns the demand for one number `d` of a criterion with this sense. `None` if the sense needs more than a
+    /// number, or if the number is 0 or has the wrong sign. `equal` demands the number itself.
     pub fn of(number: f64, sense: Sense, equal: bool) -> Option<Self> {
         match sense {
             _ if !number.is_finite() || number == 0.0 => None,

@@ -34,7 +34,8 @@ impl InUnit {
         }
     }
 
-    /// Returns the factor of the number of a value: 1 for a missed criterion that is not a time, whose number is a ratio.
+    /// Returns the factor of the number of a value: 1 for a missed criterion that is not a time, whose number is a
+    /// ratio.
     fn factor_of(&self, value: &Value) -> f64 {
         if value.missed == Some(Missed { horizon: None }) { 1.0 } else { self.factor }
     }

@@ -24,11 +24,12 @@ pub enum Loss {
 const LINEAR: f64 = 1.345;
 
 /// Degrees of freedom of Student's distribution.
-/// Source: K. L. Lange, R. J. A. Little, J. M. G. Taylor, Robust statistical modeling using the t distribution, Journal of the
-/// American Statistical Association 84 (1989) 881-896.
+/// Source: K. L. Lange, R. J. A. Little, J. M. G. Taylor, Robust statistical modeling using the t distribution, Journal
+/// of the American Statistical Association 84 (1989) 881-896.
 const FREEDOM: f64 = 4.0;
 
-/// Largest number of steps of a location, and the last change of one, in standard deviations: far below the error of a mean.
+/// Largest number of steps of a location, and the last change of one, in standard deviations: far below the error of a
+/// mean.
 const ROUNDS: usize = 200;
 const ACCURATE: f64 = 1e-9;
 
@@ -76,10 +77,11 @@ impl Loss {
         }
     }
 
-    /// Returns the location of deviations: the number whose distances to them have scores with the sum 0; for squares, their mean.
+    /// Returns the location of deviations: the number whose distances to them have scores with the sum 0; for squares,
+    /// their mean.
     ///
-    /// Iteratively reweighted means from the median. Source: P. J. Huber, E. M. Ronchetti, Robust Statistics (2nd ed., 2009),
-    /// section 6.7.
+    /// Iteratively reweighted means from the median. Source: P. J. Huber, E. M. Ronchetti, Robust Statistics (2nd ed.,
+    /// 2009), section 6.7.
     #[allow(clippy::cast_precision_loss)]
     pub fn location(self, deviations: &[f64]) -> f64 {
         if self == Self::Squares {

@@ -38,11 +38,12 @@ pub trait CriterionSpec: Send + Sync {
     /// Checks names and units against the interface of the model.
     ///
     /// # Errors
-    /// Returns an error for an unknown signal, a quantity in a wrong unit or an invalid option. The error names the option.
+    /// Returns an error for an unknown signal, a quantity in a wrong unit or an invalid option. The error names the
+    /// option.
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError>;
 
-    /// Returns the name of the measured signal if the criterion compares with a measurement; it then applies only to cases
-    /// that have one.
+    /// Returns the name of the measured signal if the criterion compares with a measurement; it then applies only to
+    /// cases that have one.
     fn needs_measurement(&self) -> Option<&str> {
         None
     }
@@ -52,8 +53,8 @@ pub trait CriterionSpec: Send + Sync {
         Vec::new()
     }
 
-    /// Checks names and units as [`CriterionSpec::bind`] does, with the criteria of the same model that [`CriterionSpec::names`]
-    /// refers to.
+    /// Checks names and units as [`CriterionSpec::bind`] does, with the criteria of the same model that
+    /// [`CriterionSpec::names`] refers to.
     ///
     /// # Errors
     /// Returns an error as [`CriterionSpec::bind`] does.
@@ -61,8 +62,8 @@ pub trait CriterionSpec: Send + Sync {
         self.bind(model)
     }
 
-    /// Binds the criterion as [`CriterionSpec::bind_with`] does, restricted to a part of the simulation from one time to another, s.
-    /// All its times then count from the first.
+    /// Binds the criterion as [`CriterionSpec::bind_with`] does, restricted to a part of the simulation from one time
+    /// to another, s. All its times then count from the first.
     ///
     /// # Errors
     /// Returns an error as [`CriterionSpec::bind`] does.
@@ -87,7 +88,8 @@ pub trait Criterion: Send + Sync {
     /// Returns the names of the signals that the criterion reads.
     fn signals(&self) -> Vec<String>;
 
-    /// Checks that the case provides all data that the criterion needs, whatever the analysis. By default, every case does.
+    /// Checks that the case provides all data that the criterion needs, whatever the analysis. By default, every case
+    /// does.
     ///
     /// # Errors
     /// Returns an error if data are missing: which, and how to provide them.
@@ -101,8 +103,8 @@ pub trait Criterion: Send + Sync {
     /// Returns one sentence if the criterion is not defined for the response.
     fn value(&self, case: &Case, analysis: &Analysis) -> Result<Value, String>;
 
-    /// Computes the value for one case, with the parameters of the model in the order of [`Interface::parameters`]. By default,
-    /// they do not matter.
+    /// Computes the value for one case, with the parameters of the model in the order of [`Interface::parameters`]. By
+    /// default, they do not matter.
     ///
     /// # Errors
     /// Returns an error as [`Criterion::value`] does.
@@ -126,14 +128,15 @@ pub trait Criterion: Send + Sync {
         None
     }
 
-    /// Returns the default demand. Without one, a criterion with a usage other than monitor needs a demand in the study.
+    /// Returns the default demand. Without one, a criterion with a usage other than monitor needs a demand in the
+    /// study.
     fn natural_demand(&self) -> Option<f64> {
         None
     }
 
-    /// Computes the directional derivative of the value and of its residuals along a tangent of the analysis. The default is
-    /// a central difference of two analyses moved by `± tangent.reach`, without simulation; by less where the order of jumps and
-    /// corners would change.
+    /// Computes the directional derivative of the value and of its residuals along a tangent of the analysis. The
+    /// default is a central difference of two analyses moved by `± tangent.reach`, without simulation; by less where
+    /// the order of jumps and corners would change.
     ///
     /// # Errors
     /// Returns one sentence if the criterion has no derivative for the response.
@@ -157,13 +160,14 @@ pub trait Criterion: Send + Sync {
         })
     }
 
-    /// Returns the measured samples behind the residuals; their noise determines the standard errors of a calibration. The
-    /// default `None` means: no residuals, or residuals of which only equal variance is assumed.
+    /// Returns the measured samples behind the residuals; their noise determines the standard errors of a calibration.
+    /// The default `None` means: no residuals, or residuals of which only equal variance is assumed.
     fn samples(&self, _case: &Case) -> Option<Samples> {
         None
     }
 
-    /// Returns input and output of the loop transfer function of a criterion that closes the loop by unity negative feedback.
+    /// Returns input and output of the loop transfer function of a criterion that closes the loop by unity negative
+    /// feedback.
     fn feedback_channel(&self) -> Option<[String; 2]> {
         None
     }
@@ -174,8 +178,8 @@ pub trait Criterion: Send + Sync {
     }
 }
 
-/// Smallest distance that [`Criterion::slope`] moves an analysis by, in the unit box: rounding of the values then changes a difference by
-/// some 1e-9 of the value. Jumps and corners that change their order within it coincide.
+/// Smallest distance that [`Criterion::slope`] moves an analysis by, in the unit box: rounding of the values then
+/// changes a difference by some 1e-9 of the value. Jumps and corners that change their order within it coincide.
 const LEAST_REACH: f64 = 1e-7;
 
 /// Which values of a criterion are better.
@@ -187,8 +191,8 @@ pub enum Sense {
     More,
     /// Values near a target: a single demand is ambiguous.
     Target,
-    /// Not fixed by the kind, as for the value of a signal. A demand is an upper limit; a pair `good`, `bad` sets either
-    /// direction.
+    /// Not fixed by the kind, as for the value of a signal. A demand is an upper limit; a pair `good`, `bad` sets
+    /// either direction.
     #[default]
     Open,
 }
@@ -210,7 +214,8 @@ pub struct Tangent<'a> {
     pub reach: f64,
 }
 
-/// Smallest share by which the number of a missed criterion exceeds 1. The share is larger than the constraint tolerance
+/// Smallest share by which the number of a missed criterion exceeds 1. The share is larger than the constraint
+/// tolerance
 /// [`crate::evaluation::FEASIBLE`], so that a missed criterion never meets its demand.
 const LEAST_MISS: f64 = 1e-5;
 
@@ -223,16 +228,17 @@ pub struct Value {
     pub residuals: Vec<f64>,
     /// Remark on the number, such as `not settled at the end`.
     pub note: Option<&'static str>,
-    /// Set if the condition of the criterion was never reached. `number` is then a measure of the distance, see [`Missed`].
+    /// Set if the condition of the criterion was never reached. `number` is then a measure of the distance, see
+    /// [`Missed`].
     pub missed: Option<Missed>,
 }
 
 /// A condition of a criterion, such as settling, that was not reached in a simulation or at any frequency.
 ///
-/// The criterion then has no value, and no demand is met. To guide solvers, the number is `h (1 + e/(e + b))`. `h` is the
-/// time available to reach the condition, in the criterion's unit. For a criterion that is not a time, `h` is 1 and the number a
-/// ratio, whatever the unit. `e` is the distance of the response from its target and `b` the tolerance. [`crate::Demand::scaled`]
-/// defines the scaled value.
+/// The criterion then has no value, and no demand is met. To guide solvers, the number is `h (1 + e/(e + b))`. `h` is
+/// the time available to reach the condition, in the criterion's unit. For a criterion that is not a time, `h` is 1 and
+/// the number a ratio, whatever the unit. `e` is the distance of the response from its target and `b` the tolerance.
+/// [`crate::Demand::scaled`] defines the scaled value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Missed {
     /// Time available to reach the condition, in the criterion's unit; `None` if the criterion is not a time.
@@ -251,8 +257,8 @@ impl Value {
         Self { number, note: Some(note), ..Self::default() }
     }
 
-    /// Returns the value of a missed criterion. `horizon` is the available time in s if the criterion is a time. `distance`
-    /// is the distance of the response from its target and `near` the tolerance, in the same unit.
+    /// Returns the value of a missed criterion. `horizon` is the available time in s if the criterion is a time.
+    /// `distance` is the distance of the response from its target and `near` the tolerance, in the same unit.
     pub fn missed(horizon: Option<f64>, distance: f64, near: f64, note: &'static str) -> Self {
         let share = (distance / (distance + near)).clamp(LEAST_MISS, 1.0);
         let number = horizon.unwrap_or(1.0) * (1.0 + if share.is_nan() { 1.0 } else { share });

@@ -9,7 +9,8 @@ pub struct Samples {
     pub signal: String,
     /// Index of the first of them among the samples of the signal.
     pub first: usize,
-    /// Residual divided by (simulated - measured), for every sample; positive. With a robust loss, that of small deviations.
+    /// Residual divided by (simulated - measured), for every sample; positive. With a robust loss, that of small
+    /// deviations.
     pub weights: Vec<f64>,
     /// Standard deviation of the noise of one sample, in the unit of the signal, if known.
     pub noise: Option<f64>,

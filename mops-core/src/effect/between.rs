@@ -8,8 +8,8 @@ use crate::effect::{
     BoundEffect, Characteristic, DeclaredTerm, Dimension, Effect, EffectClass, EffectParameter, PortKind, PortState,
 };
 
-/// An effect that acts between two joints: a function of the position and the speed of the first relative to the second. Its force
-/// acts on the first joint, its reaction on the second.
+/// An effect that acts between two joints: a function of the position and the speed of the first relative to the
+/// second. Its force acts on the first joint, its reaction on the second.
 pub struct Between(Arc<dyn Effect>);
 
 impl Between {

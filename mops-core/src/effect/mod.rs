@@ -100,10 +100,10 @@ impl Port {
 
 /// Unit of an effect parameter, as powers of the units at its place.
 ///
-/// `output` is the unit of the term that the effect adds. The term is a force, torque or flow in an equation. At an actuator
-/// it has the unit of the input, at a sensor that of the signal. `position` and `speed` are the units of the joint; at a
-/// process, of the state and its rate. `value` is the unit of the input or signal, `time` is s. The second port provides
-/// `position` and `speed` at an actuator or sensor, and `value` at a joint or process.
+/// `output` is the unit of the term that the effect adds. The term is a force, torque or flow in an equation. At an
+/// actuator it has the unit of the input, at a sensor that of the signal. `position` and `speed` are the units of the
+/// joint; at a process, of the state and its rate. `value` is the unit of the input or signal, `time` is s. The second
+/// port provides `position` and `speed` at an actuator or sensor, and `value` at a joint or process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Dimension {
     /// Power of the unit of the added term.
@@ -172,7 +172,8 @@ pub enum InitialGrid {
     /// Relative positions between the smallest and the largest position (of a process: state; of an actuator or sensor:
     /// value).
     Within(&'static [f64]),
-    /// Relative positions as in [`InitialGrid::Within`], and the centre of a dead band visible in the samples of a sensor.
+    /// Relative positions as in [`InitialGrid::Within`], and the centre of a dead band visible in the samples of a
+    /// sensor.
     WithinAndGap(&'static [f64]),
     /// Multiples of the typical size, and half the width of a dead band visible in the samples of a sensor.
     ScaledAndGap(&'static [f64]),
@@ -186,9 +187,9 @@ pub enum InitialGrid {
     Jumps(&'static [f64]),
     /// Listed values, then multiples of the typical size: periods per turn, and along a rail.
     PlainAndScaled(&'static [f64], &'static [f64]),
-    /// Frequencies in rad/s that the record can resolve: at least two thirds of a period in the record, at most 160 periods
-    /// or four samples per period. Each is above the one before by at least this share: a resonance of damping ratio d is 2 d
-    /// times its frequency wide.
+    /// Frequencies in rad/s that the record can resolve: at least two thirds of a period in the record, at most 160
+    /// periods or four samples per period. Each is above the one before by at least this share: a resonance of damping
+    /// ratio d is 2 d times its frequency wide.
     Frequencies(f64),
     /// Quantisation steps: the largest value divided by the number of steps, from one step on. Neighbouring candidates
     /// differ by one step in about every eighth sample.
@@ -198,15 +199,15 @@ pub enum InitialGrid {
 }
 
 impl InitialGrid {
-    /// Returns true if the residuals are discontinuous in the parameter, so that gradients carry no information. Examples:
-    /// quantisation steps, the width of a dead band, a break-away force.
+    /// Returns true if the residuals are discontinuous in the parameter, so that gradients carry no information.
+    /// Examples: quantisation steps, the width of a dead band, a break-away force.
     pub fn jumps(&self) -> bool {
         matches!(self, Self::Steps | Self::ScaledAndGap(_) | Self::Jumps(_))
     }
 }
 
-/// Kind of an effect parameter. It decides which values are plausible before data are seen, and what data must show for the
-/// parameter to be identifiable.
+/// Kind of an effect parameter. It decides which values are plausible before data are seen, and what data must show for
+/// the parameter to be identifiable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterKind {
     /// Magnitude; the effect vanishes at its null value.
@@ -215,8 +216,8 @@ pub enum ParameterKind {
     Steepness,
     /// Shape, such as an exponent or a characteristic speed.
     Shape,
-    /// Displacement over which a force builds up, or speed over which it falls. If the motion passes it in a fraction of a sample,
-    /// data do not show how small it is.
+    /// Displacement over which a force builds up, or speed over which it falls. If the motion passes it in a fraction
+    /// of a sample, data do not show how small it is.
     BuildUp,
     /// Value in the range visited at the place, such as the neutral position of a spring.
     Level,
@@ -226,7 +227,8 @@ pub enum ParameterKind {
     UpperEdge,
     /// Absolute temperature at the zero of the scale of the place: 273.15 for degC.
     Zero,
-    /// Damping of a contact divided by its stiffness: shorter than the time in which the place moves, else the contact is a damper.
+    /// Damping of a contact divided by its stiffness: shorter than the time in which the place moves, else the contact
+    /// is a damper.
     Damping,
     /// Angle of a periodic function.
     Phase,
@@ -309,8 +311,8 @@ pub struct EffectParameter {
     /// Multiples of the typical size for restarts of a stuck fit, at every shape in the grid. A contact that starts too
     /// soft would act over the whole motion. If empty, the fit restarts from one and two times the estimate.
     pub restarts: &'static [f64],
-    /// Names of the simpler effects that the effect is where the parameter is at the lower, and at the upper end of the values that
-    /// are possible or that records can show: Stribeck friction without a rise is Coulomb friction.
+    /// Names of the simpler effects that the effect is where the parameter is at the lower, and at the upper end of the
+    /// values that are possible or that records can show: Stribeck friction without a rise is Coulomb friction.
     pub simpler: [&'static [&'static str]; 2],
 }
 
@@ -374,8 +376,8 @@ impl EffectParameter {
         self
     }
 
-    /// Sets other bounds. A diagnosis discards an effect whose first parameter is estimated at a finite bound other than the
-    /// null value, except at actuators. Such an estimate indicates a mistake, not an effect.
+    /// Sets other bounds. A diagnosis discards an effect whose first parameter is estimated at a finite bound other
+    /// than the null value, except at actuators. Such an estimate indicates a mistake, not an effect.
     #[must_use]
     pub const fn within(mut self, low: f64, high: f64) -> Self {
         self.bounds = [low, high];
@@ -389,8 +391,8 @@ impl EffectParameter {
         self
     }
 
-    /// Makes the parameter the steepness of a contact or an edge, with the multiples of the typical size from which a stuck fit
-    /// is restarted.
+    /// Makes the parameter the steepness of a contact or an edge, with the multiples of the typical size from which a
+    /// stuck fit is restarted.
     #[must_use]
     pub const fn restarted_from(mut self, multiples: &'static [f64]) -> Self {
         self.kind = ParameterKind::Steepness;
@@ -441,8 +443,8 @@ pub struct PortState<'a, S> {
     pub other_speed: S,
     /// The inputs as they reach the plant.
     pub u: &'a [S],
-    /// True if [`BoundEffect::gap`] is negative, fixed by the simulation for a whole step. `None` for an effect without a gap, or if the
-    /// sign decides.
+    /// True if [`BoundEffect::gap`] is negative, fixed by the simulation for a whole step. `None` for an effect without
+    /// a gap, or if the sign decides.
     pub closed: Option<bool>,
 }
 
@@ -466,12 +468,12 @@ pub trait BoundEffect<S: Scalar> {
     /// Writes the rates of the states of the effect.
     fn rates(&self, _at: &PortState<'_, S>, _z: &[S], _dz: &mut [S]) {}
 
-    /// Returns the output of the effect. At a joint or a process: the term added to the right-hand side of the equation,
-    /// positive forward. At an actuator: the input that reaches the plant. At a sensor: the measured value.
+    /// Returns the output of the effect. At a joint or a process: the term added to the right-hand side of the
+    /// equation, positive forward. At an actuator: the input that reaches the plant. At a sensor: the measured value.
     fn value(&self, at: &PortState<'_, S>, z: &[S]) -> S;
 
-    /// Returns the mass or inertia that an effect with [`Effect::is_inertial`] adds to the joint; negative for a loss. Those of all
-    /// effects at a joint add up, and at most [`MOST_LOST`] of the moving mass is lost.
+    /// Returns the mass or inertia that an effect with [`Effect::is_inertial`] adds to the joint; negative for a loss.
+    /// The masses of all effects at a joint add up, and at most [`MOST_LOST`] of the moving mass is lost.
     fn inertia(&self, _at: &PortState<'_, S>) -> S {
         S::from(0.0)
     }
@@ -486,11 +488,11 @@ pub trait BoundEffect<S: Scalar> {
         None
     }
 
-    /// Returns the distance to the edge at which the law of the effect changes: the opening of a contact, the height of an edge above a
-    /// level, the distance to the limit of an actuator or a sensor. It is negative beyond the edge, and depends on what the effect
-    /// receives at its own place; an effect has one throughout a simulation or never. A simulation ends a step at its zero
-    /// crossing, and tangents account for the event time. Within a step [`PortState::closed`] selects the law, also slightly beyond
-    /// the crossing.
+    /// Returns the distance to the edge at which the law of the effect changes: the opening of a contact, the height of
+    /// an edge above a level, the distance to the limit of an actuator or a sensor. It is negative beyond the edge, and
+    /// depends on what the effect receives at its own place; an effect has one throughout a simulation or never. A
+    /// simulation ends a step at its zero crossing, and tangents account for the event time. Within a step
+    /// [`PortState::closed`] selects the law, also slightly beyond the crossing.
     fn gap(&self, _at: &PortState<'_, S>) -> Option<S> {
         None
     }
@@ -510,14 +512,14 @@ pub trait BoundEffect<S: Scalar> {
         f64::INFINITY
     }
 
-    /// Returns the largest step size at which an explicit method is stable for the decaying internal dynamics of the effect,
-    /// s.
+    /// Returns the largest step size at which an explicit method is stable for the decaying internal dynamics of the
+    /// effect, s.
     fn damped_step(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// Updates the hysteresis state ([`Effect::hysteresis_states`]), which is NaN before the first update: where the command jumps or
-    /// bends, before and after it, and where [`BoundEffect::hysteresis_guard`] becomes negative.
+    /// Updates the hysteresis state ([`Effect::hysteresis_states`]), which is NaN before the first update: where the
+    /// command jumps or bends, before and after it, and where [`BoundEffect::hysteresis_guard`] becomes negative.
     fn update_hysteresis(&self, _at: &PortState<'_, S>, _memory: &mut [S]) {}
 
     /// Returns a guard that becomes negative where the hysteresis state must be updated: the law of
@@ -586,9 +588,9 @@ pub trait Effect: Send + Sync {
         0
     }
 
-    /// Returns the dimensions of the initial values that an experiment leaves free because they matter. They are those of
-    /// all states, or of the output of an effect with a hysteresis state. A dimensionless one is a fraction of a limit,
-    /// between -1 and 1.
+    /// Returns the dimensions of the initial values that an experiment leaves free because they matter. They are those
+    /// of all states, or of the output of an effect with a hysteresis state. A dimensionless one is a fraction of a
+    /// limit, between -1 and 1.
     fn free_starts(&self) -> &'static [Dimension] {
         &[]
     }
@@ -604,8 +606,8 @@ pub trait Effect: Send + Sync {
             && self.ports().iter().any(|port| matches!(port, PortKind::Actuator | PortKind::Sensor))
     }
 
-    /// Returns true if the effect can act on the value that another one passes on: the stairs of a staircase end no step of a simulation, so
-    /// that the way from one to the next is not known.
+    /// Returns true if the effect can act on the value that another one passes on: the stairs of a staircase end no
+    /// step of a simulation, so that the way from one to the next is not known.
     fn can_follow(&self, before: &dyn Effect) -> bool {
         !(before.is_staircase() && self.is_path_dependent())
     }
@@ -620,13 +622,14 @@ pub trait Effect: Send + Sync {
         false
     }
 
-    /// Returns true if the effect is periodic over the turn of an angle, in rad: a position or signal in m or V has none.
+    /// Returns true if the effect is periodic over the turn of an angle, in rad: a position or signal in m or V has
+    /// none.
     fn is_over_a_turn(&self) -> bool {
         false
     }
 
-    /// Returns true if the effect is an exact sum of other effects of the catalogue. A diagnosis then looks for these, so that
-    /// one model has one name.
+    /// Returns true if the effect is an exact sum of other effects of the catalogue. A diagnosis then looks for these,
+    /// so that one model has one name.
     fn is_sum(&self) -> bool {
         false
     }
@@ -636,7 +639,8 @@ pub trait Effect: Send + Sync {
         None
     }
 
-    /// Returns the term of the declared model that the effect modifies or acts beside; without that term it is no candidate.
+    /// Returns the term of the declared model that the effect modifies or acts beside; without that term it is no
+    /// candidate.
     fn modifies(&self) -> Option<DeclaredTerm> {
         None
     }

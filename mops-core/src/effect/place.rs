@@ -6,7 +6,8 @@ use crate::effect::Port;
 use crate::error::StudyError;
 
 impl Port {
-    /// Returns the port with this name among the ports of a model, such as `joint:phi`, `process:level`, `actuator:u`, `sensor:theta`.
+    /// Returns the port with this name among the ports of a model, such as `joint:phi`, `process:level`, `actuator:u`,
+    /// `sensor:theta`.
     ///
     /// # Errors
     /// Returns an error if there is no such port.

@@ -13,7 +13,8 @@ pub enum Port {
         name: String,
         /// State that is the position.
         position: String,
-        /// State that is the rate of change of the position; the force enters its equation, before a mass matrix is solved.
+        /// State that is the rate of change of the position; the force enters its equation, before a mass matrix is
+        /// solved.
         velocity: String,
         /// Unit of the force, if the model provides it.
         unit: Option<Unit>,

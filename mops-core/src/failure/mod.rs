@@ -14,7 +14,8 @@ use serde::Serialize;
 pub enum Failure {
     /// A state or a derivative became non-finite at this time, s.
     Diverged(f64),
-    /// The maximum number of steps was reached at this time, s. The text names what limited most of the steps, and a remedy.
+    /// The maximum number of steps was reached at this time, s. The text names what limited most of the steps, and a
+    /// remedy.
     StepLimit(f64, String),
     /// The step size underflowed at this time, s: the equations are stiff or singular there.
     StepTooSmall(f64),

@@ -59,12 +59,12 @@ pub fn thinned(objectives: &[f64], m: usize, count: usize) -> Vec<usize> {
     taken
 }
 
-/// Difference of every objective, relative to its range over the front, up to which two points of the front are one: less matters
-/// to no designer.
+/// Difference of every objective, relative to its range over the front, up to which two points of the front are one:
+/// less matters to no designer.
 pub const SAME: f64 = 1e-3;
 
-/// Returns the points of a front of which no two are the same to within [`SAME`], in their order. The best point in every objective
-/// stays.
+/// Returns the points of a front of which no two are the same to within [`SAME`], in their order. The best point in
+/// every objective stays.
 pub fn distinct(objectives: &[f64], m: usize) -> Vec<usize> {
     let row = |i: usize| &objectives[i * m..(i + 1) * m];
     let ranges = ranges(objectives, m);

@@ -8,8 +8,9 @@ use crate::model::{
     Analysis, AnalysisKind, Event, Interface, Job, Model, Parameter, Response, Variable, WithTangents, Work,
 };
 
-/// Models that are simulated side by side. The signal `y` of the model `loop` is `loop_y`; characters that cannot be part of a name
-/// in a formula become `_`. Parameters and initial values of the same name are one, and so are inputs that the case gives.
+/// Models that are simulated side by side. The signal `y` of the model `loop` is `loop_y`; characters that cannot be
+/// part of a name in a formula become `_`. Parameters and initial values of the same name are one, and so are inputs
+/// that the case gives.
 #[derive(Clone)]
 pub struct Joined {
     parts: Vec<Part>,
@@ -31,8 +32,8 @@ impl Joined {
     /// Joins models, with their names.
     ///
     /// # Errors
-    /// Returns an error if there are fewer than two models, if one is a linear system without time, or if parameters or inputs
-    /// with one name differ in their units.
+    /// Returns an error if there are fewer than two models, if one is a linear system without time, or if parameters or
+    /// inputs with one name differ in their units.
     pub fn new(models: Vec<(String, Box<dyn Model>)>) -> Result<Self, StudyError> {
         if models.len() < 2 {
             let fact = format!("expected at least two models in `join`, found {}", models.len());

@@ -22,11 +22,11 @@ pub struct Linearise {
     pub inputs: Option<Vec<String>>,
     /// Outputs, which are signals of the model; `None` for all.
     pub outputs: Option<Vec<String>>,
-    /// Values of states and inputs at the operating point. Other states have their initial values, other inputs the values
-    /// of the case.
+    /// Values of states and inputs at the operating point. Other states have their initial values, other inputs the
+    /// values of the case.
     pub at: Vec<(String, Quantity)>,
-    /// True if the operating point is moved to an equilibrium. The states and inputs in `at` stay fixed, and so do all other
-    /// inputs.
+    /// True if the operating point is moved to an equilibrium. The states and inputs in `at` stay fixed, and so do all
+    /// other inputs.
     pub equilibrium: bool,
     /// States and inputs that the search may vary although they would be fixed.
     pub free: Vec<String>,
@@ -60,8 +60,8 @@ pub struct Resting {
     pub states: Vec<f64>,
     /// Values of all inputs of the model.
     pub inputs: Vec<f64>,
-    /// Rates of change of the states at the operating point, those of memory on average over a period of its clock; zero at an
-    /// equilibrium.
+    /// Rates of change of the states at the operating point, those of memory on average over a period of its clock;
+    /// zero at an equilibrium.
     pub rates: Vec<f64>,
     /// Joints whose dry friction is omitted, as names of their positions.
     pub frictionless: Vec<String>,
@@ -82,17 +82,20 @@ pub struct Rough {
     pub at: f64,
 }
 
-/// A variable that the equations compute for themselves, by its column in [`Local::slopes`]: the value of a row, times a sign.
+/// A variable that the equations compute for themselves, by its column in [`Local::slopes`]: the value of a row, times
+/// a sign.
 struct Tie {
     column: usize,
     row: usize,
     sign: f64,
 }
 
-/// Largest number of Newton steps to the values of tied variables. Ties are linear unless a delayed quantity depends on another.
+/// Largest number of Newton steps to the values of tied variables. Ties are linear unless a delayed quantity depends on
+/// another.
 const NEWTON: usize = 50;
 
-/// Difference of a tied variable from its computed value that counts as rounding, relative to the variable, or to 1 if it is less.
+/// Difference of a tied variable from its computed value that counts as rounding, relative to the variable, or to 1 if
+/// it is less.
 const ROUNDING: f64 = 1e-12;
 
 /// Difference of a tied variable from its computed value that counts as rounding if a step does not halve it.
@@ -199,8 +202,8 @@ impl Linearised {
         Ok(Self { model, interface, states, inputs, outputs, given, starts, free, cut: Vec::new() })
     }
 
-    /// Creates the linearised loop transfer function of a model whose loops are cut at variables. Its operating point is that of
-    /// the closed loops.
+    /// Creates the linearised loop transfer function of a model whose loops are cut at variables. Its operating point
+    /// is that of the closed loops.
     ///
     /// # Errors
     /// Returns an error if a loop cannot be cut there, or for the reasons of [`Self::new`].
@@ -240,8 +243,8 @@ impl Linearised {
         Ok(Self { cut: ends, interface, ..linearised })
     }
 
-    /// Returns what the equations compute for themselves: the inputs of cut loops, and quantities that do not change have their
-    /// present values.
+    /// Returns what the equations compute for themselves: the inputs of cut loops, and quantities that do not change
+    /// have their present values.
     fn ties(&self, delays: usize) -> Vec<Tie> {
         let (n, of) = (self.states.len(), self.model.interface());
         let cut = self.cut.iter().map(|[input, signal]| Tie { column: n + input, row: n + signal, sign: -1.0 });
@@ -250,7 +253,8 @@ impl Linearised {
         cut.chain(delayed).collect()
     }
 
-    /// Evaluates the equations at a point of states, inputs and delayed quantities, after it has moved to where its ties hold.
+    /// Evaluates the equations at a point of states, inputs and delayed quantities, after it has moved to where its
+    /// ties hold.
     fn local(&self, parameters: &[f64], point: &mut [f64], ties: &[Tie]) -> Result<Local, Failure> {
         let mut last = f64::INFINITY;
         for _ in 0..NEWTON {
@@ -278,8 +282,8 @@ impl Linearised {
         self.model.local(&at).expect("a model with equations gives them")
     }
 
-    /// Returns the rates and their slopes with respect to states and inputs, while the ties hold. `point` lacks the delayed
-    /// quantities.
+    /// Returns the rates and their slopes with respect to states and inputs, while the ties hold. `point` lacks the
+    /// delayed quantities.
     fn balance(&self, parameters: &[f64], point: &[f64], ties: &[Tie], delays: usize) -> Result<Balance, String> {
         let n = self.states.len();
         let mut point = [point, &vec![0.0; delays]].concat();
@@ -336,8 +340,8 @@ impl Linearised {
                 "{place} at the operating point, which no linear model within it describes; choose an operating point within the limits"
             )));
         }
-        // A selected value that does not follow the cut variable, where the other one would, opens the loop to the rates that nothing else
-        // connects with it, whatever other rates follow, such as that of anti-windup.
+        // A selected value that does not follow the cut variable, where the other one would, opens the loop to the
+        // rates that nothing else connects with it, whatever other rates follow, such as that of anti-windup.
         let opens = |of: &Selected<Vec<f64>>| {
             self.cut.iter().map(|[input, _]| n + input).any(|cut| {
                 let is_cut_off = |&row: &usize| slopes[(row, cut)] == 0.0;

@@ -51,8 +51,8 @@ pub struct Parameter {
     pub default: Option<f64>,
     /// Smallest and largest meaningful value.
     pub range: [f64; 2],
-    /// True if an infinite value is allowed and disables the effect of the parameter: an integral time, the stiffness of a
-    /// rigid coupling.
+    /// True if an infinite value is allowed and disables the effect of the parameter: an integral time, the stiffness
+    /// of a rigid coupling.
     pub infinite: bool,
 }
 
@@ -115,8 +115,8 @@ pub struct Interface {
     pub horizon: Option<f64>,
     /// Kind of the analyses of the model; criteria reject models of the other kind.
     pub analysis: AnalysisKind,
-    /// True for a loop transfer function of cut loops: each signal belongs to the input with its index, to which it returns, with
-    /// negative sign, where the loop is closed.
+    /// True for a loop transfer function of cut loops: each signal belongs to the input with its index, to which it
+    /// returns, with negative sign, where the loop is closed.
     pub is_cut: bool,
 }
 
@@ -190,19 +190,19 @@ pub trait Model: Send + Sync {
     /// Analyses one case.
     ///
     /// # Errors
-    /// A [`Failure`] ranks worse than every success; it is counted and reported and does not end the run. A long simulation
-    /// polls `job.case.cancellation` and returns [`Failure::Cancelled`] once cancellation is requested.
+    /// A [`Failure`] ranks worse than every success; it is counted and reported and does not end the run. A long
+    /// simulation polls `job.case.cancellation` and returns [`Failure::Cancelled`] once cancellation is requested.
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure>;
 
-    /// Computes the analysis and its directional derivatives along `seeds`, each with one number per parameter. The analysis
-    /// must be bitwise equal to the result of [`Model::analyse`]. `None` means that exact derivatives are not available and
-    /// finite differences are used.
+    /// Computes the analysis and its directional derivatives along `seeds`, each with one number per parameter. The
+    /// analysis must be bitwise equal to the result of [`Model::analyse`]. `None` means that exact derivatives are not
+    /// available and finite differences are used.
     fn tangents(&self, _job: &Job<'_>, _seeds: &[Vec<f64>]) -> Option<Result<WithTangents, Failure>> {
         None
     }
 
-    /// Returns the states of the model equations if [`Model::local`] is available. Their initial values are the parameters
-    /// named in [`Interface::states`], else 0.
+    /// Returns the states of the model equations if [`Model::local`] is available. Their initial values are the
+    /// parameters named in [`Interface::states`], else 0.
     fn equation_states(&self) -> Vec<Variable> {
         Vec::new()
     }
@@ -233,8 +233,8 @@ pub trait Model: Send + Sync {
         None
     }
 
-    /// Returns the model with its loops cut at variables: for each, a new input of this name acts in its place, and a new signal is
-    /// minus the value that the model computes. `None` if the model has no loop that can be cut.
+    /// Returns the model with its loops cut at variables: for each, a new input of this name acts in its place, and a
+    /// new signal is minus the value that the model computes. `None` if the model has no loop that can be cut.
     ///
     /// # Errors
     /// The model has no such variable.
@@ -247,8 +247,8 @@ pub trait Model: Send + Sync {
         Vec::new()
     }
 
-    /// Returns the model with another value of a constant, in its unit; `None` without such a constant, or if the model is not
-    /// defined for the value.
+    /// Returns the model with another value of a constant, in its unit; `None` without such a constant, or if the model
+    /// is not defined for the value.
     fn with_constant(&self, _name: &str, _value: f64) -> Option<Arc<dyn Model>> {
         None
     }
@@ -258,8 +258,8 @@ pub trait Model: Send + Sync {
         None
     }
 
-    /// Returns the nominal model and the added effects if the model is augmented. The parameters are those of the nominal
-    /// model, followed by those of the effects. Further effects are added to the nominal model.
+    /// Returns the nominal model and the added effects if the model is augmented. The parameters are those of the
+    /// nominal model, followed by those of the effects. Further effects are added to the nominal model.
     fn augmented(&self) -> Option<(&Arc<dyn Model>, &[Placement])> {
         None
     }
@@ -274,8 +274,8 @@ pub trait Model: Send + Sync {
 pub struct Cut {
     /// The model.
     pub model: Arc<dyn Model>,
-    /// For each variable, by their indices: the input that acts in its place, and the signal that is minus the value that the model
-    /// computes.
+    /// For each variable, by their indices: the input that acts in its place, and the signal that is minus the value
+    /// that the model computes.
     pub ends: Vec<[usize; 2]>,
 }
 
@@ -290,8 +290,9 @@ pub struct OperatingPoint<'a, S = f64> {
     pub inputs: &'a [S],
     /// Delayed values of the quantities in [`Model::delays`].
     pub past: &'a [S],
-    /// True at an equilibrium, or during the search for one: no joint then has dry friction, whatever its speed. If false,
-    /// dry friction is omitted only for joints with practically zero speed; the others slide in their direction of motion.
+    /// True at an equilibrium, or during the search for one: no joint then has dry friction, whatever its speed. If
+    /// false, dry friction is omitted only for joints with practically zero speed; the others slide in their direction
+    /// of motion.
     pub at_rest: bool,
 }
 
@@ -304,8 +305,8 @@ pub struct Local {
     pub signals: Vec<f64>,
     /// Values of the quantities in [`Model::delays`], without delay.
     pub past: Vec<f64>,
-    /// Derivatives of the rates, then of the signals, then of the quantities in [`Model::delays`] (rows), with respect to the
-    /// states, then to the inputs, then to the delayed quantities (columns).
+    /// Derivatives of the rates, then of the signals, then of the quantities in [`Model::delays`] (rows), with respect
+    /// to the states, then to the inputs, then to the delayed quantities (columns).
     pub slopes: DMatrix<f64>,
     /// Joints whose dry friction is omitted, as names of their positions: dry friction at rest has no derivative.
     pub frictionless: Vec<String>,
@@ -347,7 +348,8 @@ impl Analysis {
     /// Returns the trace of a signal.
     ///
     /// # Panics
-    /// Panics if the analysis is not a simulation or the signal was not requested. Both are checked when the study is built.
+    /// Panics if the analysis is not a simulation or the signal was not requested. Both are checked when the study is
+    /// built.
     pub fn trace(&self, signal: &str) -> &Trace {
         self.response().and_then(|response| response.trace(signal)).expect("checked when the study is built")
     }
@@ -362,8 +364,8 @@ impl Analysis {
         }
     }
 
-    /// Returns the largest distance up to which [`Analysis::moved`] keeps the order of the instants at which signals jump or bend; NaN if
-    /// instants coincide whose order changes with the parameters.
+    /// Returns the largest distance up to which [`Analysis::moved`] keeps the order of the instants at which signals
+    /// jump or bend; NaN if instants coincide whose order changes with the parameters.
     pub fn room(&self, tangent: &Self) -> f64 {
         match (self, tangent) {
             (Self::Time(response), Self::Time(tangent)) => {

@@ -5,8 +5,8 @@ use std::ops::Range;
 /// Distances at which derivatives are compared with finite differences, relative to a variable, or absolute if it is 0.
 const DISTANCES: [f64; 5] = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12];
 
-/// Magnitude below which a variable may be the rounding error of a zero, such as that of an equilibrium. Differences over
-/// distances relative to such a variable are noise, so that distances relative to 1 count as well.
+/// Magnitude below which a variable may be the rounding error of a zero, such as that of an equilibrium. Differences
+/// over distances relative to such a variable are noise, so that distances relative to 1 count as well.
 const ROUNDED_ZERO: f64 = 1e-9;
 
 /// Relative tolerance, with respect to the terms of a row, within which a difference agrees with the derivative.
@@ -26,7 +26,8 @@ pub(crate) struct Point<'a> {
     pub values: &'a [f64],
     /// Jacobian: derivatives of the values (rows) with respect to the variables (columns).
     pub slopes: &'a nalgebra::DMatrix<f64>,
-    /// Rows that are changes of the variables with the same indices: new values minus old ones, with the rounding of these.
+    /// Rows that are changes of the variables with the same indices: new values minus old ones, with the rounding of
+    /// these.
     pub changes: &'a [Range<usize>],
 }
 
@@ -58,9 +59,9 @@ impl Point<'_> {
         found
     }
 
-    /// Returns for each row whether the function lacks a derivative along a direction, for distances relative to the variables,
-    /// and, if some are rounded zeros, also for distances relative to 1. A kink, a jump or an infinite derivative at the point
-    /// shows at both scales.
+    /// Returns for each row whether the function lacks a derivative along a direction, for distances relative to the
+    /// variables, and, if some are rounded zeros, also for distances relative to 1. A kink, a jump or an infinite
+    /// derivative at the point shows at both scales.
     fn rough_at_all_scales(
         &self,
         f: &mut impl FnMut(&[f64]) -> Option<Vec<f64>>,
@@ -209,7 +210,8 @@ mod tests {
 
     #[test]
     fn the_rounding_of_memory_in_its_change_is_no_kink() {
-        // The slowest memories of filters at fast sampling: their changes are far below the rounding of their new values.
+        // The slowest memories of filters at fast sampling: their changes are far below the rounding of their new
+        // values.
         let n = 40;
         let part = |i: usize| 1e-16 * (i + 3) as f64;
         let f = |x: &[f64]| (0..n).map(|i| (x[i] - part(i) * x[i]) - x[i]).collect::<Vec<f64>>();

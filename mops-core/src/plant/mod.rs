@@ -1,20 +1,20 @@
 //! Plants: the equations of a model at given parameters, with inputs and forces as arguments.
 //!
-//! A plant is `x' = f(t, x, u, w)` with a mode, between whose changes `f` is smooth. What only some plants have is a part of its own,
-//! which the plant returns if it has it: [`Events`], [`Breaks`], [`Memory`], [`Jacobian`], [`Bounds`].
+//! A plant is `x' = f(t, x, u, w)` with a mode, between whose changes `f` is smooth. What only some plants have is a
+//! part of its own, which the plant returns if it has it: [`Events`], [`Breaks`], [`Memory`], [`Jacobian`], [`Bounds`].
 //!
 //! # Order of the calls
 //!
 //! The simulation calls, where the part exists:
 //!
 //! 1. [`Plant::start`];
-//! 2. [`Memory::begin`] at the earliest time from which on inputs are known and matter, [`Memory::follow`] and [`Memory::remember`] over
-//!    each stretch of the past, and [`Memory::jump`] where inputs jump in it;
+//! 2. [`Memory::begin`] at the earliest time from which on inputs are known and matter, [`Memory::follow`] and
+//!    [`Memory::remember`] over each stretch of the past, and [`Memory::jump`] where inputs jump in it;
 //! 3. [`Plant::begin`] with the inputs just before the start, then [`Plant::can_start`] with those from the start on;
 //! 4. at the start, and at every jump of an input or a force: [`Memory::jump`], [`Breaks::pass`], [`Plant::settle`];
 //! 5. once, at the start: [`Events::arm`];
-//! 6. within a step: [`Plant::rates`], [`Jacobian::entries`]; after it [`Events::guard`], [`Bounds::of_guard`] and [`Plant::signal`],
-//!    then [`Memory::remember`];
+//! 6. within a step: [`Plant::rates`], [`Jacobian::entries`]; after it [`Events::guard`], [`Bounds::of_guard`] and
+//!    [`Plant::signal`], then [`Memory::remember`];
 //! 7. where a guard has become negative, [`Events::switch`], or [`Events::rest`] if its events accumulate;
 //! 8. where a step reaches [`Breaks::next`] or a jump of an input, the calls of 4.
 //!
@@ -80,8 +80,9 @@ impl<S> Default for LeftOut<S> {
 
 /// A plant: `x' = f(t, x, u, w)` at given parameters, as a hybrid system whose guards switch between modes.
 ///
-/// Implementations are generic over [`Scalar`]: they run with values and with exact tangents, including those of jumps at
-/// events. The mode is the only state not contained in `x`. The mode changes in [`Events::switch`], [`Events::rest`],
+/// Implementations are generic over [`Scalar`]: they run with values and with exact tangents, including those of jumps
+/// at events. The mode is the only state not contained in `x`. The mode changes in [`Events::switch`],
+/// [`Events::rest`],
 /// [`Plant::settle`] and [`Plant::linearise`] alone; between mode changes the plant is smooth.
 pub trait Plant<S: Scalar> {
     /// Returns the states at the start.
@@ -115,9 +116,9 @@ pub trait Plant<S: Scalar> {
     /// Determines the mode: at the start, at each break of the plant, and at jumps of inputs or forces.
     fn settle(&mut self, _at: &Instant<'_, S>) {}
 
-    /// Enters the mode for linearisation. If `at_rest`, at an equilibrium or during the search for one, no joint has dry
-    /// friction. Otherwise dry friction is omitted only for joints with practically zero speed; the others slide in their
-    /// direction of motion. By default the mode is that of a simulation.
+    /// Enters the mode for linearisation. If `at_rest`, at an equilibrium or during the search for one, no joint has
+    /// dry friction. Otherwise dry friction is omitted only for joints with practically zero speed; the others slide in
+    /// their direction of motion. By default the mode is that of a simulation.
     ///
     /// # Errors
     /// Returns an error if the plant has no linearisation.
@@ -136,14 +137,14 @@ pub trait Plant<S: Scalar> {
         None
     }
 
-    /// Returns the largest step size that resolves the plant, s. The limit is needed because a state at rest does not limit
-    /// the step size.
+    /// Returns the largest step size that resolves the plant, s. The limit is needed because a state at rest does not
+    /// limit the step size.
     fn longest_step(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// Returns the largest step size at which an explicit method damps the fast decaying modes, s, where the error of a step does not
-    /// show it: at rest no error limits the step, and the tangents grow.
+    /// Returns the largest step size at which an explicit method damps the fast decaying modes, s, where the error of a
+    /// step does not show it: at rest no error limits the step, and the tangents grow.
     fn damped_step(&self) -> f64 {
         f64::INFINITY
     }
@@ -183,7 +184,8 @@ pub trait Plant<S: Scalar> {
         None
     }
 
-    /// Returns the Jacobian or its pattern, if known; otherwise the stiff method uses finite differences of all entries.
+    /// Returns the Jacobian or its pattern, if known; otherwise the stiff method uses finite differences of all
+    /// entries.
     fn jacobian(&self) -> Option<&dyn Jacobian<S>> {
         None
     }

@@ -27,8 +27,8 @@ pub trait Events<S: Scalar> {
     /// Returns the value of a guard: the mode is valid while the guard is not negative.
     fn guard(&self, index: usize, at: &Instant<'_, S>, du: InputRates<'_>) -> S;
 
-    /// Returns the index and factor of the state that a guard is proportional to, such as the speed of a sliding joint. The
-    /// event search then reads one state instead of all. `None` if the guard must be computed.
+    /// Returns the index and factor of the state that a guard is proportional to, such as the speed of a sliding joint.
+    /// The event search then reads one state instead of all. `None` if the guard must be computed.
     fn guard_state(&self, _index: usize) -> Option<(usize, f64)> {
         None
     }
@@ -41,29 +41,30 @@ pub trait Events<S: Scalar> {
     /// Decides which events wait at the start, in its mode.
     fn arm(&mut self, _at: &Instant<'_, S>) {}
 
-    /// Changes the mode after a guard became negative. If the state jumps, overwrites the state before the event in `x` with
-    /// the state after it. Returns a description of the event, empty if users need not see it.
+    /// Changes the mode after a guard became negative. If the state jumps, overwrites the state before the event in `x`
+    /// with the state after it. Returns a description of the event, empty if users need not see it.
     fn switch(&mut self, index: usize, event: &EventInstant<'_, S>, x: &mut [S]) -> &str;
 
-    /// Handles accumulating (Zeno) events of a guard, at intervals below `close` in s. Writes the limit state to `x` and
-    /// returns a description.
+    /// Handles accumulating (Zeno) events of a guard, at intervals below `close` in s. Writes the limit state to `x`
+    /// and returns a description.
     ///
     /// # Errors
-    /// Returns an error if there is no limit state: which events accumulate, and how to avoid them. The simulation fails.
+    /// Returns an error if there is no limit state: which events accumulate, and how to avoid them. The simulation
+    /// fails.
     fn rest(&mut self, _index: usize, _event: &EventInstant<'_, S>, _close: f64, _x: &mut [S]) -> Result<&str, String> {
         Err("a mode of the model chatters without end".to_owned())
     }
 }
 
-/// Instants, known beforehand, at which the plant itself samples or jumps: of clocks, where a jump arrives after a delay, where a law
-/// changes with time.
+/// Instants, known beforehand, at which the plant itself samples or jumps: of clocks, where a jump arrives after a
+/// delay, where a law changes with time.
 pub trait Breaks<S: Scalar> {
     /// Returns the next break after `t`, s; infinity if none follows.
     fn next(&self, t: f64) -> f64;
 
-    /// Passes the breaks that are due; called at the start and at every jump of an input or a force as well. `at` has the states before
-    /// it; states that jump get their new values in `x`. Returns the derivatives of the time of the break along the directions of the
-    /// scalar, with value 0; NaN if breaks with different ones coincide.
+    /// Passes the breaks that are due; called at the start and at every jump of an input or a force as well. `at` has
+    /// the states before it; states that jump get their new values in `x`. Returns the derivatives of the time of the
+    /// break along the directions of the scalar, with value 0; NaN if breaks with different ones coincide.
     fn pass(&mut self, at: &Instant<'_, S>, x: &mut [S]) -> S;
 
     /// Returns the clocks, if a linearisation can treat them.
@@ -71,8 +72,8 @@ pub trait Breaks<S: Scalar> {
         Vec::new()
     }
 
-    /// Writes the changes of the memory of all clocks at an instant of each, its next value minus the present one, to their states in
-    /// `dx`.
+    /// Writes the changes of the memory of all clocks at an instant of each, its next value minus the present one, to
+    /// their states in `dx`.
     fn changes(&self, _at: &Instant<'_, S>, _dx: &mut [S]) {}
 }
 
@@ -112,8 +113,8 @@ pub trait Memory<S: Scalar> {
         self.delays().iter().sum()
     }
 
-    /// Takes the past as constant: `at` is the beginning of what is known, or the start with the inputs just before it. States that
-    /// depend on it are completed in `x`; they rest until the start.
+    /// Takes the past as constant: `at` is the beginning of what is known, or the start with the inputs just before it.
+    /// States that depend on it are completed in `x`; they rest until the start.
     fn begin(&mut self, at: &Instant<'_, S>, x: &mut [S]);
 
     /// Follows a stretch of the past before the start, apart from [`Memory::remember`].
@@ -128,8 +129,8 @@ pub trait Memory<S: Scalar> {
     /// Returns the quantities that are delayed.
     fn past(&self, at: &Instant<'_, S>) -> Vec<S>;
 
-    /// Stores the quantities of [`Memory::past`] over a part of an accepted step or of the past, or returns false if the quartic through
-    /// their values is not accurate enough: the part is then halved.
+    /// Stores the quantities of [`Memory::past`] over a part of an accepted step or of the past, or returns false if
+    /// the quartic through their values is not accurate enough: the part is then halved.
     fn remember(&mut self, over: &Past<'_, S>) -> bool;
 
     /// Returns the delayed values of these quantities at a time.
@@ -141,11 +142,12 @@ pub trait Memory<S: Scalar> {
 
 /// Jacobian `df/dx` of a plant.
 pub trait Jacobian<S: Scalar> {
-    /// Returns the pairs of row and column whose entries may be nonzero. The stiff method uses the band spanned by them.
+    /// Returns the pairs of row and column whose entries may be nonzero. The stiff method uses the band spanned by
+    /// them.
     fn pattern(&self) -> Vec<(usize, usize)>;
 
-    /// Passes each entry as row, column and value to `entry` and returns `true`. Returns `false` if there are no exact entries; finite
-    /// differences are then used.
+    /// Passes each entry as row, column and value to `entry` and returns `true`. Returns `false` if there are no exact
+    /// entries; finite differences are then used.
     fn entries(&self, _at: &Instant<'_, S>, _entry: &mut dyn FnMut(usize, usize, f64)) -> bool {
         false
     }

@@ -13,11 +13,11 @@ use crate::error::StudyError;
 pub struct Tolerance {
     /// Relative error tolerance per step.
     pub relative: f64,
-    /// Absolute error tolerance per step, in the unit of the state and identical for all states. By default every state has
-    /// its own: a hundredth of `relative` times the largest absolute value of the state so far, or its `scale`.
+    /// Absolute error tolerance per step, in the unit of the state and identical for all states. By default every state
+    /// has its own: a hundredth of `relative` times the largest absolute value of the state so far, or its `scale`.
     pub absolute: Option<f64>,
-    /// Maximum step size: a number of seconds, or a time such as "10 ms". Without a maximum, a step may miss a short motion
-    /// that is at rest at all evaluated times, such as a pulse `exp(-(time - 500)^2)`.
+    /// Maximum step size: a number of seconds, or a time such as "10 ms". Without a maximum, a step may miss a short
+    /// motion that is at rest at all evaluated times, such as a pulse `exp(-(time - 500)^2)`.
     #[serde(deserialize_with = "seconds")]
     #[schemars(with = "Option<Quantity>")]
     pub max_step: Option<f64>,
@@ -34,7 +34,8 @@ pub enum IntegrationMethod {
     /// Dormand-Prince 5(4), explicit: for models whose fastest dynamics are of interest.
     #[default]
     Explicit,
-    /// ESDIRK 4(3), L-stable: for models with dynamics much faster than those of interest (heat, reactions, stiff contacts).
+    /// ESDIRK 4(3), L-stable: for models with dynamics much faster than those of interest (heat, reactions, stiff
+    /// contacts).
     Stiff,
 }
 

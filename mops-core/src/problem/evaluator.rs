@@ -8,7 +8,8 @@ use crate::solver::Shape;
 /// Rows of scaled values over the unit box, as a pure function: equal points give equal bits on every thread.
 ///
 /// Mandatory: shape, evaluate, tuners_at and seed. Implementations whose results can be cached under every demand also
-/// provide the two `_keeping` methods. Their evaluations and derivatives have the same bits as those of the plain methods.
+/// provide the two `_keeping` methods. Their evaluations and derivatives have the same bits as those of the plain
+/// methods.
 pub trait Evaluator: Sync {
     /// Returns the dimensions and kinds of the problem.
     fn shape(&self) -> &Shape;
@@ -19,8 +20,8 @@ pub trait Evaluator: Sync {
     /// Returns the values of all tuners at a point of the unit box; points with equal values are evaluated once.
     fn tuners_at(&self, point: &[f64]) -> Vec<f64>;
 
-    /// Returns exact derivatives at an evaluated point; `None` if there are none. `reach` is the distance within which they
-    /// are to describe the problem.
+    /// Returns exact derivatives at an evaluated point; `None` if there are none. `reach` is the distance within which
+    /// they are to describe the problem.
     fn slopes(&self, _at: &Evaluation, _reach: f64) -> Option<Slopes> {
         None
     }
@@ -40,8 +41,8 @@ pub trait Evaluator: Sync {
         CachedGradients { slopes: self.slopes(at, reach), learned: None }
     }
 
-    /// Returns the relative noise of values at neighbouring points. Simulations at a relative tolerance of 1e-8 repeat to
-    /// about 1e-9.
+    /// Returns the relative noise of values at neighbouring points. Simulations at a relative tolerance of 1e-8 repeat
+    /// to about 1e-9.
     fn noise(&self) -> f64 {
         1e-9
     }

@@ -1,5 +1,5 @@
-//! Cache of criterion values and derivatives, independent of demands, usages and weights. A resumed run, or a study with
-//! other demands, need not simulate cached points again.
+//! Cache of criterion values and derivatives, independent of demands, usages and weights. A resumed run, or a study
+//! with other demands, need not simulate cached points again.
 
 use crate::cancellation::Cancellation;
 use crate::criterion::Value;
@@ -72,9 +72,9 @@ pub struct CachedGradients<S> {
 
 /// Cache of a run: stores and returns results of points. Points are identified by the bits of all tuner values.
 ///
-/// A search reads from many threads and writes from one, in the order of its points. Sampling and worst-case searches write
-/// from many threads. Results must equal those that the problem itself would compute; the cache then changes no bit of a
-/// run.
+/// A search reads from many threads and writes from one, in the order of its points. Sampling and worst-case searches
+/// write from many threads. Results must equal those that the problem itself would compute; the cache then changes no
+/// bit of a run.
 pub trait Store: Send + Sync {
     /// Returns the cache entry of a point.
     fn known(&self, tuners: &[f64]) -> Option<Known>;
@@ -84,8 +84,8 @@ pub trait Store: Send + Sync {
         self.known(tuners).is_some()
     }
 
-    /// Returns the cancellation to request at a point without cache entry, for a read-only store. `None`: such points are
-    /// simulated.
+    /// Returns the cancellation to request at a point without cache entry, for a read-only store. `None`: such points
+    /// are simulated.
     fn closed(&self) -> Option<&Cancellation> {
         None
     }
@@ -93,7 +93,8 @@ pub trait Store: Send + Sync {
     /// Stores the answer of a point; `learned` contains the newly simulated results, `None` if there are none.
     fn answered(&self, tuners: &[f64], learned: Option<Known>);
 
-    /// Returns the cached derivatives at a point that describe it within `reach`; `Some(None)` if there are no exact ones.
+    /// Returns the cached derivatives at a point that describe it within `reach`; `Some(None)` if there are no exact
+    /// ones.
     fn known_slopes(&self, tuners: &[f64], reach: f64) -> Option<Option<RowSlopes>>;
 
     /// Stores derivatives.

@@ -28,7 +28,8 @@ use crate::solver::Shape;
 use crate::study::task::ParetoTask;
 use crate::study::{Row, Scale, Study, Tuner};
 
-/// The optimisation problem of a study: active tuners as coordinates of the unit box, criteria as rows of scaled values.
+/// The optimisation problem of a study: active tuners as coordinates of the unit box, criteria as rows of scaled
+/// values.
 #[derive(Clone)]
 pub struct Problem {
     study: Arc<Study>,
@@ -67,9 +68,9 @@ impl Problem {
         Self::with(study, active, base, own_usage)
     }
 
-    /// Creates the problem of a single case. The tuners of this case (free initial states, and all with `per-case = true`)
-    /// are active; all others keep their values in `tuners`. This estimates the local parameters of an experiment whose data
-    /// must not influence the parameters of the study.
+    /// Creates the problem of a single case. The tuners of this case (free initial states, and all with
+    /// `per-case = true`) are active; all others keep their values in `tuners`. This estimates the local parameters of
+    /// an experiment whose data must not influence the parameters of the study.
     pub fn of_case(study: Arc<Study>, case: usize, tuners: &[f64]) -> Self {
         let moves = |tuner: &Tuner| tuner.active && tuner.case == Some(case);
         let active = (0..study.tuners.len()).filter(|&i| moves(&study.tuners[i])).collect();
@@ -83,8 +84,8 @@ impl Problem {
         problem
     }
 
-    /// Returns the dimensions and kinds of the problem of a study, as far as known without a simulation. A sum is assumed to
-    /// be a sum of squares with one residual.
+    /// Returns the dimensions and kinds of the problem of a study, as far as known without a simulation. A sum is
+    /// assumed to be a sum of squares with one residual.
     pub fn outline(study: &Study) -> Shape {
         let residuals = usize::from(study.objective == Objective::Sum);
         Shape { residuals, ..shape(study, &active(study), own_usage) }
@@ -103,8 +104,8 @@ impl Problem {
         problem
     }
 
-    /// Returns the length of the residual vector, from a successful evaluation: a criterion needs its data to determine it.
-    /// The start is tried first, then random points of the box.
+    /// Returns the length of the residual vector, from a successful evaluation: a criterion needs its data to determine
+    /// it. The start is tried first, then random points of the box.
     fn count_residuals(&self) -> usize {
         if self.shape.objective != Objective::Sum {
             return 0;
@@ -116,7 +117,8 @@ impl Problem {
         succeeds.map_or(0, |evaluation| evaluation.residuals.len())
     }
 
-    /// Returns the sum of squares up to which the residuals are noise, see [`Shape::noise`]; `None` if a noise level is unknown.
+    /// Returns the sum of squares up to which the residuals are noise, see [`Shape::noise`]; `None` if a noise level is
+    /// unknown.
     ///
     /// Each term `a_i e_i^2` with standard normal `e_i` has the mean `a_i` and the variance `2 a_i^2`.
     fn noise_of_residuals(&self) -> Option<f64> {
@@ -203,7 +205,8 @@ impl Problem {
         self.evaluate_tuners(self.point_of(tuners), tuners.to_vec(), &self.jobs)
     }
 
-    /// Returns true if the cache contains a result for every simulation of a point, in `every` case or in those that count.
+    /// Returns true if the cache contains a result for every simulation of a point, in `every` case or in those that
+    /// count.
     pub fn has_met(&self, known: Option<&Known>, every: bool) -> bool {
         let mut jobs = if every { self.jobs.iter() } else { self.counting.iter() };
         jobs.all(|&job| known.is_some_and(|known| known.job(job).is_some()))
@@ -332,8 +335,9 @@ impl Problem {
         self.rows_of[job].iter().map(unless_cancelled).collect()
     }
 
-    /// Returns the derivatives at an evaluated point, from the tangents of the models. `None` if a model, a criterion or a
-    /// tuner has no exact derivatives. `reach` is the distance within which the derivatives are to describe the problem.
+    /// Returns the derivatives at an evaluated point, from the tangents of the models. `None` if a model, a criterion
+    /// or a tuner has no exact derivatives. `reach` is the distance within which the derivatives are to describe the
+    /// problem.
     pub fn slopes(&self, at: &Evaluation, reach: f64) -> Option<Slopes> {
         let of_rows = self.row_slopes(at, reach)?;
         let mut residuals = vec![Vec::new(); self.study.rows.len()];
@@ -345,8 +349,8 @@ impl Problem {
         self.scaled_slopes(at, of_rows, residuals)
     }
 
-    /// Returns the derivatives at an evaluated point as [`Problem::slopes`], with cached derivatives of the rows. Those of residuals
-    /// are not cached.
+    /// Returns the derivatives at an evaluated point as [`Problem::slopes`], with cached derivatives of the rows. Those
+    /// of residuals are not cached.
     pub fn slopes_keeping(
         &self,
         at: &Evaluation,
@@ -396,7 +400,8 @@ impl Problem {
         Some(rows)
     }
 
-    /// Returns the derivatives of the scaled values and of the weighted residuals, with the residuals of the rows as `values`.
+    /// Returns the derivatives of the scaled values and of the weighted residuals, with the residuals of the rows as
+    /// `values`.
     fn scaled_slopes(&self, at: &Evaluation, of_rows: RowSlopes, values: Vec<Vec<f64>>) -> Option<Slopes> {
         let (count, n) = (self.study.rows.len(), self.active.len());
         let mut rows = vec![vec![0.0; n]; count];
@@ -470,8 +475,8 @@ impl Problem {
             .collect()
     }
 
-    /// Returns the residuals of all rows to be minimised, weighted so that their squares sum to the objective. Empty if one
-    /// of the rows is not a sum of squares.
+    /// Returns the residuals of all rows to be minimised, weighted so that their squares sum to the objective. Empty if
+    /// one of the rows is not a sum of squares.
     fn residuals(&self, of_rows: Vec<Vec<f64>>) -> Vec<f64> {
         let mut all = Vec::new();
         if self.shape.objective != Objective::Sum {
@@ -489,8 +494,8 @@ impl Problem {
         self.shape.rows[row].0 == Usage::Minimise
     }
 
-    /// Returns the factor of a row's residuals in the residual vector: the root of weight / demand. `None` without such a
-    /// demand.
+    /// Returns the factor of a row's residuals in the residual vector: the root of weight / demand. `None` without such
+    /// a demand.
     pub fn residual_factor(&self, row: usize) -> Option<f64> {
         match self.study.rows[row] {
             Row { demand: Demand::AtMost(demand), reversed: false, .. } => {

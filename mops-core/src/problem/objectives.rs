@@ -10,7 +10,8 @@ use crate::study::task::ParetoTask;
 pub struct FrontObjective {
     /// Name of the criterion; `case/criterion` if the criterion is an objective in more than one case.
     pub label: String,
-    /// Rows of the study, as indices. The value of the objective is that of the row with the largest weighted scaled value.
+    /// Rows of the study, as indices. The value of the objective is that of the row with the largest weighted scaled
+    /// value.
     pub rows: Vec<usize>,
 }
 

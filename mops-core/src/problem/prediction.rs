@@ -1,4 +1,5 @@
-//! Criterion values and signals of a problem at given tuners, with the derivatives of signals with respect to the tuners.
+//! Criterion values and signals of a problem at given tuners, with the derivatives of signals with respect to the
+//! tuners.
 
 use crate::model::{Analysis, Job};
 use crate::problem::Problem;
@@ -21,9 +22,9 @@ impl Problem {
         row.value(case, &analysis, &parameters).ok().map(|value| value.number).filter(|number| number.is_finite())
     }
 
-    /// Returns a signal of a job at increasing times, and its derivative with respect to every active tuner, in the tuner's
-    /// unit. The derivatives are exact if the model has tangents, else central differences of simulations. `None` if a
-    /// simulation fails.
+    /// Returns a signal of a job at increasing times, and its derivative with respect to every active tuner, in the
+    /// tuner's unit. The derivatives are exact if the model has tangents, else central differences of simulations.
+    /// `None` if a simulation fails.
     pub fn signal_slopes(&self, job: usize, tuners: &[f64], signal: &str, times: &[f64]) -> Option<SignalSlopes> {
         let sample = |analysis: &Analysis| Some(analysis.response()?.trace(signal)?.sample(times));
         let plan = &self.study().jobs[job];

@@ -51,12 +51,12 @@ pub trait Watch: Sync {
     /// Called when the best point changed, at most once after each [`Watch::evaluated`].
     fn improved(&self, _best: &Evaluation) {}
 
-    /// Called at each stage of work that evaluates no points, such as `screening 412 candidates`. `done` is the finished
-    /// share of the work, from 0 to 1.
+    /// Called at each stage of work that evaluates no points, such as `screening 412 candidates`. `done` is the
+    /// finished share of the work, from 0 to 1.
     fn stage(&self, _what: &str, _done: f64) {}
 
-    /// Called with the reason when results cannot be stored. Called with `None` once storing works again and all results are
-    /// stored.
+    /// Called with the reason when results cannot be stored. Called with `None` once storing works again and all
+    /// results are stored.
     fn keeping(&self, _trouble: Option<&str>) {}
 }
 
@@ -109,8 +109,8 @@ pub struct Run<'a, E: Evaluator = Problem> {
     /// Budget that the solver counts on, if the run is to end before it.
     planned: Option<usize>,
     patience: Option<Patience>,
-    /// True while residuals are asked for, also of points evaluated before. They are not kept: a calibration may have more
-    /// samples times evaluations than memory.
+    /// True while residuals are asked for, also of points evaluated before. They are not kept: a calibration may have
+    /// more samples times evaluations than memory.
     needs_residuals: bool,
     watch: &'a dyn Watch,
     store: Option<&'a dyn Store>,
@@ -225,8 +225,8 @@ impl<'a, E: Evaluator> Run<'a, E> {
         stop
     }
 
-    /// Returns true if the best point has not improved for longer than the patience of the run. `last_gain` holds the number of
-    /// evaluations and the merit at the last gain.
+    /// Returns true if the best point has not improved for longer than the patience of the run. `last_gain` holds the
+    /// number of evaluations and the merit at the last gain.
     fn is_exhausted(&self, last_gain: &mut (usize, Merit)) -> bool {
         let (Some(patience), Some(best)) = (self.patience, &self.best) else { return false };
         let (at, before) = *last_gain;
@@ -243,8 +243,8 @@ impl<'a, E: Evaluator> Run<'a, E> {
         self.archive.len() - at > patience.least.max(patience.ratio * at)
     }
 
-    /// Records an evaluation of the start made elsewhere, so that a run cancelled before its first evaluation has a point to
-    /// report.
+    /// Records an evaluation of the start made elsewhere, so that a run cancelled before its first evaluation has a
+    /// point to report.
     pub fn take_start(&mut self, answer: CachedPoint) {
         let key = bits(&answer.evaluation.tuners);
         self.keep(key, answer);
@@ -277,8 +277,8 @@ impl<'a, E: Evaluator> Run<'a, E> {
 
     /// Returns the Pareto front, as indices into the archive. Empty for a single objective.
     ///
-    /// The points are those that the solver has solved for ([`Solver::front`]), each replaced by a better point if there is
-    /// one. If the solver has solved for none, all non-dominated points are returned.
+    /// The points are those that the solver has solved for ([`Solver::front`]), each replaced by a better point if
+    /// there is one. If the solver has solved for none, all non-dominated points are returned.
     pub fn front(&self) -> Vec<usize> {
         let all = self.non_dominated();
         if self.solved.is_empty() {

@@ -15,18 +15,19 @@ pub struct Basins {
     pub arrived: usize,
     /// Number of values, a thousandth apart, at which these searches ended.
     pub optima: usize,
-    /// Expected share of the starting points that lead to an optimum not yet seen, `w (w + 1)/(n (n - 1))` for `w` optima in `n`
-    /// searches; null if `n < w + 2`, where the estimate is 1 whatever the searches found.
+    /// Expected share of the starting points that lead to an optimum not yet seen, `w (w + 1)/(n (n - 1))` for `w`
+    /// optima in `n` searches; null if `n < w + 2`, where the estimate is 1 whatever the searches found.
     ///
     /// Source: C. G. E. Boender, A. H. G. Rinnooy Kan, Mathematical Programming 37 (1987) 59-80.
     pub unseen: Option<f64>,
 }
 
-/// Difference of two objectives, relative to the larger one plus [`SMALL_OBJECTIVE`], up to which they belong to the same optimum.
+/// Difference of two objectives, relative to the larger one plus [`SMALL_OBJECTIVE`], up to which they belong to the
+/// same optimum.
 const SAME: f64 = 1e-3;
 
-/// Expected share of starting points that lead to an unseen optimum, below which another basin is unlikely: 1 optimum in 4
-/// searches, 2 in 7.
+/// Expected share of starting points that lead to an unseen optimum, below which another basin is unlikely: 1 optimum
+/// in 4 searches, 2 in 7.
 const UNLIKELY: f64 = 0.2;
 
 /// Expected share from which another basin is likely: 2 optima in 4 searches, 3 in 6, 4 in 7.
@@ -55,8 +56,8 @@ impl Basins {
         self.arrived > 1 && self.unseen.is_some_and(|share| share < UNLIKELY)
     }
 
-    /// Returns true if a single search of several ended at the best objective, or another optimum is likely: by its expected share, or
-    /// as nearly every search ended in an optimum of its own.
+    /// Returns true if a single search of several ended at the best objective, or another optimum is likely: by its
+    /// expected share, or as nearly every search ended in an optimum of its own.
     #[must_use]
     pub fn is_doubtful(&self) -> bool {
         let is_likely = self.unseen.map_or(self.optima > 1, |share| share >= LIKELY);

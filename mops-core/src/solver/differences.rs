@@ -8,9 +8,10 @@ use crate::solver::{Linearisation, Oracle};
 
 /// Finite differences of values with the relative accuracy `noise`.
 ///
-/// A one-sided difference is best with a step near the square root of the noise and retains half of the digits. A central
-/// difference is best near the cube root and retains two thirds, at twice the cost. One-sided differences are used if half
-/// of the digits are sufficient. This holds for values exact to 1e-14 and a `reach` of at least a hundred times the step.
+/// A one-sided difference is best with a step near the square root of the noise and retains half of the digits. A
+/// central difference is best near the cube root and retains two thirds, at twice the cost. One-sided differences are
+/// used if half of the digits are sufficient. This holds for values exact to 1e-14 and a `reach` of at least a hundred
+/// times the step.
 ///
 /// Source: J. Nocedal, S. Wright, Numerical Optimization (2006), section 8.1.
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +26,8 @@ impl Differences {
     }
 
     /// Returns the step of a central difference for derivatives that describe the problem within `reach`. The step is a
-    /// tenth of `reach`, at most a fifth of the cube root of the noise. A lower bound limits the influence of the noise.
+    /// tenth of `reach`, at most a fifth of the cube root of the noise. A lower bound limits the influence of the
+    /// noise.
     pub fn step(self, reach: f64) -> f64 {
         (0.1 * reach).clamp(self.noise.sqrt() / 30.0, 0.2 * math::cbrt(self.noise))
     }
@@ -34,7 +36,8 @@ impl Differences {
         self.noise <= 1e-14 && reach >= 1e-6
     }
 
-    /// Returns values and derivatives at a point. Central differences become one-sided at the bounds and if one side fails.
+    /// Returns values and derivatives at a point. Central differences become one-sided at the bounds and if one side
+    /// fails.
     ///
     /// # Errors
     /// Returns [`Halt`] if the run is over.
@@ -60,8 +63,8 @@ fn along(point: &[f64], j: usize, by: f64) -> Vec<f64> {
     moved
 }
 
-/// Returns derivatives from the point and up to two neighbours along every coordinate. The point itself replaces a neighbour
-/// that is missing, fails or coincides with it. `None` if a coordinate has no usable neighbour.
+/// Returns derivatives from the point and up to two neighbours along every coordinate. The point itself replaces a
+/// neighbour that is missing, fails or coincides with it. `None` if a coordinate has no usable neighbour.
 fn slopes(oracle: &mut dyn Oracle, point: &[f64], neighbours: &[Vec<Vec<f64>>]) -> Result<Option<Linearisation>, Halt> {
     let points: Vec<Vec<f64>> = std::iter::once(point.to_vec()).chain(neighbours.iter().flatten().cloned()).collect();
     let mut answers = oracle.evaluate(&points)?;

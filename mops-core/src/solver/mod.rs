@@ -19,42 +19,45 @@ use crate::evaluation::{Evaluation, Merit, Objective};
 /// Problem description given to a solver: dimensions and kinds, no names.
 ///
 /// The problem lives in the unit box: every point is in `[0, 1]^n`. Rows are criterion-case pairs.
-/// Usage of the scaled value `s` of a row: `weight s` in the objective (minimise), `s - 1 <= 0` (inequality) or `s - 1 = 0`
-/// (equality).
+/// Usage of the scaled value `s` of a row: `weight s` in the objective (minimise), `s - 1 <= 0` (inequality) or
+/// `s - 1 = 0` (equality).
 #[derive(Debug, Clone, Default)]
 pub struct Shape {
     /// Distance between neighbouring values of every tuner; 0 for continuous tuners. The length is the dimension.
     pub spacing: Vec<f64>,
-    /// Logarithm of the ratio of the bounds of every tuner on a logarithmic scale, 0 on a linear one; empty if all are linear.
+    /// Logarithm of the ratio of the bounds of every tuner on a logarithmic scale, 0 on a linear one; empty if all are
+    /// linear.
     pub log_ratios: Vec<f64>,
     /// Usage and weight of every row.
     pub rows: Vec<(Usage, f64)>,
     /// Combination of the minimised rows into one objective.
     pub objective: Objective,
-    /// Index of the objective to which each minimised row belongs, in the order of these rows, if the objectives count each by
-    /// itself. The value of an objective is the largest weighted scaled value of its rows. Empty if every row is an objective of
-    /// its own.
+    /// Index of the objective to which each minimised row belongs, in the order of these rows, if the objectives count
+    /// each by itself. The value of an objective is the largest weighted scaled value of its rows. Empty if every row
+    /// is an objective of its own.
     pub groups: Vec<usize>,
     /// Number of points requested for the Pareto front; 0 if not specified.
     pub points: usize,
     /// Length of the residual vector whose sum of squares is the objective; 0 if the objective is not a sum of squares.
     pub residuals: usize,
-    /// Sum of squares up to which the residuals are noise: expectation plus three standard deviations of the sum for independent
-    /// normal noise of the known levels; 0 if a level is unknown.
+    /// Sum of squares up to which the residuals are noise: expectation plus three standard deviations of the sum for
+    /// independent normal noise of the known levels; 0 if a level is unknown.
     pub noise: f64,
-    /// Coordinates that act in a single experiment and whose initial guess follows from its data, such as initial states, by index.
+    /// Coordinates that act in a single experiment and whose initial guess follows from its data, such as initial
+    /// states, by index.
     pub local: Vec<usize>,
 }
 
 /// Share of the noise below which the residuals are too small for noise of the stated levels.
 const FAR_BELOW_NOISE: f64 = 0.1;
 
-/// Number of residuals per tuner below which several optima may lie within the noise, as with two exponentials and 41 samples.
+/// Number of residuals per tuner below which several optima may lie within the noise, as with two exponentials and 41
+/// samples.
 const RESIDUALS_PER_TUNER: usize = 30;
 
 impl Shape {
-    /// Returns true if the sum of squares is at the level of the measurement noise, so that no other point fits significantly
-    /// better. Requires many residuals per tuner.
+    /// Returns true if the sum of squares is at the level of the measurement noise, so that no other point fits
+    /// significantly better. Requires many residuals per tuner.
     pub fn is_noise(&self, sum: f64) -> bool {
         let are_many = self.residuals >= RESIDUALS_PER_TUNER * self.dimension();
         are_many && self.noise > 0.0 && (FAR_BELOW_NOISE * self.noise..=self.noise).contains(&sum)
@@ -65,7 +68,8 @@ impl Shape {
         self.spacing.len()
     }
 
-    /// Returns the objectives: the weighted scaled values of the rows to be minimised, or the largest one of each group.
+    /// Returns the objectives: the weighted scaled values of the rows to be minimised, or the largest one of each
+    /// group.
     pub fn objectives(&self, scaled: &[f64]) -> Vec<f64> {
         let mut objectives = Vec::with_capacity(self.objective_count());
         self.append_objectives(scaled, &mut objectives);
@@ -160,8 +164,8 @@ pub trait Oracle {
     /// Returns [`Halt`] if the run is over. The run keeps the evaluations made so far; the solver must return at once.
     fn evaluate(&mut self, points: &[Vec<f64>]) -> Result<Vec<Evaluation>, Halt>;
 
-    /// Returns values and derivatives at a point; `None` if a simulation near it fails. `reach` is the distance within which
-    /// the derivatives are to describe the problem. Finite differences must not step over a kink farther away.
+    /// Returns values and derivatives at a point; `None` if a simulation near it fails. `reach` is the distance within
+    /// which the derivatives are to describe the problem. Finite differences must not step over a kink farther away.
     ///
     /// # Errors
     /// Returns [`Halt`] as [`Oracle::evaluate`] does.
@@ -170,7 +174,8 @@ pub trait Oracle {
     /// Returns the best point so far, of this solver or of an earlier one in the same run.
     fn best(&self) -> Option<&Evaluation>;
 
-    /// Returns true if the run was asked to stop. Long computations without evaluations ask between their steps, and end.
+    /// Returns true if the run was asked to stop. Long computations without evaluations ask between their steps, and
+    /// end.
     fn is_over(&self) -> bool {
         false
     }
@@ -221,9 +226,9 @@ pub enum Progress {
 
 /// A solver: asks the oracle for evaluations, one iteration at a time.
 ///
-/// Mandatory: the three methods without a default, points inside the unit box, and an immediate return when the oracle returns [`Halt`]. Free: the
-/// number of points per iteration. The run keeps the best point, the solver does not. Failed evaluations are results
-/// ([`Evaluation::scaled`] is `None`) and rank worse than every finite one.
+/// Mandatory: the three methods without a default, points inside the unit box, and an immediate return when the oracle
+/// returns [`Halt`]. Free: the number of points per iteration. The run keeps the best point, the solver does not.
+/// Failed evaluations are results ([`Evaluation::scaled`] is `None`) and rank worse than every finite one.
 pub trait Solver: Send {
     /// Checks that the solver can treat such a problem.
     ///
@@ -248,18 +253,20 @@ pub trait Solver: Send {
         &[]
     }
 
-    /// Returns the kinds of the solvers that a composite solver has run so far, in order of their start; empty for other
-    /// solvers.
+    /// Returns the kinds of the solvers that a composite solver has run so far, in order of their start; empty for
+    /// other solvers.
     fn methods(&self) -> &[&'static str] {
         &[]
     }
 
-    /// Returns the merits at which local searches from different starting points have ended; empty if the solver makes none.
+    /// Returns the merits at which local searches from different starting points have ended; empty if the solver makes
+    /// none.
     fn ends(&self) -> &[Merit] {
         &[]
     }
 
-    /// Returns the points of the Pareto front that each solve a subproblem; empty if the solver only has evaluated points.
+    /// Returns the points of the Pareto front that each solve a subproblem; empty if the solver only has evaluated
+    /// points.
     fn front(&self) -> Vec<Vec<f64>> {
         Vec::new()
     }

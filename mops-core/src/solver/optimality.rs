@@ -3,12 +3,12 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Objective whose relative changes do not matter: changes count relative to the objective plus this. A scaled value of 1 is the
-/// demand.
+/// Objective whose relative changes do not matter: changes count relative to the objective plus this. A scaled value of
+/// 1 is the demand.
 pub const SMALL_OBJECTIVE: f64 = 1e-3;
 
-/// Decrease within a step of a thousandth of the box, relative to the value plus [`SMALL_OBJECTIVE`], that the tests of optimality
-/// neglect: 0.005 %, far below what a demand is known to.
+/// Decrease within a step of a thousandth of the box, relative to the value plus [`SMALL_OBJECTIVE`], that the tests of
+/// optimality neglect: 0.005 %, far below what a demand is known to.
 pub const NEGLIGIBLE_DECREASE: f64 = 5e-5;
 
 /// First-order classification of a point, for the objective under the constraints and the bounds.
@@ -17,7 +17,8 @@ pub const NEGLIGIBLE_DECREASE: f64 = 5e-5;
 pub enum Optimality {
     /// Stationary: by the derivatives at the point, no direction lowers the objective.
     Stationary,
-    /// Stationary at a kink of a criterion: by the derivatives sampled around the point, no direction lowers the objective.
+    /// Stationary at a kink of a criterion: by the derivatives sampled around the point, no direction lowers the
+    /// objective.
     Kink,
     /// The objective is constant around the point, so that derivatives show nothing.
     Plateau,

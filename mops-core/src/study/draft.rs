@@ -162,8 +162,8 @@ pub struct ChannelBuilder {
     pub unit: Option<Unit>,
     /// Standard deviation of the noise.
     pub noise: Option<Quantity>,
-    /// True for an angle counted within one turn, to which whole turns are added so that no step exceeds half a turn. False if steps
-    /// of a turn are real; `None` if that is not known.
+    /// True for an angle counted within one turn, to which whole turns are added so that no step exceeds half a turn.
+    /// False if steps of a turn are real; `None` if that is not known.
     pub unwrap: Option<bool>,
 }
 
@@ -185,8 +185,8 @@ pub struct CriterionBuilder {
     pub bad: Option<Quantity>,
     /// Weight in the objective.
     pub weight: f64,
-    /// Start of the part of the simulation that the criterion reads; `None` for its start. All times of the criterion count from
-    /// there.
+    /// Start of the part of the simulation that the criterion reads; `None` for its start. All times of the criterion
+    /// count from there.
     pub from: Option<Quantity>,
     /// End of the part of the simulation that the criterion reads; `None` for its end.
     pub until: Option<Quantity>,

@@ -33,8 +33,8 @@ use crate::failure::{Failure, caught};
 use crate::model::{Analysis, Job, Model};
 use crate::study::task::{DesignTask, Place, Task, TaskSpec};
 
-/// A study with all names, sizes, bounds and units checked. Built by [`StudyBuilder::build`] or read from a file; what may be
-/// changed afterwards has a method.
+/// A study with all names, sizes, bounds and units checked. Built by [`StudyBuilder::build`] or read from a file; what
+/// may be changed afterwards has a method.
 #[derive(Clone)]
 pub struct Study {
     pub(crate) name: String,
@@ -111,7 +111,8 @@ impl Study {
         &self.jobs
     }
 
-    /// Returns true if the task rests on a design for the given cases, although the study has the table of a design against worst cases.
+    /// Returns true if the task rests on a design for the given cases, although the study has the table of a design
+    /// against worst cases.
     pub fn leaves_worst_cases_out(&self) -> bool {
         let is_robust = self.options::<DesignTask>().is_some_and(|design| design.robust.is_some());
         is_robust && !self.task.is::<DesignTask>() && self.task.at() == Some(Place::Optimum)
@@ -369,8 +370,8 @@ impl Study {
         &self.cases[self.jobs[row.job].case]
     }
 
-    /// Returns true if equal tuner values give equal row values in both studies. This requires equal models, criteria, cases
-    /// and tuners; demands, usages, weights and roles of experiments may differ.
+    /// Returns true if equal tuner values give equal row values in both studies. This requires equal models, criteria,
+    /// cases and tuners; demands, usages, weights and roles of experiments may differ.
     pub fn measures_as(&self, other: &Self) -> bool {
         let same_case = |a: &Case, b: &Case| {
             (&a.name, &a.parameters, &a.inputs) == (&b.name, &b.parameters, &b.inputs)

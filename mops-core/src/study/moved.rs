@@ -14,8 +14,8 @@ impl Study {
         Some(moved)
     }
 
-    /// Returns the study with a parameter mapped to another value in all jobs that give it a constant one; `None` outside of its
-    /// range.
+    /// Returns the study with a parameter mapped to another value in all jobs that give it a constant one; `None`
+    /// outside of its range.
     pub fn with_constant_parameter(&self, name: &str, to: impl Fn(f64) -> f64) -> Option<Self> {
         let mut moved = self.clone();
         for job in &mut moved.jobs {

@@ -7,8 +7,8 @@ use crate::evaluation::Objective;
 use crate::study::{Grid, Scale, Tuner};
 
 impl Study {
-    /// Returns the study over its uncertain parameters at a design. The uncertain parameters become the active tuners, in
-    /// their order, at the end of the list. The tuners of the study keep the given values. Cases that differ only in
+    /// Returns the study over its uncertain parameters at a design. The uncertain parameters become the active tuners,
+    /// in their order, at the end of the list. The tuners of the study keep the given values. Cases that differ only in
     /// uncertain parameters are merged.
     pub fn over_uncertain(&self, tuners: &[f64]) -> Self {
         let mut study = self.clone();

@@ -66,8 +66,8 @@ pub struct Tuner {
     pub guessed: [bool; 2],
 }
 
-/// Part of a tuner's range within which a value is at its bound: above the rounding of positions. In a range of seven decades, optima of
-/// ordinary size are not.
+/// Part of a tuner's range within which a value is at its bound: above the rounding of positions. In a range of seven
+/// decades, optima of ordinary size are not.
 const AT_BOUND: f64 = 1e-9;
 
 impl Tuner {

@@ -65,8 +65,8 @@ impl ActiveSet {
     ///
     /// `first` lists constraints that are active with positive multipliers at the minimum over them; it may be empty.
     /// Constraints active in the previous program are tested for violation before all others. Returns false if the
-    /// constraints are inconsistent, if rounding errors prevent convergence, or as soon as `goes_on` does, which is asked before every
-    /// step.
+    /// constraints are inconsistent, if rounding errors prevent convergence, or as soon as `goes_on` does, which is
+    /// asked before every step.
     pub fn solve(
         &mut self,
         goes_on: &dyn Fn() -> bool,

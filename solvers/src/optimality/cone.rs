@@ -13,13 +13,15 @@ use crate::linearised_criteria::{LinearModel, LinearisedCriteria};
 /// Relative derivative below which finite differences show only noise.
 const MIN_GRADIENT: f64 = 1e-5;
 
-/// Largest number of unknowns for changes of objectives. The work of a step of the quadratic program grows with its square.
+/// Largest number of unknowns for changes of objectives. The work of a step of the quadratic program grows with its
+/// square.
 const GROUPS: usize = 32;
 
 /// Largest number of quadratic programs with cutting planes for one direction.
 const MOST_PLANES: usize = 50;
 
-/// Difference of the sum of the changes from its bound by cutting planes that is negligible, relative to the change and to
+/// Difference of the sum of the changes from its bound by cutting planes that is negligible, relative to the change and
+/// to
 /// [`IMPROVEMENT`].
 const GAP: f64 = 0.1;
 
@@ -29,9 +31,11 @@ pub(super) struct DescentCone {
     objective_of: Vec<usize>,
     /// Values of the objectives at the point.
     values: Vec<f64>,
-    /// Largest derivative of the rows that attain an objective within a trial step; `None` if the objective has no slope.
+    /// Largest derivative of the rows that attain an objective within a trial step; `None` if the objective has no
+    /// slope.
     steepest: Vec<Option<f64>>,
-    /// Rows, and cuts beyond kinks, each with its objective, relative to the objective and in units of its largest derivative.
+    /// Rows, and cuts beyond kinks, each with its objective, relative to the objective and in units of its largest
+    /// derivative.
     cuts: Vec<(usize, LinearModel)>,
     /// Active or nearly active constraints.
     inequalities: Vec<LinearModel>,
@@ -79,8 +83,8 @@ impl DescentCone {
         self.solve(point, goes_on).map(|(_, weights)| weights)
     }
 
-    /// Returns the linear model of a row relative to its objective, in units of the largest derivative of the objective; `None`
-    /// if the objective has no slope.
+    /// Returns the linear model of a row relative to its objective, in units of the largest derivative of the
+    /// objective; `None` if the objective has no slope.
     fn relative(&self, row: usize, model: &LinearModel) -> Option<(usize, LinearModel)> {
         let k = self.objective_of[row];
         let steepest = self.steepest[k]?;
@@ -92,10 +96,10 @@ impl DescentCone {
     ///
     /// The unknowns are the step and the changes `t_k <= 0` of the objectives; the sum of the changes is minimised.
     ///
-    /// More than [`GROUPS`] objectives are divided into groups of `s`. The unknown of a group is the mean change of its objectives,
-    /// bounded below by cutting planes: the mean of the linear models that are largest at an earlier step. So the size of the
-    /// quadratic program does not depend on the number of objectives. Source: C. Lemarechal, Y. Nesterov, Mathematical Programming
-    /// 69 (1995) 111-147, for sums of functions.
+    /// More than [`GROUPS`] objectives are divided into groups of `s`. The unknown of a group is the mean change of its
+    /// objectives, bounded below by cutting planes: the mean of the linear models that are largest at an earlier step.
+    /// So the size of the quadratic program does not depend on the number of objectives. Source: C. Lemarechal, Y.
+    /// Nesterov, Mathematical Programming 69 (1995) 111-147, for sums of functions.
     #[allow(clippy::cast_precision_loss)]
     fn solve(&self, point: &[f64], goes_on: &dyn Fn() -> bool) -> Option<(Vec<f64>, Vec<f64>)> {
         let (n, m) = (point.len(), self.values.len());
@@ -157,7 +161,8 @@ impl DescentCone {
         means
     }
 
-    /// Returns the value and the linear model that is largest at a step, in units of the trial step, for every objective with a slope.
+    /// Returns the value and the linear model that is largest at a step, in units of the trial step, for every
+    /// objective with a slope.
     fn largest(&self, at: &[f64]) -> Vec<Option<(f64, &LinearModel)>> {
         let mut largest: Vec<Option<(f64, &LinearModel)>> = vec![None; self.values.len()];
         for (k, cut) in &self.cuts {
@@ -174,8 +179,8 @@ impl DescentCone {
         self.largest(step).iter().flatten().map(|(value, _)| value).sum()
     }
 
-    /// Returns the trade-off weights: the change of an objective, or of the mean of its group, balances the multipliers of its
-    /// cuts. The planes stand after the rows of `alone`, each with its group.
+    /// Returns the trade-off weights: the change of an objective, or of the mean of its group, balances the multipliers
+    /// of its cuts. The planes stand after the rows of `alone`, each with its group.
     #[allow(clippy::cast_precision_loss)]
     fn weights(&self, multipliers: &[f64], alone: usize, (planes, size): (&[usize], usize)) -> Vec<f64> {
         let mut weights = vec![0.0; self.values.len()];

@@ -125,8 +125,8 @@ impl Model for Level {
     }
 }
 
-/// Returns the functions whose maximum is the objective, with the constraints; for an infeasible point, the constraints whose
-/// maximum is the violation.
+/// Returns the functions whose maximum is the objective, with the constraints; for an infeasible point, the constraints
+/// whose maximum is the violation.
 fn functions(shape: &Shape, at: &Linearisation, is_feasible: bool) -> LinearisedCriteria {
     let criteria = LinearisedCriteria::from_linearisation(shape, at);
     if is_feasible {

@@ -21,14 +21,16 @@ const CURVATURE: f64 = 1e-6;
 /// count as a descent direction. Corresponds to the accuracy of finite-difference gradients.
 const IMPROVEMENT: f64 = 1e-3;
 
-/// Decrease within a trial step that is regarded as zero, of the objective or, in the test of Pareto optimality, of every criterion,
-/// relative to its value plus [`mops_core::solver::SMALL_OBJECTIVE`]: the sentences on both tests state it.
+/// Decrease within a trial step that is regarded as zero, of the objective or, in the test of Pareto optimality, of
+/// every criterion, relative to its value plus [`mops_core::solver::SMALL_OBJECTIVE`]: the sentences on both tests
+/// state it.
 const NEGLIGIBLE: f64 = mops_core::solver::NEGLIGIBLE_DECREASE;
 
 /// Length of a trial step, in the unit box.
 const TRIAL_STEP: f64 = 1e-3;
 
-/// Lengths at which a direction is tried, in trial steps: along a curved constraint or valley only a short step succeeds.
+/// Lengths at which a direction is tried, in trial steps: along a curved constraint or valley only a short step
+/// succeeds.
 const LENGTHS: [f64; 2] = [1.0, 0.125];
 
 /// Maximum number of cuts added from trial points.
@@ -37,8 +39,8 @@ const MAX_CUTS: usize = 12;
 /// Number of cuts after which gradients are sampled around the point.
 const CUTS_BEFORE_SAMPLING: usize = 2;
 
-/// Largest number of coordinates along which gradients are sampled. Time and memory grow with its square; with more coordinates, a
-/// point at a kink is not shown to be optimal.
+/// Largest number of coordinates along which gradients are sampled. Time and memory grow with its square; with more
+/// coordinates, a point at a kink is not shown to be optimal.
 const MOST_SAMPLED: usize = 100;
 
 /// Distance of the sampled gradients from the point, in the unit box.
@@ -48,21 +50,21 @@ const SAMPLING_RADIUS: f64 = 0.5 * TRIAL_STEP;
 /// discontinuity. Such a cut says nothing about the point.
 const MAX_CUT_VALUE: f64 = 0.5;
 
-/// Distances from a point at which values are compared, in the unit box. Values that are identical to the last bit at the first
-/// distance, or equal to within rounding at both, indicate a plateau.
+/// Distances from a point at which values are compared, in the unit box. Values that are identical to the last bit at
+/// the first distance, or equal to within rounding at both, indicate a plateau.
 const PLATEAU_REACH: [f64; 2] = [1e-3, 1e-2];
 
 /// Cutting-plane model of what a direction would improve.
 trait Model {
-    /// Returns the step of at most [`TRIAL_STEP`] that improves most, and the predicted improvement; `None` if rounding errors
-    /// prevent its computation, or as soon as `goes_on` returns false.
+    /// Returns the step of at most [`TRIAL_STEP`] that improves most, and the predicted improvement; `None` if rounding
+    /// errors prevent its computation, or as soon as `goes_on` returns false.
     fn direction(&self, point: &[f64], goes_on: &dyn Fn() -> bool) -> Option<Step>;
 
     /// Returns true if the scaled values of a trial are an improvement.
     fn is_improvement(&self, shape: &Shape, trial: &[f64]) -> bool;
 
-    /// Adds the linear models at another point, extrapolated to `point`. Those beyond a discontinuity are ignored; returns true
-    /// if there are any.
+    /// Adds the linear models at another point, extrapolated to `point`. Those beyond a discontinuity are ignored;
+    /// returns true if there are any.
     fn add(&mut self, shape: &Shape, point: &[f64], beyond: &Linearisation) -> bool;
 }
 
@@ -97,8 +99,8 @@ enum Answer {
 /// Optimization (1985).
 ///
 /// A step along a kink stays on the kink, where finite differences average both sides. After a few steps, gradients are
-/// therefore sampled on either side along every coordinate. Source: A. A. Goldstein, Mathematical Programming 13 (1977) 14-22;
-/// J. V. Burke, A. S. Lewis, M. L. Overton, SIAM Journal on Optimization 15 (2005) 751-779.
+/// therefore sampled on either side along every coordinate. Source: A. A. Goldstein, Mathematical Programming 13 (1977)
+/// 14-22; J. V. Burke, A. S. Lewis, M. L. Overton, SIAM Journal on Optimization 15 (2005) 751-779.
 fn answer(oracle: &mut dyn Oracle, point: &[f64], model: &mut impl Model) -> Answer {
     let shape = oracle.shape().clone();
     for added in 0..MAX_CUTS {
@@ -148,9 +150,9 @@ fn beside(point: &[f64], distance: f64) -> impl Iterator<Item = Vec<f64>> {
     (0..point.len()).flat_map(move |j| [distance, -distance].into_iter().filter_map(move |step| moved(j, step)))
 }
 
-/// Returns the step within the box, in trial steps, that lowers criteria in units of the trial step most, followed by `changing`
-/// further unknowns, the changes of objectives or of means of objectives, none of which is positive. Returns `None` if rounding
-/// errors prevent the computation, or as soon as `goes_on` returns false.
+/// Returns the step within the box, in trial steps, that lowers criteria in units of the trial step most, followed by
+/// `changing` further unknowns, the changes of objectives or of means of objectives, none of which is positive. Returns
+/// `None` if rounding errors prevent the computation, or as soon as `goes_on` returns false.
 ///
 /// `curvature` makes the step unique; it is small compared with the improvements that count.
 #[allow(clippy::cast_precision_loss)]
@@ -228,8 +230,8 @@ pub struct Certificate {
 
 /// Searches for a direction that lowers one criterion and raises none, within the bounds and the active constraints.
 ///
-/// Returns `certified-local` if there is none for all sampled gradients, and `no` if a small step in such a direction is an
-/// actual improvement. Returns `not-shown` without gradients, or if only the linear models improve.
+/// Returns `certified-local` if there is none for all sampled gradients, and `no` if a small step in such a direction
+/// is an actual improvement. Returns `not-shown` without gradients, or if only the linear models improve.
 pub fn certificate(oracle: &mut dyn Oracle, point: &[f64]) -> Certificate {
     let unknown = Certificate { pareto: Pareto::NotShown, weights: None, is_beside_jump: false };
     let shape = oracle.shape().clone();

@@ -16,8 +16,8 @@ const DROP_COUNT: usize = 200;
 /// Radius of the neighbourhood whose points enter the models, in trust-region radii.
 const NEIGHBOURHOOD_RADIUS: f64 = 2.5;
 
-/// Number of points that enter the models, which is that of the coefficients of a quadratic in 20 coordinates. The fit takes time
-/// in proportion to the third power of this number.
+/// Number of points that enter the models, which is that of the coefficients of a quadratic in 20 coordinates. The fit
+/// takes time in proportion to the third power of this number.
 const MAX_NEIGHBOURS: usize = 231;
 
 impl SampleSet {

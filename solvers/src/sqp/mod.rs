@@ -26,8 +26,8 @@ use state::{FEASIBILITY_TOLERANCE, State};
 /// A criterion may have kinks of its own: an overshoot is the largest of several peaks. If a step fails in spite of its
 /// correction, the criteria are also linearised beyond the kink, and both linear models (cuts) count (bundle method).
 ///
-/// For up to about 50 tuners. Converges fast, to the optimum of the basin of its starting point; hence it starts from the initial
-/// guess of the study and from the best points of a sample of the box.
+/// For up to about 50 tuners. Converges fast, to the optimum of the basin of its starting point; hence it starts from
+/// the initial guess of the study and from the best points of a sample of the box.
 ///
 /// Source: R. Fletcher, Practical Methods of Optimization, 2nd edition (1987), section 14.4 (Sl1QP, second-order
 /// correction), 14.6 (nonsmooth functions); M. J. D. Powell, in Numerical Analysis Dundee 1977, Lecture Notes in

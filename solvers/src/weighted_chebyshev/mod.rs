@@ -19,9 +19,9 @@ use subproblem::Subproblems;
 /// Weighted Chebyshev method for evenly spread points of the Pareto front (non-dominated designs). Each point solves a
 /// weighted min-max problem. Needs `objective = "each"`.
 ///
-/// An objective is a criterion in its worst case, or in every case. First every objective is minimised alone (multistart), and
-/// then the others as far as possible without loss; for three and more objectives, also all but one at a time. The results are
-/// the ends of the front and define the range of every objective.
+/// An objective is a criterion in its worst case, or in every case. First every objective is minimised alone
+/// (multistart), and then the others as far as possible without loss; for three and more objectives, also all but one
+/// at a time. The results are the ends of the front and define the range of every objective.
 ///
 /// Two criteria: the two neighbours `p`, `q` with the largest distance define a rectangle. The next point is the
 /// deepest one in it,
@@ -33,9 +33,9 @@ use subproblem::Subproblems;
 /// is a gap in the front and is closed.
 ///
 /// Three and more criteria: `min max_i (f_i - ideal_i) / (range_i w_i)` for weights `w` spread evenly over the simplex,
-/// each from the nearest known point. Weights that end at a known point, within a thousandth of the range of every criterion, give no
-/// new one. While points are missing, the weights of the evaluated points farthest from the front follow, then those in its largest
-/// gaps.
+/// each from the nearest known point. Weights that end at a known point, within a thousandth of the range of every
+/// criterion, give no new one. While points are missing, the weights of the evaluated points farthest from the front
+/// follow, then those in its largest gaps.
 ///
 /// One more point minimises the largest scaled value, as in a single design; it meets the demands best.
 ///
@@ -238,8 +238,8 @@ impl State {
     }
 }
 
-/// Lowers the objectives of a point that are smaller than the largest one, while the others stay; `None` if the point is
-/// infeasible.
+/// Lowers the objectives of a point that are smaller than the largest one, while the others stay; `None` if the point
+/// is infeasible.
 ///
 /// # Errors
 /// Returns [`Halt`] if the run is over.
@@ -257,9 +257,9 @@ pub fn remove_slack(oracle: &mut dyn Oracle, point: &[f64]) -> Result<Option<Eva
 /// Maximum number of rounds that replace dominated points.
 const MAX_ROUNDS: usize = 5;
 
-/// Inserts a point into the front and removes points that it dominates; returns false if the point is dominated itself, or if it is
-/// the same as one of the front. `range` holds the range of every objective over the front; it is empty until the ends of the front are
-/// known.
+/// Inserts a point into the front and removes points that it dominates; returns false if the point is dominated itself,
+/// or if it is the same as one of the front. `range` holds the range of every objective over the front; it is empty
+/// until the ends of the front are known.
 fn insert(front: &mut Vec<Candidate>, candidate: Candidate, range: &[f64]) -> bool {
     let one = vec![1.0; candidate.objectives.len()];
     let is_dominated =

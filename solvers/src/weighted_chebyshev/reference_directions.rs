@@ -1,5 +1,5 @@
-//! Search for three and more objectives: evenly spread reference directions from the ideal point, then those in the gaps of
-//! the front.
+//! Search for three and more objectives: evenly spread reference directions from the ideal point, then those in the
+//! gaps of the front.
 
 use mops_core::{Halt, Oracle, front::SAME};
 use mops_math as math;
@@ -57,7 +57,8 @@ impl ReferenceDirections {
         farthest.filter(|(separation, _)| *separation > GAP).map(|(_, candidate)| candidate.clone())
     }
 
-    /// Returns the direction in the largest gap: the farthest one from the points of the front and from the solved directions.
+    /// Returns the direction in the largest gap: the farthest one from the points of the front and from the solved
+    /// directions.
     fn in_gap(&self, subproblems: &Subproblems, front: &[Candidate]) -> Option<Vec<f64>> {
         let image = |candidate: &Candidate| {
             let of = candidate.objectives.iter().zip(&subproblems.ideal).zip(&subproblems.range);
@@ -73,8 +74,8 @@ impl ReferenceDirections {
         largest.filter(|(gap, _)| *gap > 0.0).map(|(_, direction)| direction.clone())
     }
 
-    /// Solves the direction that is nearest to one solved before, or one in a gap of the front; returns false if no gap is
-    /// left, or if the front has enough points.
+    /// Solves the direction that is nearest to one solved before, or one in a gap of the front; returns false if no gap
+    /// is left, or if the front has enough points.
     pub fn solve_next(
         &mut self,
         oracle: &mut dyn Oracle,

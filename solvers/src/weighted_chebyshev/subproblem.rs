@@ -100,7 +100,8 @@ impl Subproblems {
         self.remove_slack(oracle, &scalarisation, found).map(Some)
     }
 
-    /// Minimises all objectives but one, in units of their ranges, then the one as far as possible without loss in the others.
+    /// Minimises all objectives but one, in units of their ranges, then the one as far as possible without loss in the
+    /// others.
     pub fn opposite(&mut self, oracle: &mut dyn Oracle, objective: usize) -> Result<Candidate, Halt> {
         let role = |(k, (&reference, &scale)): (usize, (&f64, &f64))| match k == objective {
             true => Role::Minimised { reference, scale: scale / MIN_WEIGHT },
@@ -150,8 +151,8 @@ impl Subproblems {
         self.remove_slack(oracle, &scalarisation, found)
     }
 
-    /// Minimises the objectives that have slack in a min-max problem, while the others stay. As this is a min-max problem itself,
-    /// its slack is removed in turn.
+    /// Minimises the objectives that have slack in a min-max problem, while the others stay. As this is a min-max
+    /// problem itself, its slack is removed in turn.
     pub fn remove_slack(
         &mut self,
         oracle: &mut dyn Oracle,

@@ -1,7 +1,7 @@
 //! Problems with known answers to measure solvers: for tests, for `mops-bench` and as a reference.
 //!
-//! Every problem is written once, over [`mops_language::Scalar`]: plain numbers give values, dual numbers exact gradients.
-//! A run ([`mops_core::Run`]) solves a problem as it solves a study, with the same budget, cache and finite
+//! Every problem is written once, over [`mops_language::Scalar`]: plain numbers give values, dual numbers exact
+//! gradients. A run ([`mops_core::Run`]) solves a problem as it solves a study, with the same budget, cache and finite
 //! differences.
 
 mod arithmetic;

@@ -2,11 +2,13 @@
 //!
 //! Sources, each a deterministic function of the seed:
 //!
-//! - `force`: at every balance a smooth stationary Gaussian force `a F_j g(t)`, another realisation in every experiment,
-//!   with `E[g(t) g(t + s)] = exp(-s^2/(2 L^2))` and the nominal force `F_j`, the root mean square of the net force.
+//! - `force`: at every balance a smooth stationary Gaussian force `a F_j g(t)`, another realisation in every
+//!   experiment, with `E[g(t) g(t + s)] = exp(-s^2/(2 L^2))` and the nominal force `F_j`, the root mean square of the
+//!   net force.
 //! - `drift`: one parameter becomes `p (1 + a g(t))`, with such a `g` of longer correlation time.
 //! - `coloured`: correlated noise of every sensor, `E[n(t) n(t + s)] = a^2 exp(-|s|/L)`.
-//! - `state`: at one balance a force `a F_j g(x)`, with one smooth random function `g` of the state for all experiments.
+//! - `state`: at one balance a force `a F_j g(x)`, with one smooth random function `g` of the state for all
+//!   experiments.
 //!
 //! `a` is the amplitude of the source.
 
@@ -66,8 +68,8 @@ enum Part {
 impl Background {
     /// Draws a background; `None` if the baseline model diverges.
     ///
-    /// Correlation times are log-uniform: 4 samples to a tenth of the shortest record for forces, 2 samples to a twentieth
-    /// for sensors. They are uniform between a sixth and a half of that record for a drifting parameter.
+    /// Correlation times are log-uniform: 4 samples to a tenth of the shortest record for forces, 2 samples to a
+    /// twentieth for sensors. They are uniform between a sixth and a half of that record for a drifting parameter.
     pub fn draw(bench: &Bench, class: Class, draw: &mut Draw) -> Option<Self> {
         let (plant, setups) = (bench.plant, &bench.setups);
         let dt = setups[0].dt;

@@ -1,9 +1,9 @@
 //! Generation of trials with a model error in the background.
 //!
 //! The records have the roles calibration, selection and validation. The effect sets the scale: the background deviates
-//! the outputs by 5 to 20 % of what the effect does, and the white noise is 10 to 300 times smaller than the background.
-//! Without a background the noise is 10 to 100 times smaller than the effect. All deviations are root mean squares over
-//! the calibration record, before any fit.
+//! the outputs by 5 to 20 % of what the effect does, and the white noise is 10 to 300 times smaller than the
+//! background. Without a background the noise is 10 to 100 times smaller than the effect. All deviations are root mean
+//! squares over the calibration record, before any fit.
 
 use mops_math as math;
 
@@ -131,8 +131,8 @@ pub const NOMINAL: &[Nominal] = &{
 
 /// Generates a trial of a plant. `effect` is missing or, in a setting without an effect, sets the scale only.
 ///
-/// Returns `None` if the plant does not have the effect in [`NOMINAL`], if the plant diverges, or if the background does
-/// not reach its size with a plausible amplitude.
+/// Returns `None` if the plant does not have the effect in [`NOMINAL`], if the plant diverges, or if the background
+/// does not reach its size with a plausible amplitude.
 pub fn disturbed(setting: Setting, plant: &str, effect: &str, seed: u64) -> Option<Trial> {
     let nominal = NOMINAL.iter().find(|nominal| nominal.plant == plant && nominal.effect == effect)?;
     let mut plants = disturbed_plants().iter().chain(further_plants()).copied();

@@ -60,7 +60,8 @@ pub struct Sampled {
     pub memory: usize,
     /// Samples of the record from one instant to the next.
     pub every: usize,
-    /// Time from an instant to the change of the memory, in sample times of the record: 0.5, so that it is a whole number of steps.
+    /// Time from an instant to the change of the memory, in sample times of the record: 0.5, so that it is a whole
+    /// number of steps.
     pub delay: f64,
     /// Writes the next values of the memory; without terms at places.
     pub next: Rates,

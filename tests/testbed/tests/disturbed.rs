@@ -62,8 +62,8 @@ fn a_background_has_the_size_that_the_truth_reports() {
     for trial in several(Setting::Background, 24) {
         let background = trial.truth.background.as_ref().expect("there is a background");
         assert!((0.05..=0.2 * 1.02).contains(&background.share) && (10.0..=300.0).contains(&background.ratio));
-        // The true parameters leave background and noise; the fit leaves less, but parameters do not follow correlated noise of a
-        // sensor.
+        // The true parameters leave background and noise; the fit leaves less, but parameters do not follow correlated
+        // noise of a sensor.
         let left = math::hypot(background.ratio, trial.truth.noise_floor[0].1);
         let least = if background.source == "coloured" { 0.6 } else { 0.01 };
         let share = trial.truth.size / left;

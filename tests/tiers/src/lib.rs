@@ -1,7 +1,7 @@
 //! Tiers of property tests: the quick tier runs a tenth of the cases of a property, the full tier all of them.
 //!
-//! `cargo test --workspace` runs the quick tier, `MOPS_TESTS=full cargo test --workspace -- --include-ignored` the full tier. A
-//! property test states the number of cases of the full tier.
+//! `cargo test --workspace` runs the quick tier, `MOPS_TESTS=full cargo test --workspace -- --include-ignored` the full
+//! tier. A property test states the number of cases of the full tier.
 
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::RngSeed;
@@ -18,8 +18,8 @@ pub fn is_full() -> bool {
     std::env::var_os("MOPS_TESTS").is_some_and(|tier| tier == "full")
 }
 
-/// Returns the configuration of a property with `full` cases in the full tier. Every run has the same cases, and failures are
-/// not written to files.
+/// Returns the configuration of a property with `full` cases in the full tier. Every run has the same cases, and
+/// failures are not written to files.
 #[must_use]
 pub fn property(full: u32) -> ProptestConfig {
     ProptestConfig {

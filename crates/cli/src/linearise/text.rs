@@ -139,8 +139,8 @@ pub(super) fn undecided_note(system: &StateSpace) -> String {
     format!("note: stability undecided, as these poles are within rounding of the {border}: {}\n", names.join(", "))
 }
 
-/// Formats poles with damping ratio, frequency and time constant, the slowest decay first. With a sampling period, the poles are
-/// those in z, and the others are those of `ln(z)/T`.
+/// Formats poles with damping ratio, frequency and time constant, the slowest decay first. With a sampling period, the
+/// poles are those in z, and the others are those of `ln(z)/T`.
 pub(super) fn poles_table(what: &str, poles: &[Complex], period: Option<f64>) -> String {
     let in_seconds = |z: Complex| period.map_or(z, |period| StateSpace::logarithm(z, period));
     let mut sorted: Vec<(Complex, Complex)> = rounded(poles, poles).into_iter().map(|p| (p, in_seconds(p))).collect();

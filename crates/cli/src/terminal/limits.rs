@@ -20,7 +20,8 @@ pub(crate) struct Limit {
     pub time_limit: Option<Duration>,
 }
 
-/// Time that a run may take to conclude after a stop request: the run time so far divided by this number, within bounds.
+/// Time that a run may take to conclude after a stop request: the run time so far divided by this number, within
+/// bounds.
 const CONCLUDING_SHARE: u32 = 20;
 const MIN_CONCLUDING: Duration = Duration::from_secs(1);
 const MAX_CONCLUDING: Duration = Duration::from_secs(10);
@@ -51,7 +52,8 @@ pub(crate) fn cancel_after(limit: Limit) -> Cancellation {
     cancellation
 }
 
-/// Ends the program with an error at the time limit, for commands without intermediate results that write files atomically.
+/// Ends the program with an error at the time limit, for commands without intermediate results that write files
+/// atomically.
 pub(crate) fn exit_after(limit: Limit) {
     let Some(limit) = limit.time_limit else { return };
     let _ = thread::Builder::new().spawn(move || {

@@ -59,7 +59,8 @@ impl Dashboard {
 const SPARKS: usize = 40;
 
 impl Progress {
-    /// Creates the progress bar of a run, visible if `shown`. Stages are printed as lines if standard error is no terminal.
+    /// Creates the progress bar of a run, visible if `shown`. Stages are printed as lines if standard error is no
+    /// terminal.
     pub(crate) fn new(shown: bool, budget: usize, cancellation: &Cancellation) -> Self {
         let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(budget as u64), target);

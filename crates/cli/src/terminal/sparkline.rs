@@ -6,9 +6,9 @@ use mops_math as math;
 const BLOCKS: [char; 8] =
     ['\u{2581}', '\u{2582}', '\u{2583}', '\u{2584}', '\u{2585}', '\u{2586}', '\u{2587}', '\u{2588}'];
 
-/// Draws the best value so far over the number of evaluations, in `width` characters. `points` holds the number of evaluations
-/// and the new value at each improvement. The scale is logarithmic if the values span more than a decade. Columns before the
-/// first finite value are blank.
+/// Draws the best value so far over the number of evaluations, in `width` characters. `points` holds the number of
+/// evaluations and the new value at each improvement. The scale is logarithmic if the values span more than a decade.
+/// Columns before the first finite value are blank.
 pub(super) fn sparkline(points: &[(usize, f64)], evaluations: usize, width: usize) -> String {
     let finite = || points.iter().map(|(_, value)| *value).filter(|value| value.is_finite());
     let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));

@@ -1,5 +1,5 @@
-//! Output to the terminal. Write errors are reported. Control characters from a study, a data file or a result are escaped:
-//! they could move the cursor, change the title or clear the screen.
+//! Output to the terminal. Write errors are reported. Control characters from a study, a data file or a result are
+//! escaped: they could move the cursor, change the title or clear the screen.
 
 use std::io::{self, ErrorKind, Write};
 

@@ -6,8 +6,8 @@ use super::entries::{Entry, Form, entries, header_of, last_line, own_end};
 use super::{TomlText, keys, owned};
 
 impl TomlText {
-    /// Sets the entry at `path` to `value`, written as TOML. An existing value or table is replaced, a new entry is inserted
-    /// where its table is.
+    /// Sets the entry at `path` to `value`, written as TOML. An existing value or table is replaced, a new entry is
+    /// inserted where its table is.
     pub fn set(&mut self, path: &[&str], value: &str) {
         let mut entries = entries(&self.0);
         match entries.iter().find(|entry| entry.path == path).map(|entry| &entry.form) {
@@ -43,8 +43,8 @@ impl TomlText {
                     self.0.insert_str(after, &format!("{} = {value}\n", keys(below)));
                     return;
                 }
-                // The key is written with dots in the enclosing braces. Otherwise it follows the last entry of the table, under
-                // a header of its own if the table has headers.
+                // The key is written with dots in the enclosing braces. Otherwise it follows the last entry of the
+                // table, under a header of its own if the table has headers.
                 Form::Implied
                     if entries
                         .iter()
@@ -96,7 +96,8 @@ impl TomlText {
         self.remove(&path.iter().map(String::as_str).collect::<Vec<_>>(), "replaced");
     }
 
-    /// Removes an entry: within braces it is deleted, elsewhere its lines become comments, with the reason `why` above them.
+    /// Removes an entry: within braces it is deleted, elsewhere its lines become comments, with the reason `why` above
+    /// them.
     pub fn remove(&mut self, path: &[&str], why: &str) {
         let entries = entries(&self.0);
         let path = owned(path);

@@ -78,8 +78,8 @@ impl TomlText {
     }
 }
 
-/// Returns a study with its `key=value` settings merged, for another folder. `locate` converts the path of a data file to be
-/// relative to that folder.
+/// Returns a study with its `key=value` settings merged, for another folder. `locate` converts the path of a data file
+/// to be relative to that folder.
 pub fn settled(text: &str, settings: &[String], locate: &dyn Fn(&str) -> String) -> TomlText {
     let mut text = TomlText::new(text);
     for setting in settings {

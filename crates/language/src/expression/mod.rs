@@ -57,8 +57,8 @@ impl Expression {
         }
     }
 
-    /// Parses an expression with reductions of time responses. In the expression that it returns each reduction is a name, its
-    /// own text; the reductions and what they reduce are returned with it.
+    /// Parses an expression with reductions of time responses. In the expression that it returns each reduction is a
+    /// name, its own text; the reductions and what they reduce are returned with it.
     ///
     /// # Errors
     /// If the text is not such an expression, with the position of the first mistake.

@@ -39,7 +39,8 @@ pub struct Unit {
     turning: [f64; 2],
     /// Value of the angle units in the coherent unit: 180/pi for V/deg, 1 for rad.
     angles: f64,
-    /// Exponents of the unit in which a quantity is declared, as in `turning`, if this unit is another one for its values.
+    /// Exponents of the unit in which a quantity is declared, as in `turning`, if this unit is another one for its
+    /// values.
     declared: Option<[f64; 2]>,
 }
 
@@ -149,10 +150,12 @@ impl Unit {
         self.turning[0] != 0.0
     }
 
-    /// Returns why a number in this unit has no certain value in `other`, and in which unit it has; `None` if it has one.
+    /// Returns why a number in this unit has no certain value in `other`, and in which unit it has; `None` if it has
+    /// one.
     ///
-    /// V is ambiguous for V/deg, and 1/s for rpm. V is not ambiguous for V/rad, because the radian is 1. Of a quantity in 1/s, Hz and
-    /// rad/s are ambiguous beside each other; and of one of unknown kind, such as the value of a formula, degC, Hz and rpm.
+    /// V is ambiguous for V/deg, and 1/s for rpm. V is not ambiguous for V/rad, because the radian is 1. Of a quantity
+    /// in 1/s, Hz and rad/s are ambiguous beside each other; and of one of unknown kind, such as the value of a
+    /// formula, degC, Hz and rpm.
     pub fn ambiguity_in(&self, other: &Self) -> Option<String> {
         if !self.is_compatible(other) {
             return None;
@@ -208,15 +211,15 @@ impl Unit {
         Self { kind: Kind::Difference, ..unit }
     }
 
-    /// Returns the unit for values of which it is unknown whether they are differences, such as those of a formula: quantities on a
-    /// temperature scale are refused.
+    /// Returns the unit for values of which it is unknown whether they are differences, such as those of a formula:
+    /// quantities on a temperature scale are refused.
     #[must_use]
     pub fn of_unknown_kind(self) -> Self {
         Self { kind: Kind::Unknown, ..self }
     }
 
-    /// Returns the unit as one for values of a quantity that is declared in `own`. Units that count neither angles nor cycles then
-    /// count what `own` counts: of a quantity in rad/s, 1 1/s is 1 rad/s, and 2 pi 1/s are 1 Hz.
+    /// Returns the unit as one for values of a quantity that is declared in `own`. Units that count neither angles nor
+    /// cycles then count what `own` counts: of a quantity in rad/s, 1 1/s is 1 rad/s, and 2 pi 1/s are 1 Hz.
     #[must_use]
     pub fn of_quantity_in(self, own: &Self) -> Self {
         Self { kind: own.kind, declared: own.declared.or(Some(own.turning)), ..self }

@@ -79,7 +79,8 @@ impl<'a> Equivalent<'a> {
         let mut waiting: Vec<usize> = self.lines.iter().map(|line| line.waiting).collect();
         if groups.first().is_some_and(|(time, _)| *time == 0.0) {
             let (_, acts) = groups.remove(0);
-            // The inputs of a cut loop change with the memory whose place they take: before the clocks compute if its values arrive.
+            // The inputs of a cut loop change with the memory whose place they take: before the clocks compute if its
+            // values arrive.
             let arrives = self.clocks[base].delay > 0.0;
             let is_before = |act: &Act| match act {
                 Act::Arrive(_) | Act::Deliver(_) => is_cut,
@@ -271,8 +272,8 @@ impl<'a> Equivalent<'a> {
         Ok(groups)
     }
 
-    /// Returns the times within a period at which the value of a delayed quantity is needed: its changes if it depends on memory and
-    /// inputs only, or the instants of the clocks that read it, `delay` earlier.
+    /// Returns the times within a period at which the value of a delayed quantity is needed: its changes if it depends
+    /// on memory and inputs only, or the instants of the clocks that read it, `delay` earlier.
     fn pushes(&self, line: usize, first: f64, delay: f64) -> Result<Vec<f64>, String> {
         let StateSpace { b, d, .. } = self.system;
         let (column, row) = (self.inputs() + line, self.system.outputs.len() - self.delayed + line);

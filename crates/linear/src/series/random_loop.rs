@@ -1,4 +1,5 @@
-//! Random sampled and continuous loops: as systems with given matrices, and as functions of the frequency in other arithmetic.
+//! Random sampled and continuous loops: as systems with given matrices, and as functions of the frequency in other
+//! arithmetic.
 
 use std::f64::consts::PI;
 
@@ -24,9 +25,11 @@ pub struct Sampled {
     integrators: usize,
     lowest: f64,
     period: f64,
-    /// Proportional gain, derivative time and integral gain per period, relative to the proportional one, filter constant.
+    /// Proportional gain, derivative time and integral gain per period, relative to the proportional one, filter
+    /// constant.
     controller: [f64; 4],
-    /// Periods from a sample to the change of the output: by copies of the measurement, of the output, and of the clock.
+    /// Periods from a sample to the change of the output: by copies of the measurement, of the output, and of the
+    /// clock.
     late: [usize; 3],
     /// Copies of memory that nothing reads.
     idle: usize,

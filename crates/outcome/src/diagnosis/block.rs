@@ -25,12 +25,13 @@ pub struct Block {
     probability: f64,
     /// p-value of the residual's structure without a missing effect.
     p_value: f64,
-    /// Recorded inputs that act at other times than the study says, or are interpolated otherwise; effects are found with these.
+    /// Recorded inputs that act at other times than the study says, or are interpolated otherwise; effects are found
+    /// with these.
     alignment: Vec<Alignment>,
     /// Effects added to the model, claimed or proposed.
     found: Vec<FoundEffect>,
-    /// Share of the squared error of the declared model, in noises, that the effects found remove from validation data, else
-    /// selection data; null without effects or without such data.
+    /// Share of the squared error of the declared model, in noises, that the effects found remove from validation data,
+    /// else selection data; null without effects or without such data.
     explained_share: Option<f64>,
     /// Coordinate on which what the declared model lacks depends; null if none is significant.
     depends_on: Option<Dependence>,
@@ -44,8 +45,9 @@ pub struct Block {
     stopped: bool,
     /// True if all fits that the verdict rests on converged.
     converged: bool,
-    /// True if the verdict is sure: nothing is missing, or every effect found is claimed, by highest evidence and a better forecast of
-    /// held-out data; the search was not stopped, all fits converged, and no parameter is at a bound.
+    /// True if the verdict is sure: nothing is missing, or every effect found is claimed, by highest evidence and a
+    /// better forecast of held-out data; the search was not stopped, all fits converged, and no parameter is at a
+    /// bound.
     sure: bool,
     /// Terms of the nominal model that the data contradict.
     removed: Vec<Removed>,
@@ -101,11 +103,12 @@ struct FoundEffect {
     /// Probability that this effect, rather than another, is missing; null if none can be stated.
     #[schemars(with = "Option<f64>")]
     probability: f64,
-    /// Probability that an effect of this class is missing at this place; null for a given effect, or if most remains to be explained.
+    /// Probability that an effect of this class is missing at this place; null for a given effect, or if most remains
+    /// to be explained.
     #[schemars(with = "Option<f64>")]
     class_probability: f64,
-    /// Other classes and places that the data cannot distinguish from these, as `class at kind:name`: `class_probability` is that of one of
-    /// them.
+    /// Other classes and places that the data cannot distinguish from these, as `class at kind:name`:
+    /// `class_probability` is that of one of them.
     alike: Vec<String>,
     /// True if class and place are claimed; otherwise the effect is a proposal, or given.
     claimed: bool,
@@ -115,8 +118,9 @@ struct FoundEffect {
     bic_gain: f64,
     /// Alternatives at the same place whose BIC is at most 6 higher.
     indistinguishable: Vec<Rival>,
-    /// Errors on held-out data with and without the effect, initial states fitted. Empty for a single effect, whose errors before
-    /// and after show the same, and if the model without the effect cannot be simulated over whole records.
+    /// Errors on held-out data with and without the effect, initial states fitted. Empty for a single effect, whose
+    /// errors before and after show the same, and if the model without the effect cannot be simulated over whole
+    /// records.
     held_back: Vec<HeldBack>,
     /// Second place, as `kind:name`, of an effect that needs one.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -32,8 +32,8 @@ pub struct StrengthValue {
     pub unit: String,
     /// Standard error, without the selection of the effect; null if the data do not determine it.
     pub std_error: Option<f64>,
-    /// 95 % confidence interval. For a discrete shape parameter: the range of the values that the data allow, if there are
-    /// several.
+    /// 95 % confidence interval. For a discrete shape parameter: the range of the values that the data allow, if there
+    /// are several.
     pub interval95: Option<[f64; 2]>,
 }
 
@@ -46,11 +46,11 @@ pub struct Rival {
     pub place: String,
     /// Probability.
     pub probability: f64,
-    /// BIC minus that of the effect found, without the penalty of parameters that the data do not constrain. Between -2 and 2
-    /// the data do not distinguish the two; below -2 they prefer the alternative.
+    /// BIC minus that of the effect found, without the penalty of parameters that the data do not constrain. Between -2
+    /// and 2 the data do not distinguish the two; below -2 they prefer the alternative.
     pub bic_behind: f64,
-    /// Cosine similarity of the responses of the outputs to both effects, without the part that the parameters absorb; 1 if
-    /// equal.
+    /// Cosine similarity of the responses of the outputs to both effects, without the part that the parameters absorb;
+    /// 1 if equal.
     pub cosine: f64,
 }
 
@@ -76,10 +76,11 @@ pub struct Found {
     pub strengths: Vec<StrengthValue>,
     /// Probability that this effect, rather than another, is missing; NaN if more is missing than it describes.
     pub probability: f64,
-    /// Probability that an effect of this class is missing at this place; NaN for a given effect, or if most remains to be explained.
+    /// Probability that an effect of this class is missing at this place; NaN for a given effect, or if most remains to
+    /// be explained.
     pub class_probability: f64,
-    /// Other classes and places that the data cannot distinguish from these, as `class at kind:name`: `class_probability` is that of one of
-    /// them.
+    /// Other classes and places that the data cannot distinguish from these, as `class at kind:name`:
+    /// `class_probability` is that of one of them.
     pub alike: Vec<String>,
     /// True if class and place are claimed; otherwise the effect is a proposal, or given.
     pub claimed: bool,
@@ -89,8 +90,9 @@ pub struct Found {
     pub bic_gain: f64,
     /// Alternatives at the same place whose BIC is at most 6 higher.
     pub indistinguishable: Vec<Rival>,
-    /// Errors on held-out data with and without the effect, initial states fitted. Empty for a single effect, whose errors before
-    /// and after show the same, and if the model without the effect cannot be simulated over whole records.
+    /// Errors on held-out data with and without the effect, initial states fitted. Empty for a single effect, whose
+    /// errors before and after show the same, and if the model without the effect cannot be simulated over whole
+    /// records.
     pub held_back: Vec<HeldBack>,
 }
 
@@ -102,7 +104,8 @@ impl Found {
 }
 
 impl Diagnosis {
-    /// Returns true if the effects found explain at least half of the squared error on held-out data, or there are none of these.
+    /// Returns true if the effects found explain at least half of the squared error on held-out data, or there are none
+    /// of these.
     pub fn explains_most(&self) -> bool {
         self.explained_share.is_none_or(|share| share >= 0.5)
     }
@@ -113,8 +116,8 @@ impl Diagnosis {
     }
 }
 
-/// Returns a place, with its companion if both are joints or both are processes, as `joint:a with joint:b`: the effect then acts on
-/// both.
+/// Returns a place, with its companion if both are joints or both are processes, as `joint:a with joint:b`: the effect
+/// then acts on both.
 pub fn both_places(place: &str, companion: Option<&str>) -> String {
     let are = |kind: &str, other: &str| place.starts_with(kind) && other.starts_with(kind);
     match companion {
@@ -259,7 +262,8 @@ pub struct ExperimentError {
     pub in_windows: Option<WindowErrors>,
 }
 
-/// Returns the root mean square of the errors over the experiments of a role, in units of the noise; `None` without experiments.
+/// Returns the root mean square of the errors over the experiments of a role, in units of the noise; `None` without
+/// experiments.
 #[allow(clippy::cast_precision_loss)]
 pub fn together(errors: &[ExperimentError], role: Role) -> Option<f64> {
     let squares: Vec<f64> = errors.iter().filter(|e| e.role == role).map(|e| math::powi(e.normalised, 2)).collect();
@@ -292,7 +296,8 @@ pub struct ParameterMove {
     pub after: f64,
     /// Standard error in the augmented model, under its likeliest error model.
     pub std_error: Option<f64>,
-    /// 95 % confidence interval under the likeliest error model, widened to `after`, which is estimated by least squares.
+    /// 95 % confidence interval under the likeliest error model, widened to `after`, which is estimated by least
+    /// squares.
     pub interval95: Option<[f64; 2]>,
 }
 
@@ -341,8 +346,8 @@ pub struct Curve {
     pub found: Vec<f64>,
 }
 
-/// Course of what is missing at a place, without a catalogue: a smooth force at a balance, a smooth error at a sensor. It is what
-/// the nominal model lacks there, or, where effects were added, their formulas plus what remains with them.
+/// Course of what is missing at a place, without a catalogue: a smooth force at a balance, a smooth error at a sensor.
+/// Where effects were added, their formulas plus what remains with them; else what the nominal model lacks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LatentInput {
     /// The place, as `kind:name`.
@@ -415,8 +420,8 @@ pub struct Diagnosis {
     pub alignment: Vec<Alignment>,
     /// Effects added.
     pub found: Vec<Found>,
-    /// Share of the squared error of the declared model, in noises, that the effects found remove from validation data, else
-    /// selection data; `None` without effects or without such data.
+    /// Share of the squared error of the declared model, in noises, that the effects found remove from validation data,
+    /// else selection data; `None` without effects or without such data.
     pub explained_share: Option<f64>,
     /// Coordinate on which what the declared model lacks depends.
     pub depends_on: Option<Dependence>,
@@ -430,8 +435,9 @@ pub struct Diagnosis {
     pub is_stopped: bool,
     /// True if all fits that the verdict rests on converged.
     pub converged: bool,
-    /// True if the verdict is sure: nothing is missing, or every effect found is claimed, by highest evidence and a better forecast of
-    /// held-out data; the search was not stopped, all fits converged, and no parameter is at a bound.
+    /// True if the verdict is sure: nothing is missing, or every effect found is claimed, by highest evidence and a
+    /// better forecast of held-out data; the search was not stopped, all fits converged, and no parameter is at a
+    /// bound.
     pub is_sure: bool,
     /// Terms of the nominal model that the data contradict.
     pub removed: Vec<Removed>,
@@ -451,7 +457,8 @@ pub struct Diagnosis {
     pub parameters: Vec<ParameterMove>,
     /// Detection limits, for the verdict `none`.
     pub noticeable: Vec<Noticeable>,
-    /// Free curve with the largest gain of each place, the largest first: where the missing input acts, whatever its form.
+    /// Free curve with the largest gain of each place, the largest first: where the missing input acts, whatever its
+    /// form.
     pub places: Vec<Dependence>,
     /// Course of what is missing at the places of the effects found, or else at the first place.
     pub latent: Vec<LatentInput>,

@@ -40,7 +40,8 @@ pub struct BlindDirection {
     pub words: String,
     /// True for a straight line in the tuners; false for one in their logarithms, as for products and ratios.
     pub straight: bool,
-    /// Clause for a straight line that has the same direction, if the clause is that of a product or a ratio of two tuners.
+    /// Clause for a straight line that has the same direction, if the clause is that of a product or a ratio of two
+    /// tuners.
     pub sum: Option<String>,
 }
 

@@ -35,8 +35,8 @@ pub fn excitations(study: &Study) -> Vec<ExcitationReport> {
     reports
 }
 
-/// Returns the findings on inputs as sentences: one for each case, or for an input of many cases, that of the least excited case
-/// and the orders of the others.
+/// Returns the findings on inputs as sentences: one for each case, or for an input of many cases, that of the least
+/// excited case and the orders of the others.
 pub fn excitation_words(reports: &[ExcitationReport]) -> Vec<String> {
     let mut sentences = Vec::new();
     for input in distinct(reports.iter().map(|report| report.input.as_str())) {

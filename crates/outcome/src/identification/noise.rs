@@ -52,7 +52,8 @@ pub(super) struct OneSided {
     pub changes: Vec<f64>,
 }
 
-/// Ratio of the samples to the large deviations below which these are no outliers: the model does not describe the data.
+/// Ratio of the samples to the large deviations below which these are no outliers: the model does not describe the
+/// data.
 const OUTLIERS: usize = 5;
 
 /// Probability below which large deviations are on one side by more than chance.
@@ -297,10 +298,11 @@ impl Noise {
 }
 
 impl OneSided {
-    /// Returns the large deviations of a record with a robust loss, if a sign test finds them on one side; `basis` as for [`Noise::of`].
+    /// Returns the large deviations of a record with a robust loss, if a sign test finds them on one side; `basis` as
+    /// for [`Noise::of`].
     ///
-    /// Without these samples, the normal equations of the step `x` are `sum w (s x + d) s = 0` over the others; over all samples,
-    /// `sum w d s = 0` and `sum w s s' = 1`.
+    /// Without these samples, the normal equations of the step `x` are `sum w (s x + d) s = 0` over the others; over
+    /// all samples, `sum w d s = 0` and `sum w s s' = 1`.
     fn of(of: &Fitted, basis: &DMatrix<f64>) -> Option<Self> {
         let tail = of.record.tail.as_ref()?;
         let count = tail.samples.len();

@@ -63,7 +63,8 @@ impl Record {
         Self { case, signal, noise, samples, blocks: vec![block], tail: None }
     }
 
-    /// Creates the record of the samples of a criterion whose residuals start at index `first`; `factor` is that of its residuals.
+    /// Creates the record of the samples of a criterion whose residuals start at index `first`; `factor` is that of its
+    /// residuals.
     fn of(case: usize, samples: Samples, first: usize, factor: f64) -> Self {
         let Samples { signal, first: sample, weights, noise, loss } = samples;
         let weights = weights.iter().map(|weight| factor * weight).collect();
@@ -79,16 +80,18 @@ impl Record {
         (self.blocks[0].loss, self.blocks[0].unit)
     }
 
-    /// Replaces the residuals of a robust loss, and the rows of their Jacobian, by those of the least-squares problem with the same
-    /// normal equations: the theory of M-estimates becomes that of least squares.
+    /// Replaces the residuals of a robust loss, and the rows of their Jacobian, by those of the least-squares problem
+    /// with the same normal equations: the theory of M-estimates becomes that of least squares.
     ///
-    /// With the score `psi` and the deviation `e`, in the unit of the loss, the deviation becomes `psi(e)/mean(psi')` and the weight
-    /// of its square `mean(psi')`. White residuals then give the covariance `s^2 mean(psi^2)/mean(psi')^2 (J'J)^-1`, and the ratio of
-    /// likelihoods becomes `(S - S_min) mean(psi')/mean(psi^2)`. Their size shows the noise, so that none is declared. Returns
-    /// false if `mean(psi')` is not positive: most samples are outliers, and the theory does not hold; the numbers are then of no use.
+    /// With the score `psi` and the deviation `e`, in the unit of the loss, the deviation becomes `psi(e)/mean(psi')`
+    /// and the weight of its square `mean(psi')`. White residuals then give the covariance
+    /// `s^2 mean(psi^2)/mean(psi')^2 (J'J)^-1`, and the ratio of likelihoods becomes
+    /// `(S - S_min) mean(psi')/mean(psi^2)`. Their size shows the noise, so that none is declared. Returns false if
+    /// `mean(psi')` is not positive: most samples are outliers, and the theory does not hold; the numbers are then of
+    /// no use.
     ///
-    /// Source: P. J. Huber, E. M. Ronchetti, Robust Statistics (2nd ed., 2009), sections 6.3, 7.6; F. R. Hampel et al., Robust
-    /// Statistics (1986), section 7.2 (tests).
+    /// Source: P. J. Huber, E. M. Ronchetti, Robust Statistics (2nd ed., 2009), sections 6.3, 7.6; F. R. Hampel et al.,
+    /// Robust Statistics (1986), section 7.2 (tests).
     #[allow(clippy::cast_precision_loss)]
     pub fn as_squares(&mut self, residuals: &mut [f64], jacobian: &mut DMatrix<f64>) -> bool {
         for block in self.blocks.iter_mut().filter(|block| block.loss != Loss::Squares) {
@@ -115,8 +118,8 @@ impl Record {
         true
     }
 
-    /// Replaces the residuals of a robust loss, and the rows of their Jacobian, by those of squares: where they are mostly misfit,
-    /// the declared noise alone counts.
+    /// Replaces the residuals of a robust loss, and the rows of their Jacobian, by those of squares: where they are
+    /// mostly misfit, the declared noise alone counts.
     pub fn without_loss(&self, jacobian: &mut DMatrix<f64>, residuals: &[f64]) {
         for block in self.blocks.iter().filter(|block| block.loss != Loss::Squares) {
             for (i, e) in block.deviations(residuals).into_iter().enumerate() {

@@ -62,8 +62,8 @@ pub struct TunerSensitivity {
     pub std_error_alone: f64,
     /// Standard error relative to the quantity named in `relative_to`.
     pub relative_error: f64,
-    /// Reference of the relative error: `value`, or `range` for an initial state, which may be near zero, for a tuner that is 0, and
-    /// for a temperature in degC or degF.
+    /// Reference of the relative error: `value`, or `range` for an initial state, which may be near zero, for a tuner
+    /// that is 0, and for a temperature in degC or degF.
     pub relative_to: &'static str,
     /// Factor by which the error grows because the other tuners are unknown: at least 1.
     pub inflation: f64,

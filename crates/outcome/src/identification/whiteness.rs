@@ -93,8 +93,8 @@ fn finding(subject: &str, is_white: bool, numbers: &str) -> String {
     }
 }
 
-/// Returns the findings on channels of experiments, each with the names of both, as sentences: one for each, or if a channel is in
-/// many experiments, one for all of these.
+/// Returns the findings on channels of experiments, each with the names of both, as sentences: one for each, or if a
+/// channel is in many experiments, one for all of these.
 pub fn whiteness_words(found: &[(&str, &str, Whiteness)]) -> Vec<String> {
     let mut sentences = Vec::new();
     for channel in distinct(found.iter().map(|(channel, ..)| *channel)) {

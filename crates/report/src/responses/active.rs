@@ -23,8 +23,8 @@ pub(super) fn narrow(group: &mut Group) {
     all.filter(|plot| !plot.log_x).for_each(|plot| plot.window = window);
 }
 
-/// Returns the part of the time in which a curve is away from its first or last value, with a margin; `None` if that is nearly
-/// the whole time. `also` are times that the part contains.
+/// Returns the part of the time in which a curve is away from its first or last value, with a margin; `None` if that is
+/// nearly the whole time. `also` are times that the part contains.
 fn part<'p>(curves: impl Iterator<Item = &'p [(f64, f64)]>, also: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     let mut whole = [f64::INFINITY, f64::NEG_INFINITY];
     let mut part = whole;

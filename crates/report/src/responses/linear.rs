@@ -1,5 +1,5 @@
-//! Plots of a linear model: Bode plots in all cases, with margins and the Nyquist curve of a loop transfer function, and the
-//! movement of the poles with each tuner.
+//! Plots of a linear model: Bode plots in all cases, with margins and the Nyquist curve of a loop transfer function,
+//! and the movement of the poles with each tuner.
 
 use mops_content::{
     figures::Figure,
@@ -21,7 +21,8 @@ const MOST_TUNERS: usize = 6;
 /// Number of values of a tuner in a plot of the poles.
 const VALUES: u32 = 120;
 
-/// Number of values without poles after which the sweeps of a model end: a search for an equilibrium that does not exist takes long.
+/// Number of values without poles after which the sweeps of a model end: a search for an equilibrium that does not
+/// exist takes long.
 const MOST_FAILURES: u32 = 3;
 /// Gain, relative to the largest one, below which a corner frequency is not shown: -60 dB.
 const SMALL: f64 = 1e-3;
@@ -168,8 +169,8 @@ fn marks(of: &Loop) -> [Vec<Level>; 2] {
     [line(of_gain, &gain), line(of_phase, &turn)]
 }
 
-/// Returns the range of frequencies that matter, rad/s: a decade beyond the crossovers of a loop, or beyond the corners of a
-/// system with a gain of at least [`SMALL`] of the largest one.
+/// Returns the range of frequencies that matter, rad/s: a decade beyond the crossovers of a loop, or beyond the corners
+/// of a system with a gain of at least [`SMALL`] of the largest one.
 fn decades(system: &StateSpace, response: &FrequencyCurve, closed: Option<&Loop>) -> [f64; 2] {
     let crossings = closed.map_or_else(Vec::new, |of| {
         let phase = of.critical().into_iter().flatten().flatten();
@@ -233,8 +234,9 @@ fn nyquist_curve(cases: &Cases<'_>, (input, output): (usize, usize), name: &str)
     Some(nyquist(&response, peak, &name))
 }
 
-/// Returns the poles of the first case while a tuner moves from its lower to its upper bound, with the name of the tuner. For
-/// a loop transfer function, the poles are those of the closed loop. `None` if the tuner is fixed or moves no pole.
+/// Returns the poles of the first case while a tuner moves from its lower to its upper bound, with the name of the
+/// tuner. For a loop transfer function, the poles are those of the closed loop. `None` if the tuner is fixed or moves
+/// no pole.
 fn poles(cases: &Cases<'_>, tuner: usize, failures: &mut u32) -> Option<(String, Plot)> {
     let (problem, one) = (&cases.report.solution.problem, cases.ones[0]);
     let moved = &problem.study().tuners()[tuner];

@@ -19,8 +19,8 @@ const MOST: usize = 6;
 /// Key of a plot: model, experiment if any, signal.
 type Key = (usize, Option<usize>, usize);
 
-/// Returns the data of a plot for every signal that criteria read, with all cases of a model in one plot and a plot for each
-/// experiment; at most six simulations. Failed simulations and linear models have no curves.
+/// Returns the data of a plot for every signal that criteria read, with all cases of a model in one plot and a plot for
+/// each experiment; at most six simulations. Failed simulations and linear models have no curves.
 pub fn live(problem: &Problem, tuners: &[f64]) -> Vec<Value> {
     let study = problem.study();
     let mut plots: Vec<(Key, Plot)> = Vec::new();

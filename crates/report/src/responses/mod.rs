@@ -1,4 +1,5 @@
-//! Plots of the responses: signals of every simulation at the initial guess and at the reported point, with measurements.
+//! Plots of the responses: signals of every simulation at the initial guess and at the reported point, with
+//! measurements.
 
 mod active;
 mod inputs;
@@ -26,8 +27,9 @@ struct Simulated {
     both: Comparison,
 }
 
-/// Returns the groups of plots, for at most [`MOST_JOBS`] simulations, and a sentence if some are omitted. Each experiment has
-/// a group, and each model a group with all cases. With a Pareto front, each case has a group with the responses of the front.
+/// Returns the groups of plots, for at most [`MOST_JOBS`] simulations, and a sentence if some are omitted. Each
+/// experiment has a group, and each model a group with all cases. With a Pareto front, each case has a group with the
+/// responses of the front.
 pub(super) fn groups(report: &Report<'_>) -> (Vec<Group>, Option<String>) {
     let study = report.solution.problem.study();
     let all = study.jobs().len();

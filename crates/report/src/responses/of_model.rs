@@ -216,8 +216,8 @@ impl Cases<'_> {
     }
 }
 
-/// Returns the caption of a criterion: the value with the largest scaled value of all cases, and the demand; without a demand, the range
-/// of its values.
+/// Returns the caption of a criterion: the value with the largest scaled value of all cases, and the demand; without a
+/// demand, the range of its values.
 fn caption<'c>(of_cases: impl Iterator<Item = &'c CriterionReport> + Clone) -> Option<String> {
     let count = of_cases.clone().count();
     // A criterion without a value is the worst.

@@ -37,8 +37,8 @@ pub(super) fn verdict(of: &Solution<'_>) -> Verdict {
 /// Residuals above this multiple of the noise show that the model does not describe the data.
 const MISFIT: f64 = 2.0;
 
-/// Returns what speaks against a calibrated model, as sentences: residuals far above the noise, a fit worse than the mean of the data,
-/// tuners at their bounds.
+/// Returns what speaks against a calibrated model, as sentences: residuals far above the noise, a fit worse than the
+/// mean of the data, tuners at their bounds.
 fn doubts_of_fit(outcome: &Outcome) -> String {
     let experiments = outcome.calibration.iter().flat_map(|c| &c.experiments);
     let channels: Vec<_> = experiments.flat_map(|e| e.channels.iter().map(move |c| (e, c))).collect();

@@ -19,11 +19,12 @@ use crate::search::{Options, Solved};
 /// Share of the evaluations of a run that the look for jumps may add: one part of so many.
 const SHARE: usize = 20;
 
-/// Distance along a tuner, in the unit box, within which the design counts as beside a jump: that of the tests of optimality.
+/// Distance along a tuner, in the unit box, within which the design counts as beside a jump: that of the tests of
+/// optimality.
 const BESIDE: f64 = 1e-3;
 
-/// Adds what is known of jumps near the design of a study to its result. A design against worst cases is looked at in the cases of the
-/// study: those that were added lie on the edge of the box.
+/// Adds what is known of jumps near the design of a study to its result. A design against worst cases is looked at in
+/// the cases of the study: those that were added lie on the edge of the box.
 pub(super) fn add(solved: &mut Solved, study: Study, options: &Options, watch: &dyn Watch) {
     let spent = solved.outcome.evaluations;
     let budget = (spent / SHARE).min(options.max_evaluations.saturating_sub(spent));
@@ -117,8 +118,8 @@ fn sentence(jump: &JumpReport, found: &JumpsReport, tuners: &[Tuner]) -> String 
     text
 }
 
-/// Returns the line of a study that makes a quantity uncertain by 1 %; `None` where no tolerance is a part of the value: near 0, and for a
-/// tuner of one case.
+/// Returns the line of a study that makes a quantity uncertain by 1 %; `None` where no tolerance is a part of the
+/// value: near 0, and for a tuner of one case.
 fn line(jump: &JumpReport, tuners: &[Tuner]) -> Option<String> {
     if jump.kind == MovedKind::Tuner || jump.is_tuner {
         let tuner = tuners.iter().find(|tuner| tuner.name == jump.name && tuner.case.is_none())?;

@@ -1,4 +1,5 @@
-//! Jumps of the criteria near the reported point: how far a tuner, a constant or an initial value may move before a criterion jumps.
+//! Jumps of the criteria near the reported point: how far a tuner, a constant or an initial value may move before a
+//! criterion jumps.
 
 use super::is_robust;
 use std::sync::Arc;
@@ -29,8 +30,8 @@ const MET: f64 = 1.0 + LEAST;
 /// Ratio of the distances at which values are compared: a change that does not shrink by it is a jump.
 const RATIO: f64 = 10.0;
 
-/// Parts of the increase over an interval that a tenth and a half of it contain at least if it jumps there: a jump may stand beside a
-/// steep change of its own size.
+/// Parts of the increase over an interval that a tenth and a half of it contain at least if it jumps there: a jump may
+/// stand beside a steep change of its own size.
 const SHARES: [f64; 2] = [0.5, 0.7];
 
 /// Width of the interval in which a jump is located, relative to its distance.
@@ -55,8 +56,8 @@ pub struct JumpsReport {
     pub discrete: Vec<String>,
     /// Jumps found within 1 %, the nearest first; those that miss a demand come before the others.
     pub found: Vec<JumpReport>,
-    /// Best evaluated point at which the criterion of the first jump still meets its demand 1 % farther; null if none was found or
-    /// looked for.
+    /// Best evaluated point at which the criterion of the first jump still meets its demand 1 % farther; null if none
+    /// was found or looked for.
     pub away: Option<AwayReport>,
 }
 
@@ -81,8 +82,8 @@ pub struct JumpReport {
     pub value: f64,
     /// Its value beyond the jump.
     pub beyond: f64,
-    /// Distance of the value beyond the jump: a part of a tuner's range, of a constant, or of an initial value (of the scale of
-    /// its state, where that is 0).
+    /// Distance of the value beyond the jump: a part of a tuner's range, of a constant, or of an initial value (of the
+    /// scale of its state, where that is 0).
     pub distance: f64,
     /// Value of the criterion at the reported point, in its unit.
     pub here: f64,
@@ -161,8 +162,8 @@ struct Step {
 }
 
 impl JumpsReport {
-    /// Looks for jumps along every tuner, constant and initial value, with at most `budget` evaluations, and for the best of the
-    /// evaluated points that is farther from the nearest jump. The result is empty after a stop request.
+    /// Looks for jumps along every tuner, constant and initial value, with at most `budget` evaluations, and for the
+    /// best of the evaluated points that is farther from the nearest jump. The result is empty after a stop request.
     pub fn of(problem: &Problem, oracle: &mut dyn Oracle, at: &Evaluation, archive: &[Record], budget: usize) -> Self {
         let counts = |i: &usize| problem.shape().rows[*i].0 != Usage::Monitor;
         let rows = (0..problem.study().rows().len()).filter(counts).collect();
@@ -211,8 +212,8 @@ impl JumpsReport {
     }
 }
 
-/// Returns the quantities whose changes are looked at: continuous active tuners, the other tuners, then constants and initial values of the
-/// models. What a robust design holds uncertain is left out: it is designed against.
+/// Returns the quantities whose changes are looked at: continuous active tuners, the other tuners, then constants and
+/// initial values of the models. What a robust design holds uncertain is left out: it is designed against.
 fn moved(problem: &Problem, at: &Evaluation) -> Vec<Moved> {
     let study = problem.study();
     let is_uncertain =
@@ -297,8 +298,8 @@ fn with_constant(study: &Study, quantity: &Moved, distance: f64) -> Option<Study
     })
 }
 
-/// Returns the point with a tuner moved by a distance, or the point and the problem with a constant moved; `None` outside of the range
-/// of the quantity.
+/// Returns the point with a tuner moved by a distance, or the point and the problem with a constant moved; `None`
+/// outside of the range of the quantity.
 fn place(problem: &Problem, quantity: &Moved, distance: f64, point: &[f64]) -> Option<(Vec<f64>, Option<Problem>)> {
     let mut point = point.to_vec();
     if quantity.kind != MovedKind::Tuner {
@@ -323,7 +324,8 @@ impl Look<'_> {
         if there.is_finite() { (there - here) / here.abs().max(1.0) } else { f64::INFINITY }
     }
 
-    /// Evaluates a quantity moved from a point by a distance; `None` outside of its range, beyond the budget, or after a stop request.
+    /// Evaluates a quantity moved from a point by a distance; `None` outside of its range, beyond the budget, or after
+    /// a stop request.
     fn step(&mut self, quantity: &Moved, distance: f64, point: &[f64]) -> Option<Step> {
         if self.evaluations >= self.budget || self.problem.is_cancelled() {
             return None;
@@ -337,7 +339,8 @@ impl Look<'_> {
         (!at.is_cancelled()).then_some(Step { distance: distance.abs(), at })
     }
 
-    /// Evaluates every quantity at both ends of its range of [`WITHIN`]. `None` for a quantity that the budget does not cover.
+    /// Evaluates every quantity at both ends of its range of [`WITHIN`]. `None` for a quantity that the budget does not
+    /// cover.
     fn ends(&mut self, moved: &[Moved], at: &Evaluation) -> Vec<Option<[Option<Step>; 2]>> {
         // A third of the budget is left to locate jumps.
         let covered = moved.len().min(self.budget / 3);
@@ -378,9 +381,9 @@ impl Look<'_> {
         found
     }
 
-    /// Locates the jump of a row: the interval with most of the increase is divided until it is much shorter than its distance.
-    /// Returns the evaluation beyond the jump; `None` if the increase shrinks with the interval. `known`: steps evaluated so far, the
-    /// farthest first.
+    /// Locates the jump of a row: the interval with most of the increase is divided until it is much shorter than its
+    /// distance. Returns the evaluation beyond the jump; `None` if the increase shrinks with the interval. `known`:
+    /// steps evaluated so far, the farthest first.
     fn locate(&mut self, row: usize, along: (&Moved, f64), at: &Evaluation, known: &mut Vec<Step>) -> Option<Step> {
         let (quantity, sign) = along;
         // What counts is whether the increase lies on this or the other side of a distance: infinite ones are equal.
@@ -445,7 +448,8 @@ impl Look<'_> {
         }
     }
 
-    /// Returns the best of the evaluated points at which the criterion that jumps still meets its demand when the quantity is moved by
+    /// Returns the best of the evaluated points at which the criterion that jumps still meets its demand when the
+    /// quantity is moved by
     /// [`WITHIN`].
     fn away(&mut self, quantity: &Moved, jump: &JumpReport, at: &Evaluation, archive: &[Record]) -> Option<AwayReport> {
         let mut best: Vec<&Record> = archive.iter().filter(|record| record.merit.is_feasible()).collect();

@@ -26,15 +26,15 @@ use crate::worst_case::{Effort, NO_GUARANTEE, Region, Worst, sentence};
 
 /// Outer approximation: solves for the present cases, searches the box for worse cases, adds them, and repeats.
 ///
-/// A design against cases that are still to be added is not worth a long search: a round has a share of the budget, and it ends
-/// when its design hardly improves any more. Once no worse case is found, the search of the last design is repeated with more
-/// patience.
+/// A design against cases that are still to be added is not worth a long search: a round has a share of the budget, and
+/// it ends when its design hardly improves any more. Once no worse case is found, the search of the last design is
+/// repeated with more patience.
 ///
-/// The optimum over the present cases is a lower bound for every design, provided that the solver finds the optimum. The worst
-/// case found in the box is the value of the present design.
+/// The optimum over the present cases is a lower bound for every design, provided that the solver finds the optimum.
+/// The worst case found in the box is the value of the present design.
 ///
-/// Source: J. W. Blankenship, J. E. Falk, Journal of Optimization Theory and Applications 19 (1976) 261-281 (algorithm 2.1).
-/// N.B.: the paper assumes an exact worst case; here it is the result of a search, so that no guarantee is given.
+/// Source: J. W. Blankenship, J. E. Falk, Journal of Optimization Theory and Applications 19 (1976) 261-281 (algorithm
+/// 2.1). N.B.: the paper assumes an exact worst case; here it is the result of a search, so that no guarantee is given.
 pub(super) fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
     let task = study.options::<DesignTask>().and_then(|design| design.robust.clone()).expect("the study asks for it");
     let mut rounds = Rounds { study, task, scenarios: Vec::new(), done: Vec::new(), worst: Vec::new() };
@@ -103,8 +103,8 @@ const NOT_SEARCHED: &str = "No search for worst cases was completed: the values 
 /// Share of the remaining budget that a round may spend: one part of so many.
 const ROUND_SHARE: usize = 3;
 
-/// Smallest number of evaluations without gain after which the design of a round is given up, in numbers of points that a gradient
-/// by differences needs.
+/// Smallest number of evaluations without gain after which the design of a round is given up, in numbers of points that
+/// a gradient by differences needs.
 const LEAST_PATIENCE: usize = 30;
 
 /// Patience with the last design, relative to that with the design of a round.
@@ -180,8 +180,8 @@ impl Rounds {
         study
     }
 
-    /// Returns the store for the points of a round, which is that of the study. The first round starts where the run starts,
-    /// later rounds at the design of the previous round.
+    /// Returns the store for the points of a round, which is that of the study. The first round starts where the run
+    /// starts, later rounds at the design of the previous round.
     fn keeping(&self, study: &Study, options: &Options) -> Option<EvaluationStore> {
         let store: Arc<dyn Store> = Arc::new(Copies::of(options, &self.study, study, &self.scenarios)?);
         let begin = options.keeping.as_ref().and_then(|keeping| keeping.begin.clone());
@@ -190,8 +190,8 @@ impl Rounds {
         Some(EvaluationStore { study: study.clone(), store, begin })
     }
 
-    /// Searches the box around a design and adds the cases that are worse than the present ones. Returns true if a case was
-    /// added.
+    /// Searches the box around a design and adds the cases that are worse than the present ones. Returns true if a case
+    /// was added.
     fn search(&mut self, solved: &Solved, options: &Options, watch: &dyn Watch) -> bool {
         let effort = Effort { samples: self.task.samples, starts: self.task.starts };
         let counts = |row: &mops_core::study::Row| row.usage != Usage::Monitor;
@@ -254,10 +254,12 @@ impl Rounds {
         self.scenarios.iter().any(|known| known.case == scenario.case && same(known))
     }
 
-    /// Returns the values beyond a new worst case in those uncertain parameters in which it lies beside the last one of its criterion, in the
-    /// direction from the last one to the new one and within the box; `None` if there are none. A parameter without effect has any value.
+    /// Returns the values beyond a new worst case in those uncertain parameters in which it lies beside the last one of
+    /// its criterion, in the direction from the last one to the new one and within the box; `None` if there are none. A
+    /// parameter without effect has any value.
     ///
-    /// Cases side by side lie at the edge of a jump, which each design moves by a little: one by one, they would not come to an end.
+    /// Cases side by side lie at the edge of a jump, which each design moves by a little: one by one, they would not
+    /// come to an end.
     fn beyond(&self, case: usize, new: &[f64], criterion: &str) -> Option<Vec<f64>> {
         let before =
             self.done.iter().rev().flat_map(|round| &round.added).find(|added| added.criterion == criterion)?;
@@ -401,7 +403,8 @@ impl End {
     }
 }
 
-/// Returns the findings as sentences. `over_all` is the worst scaled value of the reported design over the cases of all rounds.
+/// Returns the findings as sentences. `over_all` is the worst scaled value of the reported design over the cases of all
+/// rounds.
 fn words(report: &RobustReport, over_all: f64, end: End) -> Vec<String> {
     let round = &report.rounds[report.chosen];
     let added: usize = report.rounds.iter().map(|round| round.added.len()).sum();

@@ -7,7 +7,8 @@ use mops_content::{
     write_header,
 };
 
-/// Returns NAME and content of `predictions/NAME.csv` for every experiment: the time, then a column per measured output.
+/// Returns NAME and content of `predictions/NAME.csv` for every experiment: the time, then a column per measured
+/// output.
 ///
 /// The rows are the samples of the first channel. A cell is empty if its channel has no sample at that time.
 pub fn predictions(diagnosis: &Diagnosis) -> Vec<(String, String)> {

@@ -141,7 +141,8 @@ fn initial_states(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diag
 /// State, with the keys and values of its entry in `free`.
 type FreeStart = (String, Vec<(&'static str, f64)>);
 
-/// Returns the state whose initial value is `parameter`, with its initial guess; for a state of an effect also with bounds.
+/// Returns the state whose initial value is `parameter`, with its initial guess; for a state of an effect also with
+/// bounds.
 fn free_start(original: &Original<'_>, diagnosis: &Diagnosis, parameter: &str, value: f64) -> Option<FreeStart> {
     let states = original.study.models().iter().flat_map(|(_, model)| &model.interface().states);
     if let Some(state) = states.into_iter().find(|state| state.start == parameter) {
@@ -216,8 +217,8 @@ fn tuner(strength: &StrengthValue, known: Option<&EffectParameter>, own: &[(Stri
     tuner + " }"
 }
 
-/// Returns the bounds of a parameter. An infinite bound becomes plus or minus ten times the value, rounded up to one digit;
-/// plus or minus 1 if the value is 0.
+/// Returns the bounds of a parameter. An infinite bound becomes plus or minus ten times the value, rounded up to one
+/// digit; plus or minus 1 if the value is 0.
 fn range(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
     let size = if value.is_finite() && value != 0.0 { BOUND_RATIO * value.abs() } else { 1.0 };
     // Up to the next round number.

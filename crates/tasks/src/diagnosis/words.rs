@@ -7,8 +7,8 @@ use mops_outcome::diagnosis::{
 
 use mops_content::numbers::significant;
 
-/// BIC difference up to which the data cannot distinguish an alternative from an effect. Source: R. E. Kass, A. E. Raftery,
-/// Bayes Factors, JASA 90 (1995), section 3.2: a difference up to 2 is not worth more than a bare mention.
+/// BIC difference up to which the data cannot distinguish an alternative from an effect. Source: R. E. Kass, A. E.
+/// Raftery, Bayes Factors, JASA 90 (1995), section 3.2: a difference up to 2 is not worth more than a bare mention.
 pub const BARE_MENTION: f64 = 2.0;
 
 /// Returns the verdict in one to three sentences.
@@ -177,8 +177,8 @@ pub fn chance(p: f64) -> String {
     if p < LEAST_P { format!("below {LEAST_P}") } else { significant(p, 2) }
 }
 
-/// Returns `the error falls from 2.10 to 1.00 times the noise level on calibration data and from 15.40 to 1.00 on validation
-/// data`.
+/// Returns a sentence on the errors by role, as `the error falls from 2.10 to 1.00 times the noise level on calibration
+/// data and from 15.40 to 1.00 on validation data`.
 fn error_change(diagnosis: &Diagnosis) -> String {
     let mut last = "";
     let change = by_role(" times the noise level", |role| {
@@ -223,7 +223,8 @@ pub fn times(error: f64) -> String {
     if error.is_finite() && error < 100.0 { format!("{error:.2}") } else { significant(error, 3) }
 }
 
-/// Returns a place in words: ``in the joint `phi` ``, of an effect on two of a kind ``between the joints `a` and `b` ``.
+/// Returns a place in words: ``in the joint `phi` ``, of an effect on two of a kind ``between the joints `a` and `b`
+/// ``.
 pub fn at(place: &str) -> String {
     if let Some((first, second)) = place.split_once(" with ") {
         let name = |place: &str| place.split_once(':').map_or(place, |(_, name)| name).to_owned();

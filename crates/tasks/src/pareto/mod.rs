@@ -177,8 +177,8 @@ fn perform(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved,
     Ok(solved)
 }
 
-/// Notes the reasons to doubt the ends of a front as the optima of their criteria: each is examined as the result of a search for the
-/// minimum of its criterion alone. Returns the number of evaluated points, at most `budget`.
+/// Notes the reasons to doubt the ends of a front as the optima of their criteria: each is examined as the result of a
+/// search for the minimum of its criterion alone. Returns the number of evaluated points, at most `budget`.
 fn doubt_ends(problem: &Problem, front: &mut [Certified], budget: usize, watch: &dyn Watch) -> usize {
     let quiet = Quiet(watch);
     let shape = problem.shape();
@@ -306,8 +306,8 @@ fn words(problem: &Problem, front: &[Certified], found: &TradeOffs, stop: Stop) 
     words
 }
 
-/// Formats the exchange rate at a point: the cost, in the second criterion, of a round step of the first one that is small
-/// relative to its range over the front.
+/// Formats the exchange rate at a point: the cost, in the second criterion, of a round step of the first one that is
+/// small relative to its range over the front.
 fn price(found: &TradeOffs, i: usize) -> String {
     let (Some(weights), [first, second]) = (&found.points[i].weights, found.criteria.as_slice()) else {
         return String::new();

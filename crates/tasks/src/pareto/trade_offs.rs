@@ -51,13 +51,14 @@ pub struct FrontPoint {
     pub worst_scaled: f64,
     /// Pareto optimality of the point.
     pub pareto: Pareto,
-    /// Price weight of each criterion at the point, from its multipliers: `sum_k weights_k dc_k = 0` along the front, to
-    /// first order. The price of a unit of criterion `i`, in units of criterion `j`, is `weights_i / weights_j`. Normalised
-    /// so that the weights times the ranges sum to 1; null if the point was not certified.
+    /// Price weight of each criterion at the point, from its multipliers: `sum_k weights_k dc_k = 0` along the front,
+    /// to first order. The price of a unit of criterion `i`, in units of criterion `j`, is `weights_i / weights_j`.
+    /// Normalised so that the weights times the ranges sum to 1; null if the point was not certified.
     pub weights: Option<Vec<f64>>,
     /// True if a criterion jumps beside the point, so that it cannot be certified.
     pub is_beside_jump: bool,
-    /// Reason to doubt an end of the front as the optimum of its criterion; null for other points, and if there is none.
+    /// Reason to doubt an end of the front as the optimum of its criterion; null for other points, and if there is
+    /// none.
     pub doubt: Option<String>,
 }
 

@@ -1,5 +1,5 @@
-//! `task = "sensitivity"`: local sensitivity (tuners and combinations of tuners that the data or the criteria determine), or
-//! global sensitivity to the uncertain parameters.
+//! `task = "sensitivity"`: local sensitivity (tuners and combinations of tuners that the data or the criteria
+//! determine), or global sensitivity to the uncertain parameters.
 
 use mops_core::{
     Study, Watch,

@@ -1,7 +1,7 @@
 //! Search of a box of uncertain parameters for the worst case of every criterion.
 //!
-//! The search uses ordinary solvers: the uncertain parameters are the tuners, and the only row is the criterion with reversed
-//! sign.
+//! The search uses ordinary solvers: the uncertain parameters are the tuners, and the only row is the criterion with
+//! reversed sign.
 
 use std::sync::Arc;
 
@@ -118,8 +118,8 @@ impl Region {
         points
     }
 
-    /// Searches the worst case of every row. Returns them in the order of the rows, or an empty list after a stop request, and
-    /// the number of simulations.
+    /// Searches the worst case of every row. Returns them in the order of the rows, or an empty list after a stop
+    /// request, and the number of simulations.
     pub fn search(&self, watch: &dyn Watch, stage: Stage<'_>) -> (Vec<Worst>, usize) {
         let every = self.every();
         let points = self.points(&every);

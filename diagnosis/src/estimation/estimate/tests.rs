@@ -213,7 +213,8 @@ fn the_free_curve_of_a_drag_is_over_the_speed() {
 
 #[test]
 fn a_gain_of_the_input_does_not_stand_for_a_missing_force() {
-    // With all parameters free, the whole plant can be scaled with its input: a carriage with a drag that the model lacks.
+    // With all parameters free, the whole plant can be scaled with its input: a carriage with a drag that the model
+    // lacks.
     const CARRIAGE: &str = r#"
     states     = { x = "m", v = "m/s" }
     inputs     = { u = "N" }

@@ -1,7 +1,7 @@
 use super::*;
 
-/// Normal log-density of `n` samples with variance `s2` about their mean, as a function of the logarithm of the standard
-/// deviation: maximum at `ln(s2)/2`.
+/// Normal log-density of `n` samples with variance `s2` about their mean, as a function of the logarithm of the
+/// standard deviation: maximum at `ln(s2)/2`.
 fn normal(x: f64, s2: f64, n: f64) -> Score {
     let ratio = s2 / math::exp(2.0 * x);
     Score {

@@ -14,8 +14,8 @@ use crate::kernel::{allowed, common, is_due};
 ///
 /// The model that owns a delay takes steps no longer than [`Delay::longest_step`] and ends steps at
 /// [`Delay::next_break`]. It passes on `u` along every accepted step ([`Memory::remember`]). `u` is
-/// stored as the quartic through its values at five nodes of each step. A step ends where a jump of `u`, of its rate or of its
-/// curvature reaches the output.
+/// stored as the quartic through its values at five nodes of each step. A step ends where a jump of `u`, of its rate or
+/// of its curvature reaches the output.
 ///
 /// Source: A. Bellen, M. Zennaro, Numerical Methods for Delay Differential Equations (2003), section 3.2 (method of
 /// steps), 2.2 (propagation of jumps).
@@ -75,15 +75,16 @@ impl<S: Scalar> Restart<S> {
     }
 }
 
-/// Highest derivative whose jump ends a step because a lower one has arrived. The tangents with respect to the delay jump one
-/// derivative lower, and are not part of the error of a step.
+/// Highest derivative whose jump ends a step because a lower one has arrived. The tangents with respect to the delay
+/// jump one derivative lower, and are not part of the error of a step.
 const HIGHEST: u8 = 4;
 
 /// Smallest jump of the value, relative to its size: above the rounding of a quartic at its end.
 const JUMP: f64 = 1e-9;
 
-/// Smallest jumps of rate and curvature, times the length of the shorter piece and its square, in units of the permitted error of a
-/// quartic. An error of a quartic that is 1 at most appears as up to 16 and 160 there (weights of its derivatives at its ends).
+/// Smallest jumps of rate and curvature, times the length of the shorter piece and its square, in units of the
+/// permitted error of a quartic. An error of a quartic that is 1 at most appears as up to 16 and 160 there (weights of
+/// its derivatives at its ends).
 const BENDS: [f64; 2] = [100.0, 1000.0];
 
 impl<S: Scalar> Piece<S> {
@@ -163,7 +164,8 @@ impl<S: Scalar> Delay<S> {
             .map_or(0.0, |piece| piece.motion((t - piece.start - self.time.value()) / (piece.end - piece.start))[1])
     }
 
-    /// Stores `u` over a part of an accepted step, given at [`Trace::NODES`]; `error` is the permitted error of its quartic.
+    /// Stores `u` over a part of an accepted step, given at [`Trace::NODES`]; `error` is the permitted error of its
+    /// quartic.
     pub fn push(&mut self, [start, end]: [f64; 2], u: [S; 5], error: f64) {
         self.size = u.iter().fold(self.size, |most, u| most.max(u.value().abs()));
         let mut piece = Piece { start, end, coefficients: Trace::quartic(u), jumps: false };
@@ -229,9 +231,9 @@ impl<S: Scalar> Delay<S> {
 /// Highest derivative whose jump bends a signal.
 const BENDING: u8 = 1;
 
-/// Lets the jumps of delayed quantities that are due take effect; `settle` determines the mode of the plant. A jump that moves with
-/// the parameters moves the state by the jump of its rates. Returns the derivatives of the time of the jump of lowest derivative,
-/// NaN if several signals jump or bend with different ones.
+/// Lets the jumps of delayed quantities that are due take effect; `settle` determines the mode of the plant. A jump
+/// that moves with the parameters moves the state by the jump of its rates. Returns the derivatives of the time of the
+/// jump of lowest derivative, NaN if several signals jump or bend with different ones.
 pub(crate) fn pass_delays<S: Scalar, P: Plant<S> + Memory<S>>(
     plant: &mut P,
     delays: impl Fn(&mut P) -> &mut [Delay<S>],
@@ -275,7 +277,8 @@ pub(crate) fn pass_delays<S: Scalar, P: Plant<S> + Memory<S>>(
     all.unwrap_or(moves)
 }
 
-/// Stores delayed quantities over a part of a step, or returns false if a quartic through the values is not accurate enough.
+/// Stores delayed quantities over a part of a step, or returns false if a quartic through the values is not accurate
+/// enough.
 pub(crate) fn remember_delays<S: Scalar>(delays: &mut [Delay<S>], tolerance: &Tolerance, over: &Past<'_, S>) -> bool {
     let quartic = |k: usize| over.values.each_ref().map(|values| values[k]);
     let agrees = |(k, delay): (usize, &Delay<S>)| {

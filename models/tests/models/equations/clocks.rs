@@ -255,8 +255,8 @@ fn the_discrete_equivalent_follows_the_simulation_of_ten_pairs_of_rates() {
     }
 }
 
-/// Delays of a motor with a sampled current controller and a sampled speed controller: a part of the voltage, of the measured current
-/// and of the reference arrives later.
+/// Delays of a motor with a sampled current controller and a sampled speed controller: a part of the voltage, of the
+/// measured current and of the reference arrives later.
 fn delayed(rates: [u32; 4], actuator: u32, sensor: u32, reference: u32) -> String {
     motor(rates)
         .replace("= u - R*i", &format!("= 0.4*u + 0.6*delay(u, {actuator} [us]) - R*i"))
@@ -416,8 +416,10 @@ fn a_condition_on_the_time_is_met_at_the_instant_itself() {
 
 #[test]
 fn margins_do_not_depend_on_the_unit_of_memory() {
-    // A double integrator with a lag, PD by the last sample. From its frequency response, by the matrix exponential and bisection of
-    // |L| = 1: crossover 0.320_978_712_9 rad/s, phase margin 16.642_429_756 deg; on a grid: maximum sensitivity 3.454_886.
+    // A double integrator with a lag, PD by the last sample. From its frequency response, by the matrix exponential and
+    // bisection of
+    // |L| = 1: crossover 0.320_978_712_9 rad/s, phase margin 16.642_429_756 deg; on a grid: maximum sensitivity
+    // 3.454_886.
     for unit in ["1", "1000", "1e6", "1e-3"] {
         let text = format!(
             "states = {{ x1 = '1', x2 = '1', x3 = '1' }}\ninputs = {{ r = '1' }}\nparameters = {{ k = '1' }}\n\

@@ -189,7 +189,8 @@ fn a_filter_in_s_keeps_its_digits_at_fast_sampling() {
 
 #[test]
 fn a_zero_order_hold_keeps_its_digits_at_fast_sampling() {
-    // The response to a step is that of the continuous filter, 1 + sum of r exp(p t) over its poles p with the residues r.
+    // The response to a step is that of the continuous filter, 1 + sum of r exp(p t) over its poles p with the residues
+    // r.
     for (order, hertz, period) in [(4, 1.0, 2e-4), (6, 1.0, 1e-3), (7, 0.2, 1e-3)] {
         let w = std::f64::consts::TAU * hertz;
         let mut poles: Vec<Complex> = dampings(order)

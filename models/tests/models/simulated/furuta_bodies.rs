@@ -92,8 +92,8 @@ impl<const N: usize> Bodies<N> {
         DVector::from_fn(N, |i, _| rates[2 * i + 1])
     }
 
-    /// Returns the mass matrix and the torques without bearing friction. A unit torque on a joint adds a column of the inverse mass
-    /// matrix to the accelerations.
+    /// Returns the mass matrix and the torques without bearing friction. A unit torque on a joint adds a column of the
+    /// inverse mass matrix to the accelerations.
     fn mass_and_force(&self, q: &[f64; N], w: &[f64; N]) -> (DMatrix<f64>, DVector<f64>) {
         let free = self.accelerations(q, w, &[0.0; N]);
         let mut inverse = DMatrix::zeros(N, N);

@@ -86,7 +86,8 @@ fn a_window_continues_with_the_phase_of_its_clock() {
     let case = step("r");
     let whole = model.analyse(&Job { case: &case, parameters: &parameters, signals: &signals, horizon: 3.0 });
     let whole = whole.expect("it simulates");
-    // At an instant of the clock, after its values have arrived, and between both, where what it has computed is not known.
+    // At an instant of the clock, after its values have arrived, and between both, where what it has computed is not
+    // known.
     for (begin, allowed) in [(0.65, 1e-8), (0.68, 1e-8), (0.66, 0.02)] {
         let at = names.map(|name| whole.trace(name).sample(&[begin - 1e-12])[0]);
         let inputs = case.inputs.iter().map(|(name, input)| (name.clone(), input.since(begin))).collect();

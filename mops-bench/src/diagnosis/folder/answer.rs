@@ -74,8 +74,8 @@ pub(super) fn located(place: &str, locations: &[String]) -> String {
     place.to_owned()
 }
 
-/// Returns the outputs predicted at the rows of every file, as CSV. Rows without a prediction, whose sample was discarded as
-/// faulty, are interpolated.
+/// Returns the outputs predicted at the rows of every file, as CSV. Rows without a prediction, whose sample was
+/// discarded as faulty, are interpolated.
 pub(super) fn predictions(
     declared: &Declared,
     diagnosis: &Diagnosis,

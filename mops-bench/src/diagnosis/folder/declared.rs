@@ -34,18 +34,18 @@ pub(crate) struct Declared {
     /// Known constants: a number each, or an object with the number in `value`.
     #[serde(default)]
     constants: Map<String, Value>,
-    /// Course of the inputs between samples, by its first word: `zero` (or `zoh`; the default), `first` (or `foh`, or any text
-    /// with `linear`), `band-limited`.
+    /// Course of the inputs between samples, by its first word: `zero` (or `zoh`; the default), `first` (or `foh`, or
+    /// any text with `linear`), `band-limited`.
     input_hold: Option<String>,
-    /// Places at which an effect may be missing, `kind:name` with the kinds `process`, `joint`, `sensor`, `actuator`. The
-    /// answer uses the same spelling.
+    /// Places at which an effect may be missing, `kind:name` with the kinds `process`, `joint`, `sensor`, `actuator`.
+    /// The answer uses the same spelling.
     #[serde(default)]
     pub(super) locations: Vec<String>,
     /// Meaning of a place, for equations that cannot be assigned to states by their form: `... (3rd equation)`.
     #[serde(default)]
     location_meaning: Map<String, Value>,
-    /// Data files (CSV), in the folder of the case, with the time in column `t`. `calibration*` is fitted, `validation*` and
-    /// `selection*` select effects, all others are held out.
+    /// Data files (CSV), in the folder of the case, with the time in column `t`. `calibration*` is fitted,
+    /// `validation*` and `selection*` select effects, all others are held out.
     pub(super) files: Vec<String>,
 }
 
@@ -146,8 +146,8 @@ impl Declared {
         Ok(declared)
     }
 
-    /// Returns true if the equations hold for the numbers only: they contain constants without unit, and some quantity has a unit
-    /// other than the coherent SI unit, so that the constants would change with it.
+    /// Returns true if the equations hold for the numbers only: they contain constants without unit, and some quantity
+    /// has a unit other than the coherent SI unit, so that the constants would change with it.
     pub fn is_numeric(&self) -> bool {
         let named = self.states.iter().chain(&self.inputs).map(|named| &named.unit);
         let units = named.chain(self.parameters.iter().map(|p| &p.unit)).chain(self.outputs.iter().map(|o| &o.unit));
@@ -242,8 +242,8 @@ impl Declared {
         )
     }
 
-    /// Returns pairs of state and equation (indices) from the meanings of places: `equation of the angle th (3rd equation)`. If
-    /// the place is a position, this is the equation of its speed.
+    /// Returns pairs of state and equation (indices) from the meanings of places:
+    /// `equation of the angle th (3rd equation)`. If the place is a position, this is the equation of its speed.
     fn meant(&self) -> Vec<(usize, usize)> {
         let state = |name: &str| self.states.iter().position(|s| s.name == name);
         let meanings = self.location_meaning.iter().filter_map(|(name, meaning)| {

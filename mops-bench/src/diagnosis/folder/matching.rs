@@ -13,8 +13,8 @@ fn derivatives(equation: &str, states: &[String]) -> Vec<usize> {
     (0..states.len()).filter(|&i| occurs(&states[i])).collect()
 }
 
-/// Assigns to every state an equation that contains its derivative. Among several possible assignments, the pairs of state and
-/// equation in `meant` (indices) have priority, then the order.
+/// Assigns to every state an equation that contains its derivative. Among several possible assignments, the pairs of
+/// state and equation in `meant` (indices) have priority, then the order.
 ///
 /// # Errors
 /// If the numbers of states and equations differ, or no assignment exists.

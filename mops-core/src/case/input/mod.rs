@@ -75,10 +75,12 @@ pub enum Input {
     Sum(Vec<Input>),
 }
 
-/// Sine `amplitude sin(phase(t))` whose frequency changes from one value to another; 0 before its start and after its end.
+/// Sine `amplitude sin(phase(t))` whose frequency changes from one value to another; 0 before its start and after its
+/// end.
 ///
-/// Linear sweep: `phase = 2 pi (f1 + (f2 - f1) s/(2 T)) s` with `s = t - start`. Logarithmic sweep, in which equal times have
-/// equal frequency ratios: `phase = 2 pi f1 T/ln(f2/f1) ((f2/f1)^(s/T) - 1)`. The frequencies are the derivative of the phase.
+/// Linear sweep: `phase = 2 pi (f1 + (f2 - f1) s/(2 T)) s` with `s = t - start`. Logarithmic sweep, in which equal
+/// times have equal frequency ratios: `phase = 2 pi f1 T/ln(f2/f1) ((f2/f1)^(s/T) - 1)`. The frequencies are the
+/// derivative of the phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Chirp {
     /// Amplitude, in the unit of the input.
@@ -179,8 +181,8 @@ impl Input {
         }
     }
 
-    /// Returns the time from which values are known, s, at most 0: the first sample, or 0 for inputs that are not sampled. What was
-    /// before it is constant.
+    /// Returns the time from which values are known, s, at most 0: the first sample, or 0 for inputs that are not
+    /// sampled. What was before it is constant.
     pub fn first_known(&self) -> f64 {
         match self {
             Self::Sampled { times, .. } => times[0].min(0.0),
@@ -189,8 +191,8 @@ impl Input {
         }
     }
 
-    /// Returns the first time (s) at which the step between samples differs from the mean step by more than 1 %. `None` for
-    /// even sampling, and for inputs that need not be evenly sampled.
+    /// Returns the first time (s) at which the step between samples differs from the mean step by more than 1 %. `None`
+    /// for even sampling, and for inputs that need not be evenly sampled.
     pub fn uneven(&self) -> Option<f64> {
         if let Self::Sum(parts) = self {
             return parts.iter().find_map(Self::uneven);
@@ -202,8 +204,8 @@ impl Input {
         times.windows(2).find(differs).map(|pair| pair[0])
     }
 
-    /// Returns true if zero-order-hold samples look like a smooth signal. More than half of the samples must differ from
-    /// their predecessor, with a median step below a tenth of the range. Fewer than 20 samples return false.
+    /// Returns true if zero-order-hold samples look like a smooth signal. More than half of the samples must differ
+    /// from their predecessor, with a median step below a tenth of the range. Fewer than 20 samples return false.
     pub fn looks_smooth(&self) -> bool {
         let Self::Sampled { values, hold: Hold::Zero, .. } = self else { return false };
         let range = values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
@@ -233,8 +235,8 @@ impl Input {
         }
     }
 
-    /// Returns the input with its values mapped by `value`, and its amplitudes, which are differences of values, multiplied by
-    /// `factor`.
+    /// Returns the input with its values mapped by `value`, and its amplitudes, which are differences of values,
+    /// multiplied by `factor`.
     #[must_use]
     pub fn mapped(&self, value: &dyn Fn(f64) -> f64, factor: f64) -> Self {
         match self {

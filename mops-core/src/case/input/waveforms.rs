@@ -10,8 +10,8 @@ pub const PRBS_STAGES: RangeInclusive<usize> = 2..=18;
 
 /// Stages whose sum modulo 2 is fed back, so that a register with 2, 3, .., 18 stages has the longest period.
 ///
-/// Source: P. Alfke, Efficient shift registers, LFSR counters, and long pseudo-random sequence generators, Xilinx application
-/// note XAPP 052 (1996), table 3.
+/// Source: P. Alfke, Efficient shift registers, LFSR counters, and long pseudo-random sequence generators, Xilinx
+/// application note XAPP 052 (1996), table 3.
 const TAPS: [&[usize]; 17] = [
     &[2, 1],
     &[3, 2],
@@ -55,13 +55,14 @@ fn levels(before: f64, changes: impl IntoIterator<Item = (f64, f64)>) -> Input {
 }
 
 impl Input {
-    /// Returns a ramp: `before` until `start` (s), then linear to `after`, which is reached after `duration` (s, positive).
+    /// Returns a ramp: `before` until `start` (s), then linear to `after`, which is reached after `duration` (s,
+    /// positive).
     pub fn ramp(start: f64, duration: f64, before: f64, after: f64) -> Self {
         Self::Sampled { times: vec![start, start + duration], values: vec![before, after], hold: Hold::First }
     }
 
-    /// Returns a pulse: `high` for `width` (s, positive) from `start` on, else `low`. With a `period` (s, longer than the width) it
-    /// repeats until the time `until`.
+    /// Returns a pulse: `high` for `width` (s, positive) from `start` on, else `low`. With a `period` (s, longer than
+    /// the width) it repeats until the time `until`.
     ///
     /// # Errors
     /// If it has too many changes.
@@ -80,19 +81,19 @@ impl Input {
         Ok(levels(low, (0..count).flat_map(pulse)))
     }
 
-    /// Returns a doublet: `offset + amplitude` for `width` (s, positive) from `start` on, then `offset - amplitude` for as long, else
-    /// `offset`.
+    /// Returns a doublet: `offset + amplitude` for `width` (s, positive) from `start` on, then `offset - amplitude` for
+    /// as long, else `offset`.
     pub fn doublet(start: f64, width: f64, amplitude: f64, offset: f64) -> Self {
         let changes = [(start, offset + amplitude), (start + width, offset - amplitude), (start + 2.0 * width, offset)];
         levels(offset, changes)
     }
 
-    /// Returns a pseudo-random binary sequence: `offset + amplitude` or `offset - amplitude` in intervals of `interval` (s,
-    /// positive) from `start` on until the time `until`, `offset` before.
+    /// Returns a pseudo-random binary sequence: `offset + amplitude` or `offset - amplitude` in intervals of `interval`
+    /// (s, positive) from `start` on until the time `until`, `offset` before.
     ///
     /// The sequence is that of a shift register with this number of stages, all 1 at the start. It repeats after
-    /// `2^stages - 1` intervals, in which the upper value occurs once more than the lower one. Its spectrum is nearly constant up to
-    /// a third of `1/interval`.
+    /// `2^stages - 1` intervals, in which the upper value occurs once more than the lower one. Its spectrum is nearly
+    /// constant up to a third of `1/interval`.
     ///
     /// Source: L. Ljung, System Identification, 2nd edition (1999), section 13.3.
     ///
@@ -117,11 +118,11 @@ impl Input {
         Ok(levels(offset, bits.map(change)))
     }
 
-    /// Returns a multisine: sines of these frequencies (Hz), each with this amplitude, around `offset`. Schroeder's phases
-    /// `-pi k (k - 1)/n` of the k-th of n sines keep the peaks low if the frequencies are evenly spaced.
+    /// Returns a multisine: sines of these frequencies (Hz), each with this amplitude, around `offset`. Schroeder's
+    /// phases `-pi k (k - 1)/n` of the k-th of n sines keep the peaks low if the frequencies are evenly spaced.
     ///
-    /// Source: M. R. Schroeder, Synthesis of low-peak-factor signals and binary sequences with low autocorrelation, IEEE
-    /// Transactions on Information Theory 16 (1970) 85-89.
+    /// Source: M. R. Schroeder, Synthesis of low-peak-factor signals and binary sequences with low autocorrelation,
+    /// IEEE Transactions on Information Theory 16 (1970) 85-89.
     pub fn multisine(frequencies: &[f64], amplitude: f64, offset: f64) -> Self {
         let count = frequencies.len() as f64;
         let sine = |(k, &frequency): (usize, &f64)| {

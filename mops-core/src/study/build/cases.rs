@@ -269,12 +269,12 @@ fn build_channel(draft: &ChannelBuilder, to: &Unit) -> Result<Channel, StudyErro
     Ok(Channel { signal: draft.signal.clone(), times, values, noise })
 }
 
-/// Smallest deviation of a sample from the mean of its neighbours that makes it an outlier, in robust standard deviations of such
-/// deviations.
+/// Smallest deviation of a sample from the mean of its neighbours that makes it an outlier, in robust standard
+/// deviations of such deviations.
 const OUTLYING: f64 = 12.0;
 
-/// Returns a warning about outliers: far from both neighbours, which agree with theirs, and from the lines through the neighbours on either
-/// side. A corner lies on one of these lines.
+/// Returns a warning about outliers: far from both neighbours, which agree with theirs, and from the lines through the
+/// neighbours on either side. A corner lies on one of these lines.
 pub(super) fn outliers(experiment: &str, channel: &Channel) -> Option<String> {
     let v = &channel.values;
     let off = |k: usize| (v[k] - 0.5 * (v[k - 1] + v[k + 1])).abs();
@@ -285,7 +285,8 @@ pub(super) fn outliers(experiment: &str, channel: &Channel) -> Option<String> {
     sorted.sort_by(f64::total_cmp);
     // Factor: P. Rousseeuw, A. Leroy, Robust Regression and Outlier Detection (1987), section 4.4.
     let spread = 1.4826 * sorted[sorted.len() / 2];
-    // The neighbours of such a sample are off by half as much, because of it; those of a jump or a fast motion by as much.
+    // The neighbours of such a sample are off by half as much, because of it; those of a jump or a fast motion by as
+    // much.
     let is_outlier = |&k: &usize| {
         let around = [k - 1, k + 1].into_iter().filter(|&n| n > 0 && n + 1 < v.len()).map(off).fold(0.0, f64::max);
         let continues = |a: Option<usize>, b: Option<usize>| match (a.and_then(|k| v.get(k)), b.and_then(|k| v.get(k)))
@@ -405,8 +406,8 @@ fn wrapped(experiment: &str, channel: &Channel, unit: &Unit) -> Option<String> {
     })
 }
 
-/// Returns a warning if the first sample lies far from the extrapolation of the next ones. The thesis (4.2.3) found the very
-/// first sample wrong.
+/// Returns a warning if the first sample lies far from the extrapolation of the next ones. The thesis (4.2.3) found the
+/// very first sample wrong.
 fn suspicious_start(experiment: &str, channel: &Channel) -> Option<String> {
     let v = &channel.values;
     if v.len() < 8 {

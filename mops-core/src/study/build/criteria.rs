@@ -138,7 +138,8 @@ fn in_unit(criterion: Box<dyn Criterion>, draft: &CriterionBuilder) -> Result<Bo
     }
     let asked = [&draft.demand, &draft.bad, &draft.good].into_iter().flatten().find_map(|q| q.unit.as_ref());
     let own = criterion.unit();
-    // Another dimension and an ambiguous unit are refused with the demand; a temperature on another scale is converted with it.
+    // Another dimension and an ambiguous unit are refused with the demand; a temperature on another scale is converted
+    // with it.
     let is_certain = |unit: &&Unit| {
         unit.is_compatible(&own) && unit.zero() == own.zero() && unit.ambiguity_in(&own).is_none()
             // Angles and other pure numbers are refused with the demand, too.
@@ -239,8 +240,8 @@ fn named(study: &Study, name: &str) -> Result<Vec<usize>, StudyError> {
     Err(StudyError::new(name, fact).with_help(suggestion(name, all)))
 }
 
-/// Returns the demand of a criterion in its unit, checked against the sense and the range of its kind. Numbers without a unit are in
-/// `bare`.
+/// Returns the demand of a criterion in its unit, checked against the sense and the range of its kind. Numbers without
+/// a unit are in `bare`.
 fn demand(draft: &CriterionBuilder, bare: &Unit, unit: &Unit, criterion: &dyn Criterion) -> Result<Demand, StudyError> {
     let value = |key: &str, given: &Option<Quantity>| {
         given.as_ref().map_or(Ok(()), |q| refuse_mixed_angles(key, q, unit))?;

@@ -5,7 +5,8 @@ use mops_language::Unit;
 use crate::model::{AnalysisKind, Interface};
 use crate::study::{JobPlan, ParameterSource, Study, StudyError};
 
-/// Returns the job of a model in a case, created on first use and completed later. Adds the signals to those it computes.
+/// Returns the job of a model in a case, created on first use and completed later. Adds the signals to those it
+/// computes.
 pub(super) fn job(study: &mut Study, model: usize, case: usize, wanted: &[String]) -> Result<usize, StudyError> {
     let interface = study.models[model].1.interface();
     let wanted = wanted.iter().map(|name| interface.signal_index(name)).collect::<Result<Vec<_>, _>>()?;
@@ -34,8 +35,8 @@ impl Study {
         Ok(JobPlan { model, case, parameters, signals, horizon })
     }
 
-    /// Returns the sources of the parameters of a model in a case. The caller sets the parameters `set` itself, so that they need
-    /// none.
+    /// Returns the sources of the parameters of a model in a case. The caller sets the parameters `set` itself, so that
+    /// they need none.
     ///
     /// # Errors
     /// Returns an error if a parameter has no value in the case.
@@ -69,8 +70,8 @@ fn apart(name: &str, unit: &Unit, other: &Unit) -> StudyError {
         .with_help("give them different names, or one unit")
 }
 
-/// Returns the source of each parameter. The first existing one is used: a tuner of the case, a value in the case, a tuner
-/// of the study, the table of the model, the default. Parameters in `set` without a source are NaN.
+/// Returns the source of each parameter. The first existing one is used: a tuner of the case, a value in the case, a
+/// tuner of the study, the table of the model, the default. Parameters in `set` without a source are NaN.
 fn sources(
     study: &Study,
     interface: &Interface,

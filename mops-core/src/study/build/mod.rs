@@ -162,7 +162,8 @@ fn in_order(mut left: Vec<(String, CriterionBuilder)>) -> Result<Vec<(String, Cr
     Ok(ordered)
 }
 
-/// Refuses a study whose criteria all belong to experiments for validation, or are monitored: no tuner would have an effect.
+/// Refuses a study whose criteria all belong to experiments for validation, or are monitored: no tuner would have an
+/// effect.
 fn refuse_validation_alone(study: &Study) -> Result<(), StudyError> {
     let mut used = study.rows.iter().filter(|row| row.usage != Usage::Monitor);
     let Some(case) = used.clone().next().map(|row| study.case_of(row)) else { return Ok(()) };
@@ -176,7 +177,8 @@ fn refuse_validation_alone(study: &Study) -> Result<(), StudyError> {
         .with_help("remove `role` from the experiments that the tuners are fitted to"))
 }
 
-/// Refuses an experiment that does not give an input of a model, although its data files have columns that it does not use.
+/// Refuses an experiment that does not give an input of a model, although its data files have columns that it does not
+/// use.
 fn refuse_forgotten_inputs(study: &Study, drafts: &[CaseBuilder]) -> Result<(), StudyError> {
     for job in &study.jobs {
         let (case, draft) = (&study.cases[job.case], &drafts[job.case]);

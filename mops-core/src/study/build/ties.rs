@@ -7,8 +7,8 @@ use mops_language::{
 
 use crate::study::{StudyError, Tuner};
 
-/// Checks that an expression has the dimension of the tuner `name`, which it sets. Tuners that are `loose` have no unit,
-/// neither their own nor that of a parameter.
+/// Checks that an expression has the dimension of the tuner `name`, which it sets. Tuners that are `loose` have no
+/// unit, neither their own nor that of a parameter.
 pub(super) fn check(
     expression: &Expression,
     name: &str,

@@ -28,8 +28,8 @@ pub(super) fn build_tuner(
             )
             .with_help("correct `unit`, or omit it"));
         }
-        // A tuner is its parameter times a factor, in ties too. A temperature on another scale, or a frequency in Hz for a
-        // parameter in rad/s, therefore takes the unit of the parameter.
+        // A tuner is its parameter times a factor, in ties too. A temperature on another scale, or a frequency in Hz
+        // for a parameter in rad/s, therefore takes the unit of the parameter.
         (Some(unit), Some(p))
             if unit.zero() != p.variable.unit.zero() || unit.counts_cycles() != p.variable.unit.counts_cycles() =>
         {
@@ -361,9 +361,9 @@ fn begins_late(channel: &Channel) -> bool {
     matches!(channel.times[..], [first, second, ..] if first > 1.5 * (second - first))
 }
 
-/// Returns the initial guess and half-width of the search for an initial state. For a measured state: its first sample and
-/// half its range. For the rate of a measured signal: its derivative over the first samples and 1.5 times its largest
-/// derivative.
+/// Returns the initial guess and half-width of the search for an initial state. For a measured state: its first sample
+/// and half its range. For the rate of a measured signal: its derivative over the first samples and 1.5 times its
+/// largest derivative.
 fn guess_start(signal: Option<&str>, rate_of: Option<&str>, experiment: &Experiment) -> Option<(f64, f64)> {
     let measured = |name: &str| experiment.channel(name).filter(|channel| !begins_late(channel));
     if let Some(channel) = signal.and_then(measured) {

@@ -32,8 +32,8 @@ impl From<UncertaintyTask> for CalibrationTask {
 pub struct UncertaintyTask {
     /// Likelihood profiles: `true` for every tuner, or a list of tuners.
     pub profile: Chosen,
-    /// Number of bootstrap replicates, with residuals resampled in blocks; default none. 200 are sufficient for standard
-    /// errors, 1000 for intervals.
+    /// Number of bootstrap replicates, with residuals resampled in blocks; default none. 200 are sufficient for
+    /// standard errors, 1000 for intervals.
     pub bootstrap: usize,
     /// Block length in samples; default is the cube root of the number of samples, rounded up.
     pub block: Option<usize>,

@@ -22,15 +22,15 @@ impl From<RobustTask> for DesignTask {
     }
 }
 
-/// Settings of a design against the worst cases in the box of `[uncertain]`, as far as the search finds them. The design is
-/// solved for the present cases, the worst cases are searched and added, and the procedure is repeated.
+/// Settings of a design against the worst cases in the box of `[uncertain]`, as far as the search finds them. The
+/// design is solved for the present cases, the worst cases are searched and added, and the procedure is repeated.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RobustTask {
     /// Maximum number of iterations; default 12.
     pub rounds: usize,
-    /// Tolerance in scaled values; default 0.001. A worst case is added only if it exceeds the present worst scaled value by
-    /// more.
+    /// Tolerance in scaled values; default 0.001. A worst case is added only if it exceeds the present worst scaled
+    /// value by more.
     pub tolerance: f64,
     /// Number of initial sample points, as in `[worst-case]`; default 128.
     pub samples: usize,

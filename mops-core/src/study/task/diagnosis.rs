@@ -28,7 +28,8 @@ pub struct DiagnosisTask {
     pub effects: Option<Vec<String>>,
     /// Kinds of effect to exclude.
     pub without: Vec<String>,
-    /// Effects that the model has in any case, `effect@place` each, such as `coulomb-friction@joint:phi`: the search adds others.
+    /// Effects that the model has in any case, `effect@place` each, such as `coulomb-friction@joint:phi`: the search
+    /// adds others.
     pub with: Vec<String>,
 }
 

@@ -16,7 +16,8 @@ pub struct ExcitationTask {
     pub inputs: Option<Vec<String>>,
     /// Sample time; default is the sample time of the recording.
     pub sample_time: Option<Quantity>,
-    /// Standard deviation of the noise of each input, such as { u = 0.01 }; weaker components do not count as excitation.
+    /// Standard deviation of the noise of each input, such as { u = 0.01 }; weaker components do not count as
+    /// excitation.
     pub noise: Entries<Quantity>,
     /// Number of parameters to estimate; default is the number of active tuners.
     pub parameters: Option<usize>,

@@ -47,12 +47,12 @@ pub enum Place {
 
 /// Facts of a task with its options.
 pub trait TaskSpec: Any + fmt::Debug + Send + Sync {
-    /// Returns the point at which the task is performed, so that [`Place::Optimum`] needs a solver; `None` if it is performed at no
-    /// point.
+    /// Returns the point at which the task is performed, so that [`Place::Optimum`] needs a solver; `None` if it is
+    /// performed at no point.
     fn at(&self) -> Option<Place>;
 
-    /// Returns the objective of a search unless the study gives one; `is_measured`: the study has experiments. By default that of the
-    /// study which a task examines: a calibration if there are experiments, else a design.
+    /// Returns the objective of a search unless the study gives one; `is_measured`: the study has experiments. By
+    /// default that of the study which a task examines: a calibration if there are experiments, else a design.
     fn objective(&self, is_measured: bool) -> Objective {
         if is_measured { Objective::Sum } else { Objective::Max }
     }

@@ -18,8 +18,8 @@ const MOST_OF_FRONT: usize = 200;
 pub struct ParetoTask {
     /// Number of points of the Pareto front; default 30.
     pub points: usize,
-    /// True: every criterion is an objective in every case. False (default): a criterion is one objective, with the value of its
-    /// worst case, which has the largest weighted scaled value.
+    /// True: every criterion is an objective in every case. False (default): a criterion is one objective, with the
+    /// value of its worst case, which has the largest weighted scaled value.
     pub per_case: bool,
 }
 

@@ -25,14 +25,15 @@ pub enum SensitivityMethod {
 pub struct SensitivityTask {
     /// Point: `optimum` (default: the study is solved first) or `start`.
     pub at: Place,
-    /// Smallest singular value that the derivatives resolve, as share of the largest (columns of unit length). Default 1e-8
-    /// for tangents and 1e-4 for finite differences. Resolved directions are compared with the noise.
+    /// Smallest singular value that the derivatives resolve, as share of the largest (columns of unit length). Default
+    /// 1e-8 for tangents and 1e-4 for finite differences. Resolved directions are compared with the noise.
     pub zero: Option<f64>,
-    /// Method. `local` (default): derivatives with respect to the tuners. Over the box of `[uncertain]`: `morris`, elementary
-    /// effects as an inexpensive screening; `sobol`, variance shares.
+    /// Method. `local` (default): derivatives with respect to the tuners. Over the box of `[uncertain]`: `morris`,
+    /// elementary effects as an inexpensive screening; `sobol`, variance shares.
     pub method: SensitivityMethod,
-    /// Number of trajectories for `morris` (default 20); each takes one simulation more than there are uncertain parameters.
-    /// Number of samples for `sobol` (default 512); each takes two simulations more than there are uncertain parameters.
+    /// Number of trajectories for `morris` (default 20); each takes one simulation more than there are uncertain
+    /// parameters. Number of samples for `sobol` (default 512); each takes two simulations more than there are
+    /// uncertain parameters.
     pub samples: Option<usize>,
 }
 

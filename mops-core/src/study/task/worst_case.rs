@@ -7,7 +7,8 @@ use serde::Deserialize;
 use super::{MOST_SAMPLES, Place, TaskOptions, TaskSpec, count, needs_box, needs_uncertain};
 use crate::study::{Study, StudyError};
 
-/// Settings of `task = "worst-case"`: the search of the box of `[uncertain]` for the largest scaled value of every criterion.
+/// Settings of `task = "worst-case"`: the search of the box of `[uncertain]` for the largest scaled value of every
+/// criterion.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct WorstCaseTask {
@@ -17,8 +18,8 @@ pub struct WorstCaseTask {
     pub criteria: Option<Vec<String>>,
     /// Number of initial sample points per criterion, in addition to the corners of the box; default 128.
     pub samples: usize,
-    /// Number of local searches per criterion, from the worst sample points; default 8. One more search covers the whole
-    /// box.
+    /// Number of local searches per criterion, from the worst sample points; default 8. One more search covers the
+    /// whole box.
     pub starts: usize,
 }
 

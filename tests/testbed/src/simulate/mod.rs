@@ -68,8 +68,8 @@ pub fn base_states(
     Some(out)
 }
 
-/// Returns the values that the controller of a plant computes at a sample, and the fraction of the sample after which they reach its
-/// memory; `None` if it does not sample there.
+/// Returns the values that the controller of a plant computes at a sample, and the fraction of the sample after which
+/// they reach its memory; `None` if it does not sample there.
 fn sample(plant: &Plant, k: usize, x: &State, u: &[f64; FEW], p: &[f64]) -> Option<(f64, Vec<f64>)> {
     let sampled = plant.traits.sampled.filter(|sampled| k.is_multiple_of(sampled.every))?;
     let mut memory = vec![0.0; sampled.memory];

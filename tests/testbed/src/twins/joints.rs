@@ -6,8 +6,8 @@ use mops_math as math;
 
 use super::law::{At, Law, dynamic, sign, term};
 
-/// Returns the difference between a coupling with backlash and the same coupling without, for the displacement `e` and its
-/// rate.
+/// Returns the difference between a coupling with backlash and the same coupling without, for the displacement `e` and
+/// its rate.
 fn play(k: f64, gap: f64, tau: f64, e: f64, rate: f64) -> f64 {
     let contact = if e > 0.5 * gap {
         (e - 0.5 * gap + tau * rate).max(0.0)

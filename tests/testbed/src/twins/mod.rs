@@ -1,7 +1,7 @@
 //! Twins: independent simulations of small plants with several effects at one place, for comparison.
 //!
-//! The laws follow the documented formulas of the effects. The integrator is the classical Runge-Kutta method with fixed
-//! steps; steps end where the input jumps, where a law jumps, and where dry friction sticks or breaks away.
+//! The laws follow the documented formulas of the effects. The integrator is the classical Runge-Kutta method with
+//! fixed steps; steps end where the input jumps, where a law jumps, and where dry friction sticks or breaks away.
 
 mod actuators;
 mod events;
@@ -29,7 +29,8 @@ pub enum Site {
     Process(usize),
     /// Place between the command and the plant.
     Actuator,
-    /// Place between a signal and its measurement: the index of a state, or the number of states for the input that acts.
+    /// Place between a signal and its measurement: the index of a state, or the number of states for the input that
+    /// acts.
     Sensor(usize),
 }
 
@@ -70,8 +71,8 @@ pub fn has_law(name: &str, parameters: usize) -> bool {
     law(name, &vec![0.5; parameters]).is_some()
 }
 
-/// Returns the measured signals at increasing times (s), by time: the states, then the command. Integration steps have at
-/// most the given length, s.
+/// Returns the measured signals at increasing times (s), by time: the states, then the command. Integration steps have
+/// at most the given length, s.
 ///
 /// # Panics
 /// An effect has no law, or the plant with its effects has too many states.

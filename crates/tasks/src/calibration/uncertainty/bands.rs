@@ -10,11 +10,12 @@ use super::Calibrated;
 /// Largest number of times of a band.
 const MOST_TIMES: usize = 400;
 
-/// Returns the prediction band of every measured channel: `t` times the standard deviation `(g' C g)^(1/2)` of the prediction.
-/// `g` is the gradient of the prediction with respect to the tuners, `C` their covariance, `t` the quantile of the t
-/// distribution.
+/// Returns the prediction band of every measured channel: `t` times the standard deviation `(g' C g)^(1/2)` of the
+/// prediction. `g` is the gradient of the prediction with respect to the tuners, `C` their covariance, `t` the quantile
+/// of the t distribution.
 ///
-/// The band of a new measurement also includes the noise. Initial states estimated on validation data count as known there.
+/// The band of a new measurement also includes the noise. Initial states estimated on validation data count as known
+/// there.
 ///
 /// Source: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), section 5.1 (linearised prediction intervals).
 pub(super) fn bands(calibrated: &Calibrated<'_>, tuners: &[f64]) -> Vec<BandReport> {

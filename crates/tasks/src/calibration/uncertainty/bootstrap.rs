@@ -18,8 +18,8 @@ struct Measured {
     channel: usize,
     /// Response of the calibrated model.
     fitted: Vec<f64>,
-    /// Centred residuals (measured minus fitted), scaled to the noise level of the standard errors. The centre of a robust loss is its
-    /// location, about which the scores of the residuals cancel.
+    /// Centred residuals (measured minus fitted), scaled to the noise level of the standard errors. The centre of a
+    /// robust loss is its location, about which the scores of the residuals cancel.
     residuals: Vec<f64>,
     /// Length of a block.
     block: usize,
@@ -28,13 +28,13 @@ struct Measured {
 /// Returns the estimates of all replicates and the number of simulations. A replicate is `y* = fitted + e*`, where `e*`
 /// consists of blocks of the residuals with arbitrary start.
 ///
-/// Residuals of a fitted model are smaller than the noise; they are scaled to the variance used for the standard errors.
-/// Consecutive channels of an experiment with equal numbers of samples and equal block lengths use the same blocks, which
-/// preserves their correlation.
+/// Residuals of a fitted model are smaller than the noise; they are scaled to the variance used for the standard
+/// errors. Consecutive channels of an experiment with equal numbers of samples and equal block lengths use the same
+/// blocks, which preserves their correlation.
 ///
 /// Source: H. R. Kuensch, Annals of Statistics 17 (1989) 1217-1241 (moving blocks); B. Efron, R. J. Tibshirani, An
-/// Introduction to the Bootstrap (1993), sections 9.4 and 13.3 (residuals, percentile intervals); A. C. Davison, D. V. Hinkley,
-/// Bootstrap Methods and their Application (1997), section 6.2 (scaled residuals).
+/// Introduction to the Bootstrap (1993), sections 9.4 and 13.3 (residuals, percentile intervals); A. C. Davison, D. V.
+/// Hinkley, Bootstrap Methods and their Application (1997), section 6.2 (scaled residuals).
 ///
 /// # Errors
 /// If the residuals cannot be resampled; the error is the reason as a sentence.
@@ -123,8 +123,8 @@ fn measured(calibrated: &Calibrated<'_>, task: &UncertaintyTask) -> Result<Vec<M
     Ok(all)
 }
 
-/// Returns the factor that scales centred residuals to the standard deviation of the noise; 1 if the noise is unknown. With a robust
-/// loss it is that of `psi / mean psi'`, as in the covariance of the estimates.
+/// Returns the factor that scales centred residuals to the standard deviation of the noise; 1 if the noise is unknown.
+/// With a robust loss it is that of `psi / mean psi'`, as in the covariance of the estimates.
 #[allow(clippy::cast_precision_loss)]
 fn scale(residuals: &[f64], centre: f64, loss: Loss, noise: Option<f64>) -> f64 {
     let (mut squares, mut change) = (0.0, 0.0);

@@ -90,7 +90,8 @@ pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
     solved.outcome.found.add(report);
 }
 
-/// Estimates the active tuners of a study again, from their start values; returns the fit and the number of simulations.
+/// Estimates the active tuners of a study again, from their start values; returns the fit and the number of
+/// simulations.
 fn refit(study: Study, mut solver: Box<dyn Solver>, watch: &dyn Watch) -> (Option<Evaluation>, usize) {
     let problem = Problem::new(std::sync::Arc::new(study));
     let start = problem.start();

@@ -13,7 +13,8 @@ use crate::batches::{Stage, each};
 /// First distance from the estimate of a parameter without a standard error, as a share of its range.
 const FIRST: f64 = 0.02;
 
-/// Smallest and largest growth factor of the distance from the estimate. The smallest factor reaches the bound in fewer than
+/// Smallest and largest growth factor of the distance from the estimate. The smallest factor reaches the bound in fewer
+/// than
 /// [`STEPS`] steps from any standard error that double precision resolves.
 const GROWTH: [f64; 2] = [1.3, 2.5];
 
@@ -31,8 +32,8 @@ const NARROW: f64 = 1e-4;
 
 /// Root of the likelihood ratio of a better fit than the estimates above which the interval refers to that fit.
 const LOWER: f64 = 0.1;
-/// Root of the likelihood ratio of a better fit than the estimates above which a warning is given: the estimates are then
-/// off by a standard error.
+/// Root of the likelihood ratio of a better fit than the estimates above which a warning is given: the estimates are
+/// then off by a standard error.
 const BETTER: f64 = 1.0;
 
 /// Result of profiling.
@@ -46,12 +47,12 @@ pub(super) struct Profiles {
 /// Computes the profiles of the chosen tuners.
 ///
 /// With `S(v)` the minimum sum of squares for the parameter fixed at `v`, the interval is
-/// `{v : S(v) - S_min <= t^2 s(v)^2}`. The scale `s(v)^2` is the variance of the noise along the change of the residuals from
-/// the estimate to `v`. For a linear model, the interval is then that of the standard error, `estimate +- t error`, whatever
-/// the weights. For residuals of equal variance, `s(v)^2` is that variance.
+/// `{v : S(v) - S_min <= t^2 s(v)^2}`. The scale `s(v)^2` is the variance of the noise along the change of the
+/// residuals from the estimate to `v`. For a linear model, the interval is then that of the standard error,
+/// `estimate +- t error`, whatever the weights. For residuals of equal variance, `s(v)^2` is that variance.
 ///
-/// Sources: D. M. Bates, D. G. Watts, Nonlinear Regression Analysis and Its Applications (1988), section 6.1.2; J. T. Kent,
-/// Biometrika 69 (1982) 19-27 (likelihood ratios of weights that are not those of the noise).
+/// Sources: D. M. Bates, D. G. Watts, Nonlinear Regression Analysis and Its Applications (1988), section 6.1.2; J. T.
+/// Kent, Biometrika 69 (1982) 19-27 (likelihood ratios of weights that are not those of the noise).
 pub(super) fn profiles(calibrated: &Calibrated<'_>, chosen: &Chosen, watch: &dyn Watch) -> Profiles {
     let problem = calibrated.problem;
     let study = problem.study();
@@ -103,8 +104,8 @@ pub(super) fn profiles(calibrated: &Calibrated<'_>, chosen: &Chosen, watch: &dyn
     }
 }
 
-/// Returns the root of the likelihood ratio of a fit and a better one, `((S - S_better) / s^2)^(1/2)`; 0 if the fit is no
-/// worse.
+/// Returns the root of the likelihood ratio of a fit and a better one, `((S - S_better) / s^2)^(1/2)`; 0 if the fit is
+/// no worse.
 fn root(calibrated: &Calibrated<'_>, better: &Evaluation, fit: &Evaluation) -> f64 {
     let excess = fit.merit.objective - better.merit.objective;
     let change: Vec<f64> = fit.residuals.iter().zip(&better.residuals).map(|(a, b)| a - b).collect();
@@ -116,8 +117,8 @@ fn root(calibrated: &Calibrated<'_>, better: &Evaluation, fit: &Evaluation) -> f
     excess.sqrt() / calibrated.covariance.noise().along(&direction).deviation
 }
 
-/// Returns the t quantile for the estimate of a tuner; for a tuner that the data do not determine, with the degrees of freedom
-/// of all residuals.
+/// Returns the t quantile for the estimate of a tuner; for a tuner that the data do not determine, with the degrees of
+/// freedom of all residuals.
 fn limit(calibrated: &Calibrated<'_>, k: usize) -> f64 {
     let Spread { freedom, .. } = calibrated.covariance.of_tuner(k);
     let freedom = if freedom >= 1.0 { freedom } else { calibrated.covariance.noise().freedom() };
@@ -172,8 +173,8 @@ impl<'a> Search<'a> {
         Self { calibrated, reference, watch, k, sign, tuner, limit: limit(calibrated, k), side }
     }
 
-    /// Steps from the estimate towards the bound with growing steps; an end is bracketed by the last point within the limit and
-    /// the first one beyond.
+    /// Steps from the estimate towards the bound with growing steps; an end is bracketed by the last point within the
+    /// limit and the first one beyond.
     fn side(mut self) -> Side {
         let best = self.calibrated.best;
         let value = best.tuners[self.calibrated.problem.active()[self.k]];
@@ -209,9 +210,9 @@ impl<'a> Search<'a> {
         self.side
     }
 
-    /// Locates the end between the last point within the limit and one beyond, by regula falsi. A step that does not halve the
-    /// bracket is followed by a bisection. Returns `None` if the end is found or the search is over. Returns the point beyond
-    /// if a refit shows that it is within the limit.
+    /// Locates the end between the last point within the limit and one beyond, by regula falsi. A step that does not
+    /// halve the bracket is followed by a bisection. Returns `None` if the end is found or the search is over. Returns
+    /// the point beyond if a refit shows that it is within the limit.
     fn end_between(
         &mut self,
         start: f64,
@@ -255,9 +256,9 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Estimates all other tuners with the parameter fixed. The initial guess is extrapolated from the last two points within
-    /// the limit. If the result is beyond the limit, the last point and `other` are tried as well. Returns `None` if no
-    /// simulation succeeds or a stop is requested.
+    /// Estimates all other tuners with the parameter fixed. The initial guess is extrapolated from the last two points
+    /// within the limit. If the result is beyond the limit, the last point and `other` are tried as well. Returns
+    /// `None` if no simulation succeeds or a stop is requested.
     fn refit_at(&mut self, position: f64, within: &[ProfilePoint], other: &[f64]) -> Option<ProfilePoint> {
         let last = within.last().expect("the estimate is within the limit");
         let guess = within.len().checked_sub(2).map(|i| self.extrapolated(&within[i], last, position));

@@ -47,8 +47,8 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> Vec<Group> {
     diagnosis.latent.iter().take(MOST_PLACES).map(|latent| group(diagnosis, latent)).collect()
 }
 
-/// Returns the plot of what is missing over the coordinate that it depends on: the free curve, and the estimated input at the
-/// place with the formulas of the effects found there.
+/// Returns the plot of what is missing over the coordinate that it depends on: the free curve, and the estimated input
+/// at the place with the formulas of the effects found there.
 pub(super) fn dependence(diagnosis: &Diagnosis) -> Option<Group> {
     let dependence = diagnosis.depends_on.as_ref()?;
     let [x, y] = [0, 1].map(|k| dependence.curve.iter().map(|point| point[k]).collect::<Vec<f64>>());

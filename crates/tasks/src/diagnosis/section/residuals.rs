@@ -34,8 +34,8 @@ fn title(channels: &[Prediction]) -> String {
     format!("Experiment `{}` ({})", channels[0].experiment, channels[0].role.name())
 }
 
-/// Returns a group for every experiment, with a column of plots for every channel. The first group includes spectrum and
-/// autocorrelation.
+/// Returns a group for every experiment, with a column of plots for every channel. The first group includes spectrum
+/// and autocorrelation.
 pub(super) fn groups(diagnosis: &Diagnosis) -> Vec<Group> {
     let all = diagnosis.predictions.chunk_by(|a, b| a.experiment == b.experiment).count();
     let shown = shown(diagnosis);

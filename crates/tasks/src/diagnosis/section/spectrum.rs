@@ -7,8 +7,8 @@ const MOST_LAGS: usize = 100;
 /// Bounds of the segment length, in samples; the length is a third of the record within these bounds.
 const SEGMENT: [usize; 2] = [32, 512];
 
-/// Returns a residual at evenly spaced times: the sample time, s, and the values. Uneven samples are interpolated linearly.
-/// `None` for records shorter than a segment.
+/// Returns a residual at evenly spaced times: the sample time, s, and the values. Uneven samples are interpolated
+/// linearly. `None` for records shorter than a segment.
 pub(super) fn even(times: &[f64], values: &[f64]) -> Option<(f64, Vec<f64>)> {
     let known: Vec<(f64, f64)> =
         times.iter().copied().zip(values.iter().copied()).filter(|p| p.1.is_finite()).collect();
@@ -38,8 +38,8 @@ pub(super) fn even(times: &[f64], values: &[f64]) -> Option<(f64, Vec<f64>)> {
 
 /// Returns frequencies, Hz, with the power spectrum relative to white noise of standard deviation `noise`.
 ///
-/// Average over segments with a Hann window and 50 % overlap. Source: P. D. Welch, The use of fast Fourier transform for the
-/// estimation of power spectra, IEEE Transactions on Audio and Electroacoustics 15 (1967), 70-73.
+/// Average over segments with a Hann window and 50 % overlap. Source: P. D. Welch, The use of fast Fourier transform
+/// for the estimation of power spectra, IEEE Transactions on Audio and Electroacoustics 15 (1967), 70-73.
 pub(super) fn spectrum(step: f64, values: &[f64], noise: f64) -> Vec<(f64, f64)> {
     let length = (values.len() / 3).clamp(SEGMENT[0], SEGMENT[1]).min(values.len());
     let window: Vec<f64> = (0..length)
