@@ -47,6 +47,7 @@ pub fn source(text: &str, diagnosis: &Diagnosis, folder: &str) -> String {
     let seed = study.get("study").and_then(|s| s.get("seed")).and_then(Value::as_integer);
     let seed = seed.map_or_else(String::new, |seed| format!("        seed: {seed},\n"));
 
+    let about = wrapped(&about, 116).join("\n//! ");
     format!(
         "//! {about}
 //!
@@ -220,6 +221,23 @@ fn tuner(tuner: &Value) -> String {
         });
     }
     format!("TunerBuilder {{ {}, ..TunerBuilder::default() }}", fields.join(", "))
+}
+
+/// Returns the lines of a text of at most so many characters, broken between words.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = vec![String::new()];
+    for word in text.split(' ') {
+        let last = lines.last_mut().expect("there is one");
+        if last.is_empty() {
+            last.push_str(word);
+        } else if last.chars().count() + 1 + word.chars().count() <= width {
+            *last += " ";
+            *last += word;
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines
 }
 
 #[cfg(test)]
