@@ -11,20 +11,20 @@ use std::path::Path;
 use assert_cmd::cargo::cargo_bin_cmd;
 use serde_json::Value;
 
-/// Runs a script, which ends with `tell(...)`, in the page; returns its answer.
+/// Runs a script, which ends with `answer(...)`, in the page; returns its answer.
 fn answer(browser: &Path, folder: &Path, page: &str, script: &str) -> Value {
-    let tell = "const tell = (value) => { const pre = document.createElement('pre'); pre.id = 'told'; \
+    let notify = "const answer = (value) => { const pre = document.createElement('pre'); pre.id = 'answer'; \
                 pre.textContent = JSON.stringify(value); document.body.append(pre); };";
     let listen = "const problems = []; console.error = console.warn = (...all) => problems.push(all.join(' ')); \
                   window.addEventListener('error', (event) => problems.push(event.message));";
     let file = folder.join("tested.html");
     let page = page.replacen("<head>", &format!("<head><script>{listen}</script>"), 1);
-    std::fs::write(&file, page.replace("</body>", &format!("<script>{tell}\n{script}</script></body>"))).unwrap();
+    std::fs::write(&file, page.replace("</body>", &format!("<script>{notify}\n{script}</script></body>"))).unwrap();
     let output = headless::dump(browser, folder, &format!("file://{}", file.display()), &["--window-size=1100,1600"]);
     let dom = String::from_utf8_lossy(&output.stdout);
-    let told = dom.split_once("<pre id=\"told\">").and_then(|(_, rest)| rest.split_once("</pre>"));
-    let (told, _) = told.unwrap_or_else(|| panic!("no answer: {}", String::from_utf8_lossy(&output.stderr)));
-    serde_json::from_str(&told.replace("&quot;", "\"").replace("&amp;", "&")).unwrap()
+    let message = dom.split_once("<pre id=\"answer\">").and_then(|(_, rest)| rest.split_once("</pre>"));
+    let (message, _) = message.unwrap_or_else(|| panic!("no answer: {}", String::from_utf8_lossy(&output.stderr)));
+    serde_json::from_str(&message.replace("&quot;", "\"").replace("&amp;", "&")).unwrap()
 }
 
 const SCRIPT: &str = r#"
@@ -45,32 +45,32 @@ const move = (svg, [x, y]) => {
 };
 const place = (svg, point) =>
   svg.querySelector(`g.dot[data-point="${point}"] path`).getAttribute("d").slice(1).split(/[ h]/).slice(0, 2).map(Number);
-const told = { pictures: pictures.length, rows: rows().length, responses: document.querySelectorAll("g.line[data-point]").length };
+const seen = { pictures: pictures.length, rows: rows().length, responses: document.querySelectorAll("g.line[data-point]").length };
 key(pictures[0], "ArrowRight");
 key(pictures[0], "ArrowRight");
-told.keys = chosen();
+seen.keys = chosen();
 key(pictures[0], "Escape");
-told.escaped = chosen();
+seen.escaped = chosen();
 move(dotted[1], place(dotted[1], 3));
-told.hovered = chosen();
+seen.hovered = chosen();
 dotted[1].dispatchEvent(new PointerEvent("pointerleave"));
-told.left = chosen();
+seen.left = chosen();
 dotted[0].dispatchEvent(new MouseEvent("click", move(dotted[0], place(dotted[0], 1))));
 dotted[0].dispatchEvent(new PointerEvent("pointerleave"));
-told.clicked = chosen();
+seen.clicked = chosen();
 const heads = [...document.querySelectorAll("table.front thead button")];
 const column = (i) => rows().map((row) => Number(row.cells[i].dataset.value));
 heads[2].click();
-told.ascending = column(2);
+seen.ascending = column(2);
 heads[2].click();
-told.descending = column(2);
-told.sort = document.querySelectorAll("table.front thead th")[2].getAttribute("aria-sort");
-told.still = chosen();
+seen.descending = column(2);
+seen.sort = document.querySelectorAll("table.front thead th")[2].getAttribute("aria-sort");
+seen.still = chosen();
 const line = document.querySelector("g.line[data-point='2'] path");
 line.dispatchEvent(new PointerEvent("pointermove", { clientX: -100, clientY: -100, bubbles: true }));
-told.line = chosen();
-told.problems = problems;
-tell(told);
+seen.line = chosen();
+seen.problems = problems;
+answer(seen);
 "#;
 
 #[test]
@@ -85,26 +85,26 @@ fn a_point_selected_in_one_plot_is_selected_in_all_plots_and_in_the_table() {
     run.args(["pareto", "pid-pareto", "--points", "5", "--quiet", "--out", out.to_str().unwrap()]).assert().success();
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(!page.contains("src=\"http") && !page.contains("@import"), "the page needs no network");
-    let told = answer(&browser, folder.path(), &page, SCRIPT);
+    let message = answer(&browser, folder.path(), &page, SCRIPT);
     // Overshoot over settling time, parallel coordinates, three tuners, and at least one response.
-    let pictures = told["pictures"].as_u64().unwrap();
-    assert!(pictures >= 6, "{told}");
-    assert!(told["rows"].as_u64().unwrap() >= 5, "{told}");
-    assert!(told["responses"].as_u64() >= told["rows"].as_u64(), "{told}");
+    let pictures = message["pictures"].as_u64().unwrap();
+    assert!(pictures >= 6, "{message}");
+    assert!(message["rows"].as_u64().unwrap() >= 5, "{message}");
+    assert!(message["responses"].as_u64() >= message["rows"].as_u64(), "{message}");
     let everywhere = |point: &str| serde_json::json!({ "points": [point], "pictures": pictures, "rows": 1 });
     let nowhere = serde_json::json!({ "points": [], "pictures": 0, "rows": 0 });
-    assert_eq!(told["keys"], everywhere("1"), "two steps to the right select the second row");
-    assert_eq!(told["escaped"], nowhere);
-    assert_eq!(told["hovered"], everywhere("3"));
-    assert_eq!(told["left"], nowhere, "hovering selects only temporarily");
-    assert_eq!(told["clicked"], everywhere("1"), "a click selects permanently");
-    let numbers = |key: &str| told[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect::<Vec<_>>();
-    assert!(numbers("ascending").is_sorted(), "{told}");
-    assert!(numbers("descending").iter().rev().is_sorted(), "{told}");
-    assert_eq!(told["sort"], "descending");
-    assert_eq!(told["still"], everywhere("1"), "sorting keeps the selection");
-    assert_eq!(told["line"], everywhere("2"), "touching a line selects it");
-    assert_eq!(told["problems"], serde_json::json!([]));
+    assert_eq!(message["keys"], everywhere("1"), "two steps to the right select the second row");
+    assert_eq!(message["escaped"], nowhere);
+    assert_eq!(message["hovered"], everywhere("3"));
+    assert_eq!(message["left"], nowhere, "hovering selects only temporarily");
+    assert_eq!(message["clicked"], everywhere("1"), "a click selects permanently");
+    let numbers = |key: &str| message[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect::<Vec<_>>();
+    assert!(numbers("ascending").is_sorted(), "{message}");
+    assert!(numbers("descending").iter().rev().is_sorted(), "{message}");
+    assert_eq!(message["sort"], "descending");
+    assert_eq!(message["still"], everywhere("1"), "sorting keeps the selection");
+    assert_eq!(message["line"], everywhere("2"), "touching a line selects it");
+    assert_eq!(message["problems"], serde_json::json!([]));
 }
 
 const TURNED: &str = r#"
@@ -115,32 +115,32 @@ const place = (point) =>
   svg.querySelector(`g.dot[data-point="${point}"] path`).getAttribute("d").slice(1).split(/[ h]/).slice(0, 2).map(Number);
 const all = () => [...svg.querySelectorAll("g[data-space] > path, g[data-space] > text")].map((shape) => shape.outerHTML);
 const chosen = () => [...new Set([...document.querySelectorAll(".chosen")].map((e) => e.dataset.point))];
-const told = { dots: svg.querySelectorAll("g.dot").length, rows: document.querySelectorAll("table.front tbody tr").length };
+const seen = { dots: svg.querySelectorAll("g.dot").length, rows: document.querySelectorAll("table.front tbody tr").length };
 const [before, drawn] = [place(0), all()];
 key(svg, "ArrowRight", true);
-told.turned = { moved: place(0)[0] !== before[0], shapes: all().filter((shape, i) => shape !== drawn[i]).length, chosen: chosen() };
+seen.turned = { moved: place(0)[0] !== before[0], shapes: all().filter((shape, i) => shape !== drawn[i]).length, chosen: chosen() };
 key(svg, "ArrowLeft", true);
-told.back = Math.hypot(place(0)[0] - before[0], place(0)[1] - before[1]);
+seen.back = Math.hypot(place(0)[0] - before[0], place(0)[1] - before[1]);
 const drag = (kind, x, y, buttons) =>
   svg.dispatchEvent(new PointerEvent(kind, { clientX: x, clientY: y, buttons, bubbles: true }));
 drag("pointerdown", 300, 300, 1);
 drag("pointermove", 360, 320, 1);
 drag("pointerup", 360, 320, 0);
 svg.dispatchEvent(new MouseEvent("click", { clientX: 360, clientY: 320, bubbles: true }));
-told.dragged = { moved: place(0)[0] !== before[0], kept: document.querySelectorAll("[aria-selected='true']").length };
+seen.dragged = { moved: place(0)[0] !== before[0], kept: document.querySelectorAll("[aria-selected='true']").length };
 key(svg, "Escape", false);
 key(svg, "ArrowRight", false);
-told.stepped = { chosen: chosen(), dots: svg.querySelectorAll("g.dot.chosen").length > 0 };
+seen.stepped = { chosen: chosen(), dots: svg.querySelectorAll("g.dot.chosen").length > 0 };
 // Another table of the page, by keyboard alone: its headers are buttons.
 const criteria = [...document.querySelectorAll("table")].find((table) => table.tHead.textContent.startsWith("criterion"));
 const names = () => [...criteria.tBodies[0].rows].map((row) => row.cells[0].textContent);
 const head = criteria.querySelector("thead button");
 head.focus();
-told.focused = document.activeElement === head;
+seen.focused = document.activeElement === head;
 head.click();
-told.names = names();
-told.problems = problems;
-tell(told);
+seen.names = names();
+seen.problems = problems;
+answer(seen);
 "#;
 
 #[test]
@@ -156,18 +156,18 @@ fn a_three_dimensional_front_rotates_by_keys_and_by_dragging_and_other_tables_so
     run.args(["pareto", "pid-pareto", "--points", "3", "--max-evaluations", "600", "--quiet", "--set", third]);
     run.args(["--out", out.to_str().unwrap()]).assert().success();
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
-    let told = answer(&browser, folder.path(), &page, TURNED);
+    let message = answer(&browser, folder.path(), &page, TURNED);
     // One dot per point, and one of another colour on the point nearest to the demands.
-    assert!(told["rows"].as_u64().unwrap() >= 3 && told["dots"].as_u64() > told["rows"].as_u64(), "{told}");
-    assert_eq!(told["turned"]["moved"], true, "{told}");
-    assert!(told["turned"]["shapes"].as_u64().unwrap() > 20, "edges, numbers and names rotate as well: {told}");
-    assert_eq!(told["turned"]["chosen"], serde_json::json!([]), "rotation selects nothing");
-    assert!(told["back"].as_f64().unwrap() < 0.15, "{told}");
-    assert_eq!(told["dragged"], serde_json::json!({ "moved": true, "kept": 0 }), "the end of a drag is not a click");
-    assert_eq!(told["stepped"], serde_json::json!({ "chosen": ["0"], "dots": true }));
-    assert_eq!(told["focused"], true);
-    assert_eq!(told["names"], serde_json::json!(["error", "overshoot", "settling"]));
-    assert_eq!(told["problems"], serde_json::json!([]));
+    assert!(message["rows"].as_u64().unwrap() >= 3 && message["dots"].as_u64() > message["rows"].as_u64(), "{message}");
+    assert_eq!(message["turned"]["moved"], true, "{message}");
+    assert!(message["turned"]["shapes"].as_u64().unwrap() > 20, "edges, numbers and names rotate as well: {message}");
+    assert_eq!(message["turned"]["chosen"], serde_json::json!([]), "rotation selects nothing");
+    assert!(message["back"].as_f64().unwrap() < 0.15, "{message}");
+    assert_eq!(message["dragged"], serde_json::json!({ "moved": true, "kept": 0 }), "the end of a drag is not a click");
+    assert_eq!(message["stepped"], serde_json::json!({ "chosen": ["0"], "dots": true }));
+    assert_eq!(message["focused"], true);
+    assert_eq!(message["names"], serde_json::json!(["error", "overshoot", "settling"]));
+    assert_eq!(message["problems"], serde_json::json!([]));
 }
 
 /// Writes the report of a shipped study; returns its page.

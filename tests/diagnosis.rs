@@ -54,7 +54,7 @@ fn found(diagnosis: &Diagnosis) -> Vec<(&str, &str)> {
 #[test]
 #[ignore = "full tier"]
 fn a_missing_effect_is_found_with_its_place_and_its_parameter() {
-    for (plant, effect, [name, told]) in [
+    for (plant, effect, [name, parameter]) in [
         ("servo", "coulomb-friction", ["c", "torque"]),
         ("spring", "cubic-stiffness", ["k", "stiffness"]),
         ("tanks", "leak", ["k", "flow"]),
@@ -65,7 +65,7 @@ fn a_missing_effect_is_found_with_its_place_and_its_parameter() {
         assert_eq!(diagnosis.verdict, Verdict::Effect, "{}", case.name);
         assert_eq!(found(&diagnosis), [(effect, truth.place.as_str())], "{}", case.name);
         let value = &diagnosis.found[0].strengths[0];
-        let expected = truth.strengths.iter().find(|(n, _)| n == told).expect("the truth has this parameter").1;
+        let expected = truth.strengths.iter().find(|(n, _)| n == parameter).expect("the truth has this parameter").1;
         // Forces in the equations are in SI units, flows of the testbed's tanks in cm3/s.
         let expected = if plant == "tanks" { 1e-6 } else { 1.0 } * expected;
         assert!(value.name == name && (value.value / expected - 1.0).abs() < 0.2, "{}: {value:?}", case.name);

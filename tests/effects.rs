@@ -203,6 +203,6 @@ fn a_play_behind_a_quantisation_is_refused() {
     std::fs::write(folder.path().join("study.toml"), study).unwrap();
     let path = folder.path().join("study.toml");
     let output = cargo_bin_cmd!("mops").args(["check", path.to_str().unwrap()]).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.code() == Some(2) && said.contains("cannot follow the staircase"), "{said}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && message.contains("cannot follow the staircase"), "{message}");
 }

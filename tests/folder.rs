@@ -34,7 +34,7 @@ fn mops(arguments: &[&str], out: &Path) -> Output {
     command(arguments, out).output().unwrap()
 }
 
-fn said(output: &Output) -> String {
+fn message(output: &Output) -> String {
     [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned()).concat()
 }
 
@@ -128,9 +128,9 @@ fn an_unreadable_database_is_renamed_by_a_new_run_and_never_deleted() {
         let before = fs::read(&database).ok();
         let output = mops(&["run", "pid-design", "--solver", "genetic", "--max-evaluations", "60"], &out);
         assert!(
-            output.status.success() && said(&output).contains("evaluations.previous.sqlite"),
+            output.status.success() && message(&output).contains("evaluations.previous.sqlite"),
             "{what}: {}",
-            said(&output)
+            message(&output)
         );
         let aside = out.join("evaluations.previous.sqlite");
         match before {
@@ -154,7 +154,7 @@ fn every_unfinished_run_keeps_its_points_under_its_own_file_name() {
     for name in ["evaluations.previous.sqlite", "evaluations.previous-2.sqlite", "evaluations.previous-3.sqlite"] {
         counts.push((name, unfinished(&out)));
         let output = mops(&["run", "pid-design", "--solver", "genetic", "--max-evaluations", "1"], &out);
-        assert!(said(&output).contains(name), "{}", said(&output));
+        assert!(message(&output).contains(name), "{}", message(&output));
         // The short run finished: the next run replaces it.
     }
     for (name, count) in counts {
@@ -177,7 +177,7 @@ fn a_database_open_in_another_program_is_not_moved_and_the_run_is_refused() {
     );
     let output = mops(&SHORT, &out);
     assert_eq!(output.status.code(), Some(2));
-    assert!(said(&output).contains("is open in another program"), "{}", said(&output));
+    assert!(message(&output).contains("is open in another program"), "{}", message(&output));
     drop(reader);
     assert_eq!(points(&database), count);
     assert!(mops(&SHORT, &out).status.success());
@@ -228,8 +228,8 @@ fn a_run_with_a_permanently_locked_database_still_writes_its_result_and_ends() {
     other.execute_batch("BEGIN IMMEDIATE").unwrap();
     Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(4), "{}", said(&output));
-    assert!(said(&output).contains("evaluations could not be stored: database is locked"), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(4), "{}", message(&output));
+    assert!(message(&output).contains("evaluations could not be stored: database is locked"), "{}", message(&output));
     let result = result(&out);
     assert_eq!(result["stop"], "interrupted");
     // The history does not list it as unfinished, and no report is written from part of its points.
@@ -239,8 +239,8 @@ fn a_run_with_a_permanently_locked_database_still_writes_its_result_and_ends() {
     other.execute_batch("ROLLBACK").unwrap();
     drop(other);
     let report = look("report", &out);
-    assert_eq!(report.status.code(), Some(2), "{}", said(&report));
-    assert!(said(&report).contains("of the run's"), "{}", said(&report));
+    assert_eq!(report.status.code(), Some(2), "{}", message(&report));
+    assert!(message(&report).contains("of the run's"), "{}", message(&report));
     assert!(fs::read(out.join("report.html")).unwrap() == page);
     // Missing points are simulated again.
     let search = [&["run", "pid-design"], &SEARCH[..4], &["--max-evaluations", "400", "--resume"]].concat();
@@ -267,7 +267,7 @@ fn every_task_replaces_the_files_of_an_earlier_run_in_its_folder() {
     assert_eq!(result(&out)["study"], "tank-level");
     let page = fs::read(out.join("report.html")).unwrap();
     let report = look("report", &out);
-    assert_eq!(report.status.code(), Some(2), "{}", said(&report));
+    assert_eq!(report.status.code(), Some(2), "{}", message(&report));
     assert!(fs::read(out.join("report.html")).unwrap() == page);
     // A run is refused while another one is in progress.
     let busy = root.path().join("busy");
@@ -275,7 +275,7 @@ fn every_task_replaces_the_files_of_an_earlier_run_in_its_folder() {
     for task in [&LOCAL[..], &SHORT[..], &["diagnose", "furuta-swing", "--quiet"]] {
         let refused = mops(task, &busy);
         assert_eq!(refused.status.code(), Some(2));
-        assert!(said(&refused).contains("is in use by another run"), "{}", said(&refused));
+        assert!(message(&refused).contains("is in use by another run"), "{}", message(&refused));
     }
     assert_eq!(history(&busy)[0]["state"], "running");
     child.kill().unwrap();
@@ -303,8 +303,8 @@ fn runs_without_a_result_are_skipped_in_a_comparison() {
     assert!(mops(&SHORT, &a).status.success());
     unfinished(&b);
     let compared = Command::new(cargo_bin!("mops")).arg("compare").args([&a, &b]).output().unwrap();
-    assert!(compared.status.success(), "{}", said(&compared));
-    let text = said(&compared);
+    assert!(compared.status.success(), "{}", message(&compared));
+    let text = message(&compared);
     assert!(text.contains("unfinished, no result yet") && text.contains("nominal/overshoot"), "{text}");
     let none = Command::new(cargo_bin!("mops")).arg("compare").args([&b, &b]).output().unwrap();
     assert_eq!(none.status.code(), Some(2));
@@ -323,8 +323,8 @@ fn a_report_evaluates_no_points_beyond_the_stored_ones() {
         change(&format!("UPDATE runs SET max_evaluations = 100000000, state = '{state}'"));
         let report = look("report", &out);
         // The search has 54 evaluations; what a tenth of another budget would examine is not stored.
-        let counted = ["54 evaluations", "60 evaluations"].iter().any(|count| said(&report).contains(count));
-        assert!(report.status.success() && counted, "{state}: {}", said(&report));
+        let counted = ["54 evaluations", "60 evaluations"].iter().any(|count| message(&report).contains(count));
+        assert!(report.status.success() && counted, "{state}: {}", message(&report));
         assert_eq!(points(&database), kept);
     }
     change("UPDATE runs SET max_evaluations = 60, state = 'budget'");
@@ -333,7 +333,7 @@ fn a_report_evaluates_no_points_beyond_the_stored_ones() {
     // No report is written from part of the points.
     change("DELETE FROM points WHERE id > 30");
     let report = look("report", &out);
-    assert_eq!(report.status.code(), Some(2), "{}", said(&report));
+    assert_eq!(report.status.code(), Some(2), "{}", message(&report));
     assert!(fs::read_to_string(out.join("report.html")).unwrap() == page);
 }
 
@@ -346,11 +346,11 @@ fn a_folder_removed_during_the_run_is_restored_with_all_points() {
     fs::remove_dir_all(&out).unwrap();
     Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(4), "{}", said(&output));
-    assert!(said(&output).contains("was removed during the run and has been restored"), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(4), "{}", message(&output));
+    assert!(message(&output).contains("was removed during the run and has been restored"), "{}", message(&output));
     assert!(points(&out.join("evaluations.sqlite")) as u64 >= result(&out)["evaluations"].as_u64().unwrap());
     let report = look("report", &out);
-    assert!(report.status.success(), "{}", said(&report));
+    assert!(report.status.success(), "{}", message(&report));
     // Files of another run that uses the folder by then are not changed.
     let out = root.path().join("taken");
     let child = going(&out);
@@ -358,8 +358,8 @@ fn a_folder_removed_during_the_run_is_restored_with_all_points() {
     let mut other = going(&out);
     Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(3), "{}", said(&output));
-    assert!(said(&output).contains("is now used by another run"), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(3), "{}", message(&output));
+    assert!(message(&output).contains("is now used by another run"), "{}", message(&output));
     assert!(!out.join("result.json").exists());
     other.kill().unwrap();
     other.wait().unwrap();
@@ -403,9 +403,9 @@ fn a_folder_name_that_is_not_utf8_is_accepted() {
         .current_dir(&study)
         .output()
         .unwrap();
-    assert!(matches!(run.status.code(), Some(0 | 1)), "{}", said(&run));
+    assert!(matches!(run.status.code(), Some(0 | 1)), "{}", message(&run));
     let report = Command::new(cargo_bin!("mops")).args(["report", "out"]).current_dir(&study).output().unwrap();
-    assert!(report.status.success(), "{}", said(&report));
+    assert!(report.status.success(), "{}", message(&report));
 }
 
 #[test]
@@ -423,9 +423,9 @@ fn a_locked_database_is_reported_before_the_first_simulation() {
         for (arguments, folder) in [(&resumed, &out), (&reused, &other)] {
             scope.spawn(move || {
                 let output = mops(arguments, folder);
-                assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+                assert_eq!(output.status.code(), Some(2), "{}", message(&output));
                 let fact = format!("{} is locked by another program", out_of(folder, arguments).display());
-                assert!(said(&output).contains(&fact), "{}", said(&output));
+                assert!(message(&output).contains(&fact), "{}", message(&output));
             });
         }
     });

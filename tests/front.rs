@@ -103,12 +103,12 @@ fn knee_nearest_point_and_exchange_rates_agree_with_the_points_of_the_front() {
     let weights = |i: usize| {
         found["points"][i]["weights"].as_array().map(|w| w.iter().map(|w| w.as_f64().unwrap()).collect::<Vec<_>>())
     };
-    let told: Vec<(f64, [f64; 2])> = (1..front.len() - 1)
+    let certified: Vec<(f64, [f64; 2])> = (1..front.len() - 1)
         .filter_map(|i| Some((weights(i)?, [rates[i - 1], rates[i]])))
         .map(|(w, rates)| (-w[0] / w[1], rates))
         .collect();
-    assert!(told.len() >= 3, "some points are certified: {told:?}");
-    for (price, [before, after]) in told {
+    assert!(certified.len() >= 3, "some points are certified: {certified:?}");
+    for (price, [before, after]) in certified {
         assert!(
             price < 0.0 && price > 2.0 * before.min(after) && price < 0.5 * before.max(after),
             "{price} {before} {after}"
@@ -222,8 +222,9 @@ fn a_front_keeps_its_budget_and_says_why_points_are_missing() {
     assert!(result["evaluations"].as_u64().unwrap() <= 400, "{}", result["evaluations"]);
     let front = result["front"].as_array().unwrap().len();
     let warnings = result["warnings"].to_string();
-    let said = warnings.contains(&format!("40 points were asked for, the front has {front}: the budget was spent"));
-    assert!(said == (front < 40), "{front} {warnings}");
+    let is_reported =
+        warnings.contains(&format!("40 points were asked for, the front has {front}: the budget was spent"));
+    assert!(is_reported == (front < 40), "{front} {warnings}");
 }
 
 /// `d` alone decides the maximum, 2, whatever `a` is; `c = 1 + a` costs nothing.

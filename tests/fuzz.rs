@@ -369,12 +369,12 @@ fn damaged_input_is_read_or_refused() {
             if i % 50_000 == 0 {
                 eprintln!("input {i}");
             }
-            let (begun, mut random) = (Instant::now(), SmallRng::seed_from_u64(i));
+            let (started, mut random) = (Instant::now(), SmallRng::seed_from_u64(i));
             let reader = readers[usize::try_from(i % 3).expect("below three")];
             if catch_unwind(AssertUnwindSafe(|| reader(&corpus, &mut random))).is_err() {
                 broken.push(i);
             }
-            slowest = slowest.max((begun.elapsed(), i));
+            slowest = slowest.max((started.elapsed(), i));
         }
     };
     let found: Vec<_> = std::thread::scope(|scope| {

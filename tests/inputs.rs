@@ -596,7 +596,7 @@ fn a_window_ends_at_a_pause_of_the_record() {
 
 #[test]
 fn an_unstable_plant_in_closed_loop_is_calibrated_in_windows() {
-    // x'' = a x - d x' + b u, unstable, with u of a sampled controller held over 20 ms. The matrix exponential is a
+    // x'' = a x - d x' + b u, unstable, with u of a sampled controller kept over 20 ms. The matrix exponential is a
     // Taylor series.
     let [a, d, b, step] = [9.0, 0.4, 4.0, 0.02];
     let rate = |x: [f64; 2], u: f64| [x[1], a * x[0] - d * x[1] + b * u];

@@ -83,25 +83,25 @@ impl Place {
 
 struct Run {
     status: i32,
-    said: String,
+    message: String,
 }
 
 impl Run {
     fn of(output: Output) -> Self {
-        let said = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()).concat();
-        Self { status: output.status.code().unwrap_or(-1), said }
+        let message = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()).concat();
+        Self { status: output.status.code().unwrap_or(-1), message }
     }
 
     #[track_caller]
     fn ends_with(self, status: i32) -> String {
-        assert_eq!(self.status, status, "{}", self.said);
-        self.said
+        assert_eq!(self.status, status, "{}", self.message);
+        self.message
     }
 
     #[track_caller]
     fn refused_for(self, word: &str) {
-        let said = self.ends_with(2);
-        assert!(said.contains(word), "{said}");
+        let message = self.ends_with(2);
+        assert!(message.contains(word), "{message}");
     }
 }
 
@@ -246,7 +246,7 @@ mod links {
         symlink("../elsewhere", place.at("front/data")).unwrap();
         let shipped = ["pareto", "furuta-calibration", "--points", "3", "--max-evaluations", "30", "--out", "front"];
         let run = place.mops(&shipped);
-        assert!(!place.at("front/data").is_symlink() && place.at("front/data/upright.csv").exists(), "{}", run.said);
+        assert!(!place.at("front/data").is_symlink() && place.at("front/data/upright.csv").exists(), "{}", run.message);
         assert_eq!(place.text("elsewhere/upright.csv"), "mine");
     }
 
@@ -302,9 +302,12 @@ fn a_study_reads_files_outside_of_its_folder_only_where_the_command_line_allows_
     let absolute = place.at("secret.csv").display().to_string();
     for path in ["../secret.csv", "../nothing.csv", "data/../../secret.csv", absolute.as_str(), "/etc/passwd"] {
         place.write("study/study.toml", &CALIBRATION.replace("FILE", path));
-        let said = place.mops(&["check", "study/study.toml"]).ends_with(2);
-        assert!(said.contains("outside of the folder of the study") && said.contains("--allow-read DIR"), "{said}");
-        assert!(!said.contains("SECRETS") && !said.contains("root:"), "{said}");
+        let message = place.mops(&["check", "study/study.toml"]).ends_with(2);
+        assert!(
+            message.contains("outside of the folder of the study") && message.contains("--allow-read DIR"),
+            "{message}"
+        );
+        assert!(!message.contains("SECRETS") && !message.contains("root:"), "{message}");
     }
     // Every place of a study that names files.
     let files = CALIBRATION.replace("file = \"FILE\"", "files = \"../*.csv\"");
@@ -318,8 +321,8 @@ fn a_study_reads_files_outside_of_its_folder_only_where_the_command_line_allows_
     place.write("study/own.csv", RECORDING);
     for text in [files, channel, table, input] {
         place.write("study/study.toml", &text);
-        let said = place.mops(&["check", "study/study.toml"]).ends_with(2);
-        assert!(said.contains("outside of the folder of the study") && !said.contains("SECRETS"), "{said}");
+        let message = place.mops(&["check", "study/study.toml"]).ends_with(2);
+        assert!(message.contains("outside of the folder of the study") && !message.contains("SECRETS"), "{message}");
     }
     place.write("study/study.toml", &CALIBRATION.replace("FILE", "../shared/data.csv"));
     place.mops(&["check", "study/study.toml", "--allow-read", "other"]).ends_with(2);
@@ -336,23 +339,23 @@ fn project(place: &Place, out: &str) -> String {
     let second = "[criteria.late]\nfit = { signal = \"x\" }\nfrom = 0.2\ndemand = 2\n";
     place.write("project/rig.toml", &(CALIBRATION.replace("FILE", "data/step.csv") + second));
     let front = ["pareto", "project/rig.toml", "--points", "3", "--max-evaluations", "60", "--out", out];
-    let said = place.mops(&front).ends_with(0);
+    let message = place.mops(&front).ends_with(0);
     let pick = place.mops(&["pick", out, "--demand", "late=1", "--no-refine", "--allow-read", "project"]);
-    assert_eq!(pick.said.contains("use it with --allow-read"), said.contains("use it with --allow-read"));
+    assert_eq!(pick.message.contains("use it with --allow-read"), message.contains("use it with --allow-read"));
     assert!(place.at(out).join("picked.toml").exists());
-    said
+    message
 }
 
 #[test]
 fn a_study_that_mops_wrote_below_its_study_reads_the_data_of_that_study() {
     let place = Place::new();
-    let said = project(&place, "project/results/rig");
-    assert!(!said.contains("--allow-read"), "{said}");
+    let message = project(&place, "project/results/rig");
+    assert!(!message.contains("--allow-read"), "{message}");
     place.mops(&["check", "project/results/rig/picked.toml"]).ends_with(0);
     // A study written from the written one, beside it.
     let second = ["pareto", "project/results/rig/picked.toml", "--points", "3", "--max-evaluations", "40", "--out"];
     let second = place.mops(&[&second[..], &["project/results/second"]].concat());
-    assert!(second.status < 2, "{}", second.said);
+    assert!(second.status < 2, "{}", second.message);
     place.mops(&["check", "project/results/second/study.toml"]).ends_with(0);
     // The project is moved.
     fs::rename(place.at("project"), place.at("moved")).unwrap();
@@ -367,9 +370,9 @@ fn a_study_that_mops_wrote_below_its_study_reads_the_data_of_that_study() {
 #[test]
 fn a_study_that_mops_wrote_elsewhere_needs_the_option_that_the_run_prints() {
     let place = Place::new();
-    let said = project(&place, "elsewhere/rig");
+    let message = project(&place, "elsewhere/rig");
     let folder = place.at("project").canonicalize().unwrap().display().to_string();
-    assert!(said.contains(&format!("use it with --allow-read {folder}")), "{said}");
+    assert!(message.contains(&format!("use it with --allow-read {folder}")), "{message}");
     for study in ["elsewhere/rig/study.toml", "elsewhere/rig/picked.toml"] {
         place.mops(&["check", study]).refused_for("--allow-read");
         place.mops(&["check", study, "--allow-read", &folder]).ends_with(0);
@@ -408,8 +411,8 @@ fn a_link_out_of_the_folder_of_a_study_is_not_read() {
     place.write("secret.csv", "not,a,table of SECRETS\n");
     place.write("study/study.toml", &CALIBRATION.replace("FILE", "data.csv"));
     std::os::unix::fs::symlink("../secret.csv", place.at("study/data.csv")).unwrap();
-    let said = place.mops(&["check", "study"]).ends_with(2);
-    assert!(said.contains("outside of the folder of the study") && !said.contains("SECRETS"), "{said}");
+    let message = place.mops(&["check", "study"]).ends_with(2);
+    assert!(message.contains("outside of the folder of the study") && !message.contains("SECRETS"), "{message}");
     fs::remove_file(place.at("study/data.csv")).unwrap();
     std::os::unix::fs::symlink(Path::new("other/real.csv"), place.at("study/data.csv")).unwrap();
     place.write("study/other/real.csv", RECORDING);
@@ -437,7 +440,7 @@ fn a_damaged_database_is_renamed_by_a_fresh_run_and_named_by_a_resumed_one() {
         damage(&mut bytes);
         fs::write(place.at("r/evaluations.sqlite"), &bytes).unwrap();
         let resumed = place.mops(&[&run[..], &["--resume"]].concat());
-        assert!(resumed.status == 2 || resumed.status == 0, "{i}: {}", resumed.said);
+        assert!(resumed.status == 2 || resumed.status == 0, "{i}: {}", resumed.message);
         fs::write(place.at("r/evaluations.sqlite"), &bytes).unwrap();
         place.mops(&run).ends_with(0);
         place.mops(&["report", "r"]).ends_with(0);
@@ -534,7 +537,7 @@ fn a_constant_that_is_no_finite_number_is_a_mistake_of_the_study() {
         place.write("study.toml", &DESIGN.replace("NAME", "n").replace("-k*x + l", expression));
         let run = place.mops(&["check", "study.toml"]);
         let is_of_parameter = expression == "l/0";
-        assert!(is_of_parameter || run.status == 2 && run.said.contains(word), "{expression}: {}", run.said);
+        assert!(is_of_parameter || run.status == 2 && run.message.contains(word), "{expression}: {}", run.message);
     }
 }
 
@@ -626,9 +629,9 @@ fn names_like_formulas_are_text_in_csv_files_and_are_read_back_unchanged() {
     let study = DESIGN.replace("NAME", "n").replace("\na = {", "\n\"=a\" = {").replace("\nb = {", "\n\"'-b\" = {");
     place.write("study.toml", &(study + "[cases.\"@c\"]\n[cases.\"+d\"]\n"));
     let run = place.mops(&[&["run", "study.toml", "--out", "r"], &FEW[..]].concat());
-    assert!(run.status < 2, "{}", run.said);
+    assert!(run.status < 2, "{}", run.message);
     let header = place.text("r/evaluations.csv").lines().next().unwrap().to_owned();
     assert!(header.contains("'@c/=a") && header.contains("'+d/=a") && !header.contains(",@"), "{header}");
-    let said = place.mops(&["data", "r/evaluations.csv"]).ends_with(0);
-    assert!(said.contains(" @c/=a ") && said.contains(" +d/'-b "), "{said}");
+    let message = place.mops(&["data", "r/evaluations.csv"]).ends_with(0);
+    assert!(message.contains(" @c/=a ") && message.contains(" +d/'-b "), "{message}");
 }

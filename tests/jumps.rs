@@ -32,7 +32,7 @@ fn doubt(result: &Value) -> &str {
 }
 
 #[test]
-fn an_optimum_on_a_jump_is_told_with_what_comes_beyond() {
+fn an_optimum_on_a_jump_is_reported_with_what_comes_beyond() {
     // The least value is 1 at k m = 12; beyond, y is 3.
     let result = with_output("1 + 0.1*(3 - k) + if(k*m > 12.0, 2, 0)");
     assert!((result["objective"].as_f64().unwrap() - 1.0 / 1.5).abs() < 1e-3, "{result}");
@@ -51,7 +51,7 @@ fn an_optimum_on_a_jump_is_told_with_what_comes_beyond() {
 }
 
 #[test]
-fn the_line_that_is_told_designs_against_the_jump() {
+fn the_line_that_is_given_designs_against_the_jump() {
     let parts = "parameters = { k = '1' }\nconstants = { m = 4.0 }\noutputs = { y = '1 + 0.1*(3 - k) + if(k*m > 12.0, 2 + (k*m - 12), 0)' }";
     let first = run(parts, "");
     let text = doubt(&first);
@@ -143,7 +143,7 @@ fn a_tuner_that_is_not_active_is_moved_as_a_constant() {
 }
 
 #[test]
-fn no_line_against_a_jump_is_told_where_a_tolerance_is_no_part_of_the_value() {
+fn no_line_against_a_jump_is_given_where_a_tolerance_is_no_part_of_the_value() {
     let criteria =
         "b = { start = 0.2, min = -2.0, max = 2.0 }\n[criteria]\ny = { final-value = { signal = 'y' }, demand = 1 }";
     let result = solve("y = '0.1 + a^2 + (b - 1)^2 + if(a > 0.005, 5, 0)'", criteria, "run");

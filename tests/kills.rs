@@ -118,13 +118,13 @@ fn killed(arguments: &[&str], root: &Path, [prepare, keeps]: [&dyn Fn(&Path); 2]
             wrong.push(format!("{call} {k}: the result is damaged"));
         }
         let mut again = mops(&STUDY, &out).arg("--resume").output().unwrap();
-        let said = String::from_utf8_lossy(&again.stderr).into_owned();
+        let message = String::from_utf8_lossy(&again.stderr).into_owned();
         // If killed before it changed the earlier run, it has not started.
-        if said.contains("contains another run") {
+        if message.contains("contains another run") {
             again = mops(&STUDY, &out).output().unwrap();
         }
         if result(&out).as_ref() != Some(&expected) || !passing(&out).is_empty() {
-            wrong.push(format!("{call} {k}: {:?} {said} {:?}", again.status.code(), passing(&out)));
+            wrong.push(format!("{call} {k}: {:?} {message} {:?}", again.status.code(), passing(&out)));
         }
         keeps(&out);
     }

@@ -13,7 +13,7 @@ fn mops(arguments: &[&str], folder: &Path) -> Output {
     Command::new(cargo_bin!("mops")).args(arguments).current_dir(folder).output().unwrap()
 }
 
-fn said(output: &Output) -> String {
+fn message(output: &Output) -> String {
     [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned()).concat()
 }
 
@@ -120,7 +120,7 @@ fn a_time_limit_ends_every_task_like_a_spent_budget() {
     for (i, (task, known)) in tasks.into_iter().enumerate() {
         let out = format!("out{i}");
         let output = mops(&[task, &["--quiet", "--out", &out, "--time-limit", "0.5 s"]].concat(), root.path());
-        assert!(matches!(output.status.code(), Some(0 | 1 | 3)), "{task:?}: {}", said(&output));
+        assert!(matches!(output.status.code(), Some(0 | 1 | 3)), "{task:?}: {}", message(&output));
         let result = result(&root.path().join(&out));
         assert_eq!(result["stop"], "time-limit", "{task:?}");
         assert_eq!(result["evaluations"].as_u64().unwrap() > 0, known, "{task:?}");
@@ -144,7 +144,7 @@ fn a_run_stopped_by_its_time_limit_resumes_to_the_result_of_an_unlimited_run() {
     mops(&[&search[..], &["parts", "--time-limit", "0.05"]].concat(), root.path());
     assert!(result(&root.path().join("parts"))["evaluations"].as_u64().unwrap() < 1500);
     let report = mops(&["report", "parts"], root.path());
-    assert!(report.status.success(), "{}", said(&report));
+    assert!(report.status.success(), "{}", message(&report));
     mops(&[&search[..], &["parts", "--resume"]].concat(), root.path());
     let [mut whole, mut parts] = ["whole", "parts"].map(|out| result(&root.path().join(out)));
     for result in [&mut whole, &mut parts] {
@@ -166,7 +166,7 @@ fn without_an_output_folder_every_study_name_gives_one_folder_below_results() {
         let named = text.replacen("name = \"pid-design\"", &format!("name = \"{name}\""), 1);
         fs::write(below.join("study.toml"), named).unwrap();
         let output = mops(&["run", "study.toml", "--quiet", "--max-evaluations", "1"], &below);
-        assert!(output.status.success(), "{name}: {}", said(&output));
+        assert!(output.status.success(), "{name}: {}", message(&output));
         let results = below.join("results");
         let folders: Vec<_> = fs::read_dir(&results).unwrap().map(|entry| entry.unwrap().path()).collect();
         assert!(folders.len() == 1 && folders[0].join("result.json").is_file(), "{name}: {folders:?}");
@@ -190,7 +190,7 @@ fn an_error_in_a_long_line_is_shown_with_its_surroundings_only() {
     };
     for blanks in [10, 199, 201, 1000, 65_000, 65_535, 66_000, 200_000, 900_000] {
         fs::write(at("study.toml"), study(blanks)).unwrap();
-        let text = said(&mops(&["check", "study.toml"], root.path()));
+        let text = message(&mops(&["check", "study.toml"], root.path()));
         assert!(
             text.contains(&format!("study.toml:5:{}", 17 + blanks)) && text.contains("+$"),
             "{blanks}: {text:.500}"
@@ -201,10 +201,10 @@ fn an_error_in_a_long_line_is_shown_with_its_surroundings_only() {
     let header: Vec<String> = (0..9000).map(|i| format!("c{i}")).collect();
     fs::write(at("wide.csv"), header.join(",") + "\n" + &row("1") + &row("1e999")).unwrap();
     let output = mops(&["data", "wide.csv"], root.path());
-    assert!(output.status.code() == Some(2) && said(&output).contains("1e999"), "{}", said(&output));
+    assert!(output.status.code() == Some(2) && message(&output).contains("1e999"), "{}", message(&output));
     // Characters of several bytes, and an error at the end.
     fs::write(at("study.toml"), format!("[study]\nname = \"{}\" é", "é".repeat(70_000))).unwrap();
-    assert!(said(&mops(&["check", "study.toml"], root.path())).contains("study.toml:2:"));
+    assert!(message(&mops(&["check", "study.toml"], root.path())).contains("study.toml:2:"));
 }
 
 #[test]
@@ -234,7 +234,7 @@ fn no_control_character_reaches_the_terminal() {
     ];
     for arguments in runs {
         let output = mops(arguments, root.path());
-        let text = said(&output);
+        let text = message(&output);
         let acts = |c: char| (c.is_control() && c != '\n' && c != '\t') || c == '\u{202e}';
         assert!(!text.contains(acts), "{arguments:?}: {text:?}");
         assert!(!text.is_empty(), "{arguments:?}");
@@ -264,7 +264,7 @@ fn a_failed_print_is_an_error_and_the_result_is_kept() {
     ] {
         let output = full(arguments);
         assert_eq!(output.status.code(), Some(3), "{arguments:?}");
-        assert!(said(&output).contains("cannot write to standard output"), "{arguments:?}: {}", said(&output));
+        assert!(message(&output).contains("cannot write to standard output"), "{arguments:?}: {}", message(&output));
     }
     assert_eq!(result(&root.path().join("out"))["evaluations"], 20);
     // A reader that closes the pipe is not an error.
@@ -290,11 +290,11 @@ fn devices_and_pipes_are_refused_as_data_files() {
         }
         fs::write(at("study.toml"), text.replacen(line, &format!("file = \"{file}\""), 1)).unwrap();
         let output = mops(&["check", "study.toml"], root.path());
-        assert_eq!(output.status.code(), Some(2), "{file}: {}", said(&output));
-        assert!(said(&output).contains("study.toml:"), "{file}: {}", said(&output));
+        assert_eq!(output.status.code(), Some(2), "{file}: {}", message(&output));
+        assert!(message(&output).contains("study.toml:"), "{file}: {}", message(&output));
     }
     let output = mops(&["check", "/dev/zero"], root.path());
-    assert!(output.status.code() == Some(2) && said(&output).contains("not a study"), "{}", said(&output));
+    assert!(output.status.code() == Some(2) && message(&output).contains("not a study"), "{}", message(&output));
 }
 
 #[test]
@@ -309,7 +309,7 @@ fn numbers_that_are_not_finite_are_refused_with_their_position() {
         "criteria.level.demand=nan",
     ] {
         let output = mops(&["check", "study.toml", "--set", setting], root.path());
-        assert_eq!(output.status.code(), Some(2), "{setting}: {}", said(&output));
+        assert_eq!(output.status.code(), Some(2), "{setting}: {}", message(&output));
     }
     let own = turning(1.0)
         .replace("parameters = { k = \"1\" }", "parameters = { k = \"1\", j = \"1\" }\ninputs = { u = \"1\" }");
@@ -329,7 +329,7 @@ fn numbers_that_are_not_finite_are_refused_with_their_position() {
     ] {
         fs::write(root.path().join("own.toml"), format!("{own}[cases]\nc = {{ {case} }}\n")).unwrap();
         let output = mops(&["check", "own.toml"], root.path());
-        assert_eq!(output.status.success(), fits, "{case}: {}", said(&output));
+        assert_eq!(output.status.success(), fits, "{case}: {}", message(&output));
     }
     // An integral time may be infinite: there is then no integral action.
     assert!(mops(&["check", "pid-design", "--set", "tuners.Ti.start=2.0"], root.path()).status.success());
@@ -339,15 +339,15 @@ fn numbers_that_are_not_finite_are_refused_with_their_position() {
 fn a_picked_study_overwrites_no_existing_file() {
     let root = tempfile::tempdir().unwrap();
     let found = mops(&["pareto", "pid-design", "--points", "3", "--out", "out", "--quiet"], root.path());
-    assert!(matches!(found.status.code(), Some(0 | 1)), "{}", said(&found));
+    assert!(matches!(found.status.code(), Some(0 | 1)), "{}", message(&found));
     let pick = ["pick", "out", "--no-refine", "--demand", "settling=14"];
-    let name = |output: &Output| said(output).lines().last().unwrap().to_owned();
+    let name = |output: &Output| message(output).lines().last().unwrap().to_owned();
     assert!(name(&mops(&pick, root.path())).ends_with("picked.toml"));
     fs::write(root.path().join("out/picked.toml"), "worked on").unwrap();
     assert!(name(&mops(&pick, root.path())).ends_with("picked-2.toml"));
     assert_eq!(fs::read_to_string(root.path().join("out/picked.toml")).unwrap(), "worked on");
     let refused = mops(&[&pick[..], &["--out", "out/picked.toml"]].concat(), root.path());
-    assert!(refused.status.code() == Some(2) && said(&refused).contains("already exists"), "{}", said(&refused));
+    assert!(refused.status.code() == Some(2) && message(&refused).contains("already exists"), "{}", message(&refused));
 }
 
 #[test]
@@ -360,16 +360,16 @@ fn an_empty_table_on_the_command_line_replaces_the_table_of_the_study() {
             let output = mops(&[command, study, "--set", table], root.path());
             // A study without criteria is right, but there is nothing to solve.
             let expected = if command == "check" && table == "criteria={}" { 0 } else { 2 };
-            assert_eq!(output.status.code(), Some(expected), "{command} {study} {table}: {}", said(&output));
-            assert!(!said(&output).contains("panicked"), "{}", said(&output));
+            assert_eq!(output.status.code(), Some(expected), "{command} {study} {table}: {}", message(&output));
+            assert!(!message(&output).contains("panicked"), "{}", message(&output));
         }
     }
     // `solver` may be empty: the front is computed, and the study written for `pick` is valid.
     let output =
         mops(&["pareto", "pid-design", "--set", "solver={}", "--points", "3", "--out", "out", "--quiet"], root.path());
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", message(&output));
     let output = mops(&["check", "out/study.toml"], root.path());
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", message(&output));
 }
 
 #[test]
@@ -382,8 +382,8 @@ fn a_linearisation_ends_at_its_time_limit() {
                 [tuners]\nk = { start = 1.0, min = 0.1, max = 10.0 }\n[criteria]\nend = { final-value = { signal = \"T[400]\" }, demand = 1.0 }\n";
     fs::write(root.path().join("study.toml"), text).unwrap();
     let output = mops(&["linearise", "study.toml", "--out", "out", "--time-limit", "0.02"], root.path());
-    assert_eq!(output.status.code(), Some(3), "{}", said(&output));
-    assert!(said(&output).contains("not finished within the time limit of 0.02 s"), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(3), "{}", message(&output));
+    assert!(message(&output).contains("not finished within the time limit of 0.02 s"), "{}", message(&output));
     assert!(!root.path().join("out").exists());
     assert_eq!(mops(&["check", "study.toml"], root.path()).status.code(), Some(0));
 }
@@ -397,7 +397,7 @@ fn cases_with_colliding_file_names_have_separate_files() {
     let case = text.lines().find(|line| line.starts_with("nominal")).unwrap();
     fs::write(root.path().join("study.toml"), text.replacen(case, &cases, 1)).unwrap();
     let output = mops(&["simulate", "study.toml", "--out", "out", "--samples", "3"], root.path());
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", message(&output));
     // One table for each of the six cases, one plot for each of the five signals in each.
     for (end, count) in [(".csv", 6), (".svg", 30), (".png", 30)] {
         let files = fs::read_dir(root.path().join("out")).unwrap();
@@ -416,7 +416,7 @@ fn a_refused_run_creates_no_folder() {
         [&["--reuse", "nowhere"][..], &["--solver", "nonsense"], &["--set", "study.task=excitation", "--resume"]]
     {
         let output = mops(&[&["run", "tank-level", "--out", "out"], more].concat(), root.path());
-        assert_eq!(output.status.code(), Some(2), "{more:?}: {}", said(&output));
+        assert_eq!(output.status.code(), Some(2), "{more:?}: {}", message(&output));
         assert!(!root.path().join("out").exists(), "{more:?}");
     }
 }

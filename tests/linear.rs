@@ -82,9 +82,9 @@ fn errors_of_linearise_suggest_a_fix() {
         (vec!["--at", "theta=1"], "no such tuner or parameter"),
     ] {
         let output = mops(&[&["linearise", &file], &arguments[..]].concat()).output().unwrap();
-        let told = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{told}");
-        assert!(told.replace('\n', " ").contains(fact), "{told}");
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.replace('\n', " ").contains(fact), "{message}");
     }
 }
 
@@ -235,8 +235,8 @@ p = { peak = { signal = 'ph' }, usage = 'monitor' }
         assert!(text.contains(part), "{part}: {text}");
     }
     assert!(!text.contains("u/u"), "{text}");
-    let held = mops(&arguments).output().unwrap();
-    let error = String::from_utf8(held.stderr).unwrap();
+    let fixed = mops(&arguments).output().unwrap();
+    let error = String::from_utf8(fixed.stderr).unwrap();
     assert!(error.contains("`ph` still changes by") && error.contains("the input `u` is fixed, --free"), "{error}");
 }
 
@@ -276,9 +276,9 @@ slowest = { slowest-pole = { input = 'u1' }, usage = 'monitor' }
     std::fs::remove_dir_all(&out).unwrap();
     let file = study(folder.path(), &text.replace("0.4", "0"));
     let refused = mops(&["linearise", &file, "--place=-3,-3,-9,-9", "--out", out.to_str().unwrap()]).output().unwrap();
-    let told = String::from_utf8(refused.stderr).unwrap().replace('\n', " ");
-    assert_eq!(refused.status.code(), Some(2), "{told}");
-    assert!(told.contains("rank 3 of 4") && told.contains("-0.050000"), "{told}");
+    let message = String::from_utf8(refused.stderr).unwrap().replace('\n', " ");
+    assert_eq!(refused.status.code(), Some(2), "{message}");
+    assert!(message.contains("rank 3 of 4") && message.contains("-0.050000"), "{message}");
     assert!(json(&out.join("linearised.json"))["feedback"].is_null());
 }
 
@@ -366,9 +366,12 @@ fn a_linearisation_that_does_not_exist_is_refused() {
         ["u - k*sqrt(x)", "u - k*x^0.5", "u - k*abs(x)", "u - sign(x)", "max(x, k*x) + u", "k*asin(1 - abs(x)) + u"]
     {
         let refused = mops(&["linearise", &study(folder.path(), &vessel(der))]).output().unwrap();
-        let told = String::from_utf8(refused.stderr).unwrap().replace('\n', " ");
-        assert_eq!(refused.status.code(), Some(3), "{der}: {told}");
-        assert!(told.contains("the rate of `x` is not differentiable with respect to `x` at x = 0"), "{der}: {told}");
+        let message = String::from_utf8(refused.stderr).unwrap().replace('\n', " ");
+        assert_eq!(refused.status.code(), Some(3), "{der}: {message}");
+        assert!(
+            message.contains("the rate of `x` is not differentiable with respect to `x` at x = 0"),
+            "{der}: {message}"
+        );
     }
     // At other points, and for smooth equations, the linearisation exists. An output that is not differentiable gets a
     // note.
@@ -386,8 +389,8 @@ fn a_linearisation_that_does_not_exist_is_refused() {
         .replace("horizon = 1", "horizon = 1\n[models.m.linearise]\noutputs = ['x']")
         .replace("final-value = { signal = 'x' }", "slowest-pole = {}");
     let none = mops(&["simulate", &study(folder.path(), &text)]).output().unwrap();
-    let told = String::from_utf8(none.stdout).unwrap() + &String::from_utf8(none.stderr).unwrap();
-    assert!(!none.status.success() && told.contains("is not differentiable with respect to `x`"), "{told}");
+    let message = String::from_utf8(none.stdout).unwrap() + &String::from_utf8(none.stderr).unwrap();
+    assert!(!none.status.success() && message.contains("is not differentiable with respect to `x`"), "{message}");
 }
 
 #[test]

@@ -187,9 +187,9 @@ fn a_study_is_made_from_headers_and_encodings_as_people_have_them() {
         let place = folder(&[("oven.csv", &bytes)]);
         let (code, text) = mops(place.path(), &["data", "oven.csv"]);
         assert!(code == 0 && text.contains(&format!("`{time}` (s) from 0 to 59")), "{name}: {text}");
-        let said = [("latin", "Latin-1"), ("utf16", "UTF-16"), ("preamble", "2 lines before the header skipped")];
-        for (_, said) in said.iter().filter(|(of, _)| *of == name) {
-            assert!(text.contains(said), "{name}: {text}");
+        let message = [("latin", "Latin-1"), ("utf16", "UTF-16"), ("preamble", "2 lines before the header skipped")];
+        for (_, message) in message.iter().filter(|(of, _)| *of == name) {
+            assert!(text.contains(message), "{name}: {text}");
         }
         let (code, text) = mops(place.path(), &["new", "study", "--from-data", "oven.csv"]);
         assert_eq!(code, 0, "{name}: {text}");
@@ -197,8 +197,8 @@ fn a_study_is_made_from_headers_and_encodings_as_people_have_them() {
         assert!(study.contains("= \"degC\"") || study.contains("= \"\u{b0}C\""), "{name}: {study}");
         let (code, text) = mops(&place.path().join("study"), &["check", "study.toml"]);
         assert_eq!(code, 0, "{name}: {text}");
-        for (_, said) in said.iter().filter(|(of, _)| *of == name) {
-            assert!(text.contains(said), "{name}: {text}");
+        for (_, message) in message.iter().filter(|(of, _)| *of == name) {
+            assert!(text.contains(message), "{name}: {text}");
         }
     }
 }

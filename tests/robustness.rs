@@ -264,7 +264,7 @@ fn an_edge_that_each_design_moves_by_a_little_is_followed_in_large_steps() {
 
 /// The only round trades the nominal case for one that it does not know.
 #[test]
-fn an_initial_guess_that_is_better_over_the_cases_found_is_said() {
+fn an_initial_guess_that_is_better_over_the_cases_found_is_reported() {
     let f = |p: &[f64]| Some(vec![1.0 - 0.1 * p[0] + 4.0 * (p[0] + 2.0) * (p[1] - 0.5)]);
     let mut draft =
         draft(robust(RobustTask { rounds: 1, ..RobustTask::default() }), BOX(), vec![end(0, 1.0, Usage::Minimise)], f);

@@ -89,13 +89,13 @@ fn compare(index: usize, setup: &Setup) -> Vec<Compared> {
             let (parameters, reach) = (&setup.parameters[..], REACH);
             let tangent = Tangent { analysis: &analysis, value: &value, along, parameters, seed, reach };
             // Refused, as instants coincide.
-            let Ok(Value { number: told, .. }) = asked.criterion.slope(&case, &tangent) else { continue };
+            let Ok(Value { number: reported, .. }) = asked.criterion.slope(&case, &tangent) else { continue };
             let values = around.each_ref().map(|[low, high]| [low[k], high[k]]);
             found.push(Compared {
                 setup: index,
                 criterion: asked.name.clone(),
                 parameter: interface.parameters[i].variable.name.clone(),
-                verdict: judge(told, here[k], &values),
+                verdict: judge(reported, here[k], &values),
             });
         }
     }
@@ -110,15 +110,15 @@ fn check(setups: &[&Setup]) {
     // Of every parameter of a setup, the number of slopes that are off, and the one that is off most.
     let mut worst: BTreeMap<String, (usize, f64, String)> = BTreeMap::new();
     for Compared { setup, criterion, parameter, verdict } in &compared {
-        let Verdict::Off { told, sides } = verdict else { continue };
+        let Verdict::Off { reported, sides } = verdict else { continue };
         let Setup { name, effects, .. } = setups[*setup];
         let off =
-            sides.map(|side| (told - side).abs() / side.abs().max(1e-3)).into_iter().fold(f64::INFINITY, f64::min);
+            sides.map(|side| (reported - side).abs() / side.abs().max(1e-3)).into_iter().fold(f64::INFINITY, f64::min);
         let entry = worst.entry(format!("{effects}, {parameter}")).or_default();
         entry.0 += 1;
         if off >= entry.1 {
             let [left, right] = sides;
-            (entry.1, entry.2) = (off, format!("{name}: {criterion} {told:.6}, not {left:.6} or {right:.6}"));
+            (entry.1, entry.2) = (off, format!("{name}: {criterion} {reported:.6}, not {left:.6} or {right:.6}"));
         }
     }
     for (pair, (count, off, line)) in &worst {

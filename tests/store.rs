@@ -31,8 +31,8 @@ fn result(out: &Path) -> Value {
 }
 
 /// Stored points, evaluations answered by one of them, and simulated evaluations, as printed by the terminal.
-fn counts(said: &str) -> [usize; 3] {
-    let line = said.lines().find(|line| line.starts_with("cache: ")).unwrap_or_else(|| panic!("{said}"));
+fn counts(message: &str) -> [usize; 3] {
+    let line = message.lines().find(|line| line.starts_with("cache: ")).unwrap_or_else(|| panic!("{message}"));
     let numbers: Vec<usize> = line.split(|c: char| !c.is_ascii_digit()).filter_map(|word| word.parse().ok()).collect();
     numbers.try_into().unwrap()
 }
@@ -67,10 +67,10 @@ fn resuming_a_finished_run_simulates_nothing_and_gives_the_same_result() {
         run(study, &out, more);
         let first = result(&out);
         std::fs::remove_file(out.join("result.json")).unwrap();
-        let said = run(study, &out, &[more, &["--resume"]].concat());
-        let [known, met, simulated] = counts(&said);
-        assert!(known > 0 && met > 0, "{said}");
-        assert_eq!(simulated, 0, "{study}: {said}");
+        let message = run(study, &out, &[more, &["--resume"]].concat());
+        let [known, met, simulated] = counts(&message);
+        assert!(known > 0 && met > 0, "{message}");
+        assert_eq!(simulated, 0, "{study}: {message}");
         assert_eq!(result(&out), first, "{study}");
     }
 }
@@ -107,12 +107,12 @@ fn killed_again_and_again(kills: usize, seed: u64) {
         assert!(points >= most, "what was written stays: {points} after {most}");
         most = points;
     }
-    let said = run("pid-design-multi-case", &torn, &[&search[..], &["--resume"]].concat());
+    let message = run("pid-design-multi-case", &torn, &[&search[..], &["--resume"]].concat());
     assert_eq!(result(&torn), result(&whole));
     if most > 0 {
-        let [known, met, simulated] = counts(&said);
+        let [known, met, simulated] = counts(&message);
         assert_eq!(known, most);
-        assert!(met + simulated >= 2250 && simulated <= 2600 - known.min(2250), "{said}");
+        assert!(met + simulated >= 2250 && simulated <= 2600 - known.min(2250), "{message}");
     }
 }
 
@@ -155,20 +155,20 @@ fn after_a_change_of_a_demand_no_stored_point_is_simulated_again() {
 
     // With a budget of one evaluation the run evaluates its initial point only: the best stored point.
     let reuse = ["--reuse", first.to_str().unwrap()];
-    let said = run(study.to_str().unwrap(), &second, &[&reuse[..], &["--max-evaluations", "1"]].concat());
-    assert_eq!(counts(&said)[0], known);
+    let message = run(study.to_str().unwrap(), &second, &[&reuse[..], &["--max-evaluations", "1"]].concat());
+    assert_eq!(counts(&message)[0], known);
     let found = result(&second);
     assert_eq!((found["evaluations"].as_u64(), found["reused"].as_u64()), (Some(1), Some(1)));
     assert_eq!(found["worst_scaled"].as_f64(), Some(best));
 
     // A whole search: stored points are not simulated again, and no point is written twice.
-    let said = run(study.to_str().unwrap(), &second, &[&reuse[..], &["--max-evaluations", "200"]].concat());
-    let [_, met, simulated] = counts(&said);
+    let message = run(study.to_str().unwrap(), &second, &[&reuse[..], &["--max-evaluations", "200"]].concat());
+    let [_, met, simulated] = counts(&message);
     let found = result(&second);
-    assert!(met >= 1 && simulated >= 1, "{said}");
+    assert!(met >= 1 && simulated >= 1, "{message}");
     // Points evaluated twice (by the search, then by the certificate) are written once.
-    assert!(points(&second) <= met + simulated && points(&second) > simulated, "every point once: {said}");
-    assert_eq!(found["reused"].as_u64().map(|reused| 180 - reused as usize <= simulated), Some(true), "{said}");
+    assert!(points(&second) <= met + simulated && points(&second) > simulated, "every point once: {message}");
+    assert_eq!(found["reused"].as_u64().map(|reused| 180 - reused as usize <= simulated), Some(true), "{message}");
     assert!(found["worst_scaled"].as_f64().unwrap() <= best);
 }
 
@@ -179,8 +179,8 @@ fn a_run_that_reuses_its_own_folder_adds_its_points_to_the_database() {
     run("pid-design", &out, &SEARCH);
     let solver = [&SEARCH[..], &["--reuse", out.to_str().unwrap()]].concat();
     let before = points(&out);
-    let said = run("pid-design", &out, &solver);
-    let [known, _, simulated] = counts(&said);
+    let message = run("pid-design", &out, &solver);
+    let [known, _, simulated] = counts(&message);
     assert_eq!((known, points(&out)), (before, before + simulated));
 }
 
@@ -199,19 +199,19 @@ fn evaluations_of_another_study_are_refused_with_the_reason() {
     run("pid-design", &out, &SEARCH);
     let base = [&["run", "pid-design", "--out", place], &SEARCH[..]].concat();
     let with = |more: &[&'static str]| refusal(&[&base[..], more].concat());
-    let said = with(&["--resume", "--seed", "2"]);
-    assert!(said.contains("`seed` was 1 and is 2") && said.contains("--reuse DIR"), "{said}");
-    let said = with(&["--resume", "--set", "criteria.settling.demand=\"9 s\""]);
-    assert!(said.contains("`criteria.settling.demand` was \"15 s\" and is \"9 s\""), "{said}");
-    let said = with(&["--resume", "--set", "solver.genetic.population=50"]);
-    assert!(said.contains("population"), "{said}");
+    let message = with(&["--resume", "--seed", "2"]);
+    assert!(message.contains("`seed` was 1 and is 2") && message.contains("--reuse DIR"), "{message}");
+    let message = with(&["--resume", "--set", "criteria.settling.demand=\"9 s\""]);
+    assert!(message.contains("`criteria.settling.demand` was \"15 s\" and is \"9 s\""), "{message}");
+    let message = with(&["--resume", "--set", "solver.genetic.population=50"]);
+    assert!(message.contains("population"), "{message}");
 
     let reuse = ["run", "pid-design", "--out", place, "--reuse", place, "--set"];
-    let said = refusal(&[&reuse[..], &["cases.nominal.b=-4.5"]].concat());
-    assert!(said.contains("`cases.nominal.b` was") && said.contains("-4.5"), "{said}");
+    let message = refusal(&[&reuse[..], &["cases.nominal.b=-4.5"]].concat());
+    assert!(message.contains("`cases.nominal.b` was") && message.contains("-4.5"), "{message}");
     let nowhere = folder.path().join("nowhere");
-    let said = refusal(&["run", "pid-design", "--out", place, "--reuse", nowhere.to_str().unwrap()]);
-    assert!(said.contains("contains no evaluations.sqlite"), "{said}");
+    let message = refusal(&["run", "pid-design", "--out", place, "--reuse", nowhere.to_str().unwrap()]);
+    assert!(message.contains("contains no evaluations.sqlite"), "{message}");
     std::fs::write(out.join("evaluations.sqlite"), "not a database").unwrap();
     let output = mops(&["run", "pid-design", "--out", place, "--resume"]).output().unwrap();
     assert!(matches!(output.status.code(), Some(2 | 3)), "{output:?}");
@@ -222,10 +222,10 @@ fn a_larger_budget_extends_a_run() {
     let folder = tempfile::tempdir().unwrap();
     let (short, long) = (folder.path().join("short"), folder.path().join("long"));
     run("pid-design", &short, &["--solver", "genetic", "--max-evaluations", "300"]);
-    let said = run("pid-design", &short, &[&SEARCH[..], &["--resume"]].concat());
+    let message = run("pid-design", &short, &[&SEARCH[..], &["--resume"]].concat());
     run("pid-design", &long, &SEARCH);
     // Of the shorter run, the last fifth was spent on local searches.
-    assert!(counts(&said)[1] >= 240, "{said}");
+    assert!(counts(&message)[1] >= 240, "{message}");
     assert_eq!(result(&short), result(&long));
 }
 
@@ -238,7 +238,7 @@ fn a_new_run_keeps_the_points_of_an_unfinished_one() {
         .unwrap()
         .execute("UPDATE runs SET state = 'running', ended = NULL", [])
         .unwrap();
-    let said = run("pid-design", &out, &SEARCH);
-    assert!(said.contains("evaluations of an unfinished run were moved to"), "{said}");
+    let message = run("pid-design", &out, &SEARCH);
+    assert!(message.contains("evaluations of an unfinished run were moved to"), "{message}");
     assert!(out.join("evaluations.previous.sqlite").exists());
 }

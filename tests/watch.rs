@@ -37,11 +37,11 @@ fn watched(out: &Path, more: &[&str]) -> Watched {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let mut said = BufReader::new(process.stderr.take().unwrap());
+    let mut errors = BufReader::new(process.stderr.take().unwrap());
     let mut line = String::new();
-    said.read_line(&mut line).unwrap();
+    errors.read_line(&mut line).unwrap();
     // Further output must be read, so that the run does not block.
-    std::thread::spawn(move || std::io::copy(&mut said, &mut std::io::sink()));
+    std::thread::spawn(move || std::io::copy(&mut errors, &mut std::io::sink()));
     let address = line.trim().rsplit(' ').next().unwrap().to_owned();
     let rest = address.strip_prefix("http://127.0.0.1:").unwrap_or_else(|| panic!("{line}"));
     let (port, token) = rest.trim_end_matches('/').split_once('/').unwrap();
@@ -123,14 +123,14 @@ fn events_count_only_committed_evaluations() {
     let run = watched(&out, &LONG);
     let state = run.first_state();
     assert_eq!((state["study"].as_str(), state["budget"].as_u64()), (Some("pid-design"), Some(100_000)));
-    let told = state["evaluations"].as_i64().unwrap();
-    assert!(told > 0 && !state["curve"].as_array().unwrap().is_empty(), "{state}");
+    let reported = state["evaluations"].as_i64().unwrap();
+    assert!(reported > 0 && !state["curve"].as_array().unwrap().is_empty(), "{state}");
     let criteria: Vec<&str> =
         state["criteria"].as_array().unwrap().iter().map(|criterion| criterion["name"].as_str().unwrap()).collect();
     assert_eq!(criteria, ["overshoot", "settling"]);
     let database = rusqlite::Connection::open(out.join("evaluations.sqlite")).unwrap();
     let written: i64 = database.query_row("SELECT count(*) FROM points", [], |row| row.get(0)).unwrap();
-    assert!(written >= told, "{told} evaluations reported, {written} committed");
+    assert!(written >= reported, "{reported} evaluations reported, {written} committed");
 }
 
 #[test]
@@ -175,8 +175,8 @@ fn idle_and_faulty_viewers_do_not_affect_a_run() {
         // Viewers send nothing or half a request, never read, disconnect at once, or request a wrong address. A
         // finished run accepts no connection.
         let Ok(mut viewer) = TcpStream::connect(("127.0.0.1", run.port)) else { break };
-        let said = ["", &head[..head.len() / 2], &head, &head, &elsewhere, &rebound][i % 6];
-        let _ = viewer.write_all(said.as_bytes());
+        let request = ["", &head[..head.len() / 2], &head, &head, &elsewhere, &rebound][i % 6];
+        let _ = viewer.write_all(request.as_bytes());
         if i % 6 != 3 {
             viewers.push(viewer);
         }
@@ -227,17 +227,17 @@ fn a_browser_shows_values_during_the_run_and_its_end() {
     );
     let seen: Vec<[f64; 2]> = serde_json::from_value(seen).unwrap();
     assert!(seen.windows(2).all(|pair| pair[0][0] < pair[1][0] && pair[0][1] < pair[1][1]), "{seen:?}");
-    let told = page.evaluate(
+    let shown = page.evaluate(
         "({ study: document.querySelector('h1').textContent, page: document.body.textContent, \
             curve: document.querySelectorAll('#curve path.result, #curve path.measured').length, \
             dot: document.querySelectorAll('#curve circle').length })",
     );
-    assert_eq!(told["study"], "pid-design");
-    let text = told["page"].as_str().unwrap();
+    assert_eq!(shown["study"], "pid-design");
+    let text = shown["page"].as_str().unwrap();
     for part in ["of 100000", "Best objective", "overshoot", "settling", "Td"] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    assert!(told["curve"].as_u64().unwrap() > 0 && told["dot"] == 1, "{told}");
+    assert!(shown["curve"].as_u64().unwrap() > 0 && shown["dot"] == 1, "{shown}");
     // Responses of the best point are drawn, and replaced by those of better points.
     let shown = "document.querySelector('#responses .chart .uplot') ? Number(document.querySelector('#responses').dataset.shown) : null";
     assert!(page.once(shown).as_u64().unwrap() > 0);

@@ -126,22 +126,22 @@ impl Page {
         }
         self.to.write_all(format!("{question}\0").as_bytes()).unwrap();
         loop {
-            let mut said = Vec::new();
-            self.from.read_until(0, &mut said).unwrap();
-            assert!(said.pop() == Some(0), "the browser has ended");
-            let said: Value = serde_json::from_slice(&said).unwrap();
-            if said["id"] == self.asked {
-                assert!(said["error"].is_null(), "{method}: {said}");
-                return said["result"].clone();
+            let mut message = Vec::new();
+            self.from.read_until(0, &mut message).unwrap();
+            assert!(message.pop() == Some(0), "the browser has ended");
+            let message: Value = serde_json::from_slice(&message).unwrap();
+            if message["id"] == self.asked {
+                assert!(message["error"].is_null(), "{method}: {message}");
+                return message["result"].clone();
             }
-            let bad = match said["method"].as_str() {
+            let bad = match message["method"].as_str() {
                 Some("Runtime.exceptionThrown") => true,
-                Some("Runtime.consoleAPICalled") => said["params"]["type"] == "error",
-                Some("Log.entryAdded") => said["params"]["entry"]["level"] == "error",
+                Some("Runtime.consoleAPICalled") => message["params"]["type"] == "error",
+                Some("Log.entryAdded") => message["params"]["entry"]["level"] == "error",
                 _ => false,
             };
             if bad {
-                self.problems.push(said["params"].to_string());
+                self.problems.push(message["params"].to_string());
             }
         }
     }

@@ -182,8 +182,8 @@ fn outliers_on_one_side_are_reported_with_what_they_shift() {
         }
         let words = words(&calibration.run(0));
         assert!(words.contains("standard deviations of the noise off the model are above it"), "{words}");
-        let (_, told) = words.split_once("to first order: ").unwrap();
-        assert!((loss == Loss::Huber) == told.contains("`o` = "), "{words}");
+        let (_, message) = words.split_once("to first order: ").unwrap();
+        assert!((loss == Loss::Huber) == message.contains("`o` = "), "{words}");
     }
 }
 

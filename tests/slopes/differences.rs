@@ -10,7 +10,7 @@ pub enum Verdict {
     /// The slope is that of the differences, or of one side of a kink.
     Right,
     /// The slope is another one.
-    Off { told: f64, sides: [f64; 2] },
+    Off { reported: f64, sides: [f64; 2] },
     /// Differences of two step sizes disagree.
     Undecided,
 }
@@ -22,7 +22,7 @@ const TOLERANCE: f64 = 1e-4;
 const AGREE: f64 = 3e-5;
 
 /// Compares a slope with the values `[low, high]` at [`STEPS`] around `here`.
-pub fn judge(told: f64, here: f64, values: &[[f64; 2]; 4]) -> Verdict {
+pub fn judge(reported: f64, here: f64, values: &[[f64; 2]; 4]) -> Verdict {
     let central = |k: usize| (values[k][1] - values[k][0]) / (2.0 * STEPS[k]);
     let one_sided = |k: usize, side: usize| {
         let sign = if side == 0 { -1.0 } else { 1.0 };
@@ -31,22 +31,22 @@ pub fn judge(told: f64, here: f64, values: &[[f64; 2]; 4]) -> Verdict {
     let size = here.abs().max(1e-3);
     let scale = |slope: f64| slope.abs().max(size);
     let agree = |a: f64, b: f64| (a - b).abs() <= AGREE * scale(a.abs().max(b.abs()));
-    let close = |slope: f64| (told - slope).abs() <= TOLERANCE * scale(slope);
+    let close = |slope: f64| (reported - slope).abs() <= TOLERANCE * scale(slope);
     let [fine, coarse] = [central(0), central(2)];
     let sides = [0, 1].map(|side| one_sided(0, side));
     // One-sided differences are less accurate than central ones; a kink exceeds that.
     let is_side = [0, 1].map(|side| (sides[side] - one_sided(2, side)).abs() <= 10.0 * AGREE * scale(sides[side]));
     let is_kink = (sides[0] - sides[1]).abs() > 30.0 * AGREE * scale(sides[0].abs().max(sides[1].abs()));
     if is_kink {
-        let near = |side: usize| (told - sides[side]).abs() <= 10.0 * TOLERANCE * scale(sides[side]);
+        let near = |side: usize| (reported - sides[side]).abs() <= 10.0 * TOLERANCE * scale(sides[side]);
         return match is_side {
             _ if near(0) || near(1) => Verdict::Right,
-            [true, true] => Verdict::Off { told, sides },
+            [true, true] => Verdict::Off { reported, sides },
             _ => Verdict::Undecided,
         };
     }
     if !agree(fine, coarse) {
         return Verdict::Undecided;
     }
-    if close(fine) { Verdict::Right } else { Verdict::Off { told, sides: [fine; 2] } }
+    if close(fine) { Verdict::Right } else { Verdict::Off { reported, sides: [fine; 2] } }
 }

@@ -126,8 +126,8 @@ pub fn nearest<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
         let distance = strsim::damerau_levenshtein(&given, &name);
         // If a name has one letter only, no common letter remains when that one differs.
         let near = distance <= 1 + longer / 4 && distance < longer;
-        let begun = length >= 3 && name.starts_with(&given);
-        (near || begun).then_some(if begun { 0 } else { distance })
+        let started = length >= 3 && name.starts_with(&given);
+        (near || started).then_some(if started { 0 } else { distance })
     };
     let near = known.into_iter().filter_map(|name| Some((distance(name)?, name)));
     near.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)

@@ -170,8 +170,8 @@ impl<R: FnMut(&[f64]) -> Result<Balance, String>> Search<'_, R> {
         for _ in 0..200 {
             let far = distance(&here);
             let largest = x.iter().map(|x| x.abs()).fold(1.0, f64::max);
-            let held = |i: usize| here.rates[i] != 0.0 && reach(&here, i) == 0.0;
-            let stuck = !lenient && (0..here.rates.len()).any(held);
+            let kept = |i: usize| here.rates[i] != 0.0 && reach(&here, i) == 0.0;
+            let stuck = !lenient && (0..here.rates.len()).any(kept);
             let slopes =
                 DMatrix::from_fn(here.rates.len(), moving.len(), |i, j| weights[i] * here.slopes[(i, moving[j])]);
             let wanted = DVector::from_fn(here.rates.len(), |i, _| -weights[i] * here.rates[i]);

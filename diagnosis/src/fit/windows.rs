@@ -76,8 +76,8 @@ fn starts(measurement: &Measurement, model: &dyn Model, at: f64, length: f64) ->
             (None, None, None) if at == 0.0 => return None,
             // A hidden state has moved on from where the record began.
             (None, None, None) => {
-                let begun = interface.parameters[parameter].default.unwrap_or(0.0);
-                (begun, if begun == 0.0 { 1.0 } else { begun.abs() })
+                let started = interface.parameters[parameter].default.unwrap_or(0.0);
+                (started, if started == 0.0 { 1.0 } else { started.abs() })
             }
         };
         // Bounds that the study gives are those of the beginning.

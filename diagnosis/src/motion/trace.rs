@@ -270,8 +270,8 @@ impl<'a> View<'a> {
         while t < 0.0 {
             let value = input.at(t);
             let next = input.next_break(t).min(0.0);
-            let is_held = matches!(input, Input::Sampled { hold: Hold::Zero, .. } | Input::Step { .. });
-            before.extend([at(t, value), at(next, if is_held { value } else { input.at(next) })]);
+            let is_constant = matches!(input, Input::Sampled { hold: Hold::Zero, .. } | Input::Step { .. });
+            before.extend([at(t, value), at(next, if is_constant { value } else { input.at(next) })]);
             t = next;
         }
         before

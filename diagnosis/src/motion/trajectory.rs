@@ -175,10 +175,10 @@ impl Trajectory {
             let mut transition = DMatrix::identity(states, states);
             let mut gain = DMatrix::zeros(states, forces);
             for interval in &self.intervals[pair[0]..pair[1]] {
-                let held = DMatrix::from_fn(states, forces, |a, j| {
+                let fixed = DMatrix::from_fn(states, forces, |a, j| {
                     interval.gains.iter().map(|g| g[(a, self.inputs + j)]).sum::<f64>() * nominal[j]
                 });
-                gain = &interval.transition * gain + held;
+                gain = &interval.transition * gain + fixed;
                 transition = &interval.transition * transition;
             }
             motion.transitions.extend(transition.transpose().iter());

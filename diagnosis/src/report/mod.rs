@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 use mops_core::{Role, effect::Port};
 use mops_math as math;
 use mops_outcome::diagnosis::{
-    Alignment, Change, Dependence, Diagnosis, ForecastOf, Found, HeldBack, LatentInput, Noticeable, Step,
-    StrengthValue, Unexplained, Verdict,
+    Alignment, Change, Dependence, Diagnosis, ForecastOf, Found, HeldOut, LatentInput, Noticeable, Step, StrengthValue,
+    Unexplained, Verdict,
 };
 
 use self::records::Records;
@@ -201,17 +201,17 @@ impl<'a> Findings<'_, 'a> {
             claimed: self.verdict.conclusion == Conclusion::Effect && stated.is_some_and(|stated| stated.is_claimed),
             bic_gain: smaller.map_or(f64::NAN, |smaller| 2.0 * (fitted.log_evidence() - smaller.log_evidence())),
             indistinguishable: self.rivals(fitted, position),
-            held_back: if set.key.len() > 1 { self.held_back(set, smaller) } else { Vec::new() },
+            held_out: if set.key.len() > 1 { self.held_out(set, smaller) } else { Vec::new() },
             place,
         }
     }
 
     /// Returns the errors on held-out records with and without an effect.
-    fn held_back(&self, set: &FittedSet<'a>, smaller: Option<&FittedSet<'a>>) -> Vec<HeldBack> {
+    fn held_out(&self, set: &FittedSet<'a>, smaller: Option<&FittedSet<'a>>) -> Vec<HeldOut> {
         let Some(smaller) = smaller else { return Vec::new() };
         let of = |role| {
             let error = |set: &FittedSet<'a>| Forecasts::error_on(set, role);
-            Some(HeldBack { role, without: error(smaller)?, with: error(set)? })
+            Some(HeldOut { role, without: error(smaller)?, with: error(set)? })
         };
         [Role::Selection, Role::Validation].into_iter().filter_map(of).collect()
     }

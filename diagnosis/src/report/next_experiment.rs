@@ -30,8 +30,8 @@ pub fn separating(a: &FittedSet<'_>, b: &FittedSet<'_>, names: [&str; 2]) -> Opt
             for (input, start, what) in inputs.into_iter().chain([(1.0, factor, "its start values")]) {
                 let Some(then) = difference(a, b, piece, input, start) else { continue };
                 #[allow(clippy::cast_precision_loss)]
-                let is_telling = then * then * samples as f64 >= STRONG;
-                if is_telling && then > WORTH * now && best.as_ref().is_none_or(|(most, ..)| then > *most) {
+                let is_informative = then * then * samples as f64 >= STRONG;
+                if is_informative && then > WORTH * now && best.as_ref().is_none_or(|(most, ..)| then > *most) {
                     best = Some((then, now, format!("`{name}` again with {what} {factor} times as large")));
                 }
             }

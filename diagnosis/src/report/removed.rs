@@ -24,7 +24,7 @@ fn place(sets: &FittedSets<'_, '_>, declared: &FittedSet<'_>, term: usize) -> Op
     let own: Vec<f64> = fit.slopes(point)?.iter().flat_map(|piece| piece.j[term].iter().copied()).collect();
     let along = |piece| Trajectory::new(fit, model, piece, point).ok();
     let trajectories: Vec<Trajectory> = (0..fit.pieces.len()).map(along).collect::<Option<_>>()?;
-    let likeness = |candidate: &Candidate| {
+    let cosine = |candidate: &Candidate| {
         let sizes = sizes(&candidate.port, model, &fit.pieces, &trajectories, fit.subject.settings.coverage)?;
         let strengths = sizes.combinations(candidate.effect.as_ref()).into_iter().next()?;
         let mut trace = Vec::with_capacity(own.len());
@@ -32,11 +32,11 @@ fn place(sets: &FittedSets<'_, '_>, declared: &FittedSet<'_>, term: usize) -> Op
             trace.extend(View::new(candidate, model, piece, along)?.trace(&strengths)?);
         }
         let size = dot(&own, &own) * dot(&trace, &trace);
-        Some((dot(&own, &trace).abs() / size.sqrt(), candidate.place())).filter(|(likeness, _)| likeness.is_finite())
+        Some((dot(&own, &trace).abs() / size.sqrt(), candidate.place())).filter(|(cosine, _)| cosine.is_finite())
     };
     // One parameter, in proportion to which it acts: what a declared term is.
     let is_plain = |c: &&Candidate| c.effect.parameters().len() == 1 && c.only.is_none();
-    let all = sets.refit.candidates.iter().filter(is_plain).filter_map(likeness);
+    let all = sets.refit.candidates.iter().filter(is_plain).filter_map(cosine);
     let best = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (best.0 > SAME_PLACE).then_some(best.1)
 }

@@ -54,13 +54,13 @@ pub fn baseline(subject: &Subject, simulations: &Meter<'_>) -> Option<Start> {
     let first = |tuners: &Vec<f64>| fit(shortest.clone(), tuners, pieces::first_locals(&shortest), ROUND_ITERATIONS);
     let mut starts = vec![subject.start()];
     starts.extend(spread(subject));
-    let mut begun: Vec<Fitted> = starts.par_iter().filter_map(first).collect();
-    begun.sort_by(|a, b| a.sum.total_cmp(&b.sum));
-    begun.dedup_by(|later, earlier| later.sum <= (1.0 + SAME_OPTIMUM) * earlier.sum);
-    begun.truncate(ROOTS);
-    let to_the_end = |begun: &Fitted| {
-        let mut tuners = begun.tuners.clone();
-        let mut starts = begin_of_records(&whole, &shortest, &begun.locals);
+    let mut started: Vec<Fitted> = starts.par_iter().filter_map(first).collect();
+    started.sort_by(|a, b| a.sum.total_cmp(&b.sum));
+    started.dedup_by(|later, earlier| later.sum <= (1.0 + SAME_OPTIMUM) * earlier.sum);
+    started.truncate(ROOTS);
+    let to_the_end = |started: &Fitted| {
+        let mut tuners = started.tuners.clone();
+        let mut starts = begin_of_records(&whole, &shortest, &started.locals);
         for count in std::iter::successors(Some(WINDOWS / 2), |count| Some(count / 2)).take_while(|c| *c > 1) {
             let windows = in_windows(count);
             let locals = pieces::first_locals(&windows);
@@ -70,7 +70,7 @@ pub fn baseline(subject: &Subject, simulations: &Meter<'_>) -> Option<Start> {
         }
         fit(whole.clone(), &tuners, starts, ITERATIONS)
     };
-    let mut ended: Vec<Fitted> = begun.par_iter().filter_map(to_the_end).collect();
+    let mut ended: Vec<Fitted> = started.par_iter().filter_map(to_the_end).collect();
     // Windows help a poor start; a good one may need none.
     ended.extend(fit(whole.clone(), &subject.start(), pieces::first_locals(&whole), ITERATIONS));
     let best = ended.into_iter().min_by(|a, b| a.sum.total_cmp(&b.sum))?;

@@ -284,8 +284,8 @@ impl<'s> Screening<'s> {
             let mut white: Vec<Vec<f64>> = traces.iter().map(|(_, trace)| trace.clone()).collect();
             projection.errors.whiten(&self.set.fit.pieces[index], &self.channels, index, &mut white);
             let r = &projection.residuals[self.begins[index]..self.begins[index + 1]];
-            let likeness = |t: &[f64]| -dot(t, r) / dot(t, t).sqrt().max(f64::MIN_POSITIVE);
-            let best = (0..white.len()).max_by(|&a, &b| likeness(&white[a]).total_cmp(&likeness(&white[b])))?;
+            let similarity = |t: &[f64]| -dot(t, r) / dot(t, t).sqrt().max(f64::MIN_POSITIVE);
+            let best = (0..white.len()).max_by(|&a, &b| similarity(&white[a]).total_cmp(&similarity(&white[b])))?;
             strengths.push(traces[best].0);
             total.extend_from_slice(&white[best]);
         }

@@ -45,8 +45,8 @@ fn recorded(force: fn(x: f64, v: f64) -> f64, correlated: f64, roles: &[Role], s
         };
         #[allow(clippy::cast_precision_loss)]
         let times: Vec<f64> = (0..COUNT).map(|k| k as f64 * STEP).collect();
-        let held = |t: f64| drive((t / STEP).floor() * STEP);
-        let rates = |t: f64, s: &[f64; 2]| [s[1], held(t) - 0.3 * s[1] - 4.0 * s[0] + force(s[0], s[1])];
+        let fixed = |t: f64| drive((t / STEP).floor() * STEP);
+        let rates = |t: f64, s: &[f64; 2]| [s[1], fixed(t) - 0.3 * s[1] - 4.0 * s[0] + force(s[0], s[1])];
         let states = integrated(rates, [0.5, 0.0], STEP, COUNT);
         let label = format!("selection {number}");
         let (fast, slow) = (white(&label, NOISE, COUNT), white(&format!("{label} slow"), 1.0, COUNT));
@@ -187,7 +187,7 @@ fn given_effects_are_in_every_set_and_the_search_adds_others() {
 }
 
 #[test]
-fn effects_that_the_records_cannot_tell_apart_are_one_claim() {
+fn effects_that_the_records_cannot_distinguish_are_one_claim() {
     // A position about which the spring pulls can be anywhere: a constant force is a bias of the sensor.
     let subject = recorded(|_, _| 0.6, 0.0, &BOTH, &[0.2, 5.0, 0.4, 0.1]);
     let tried = catalogue(&["constant-force", "sensor-bias", "input-bias", "quadratic-drag"]);

@@ -12,7 +12,7 @@ der        = { x = "-a*x" }
 "#;
 
 #[test]
-fn a_declared_parameter_that_its_bound_stops_is_told() {
+fn a_declared_parameter_that_its_bound_stops_is_reported() {
     let states = integrated(|_, x: &[f64; 2]| [-0.5 * x[0], 0.0], [2.0, 0.0], 0.05, 100);
     let subject = subject(DECAY, &[0.35, 2.0], 1, vec![Record::of_first("x", &states, 0.05, 0.01, "decay")]);
     let notes = |largest: f64| {

@@ -66,10 +66,10 @@ fn where_noise_is_correlated_the_simpler_of_two_effects_is_found() {
         let record = Record { inputs: Vec::new(), times, signals: vec![("th", values, NOISE)] };
         let subject = subject(PENDULUM, &[17.0, 0.2, 1.2, 0.0], 2, vec![record]);
         let options = Options { max_effects: 1, level: 0.01, ..Options::default() };
-        let told = diagnose(&study(&subject), &some, &options, &()).expect("it simulates");
-        let names: Vec<_> = told.found.iter().map(|f| f.effect.as_str()).collect();
+        let diagnosis = diagnose(&study(&subject), &some, &options, &()).expect("it simulates");
+        let names: Vec<_> = diagnosis.found.iter().map(|f| f.effect.as_str()).collect();
         assert_eq!(names, ["coulomb-friction"], "{label}");
         // Of effects within one nat, two in the BIC, the simplest is named.
-        assert!(told.found[0].indistinguishable.iter().all(|rival| rival.bic_behind > -2.0), "{label}");
+        assert!(diagnosis.found[0].indistinguishable.iter().all(|rival| rival.bic_behind > -2.0), "{label}");
     }
 }

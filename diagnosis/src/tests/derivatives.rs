@@ -79,7 +79,7 @@ fn by_outputs(record: Record) -> String {
 }
 
 #[test]
-fn outputs_tell_the_effect_where_differences_drown_it() {
+fn outputs_show_the_effect_where_differences_drown_it() {
     let (mut differences, mut outputs) = (0, 0);
     for run in 0..RUNS {
         let record = record(run);

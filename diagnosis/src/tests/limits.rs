@@ -23,7 +23,7 @@ fn found(k: f64, names: &[&str]) -> Diagnosis {
 }
 
 #[test]
-fn a_gain_that_may_be_is_told() {
+fn a_gain_that_may_be_is_found() {
     let made = found(0.4, &["sensor-gain"]);
     assert_eq!(made.verdict, Verdict::Effect, "{made:?}");
     let gain = &made.found[0].strengths[0];
@@ -31,8 +31,8 @@ fn a_gain_that_may_be_is_told() {
 }
 
 #[test]
-fn a_gain_that_cannot_be_is_not_told() {
-    let untold = found(0.2, &["sensor-gain"]);
-    assert_eq!(untold.verdict, Verdict::Unexplained);
-    assert!(untold.found.is_empty(), "{:?}", untold.found);
+fn a_gain_that_cannot_be_is_not_found() {
+    let made = found(0.2, &["sensor-gain"]);
+    assert_eq!(made.verdict, Verdict::Unexplained);
+    assert!(made.found.is_empty(), "{:?}", made.found);
 }

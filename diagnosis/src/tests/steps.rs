@@ -29,8 +29,8 @@ fn stairs(value: f64, size: f64) -> f64 {
 /// What a search finds first, its strength and what it leaves, where input and measurement come in steps of these
 /// sizes.
 fn found(input: f64, measurement: f64) -> (String, f64, f64) {
-    let held = |t: f64| command((t / STEP).floor() * STEP);
-    let rates = |t: f64, x: &[f64; 1]| [1.3 * stairs(held(t), input) - 0.9 * x[0]];
+    let fixed = |t: f64| command((t / STEP).floor() * STEP);
+    let rates = |t: f64, x: &[f64; 1]| [1.3 * stairs(fixed(t), input) - 0.9 * x[0]];
     let states = integrated(rates, [0.5], STEP, COUNT);
     let times: Vec<f64> = (0..COUNT).map(|k| k as f64 * STEP).collect();
     let noise = white("steps", NOISE, COUNT);

@@ -179,10 +179,10 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
 
     /// Updates the list of fixed states from the phases of all events.
     fn hold_states(&mut self) {
-        self.held.clear();
+        self.fixed.clear();
         for (happening, phase) in self.model.happenings.iter().zip(&self.phases) {
             if matches!(phase, Phase::AtRest(_)) {
-                self.held.extend(&happening.at_rest.0);
+                self.fixed.extend(&happening.at_rest.0);
             }
         }
     }
@@ -192,7 +192,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
     /// speed is fixed, too.
     fn lift(&self, k: usize, at: &Instant<'_, S>) -> Vec<(usize, f64)> {
         let model = self.model;
-        let (held, n) = (&model.happenings[k].at_rest.0, at.x.len());
+        let (fixed, n) = (&model.happenings[k].at_rest.0, at.x.len());
         let still = |_: usize| 0.0;
         let mut free = at.x.to_vec();
         self.free_rates(at, &mut free);
@@ -205,8 +205,8 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
                 bank.get(guard.results[0]).tangent[0]
             })
             .collect();
-        if held.iter().any(|&state| gradient[state] * free[state].value() != 0.0) {
-            return held.iter().map(|&state| (state, gradient[state])).collect();
+        if fixed.iter().any(|&state| gradient[state] * free[state].value() != 0.0) {
+            return fixed.iter().map(|&state| (state, gradient[state])).collect();
         }
         let mut second = |state: usize| {
             self.load_dual(&mut bank, at, |i| f64::from(u8::from(i == state)), (0.0, &still));
@@ -214,7 +214,7 @@ impl<S: Scalar, B: Bank<S>> Running<'_, S, B> {
             let rate = |i: usize| bank.get(model.derivative.results[i]).tangent[0];
             (0..n).map(|i| if gradient[i] == 0.0 { 0.0 } else { gradient[i] * rate(i) }).sum()
         };
-        held.iter().map(|&state| (state, second(state))).collect()
+        fixed.iter().map(|&state| (state, second(state))).collect()
     }
 
     /// Returns the first and second time derivatives of all states, with no state fixed.

@@ -44,7 +44,7 @@ pub struct Running<'a, S, B> {
     /// Progress of the clocks.
     pub(super) ticking: Vec<Ticking<S>>,
     /// States fixed by events at rest.
-    pub(super) held: Vec<usize>,
+    pub(super) fixed: Vec<usize>,
     /// Largest absolute values of the states, at the start and at events.
     pub(super) sizes: Vec<f64>,
     /// Registers with bounds, created on first use.
@@ -94,7 +94,7 @@ impl<'a, S: Scalar, B: Bank<S>> Running<'a, S, B> {
             phases: vec![Phase::Armed(0.0); model.happenings.len()],
             delays,
             ticking: vec![Ticking::new(); model.clocks.len()],
-            held: Vec::new(),
+            fixed: Vec::new(),
             sizes: vec![0.0; model.states],
             bounds: RefCell::new(Vec::new()),
         }
@@ -292,7 +292,7 @@ impl<S: Scalar, B: Bank<S>> Plant<S> for Running<'_, S, B> {
 
     fn rates(&self, at: &Instant<'_, S>, dx: &mut [S]) {
         self.free_rates(at, dx);
-        for &state in &self.held {
+        for &state in &self.fixed {
             dx[state] = S::from(0.0);
         }
     }
@@ -582,7 +582,7 @@ impl<S: Scalar, B: Bank<S>> Jacobian<S> for Running<'_, S, B> {
             model.derivative.run(bank);
             for (direction, group) in groups.iter().enumerate() {
                 for (column, rows) in group {
-                    for &row in rows.iter().filter(|row| !self.held.contains(row)) {
+                    for &row in rows.iter().filter(|row| !self.fixed.contains(row)) {
                         entry(row, *column, bank.get(model.derivative.results[row]).tangent[direction]);
                     }
                 }

@@ -426,8 +426,8 @@ fn solve(
             if let Some(contact) = contact {
                 let direction = graph.add_op(Op::Mode(contact.direction));
                 let stuck = graph.add_op(Op::Mode(contact.stuck));
-                let held = graph.mul(contact.coulomb, direction);
-                let sliding = graph.sub(right[i], held);
+                let kept = graph.mul(contact.coulomb, direction);
+                let sliding = graph.sub(right[i], kept);
                 right[i] = graph.choose(stuck, zero, sliding);
                 for j in 0..n {
                     let unit = graph.number(if i == j { 1.0 } else { 0.0 });

@@ -90,7 +90,7 @@ impl Curve<'_> {
 
 impl<S: Scalar> Drive<'_, S> {
     /// Creates a drive with a constant value.
-    pub fn held(value: S) -> Self {
+    pub fn fixed(value: S) -> Self {
         Self { input: None, since: 0.0, value, slope: 0.0, after: 0, change: 0, curve: None }
     }
 }
@@ -98,12 +98,12 @@ impl<S: Scalar> Drive<'_, S> {
 impl<'a, S: Scalar> Drive<'a, S> {
     /// Creates a drive at time 0; without an `input` it is zero.
     pub fn new(input: Option<&'a Input>) -> Self {
-        input.map_or_else(|| Self::held(S::from(0.0)), |input| Self::from(input, 0.0))
+        input.map_or_else(|| Self::fixed(S::from(0.0)), |input| Self::from(input, 0.0))
     }
 
     /// Creates a drive with the value that is valid from `t` on.
     fn from(input: &'a Input, t: f64) -> Self {
-        let mut drive = Self { input: Some(input), ..Self::held(S::from(0.0)) };
+        let mut drive = Self { input: Some(input), ..Self::fixed(S::from(0.0)) };
         drive.pass_break(t);
         drive
     }

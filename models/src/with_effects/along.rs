@@ -355,11 +355,11 @@ impl Linear<'_, '_> {
         let [x, u, w] = [&look.x, &look.u, &look.w].map(|values| constant(values));
         let here = Instant { t: look.t + self.begins, x: &x, u: &u, w: &w };
         self.tangent.take(&look.contacts, &look.effects);
-        let held = self.tangent.holding(&fixed(&here));
+        let kept = self.tangent.holding(&fixed(&here));
         if let Some(memory) = self.tangent.memory_mut() {
             memory.hold(&constant(&look.delayed));
         }
-        let held_rates = (!held.is_empty()).then(|| self.tangent.look(&here, &[]).0);
+        let fixed_rates = (!kept.is_empty()).then(|| self.tangent.look(&here, &[]).0);
         self.tangent.take(&look.contacts.sliding(), &look.effects);
         let (mut slopes, values) = self.slopes(look, |plant, at| {
             let (mut all, outputs) = plant.look(at, signals);
@@ -369,10 +369,10 @@ impl Linear<'_, '_> {
         });
         let (rates, outputs) = values.split_at(n);
         let mut rates = rates.to_vec();
-        if let Some(held_rates) = held_rates {
-            rates.iter_mut().zip(&held_rates).for_each(|(r, d)| *r = d.value());
+        if let Some(fixed_rates) = fixed_rates {
+            rates.iter_mut().zip(&fixed_rates).for_each(|(r, d)| *r = d.value());
         }
-        for (w, velocity, most) in held {
+        for (w, velocity, most) in kept {
             let slope = most / (CREEP * speeds[velocity]);
             if slope.is_finite() {
                 let forward = self.tangent.forward(w);

@@ -91,11 +91,11 @@ impl<S: PlantScalar> Affected<'_, S> {
         // Joints that the plant itself keeps stuck need no force, and do not move.
         let moves: Vec<usize> = (0..n).filter(|&k| columns[k][k].value() != 0.0).collect();
         let pick = |list: &[S]| moves.iter().map(|&k| list[k]).collect::<Vec<S>>();
-        let held = solve(&moves.iter().map(|&k| pick(&columns[k])).collect::<Vec<_>>(), &pick(&free));
+        let fixed = solve(&moves.iter().map(|&k| pick(&columns[k])).collect::<Vec<_>>(), &pick(&free));
         let mut forces = vec![S::from(0.0); joints.len()];
-        for (&k, &held) in moves.iter().zip(&held) {
-            forces[stuck[k]] = held;
-            w[joints[stuck[k]].w] += held;
+        for (&k, &fixed) in moves.iter().zip(&fixed) {
+            forces[stuck[k]] = fixed;
+            w[joints[stuck[k]].w] += fixed;
         }
         self.moved(here, u, w, dx);
         for &j in &stuck {
@@ -124,11 +124,11 @@ impl<S: PlantScalar> Affected<'_, S> {
         if joint.contact != Contact::Stuck {
             return here.at.x[joint.velocity] * joint.contact.sign();
         }
-        self.balanced_with(here, |u, _, held| {
-            let held = held[index] * self.forward(joint.w);
+        self.balanced_with(here, |u, _, fixed| {
+            let fixed = fixed[index] * self.forward(joint.w);
             // A backward friction force is limited by the friction against forward motion.
             let friction = self.friction(joint, here, u);
-            friction.limit[usize::from(held.value() > 0.0)] - held.abs()
+            friction.limit[usize::from(fixed.value() > 0.0)] - fixed.abs()
         })
     }
 
@@ -147,8 +147,8 @@ impl<S: PlantScalar> Affected<'_, S> {
         let Joint { w: force, velocity, contact, .. } = self.contacts.joints[index];
         if contact == Contact::Stuck {
             let (mut u, mut w, mut dx) = (Vec::new(), Vec::new(), vec![S::from(0.0); self.own]);
-            let held = self.balance(event, &mut u, &mut w, &mut dx)[index].value() * self.forward(force);
-            self.contacts.joints[index].contact = if held < 0.0 { Contact::Forward } else { Contact::Backward };
+            let fixed = self.balance(event, &mut u, &mut w, &mut dx)[index].value() * self.forward(force);
+            self.contacts.joints[index].contact = if fixed < 0.0 { Contact::Forward } else { Contact::Backward };
             self.settle_contacts(event, Some(index));
         } else {
             x[velocity] = S::from(0.0);
@@ -186,7 +186,7 @@ impl<S: PlantScalar> Affected<'_, S> {
                 self.contacts.joints[i].contact = CHOICES[digits % 3];
                 digits /= 3;
             }
-            let held = self.balance(here, &mut u, &mut w, &mut dx);
+            let fixed = self.balance(here, &mut u, &mut w, &mut dx);
             let mut excess: f64 = 0.0;
             let mut departures = 0.0;
             for &i in &resting {
@@ -194,10 +194,10 @@ impl<S: PlantScalar> Affected<'_, S> {
                 departures += f64::from(u8::from(joint.contact != before[i]));
                 if joint.contact == Contact::Stuck {
                     let friction = self.friction(joint, here, &u);
-                    let held = held[i].value() * self.forward(joint.w);
-                    let limit = friction.limit[usize::from(held > 0.0)].value();
+                    let fixed = fixed[i].value() * self.forward(joint.w);
+                    let limit = friction.limit[usize::from(fixed > 0.0)].value();
                     let never = limit == 0.0 || released == Some(i);
-                    excess = if never { f64::INFINITY } else { excess.max((held.abs() - limit) / limit) };
+                    excess = if never { f64::INFINITY } else { excess.max((fixed.abs() - limit) / limit) };
                 } else {
                     // Any acceleration against the direction of sliding is inconsistent.
                     let a = dx[joint.velocity].value() * joint.contact.sign();
@@ -229,12 +229,12 @@ pub(super) fn solve<S: Scalar>(columns: &[Vec<S>], free: &[S]) -> Vec<S> {
     let right = DVector::from_fn(n, |i, _| -free[i].value());
     let Some(values) = lu.solve(&right) else { return vec![S::from(f64::NAN); n] };
     let residual: Vec<S> = (0..n).map(|i| (0..n).fold(free[i], |sum, j| sum + columns[j][i] * values[j])).collect();
-    let mut held: Vec<S> = values.iter().map(|&v| S::from(v)).collect();
+    let mut fixed: Vec<S> = values.iter().map(|&v| S::from(v)).collect();
     for direction in 0..S::DIRECTIONS {
         let right = DVector::from_fn(n, |i, _| -residual[i].tangents()[direction]);
         if let Some(tangent) = lu.solve(&right) {
-            held.iter_mut().zip(tangent.iter()).for_each(|(h, &t)| h.set_tangent(direction, t));
+            fixed.iter_mut().zip(tangent.iter()).for_each(|(h, &t)| h.set_tangent(direction, t));
         }
     }
-    held
+    fixed
 }

@@ -51,7 +51,7 @@ impl<S: PlantScalar> PlacedEffect<S> {
     }
 
     /// Returns true if the effect has a hysteresis state that is known.
-    fn has_begun(&self) -> bool {
+    fn has_started(&self) -> bool {
         self.hysteresis.first().is_some_and(|first| !first.value().is_nan())
     }
 
@@ -179,7 +179,7 @@ impl<S: PlantScalar> Affected<'_, S> {
             if (effect.is_at_actuator() || effect.is_at_sensor()) && effect.closed.is_some() && settles(effect) {
                 self.settle_gap(index, here);
             }
-            if self.effects[index].has_begun() {
+            if self.effects[index].has_started() {
                 self.update_hysteresis_of(index, here);
             }
         }
@@ -237,7 +237,7 @@ impl<S: PlantScalar> Affected<'_, S> {
     /// Updates the hysteresis states of some effects, in their order.
     pub(super) fn update_hysteresis(&mut self, here: &EventInstant<'_, S>, which: impl Fn(&PlacedEffect<S>) -> bool) {
         for index in 0..self.effects.len() {
-            if which(&self.effects[index]) && self.effects[index].has_begun() {
+            if which(&self.effects[index]) && self.effects[index].has_started() {
                 self.update_hysteresis_of(index, here);
             }
         }

@@ -298,8 +298,8 @@ impl<'a, S: PlantScalar> Affected<'a, S> {
         let mut scratch = self.scratch.take();
         let Scratch { u, w, dx } = &mut scratch;
         dx.resize(self.own, S::from(0.0));
-        let held = self.balance(here, u, w, dx);
-        let found = of(u, w, held);
+        let kept = self.balance(here, u, w, dx);
+        let found = of(u, w, kept);
         self.scratch.replace(scratch);
         found
     }

@@ -412,11 +412,11 @@ impl Linearised {
             "no equilibrium found: at the end of the search `{name}` still changes by {rate:.3e} {unit}, most of all states"
         );
         let free = self.free.as_deref().unwrap_or_default();
-        let held = |from: usize, names: &[Variable]| -> Vec<String> {
+        let fixed = |from: usize, names: &[Variable]| -> Vec<String> {
             names.iter().enumerate().filter(|(i, _)| !free[from + i]).map(|(_, v)| format!("`{}`", v.name)).collect()
         };
-        let inputs = held(self.states.len(), &self.model.interface().inputs);
-        let states = held(0, &self.states);
+        let inputs = fixed(self.states.len(), &self.model.interface().inputs);
+        let states = fixed(0, &self.states);
         match (inputs.as_slice(), states.as_slice()) {
             ([], []) => {}
             ([], states) => text += &format!("; the state {} is fixed", states.join(", ")),
@@ -582,8 +582,8 @@ mod tests {
         let trim = Linearise { at: at.clone(), equilibrium: true, free: vec!["u".into()], ..Linearise::default() };
         let resting = Linearised::new(pendulum(), &trim).unwrap().at(&Case::default(), &[9.0, 0.0]).unwrap();
         assert!((resting.inputs[0] - 9.0 * math::sin(0.4)).abs() < 1e-12 && resting.states[0] == 0.4);
-        let held = Linearise { at, equilibrium: true, ..Linearise::default() };
-        let failure = Linearised::new(pendulum(), &held).unwrap().at(&Case::default(), &[9.0, 0.0]).unwrap_err();
+        let fixed = Linearise { at, equilibrium: true, ..Linearise::default() };
+        let failure = Linearised::new(pendulum(), &fixed).unwrap().at(&Case::default(), &[9.0, 0.0]).unwrap_err();
         assert!(matches!(&failure, Failure::Undefined(why) if why.contains("no equilibrium")), "{failure}");
         // Newton's method stops at zero speed, with the gravity torque unbalanced.
         assert!(failure.to_string().contains("`speed` still changes by 3.505e0"), "{failure}");

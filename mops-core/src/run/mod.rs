@@ -207,7 +207,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
             return self.watch.halt().into();
         }
         self.keep(key(self.problem, start), first);
-        self.tell();
+        self.notify();
         let mut iterate = || -> Result<Stop, Halt> {
             solver.begin(self, start)?;
             let mut last_gain = (0, Merit::FAILED);
@@ -335,7 +335,7 @@ impl<'a, E: Evaluator> Run<'a, E> {
     }
 
     /// Notifies the observer of the progress.
-    fn tell(&mut self) {
+    fn notify(&mut self) {
         self.watch.evaluated(&self.state());
         if let Some(best) = self.best.as_ref().filter(|_| std::mem::take(&mut self.improved)) {
             self.watch.improved(best);
@@ -479,7 +479,7 @@ impl<E: Evaluator> Oracle for Run<'_, E> {
                 }
                 self.keep(keys[i].clone(), answer);
             }
-            self.tell();
+            self.notify();
             if cut_off.is_some() {
                 return Err(self.watch.halt());
             }

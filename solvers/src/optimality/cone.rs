@@ -138,8 +138,8 @@ impl DescentCone {
             let direction = steepest_step(&cone, point, (groups, CURVATURE / size as f64), goes_on)?;
             at = direction.step[..n].to_vec();
             let change = self.change(&at);
-            let told: f64 = direction.step[n..].iter().sum::<f64>() * size as f64;
-            if size > 1 && change - told > GAP * (IMPROVEMENT + change.abs()) {
+            let expected: f64 = direction.step[n..].iter().sum::<f64>() * size as f64;
+            if size > 1 && change - expected > GAP * (IMPROVEMENT + change.abs()) {
                 continue;
             }
             return Some((at, self.weights(&direction.multipliers.inequalities, alone, (&planes, size))));

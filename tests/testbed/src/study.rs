@@ -54,12 +54,12 @@ pub fn text(plant: &Plant, declared: &Declared<'_>) -> String {
     for (experiment, role) in declared.experiments {
         line(format!("\n[experiments.{experiment}]\nfile     = \"{experiment}.csv\"\ntime     = \"t\""));
         if !plant.inputs.is_empty() {
-            let held: Vec<String> = plant
+            let fixed: Vec<String> = plant
                 .inputs
                 .iter()
                 .map(|(name, _)| format!("{name} = {{ column = \"{name}\", hold = \"zero\" }}"))
                 .collect();
-            line(format!("inputs   = {{ {} }}", held.join(", ")));
+            line(format!("inputs   = {{ {} }}", fixed.join(", ")));
         }
         let channels: Vec<String> = plant
             .outputs

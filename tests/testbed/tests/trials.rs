@@ -124,8 +124,8 @@ fn guesses_are_20_to_60_percent_off_and_the_truth_is_within_the_bounds() {
 #[test]
 fn two_effects_are_both_reported_and_distinguishable() {
     let trial = first("axis", Missing::Effects(&["coulomb-friction", "input-delay"]), 5.0);
-    let told: Vec<&str> = trial.truth.effects.iter().map(|effect| effect.class.as_str()).collect();
-    assert_eq!(told, ["coulomb-friction", "input-delay"]);
+    let classes: Vec<&str> = trial.truth.effects.iter().map(|effect| effect.class.as_str()).collect();
+    assert_eq!(classes, ["coulomb-friction", "input-delay"]);
     // A constant force and an input bias are indistinguishable: such a trial does not exist.
     let alike = Missing::Effects(&["constant-force", "input-bias"]);
     assert!((1..6).all(|seed| generate("axis", alike, 5.0, seed).is_none()));

@@ -477,7 +477,7 @@ mod tests {
     }
 
     #[test]
-    fn the_unit_in_which_a_quantity_is_declared_tells_what_its_other_units_count() {
+    fn the_unit_in_which_a_quantity_is_declared_decides_what_its_other_units_count() {
         let shown = |unit: &str, own: &str| Unit::known(unit).of_quantity_in(&Unit::known(own));
         let read = |text: &str, unit: &str, own: &str| Quantity::parse(text).unwrap().to(&shown(unit, own));
         for (text, unit, own, value) in [

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 use crate::Finding;
 
 use super::{
-    Alignment, Dependence, Diagnosis, ExperimentError, ForecastOf, Found, HeldBack, Noticeable, ParameterMove, Ranked,
+    Alignment, Dependence, Diagnosis, ExperimentError, ForecastOf, Found, HeldOut, Noticeable, ParameterMove, Ranked,
     Removed, Rival, Rule, Step, StrengthValue, Unexplained, Verdict,
 };
 
@@ -121,7 +121,7 @@ struct FoundEffect {
     /// Errors on held-out data with and without the effect, initial states fitted. Empty for a single effect, whose
     /// errors before and after show the same, and if the model without the effect cannot be simulated over whole
     /// records.
-    held_back: Vec<HeldBack>,
+    held_out: Vec<HeldOut>,
     /// Second place, as `kind:name`, of an effect that needs one.
     #[serde(skip_serializing_if = "Option::is_none")]
     companion: Option<String>,
@@ -280,7 +280,7 @@ impl FoundEffect {
             given: found.given,
             bic_gain: found.bic_gain,
             indistinguishable: found.indistinguishable.clone(),
-            held_back: found.held_back.clone(),
+            held_out: found.held_out.clone(),
             companion: found.companion.clone(),
             experiment: found.only.clone(),
         }

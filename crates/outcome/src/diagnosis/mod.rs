@@ -93,7 +93,7 @@ pub struct Found {
     /// Errors on held-out data with and without the effect, initial states fitted. Empty for a single effect, whose
     /// errors before and after show the same, and if the model without the effect cannot be simulated over whole
     /// records.
-    pub held_back: Vec<HeldBack>,
+    pub held_out: Vec<HeldOut>,
 }
 
 impl Found {
@@ -128,7 +128,7 @@ pub fn both_places(place: &str, companion: Option<&str>) -> String {
 
 /// Error on held-out data with and without an effect, all other parameters fitted to calibration data.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct HeldBack {
+pub struct HeldOut {
     /// Role of the data: selection or validation.
     pub role: Role,
     /// Error without the effect, in units of the noise.

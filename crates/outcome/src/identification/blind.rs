@@ -73,8 +73,8 @@ pub(super) fn directions(
             let changes: Vec<(usize, f64)> = members.iter().map(|&k| (k, first * shares[k] / most)).collect();
             let words = words(&changes, coordinates);
             // Text outside the names, which are between backticks.
-            let said: String = words.split('`').step_by(2).collect();
-            let multiplied = ["ratio", "product", "^", "factor"].iter().any(|sign| said.contains(sign));
+            let message: String = words.split('`').step_by(2).collect();
+            let multiplied = ["ratio", "product", "^", "factor"].iter().any(|sign| message.contains(sign));
             let sum = match changes.as_slice() {
                 [a, b] if multiplied => Some(sum(*a, *b, coordinates)),
                 _ => None,

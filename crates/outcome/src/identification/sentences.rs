@@ -220,12 +220,12 @@ fn pairs(local: &Local, tuners: &[TunerSensitivity]) -> Vec<String> {
             let mut slopes = vec![0.0; n];
             slopes[most] = 1.0;
             slopes[least] = -found.inverse[(most, least)] / found.inverse[(least, least)];
-            let held = tuners[most].relative_error * covariance.spread(&slopes).deviation / error(most);
+            let fixed = tuners[most].relative_error * covariance.spread(&slopes).deviation / error(most);
             text += &format!(
                 " With `{}` fixed, the standard error of `{}` would be {} instead of {}.",
                 tuners[least].name,
                 tuners[most].name,
-                percent(held),
+                percent(fixed),
                 percent(tuners[most].relative_error)
             );
         }

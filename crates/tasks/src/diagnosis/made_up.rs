@@ -141,7 +141,7 @@ pub fn coulomb() -> Diagnosis {
         given: false,
         bic_gain: 2400.0,
         indistinguishable: vec![rival("stribeck-friction", 0.7), rival("quadratic-drag", 4.1)],
-        held_back: Vec::new(),
+        held_out: Vec::new(),
     }];
     made.removed = Vec::new();
     made.steps =

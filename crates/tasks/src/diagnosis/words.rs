@@ -2,7 +2,7 @@
 
 use mops_core::Role;
 use mops_outcome::diagnosis::{
-    Alignment, Dependence, Diagnosis, Found, HeldBack, Removed, Rival, Rule, StrengthValue, Verdict, together,
+    Alignment, Dependence, Diagnosis, Found, HeldOut, Removed, Rival, Rule, StrengthValue, Verdict, together,
 };
 
 use mops_content::numbers::significant;
@@ -268,8 +268,8 @@ pub fn remarks(found: &Found) -> Vec<String> {
 fn held_out_errors(found: &Found) -> Vec<String> {
     let effect = format!("`{}` {}", found.effect, at(&found.places()));
     let errors = |is: fn(f64, f64) -> bool| {
-        let of_sign = found.held_back.iter().filter(|h| times(h.with) != times(h.without) && is(h.with, h.without));
-        let error = |(k, h): (usize, &HeldBack)| {
+        let of_sign = found.held_out.iter().filter(|h| times(h.with) != times(h.without) && is(h.with, h.without));
+        let error = |(k, h): (usize, &HeldOut)| {
             let unit = if k == 0 { " times the noise level" } else { "" };
             let selected = if h.role == Role::Selection { " (used to select the effects)" } else { "" };
             format!("{} instead of {}{unit} on {} data{selected}", times(h.without), times(h.with), h.role.name())
@@ -390,8 +390,8 @@ mod tests {
     fn held_out_errors_are_reported_with_and_without_the_effect() {
         let mut found = made_up::coulomb().found.remove(0);
         assert!(held_out_errors(&found).is_empty());
-        let held_back = |role, without, with| HeldBack { role, without, with };
-        found.held_back = vec![held_back(Role::Selection, 1.27, 1.0), held_back(Role::Validation, 0.99, 1.03)];
+        let held_out = |role, without, with| HeldOut { role, without, with };
+        found.held_out = vec![held_out(Role::Selection, 1.27, 1.0), held_out(Role::Validation, 0.99, 1.03)];
         assert_eq!(
             held_out_errors(&found),
             [
@@ -399,7 +399,7 @@ mod tests {
                 "The model predicts better without `coulomb-friction` in the joint `phi`: the error is 0.99 instead of 1.03 times the noise level on validation data.",
             ]
         );
-        found.held_back = vec![held_back(Role::Validation, 1.001, 1.004)];
+        found.held_out = vec![held_out(Role::Validation, 1.001, 1.004)];
         assert!(held_out_errors(&found).is_empty());
     }
 

@@ -42,9 +42,9 @@ impl Model for Watched {
 
 /// Records the points that a run answers.
 #[derive(Default)]
-struct Told(Mutex<Vec<(Vec<u64>, Known)>>);
+struct Recorded(Mutex<Vec<(Vec<u64>, Known)>>);
 
-impl Store for Told {
+impl Store for Recorded {
     fn known(&self, _: &[f64]) -> Option<Known> {
         None
     }
@@ -103,8 +103,8 @@ fn what_is_cut_off_is_no_evaluation_no_failure_and_kept_nowhere() {
             // Each point takes a simulation of every case at least, so that the request comes while it searches.
             for last in [0, 1, 2, whole * cases / 3, whole * cases / 2, whole * cases - 1] {
                 let (study, cancellation) = study(last, cases);
-                let told = Arc::new(Told::default());
-                let store: Arc<dyn Store> = Arc::<Told>::clone(&told) as Arc<dyn Store>;
+                let recorded = Arc::new(Recorded::default());
+                let store: Arc<dyn Store> = Arc::<Recorded>::clone(&recorded) as Arc<dyn Store>;
                 let keeping = Some(EvaluationStore { study: study.clone(), store, begin: None });
                 let solved = solve(study, &Options { keeping, cancellation, ..options.clone() }, &()).unwrap();
                 let outcome = &solved.outcome;
@@ -114,9 +114,12 @@ fn what_is_cut_off_is_no_evaluation_no_failure_and_kept_nowhere() {
                 assert!(outcome.stop == Stop::TimeLimit && (1..=most).contains(&outcome.evaluations), "{what}");
                 assert!(outcome.failures.is_empty() && solved.best.scaled.is_some(), "{what}: {:?}", outcome.failures);
                 assert!(solved.archive.iter().all(|record| record.merit.objective.is_finite()), "{what}");
-                let told = told.0.lock().unwrap();
-                assert!(told.iter().all(|(_, known)| known.jobs.iter().all(|(_, values)| values.is_ok())), "{what}");
-                let points: HashSet<&Vec<u64>> = told.iter().map(|(tuners, _)| tuners).collect();
+                let recorded = recorded.0.lock().unwrap();
+                assert!(
+                    recorded.iter().all(|(_, known)| known.jobs.iter().all(|(_, values)| values.is_ok())),
+                    "{what}"
+                );
+                let points: HashSet<&Vec<u64>> = recorded.iter().map(|(tuners, _)| tuners).collect();
                 assert_eq!(points.len(), outcome.evaluations, "{what}");
             }
         }

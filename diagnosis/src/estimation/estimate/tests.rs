@@ -224,10 +224,10 @@ fn a_gain_of_the_input_does_not_stand_for_a_missing_force() {
     let times: Vec<f64> = (0..400).map(|k| f64::from(k) * 0.05).collect();
     let force = |t: f64| 3.0 * math::sin(0.9 * t) + 2.0 * math::sin(2.3 * t);
     let values: Vec<f64> = times.iter().map(|&t| force(t + 0.025)).collect();
-    let held = values.clone();
+    let fixed = values.clone();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let rates =
-        move |t: f64, s: &[f64; 2]| [s[1], (held[(t / 0.05) as usize] - 0.5 * s[1] - 0.4 * s[1] * s[1].abs()) / 2.0];
+        move |t: f64, s: &[f64; 2]| [s[1], (fixed[(t / 0.05) as usize] - 0.5 * s[1] - 0.4 * s[1] * s[1].abs()) / 2.0];
     let states = integrated(rates, [0.0, 0.0], 0.05, 400);
     let input = Input::Sampled { times, values, hold: Hold::Zero };
     let record = Record { inputs: vec![("u", input)], ..Record::of_first("x", &states, 0.05, NOISE, "carriage") };

@@ -12,7 +12,7 @@ fn wave(half_width: f64) -> Vec<f64> {
 }
 
 #[test]
-fn a_value_alone_tells_a_gap() {
+fn a_value_alone_shows_a_gap() {
     let gap = gap(&wave(0.05), NOISE).expect("there is one");
     assert!((gap.middle - 0.2).abs() < NOISE, "{gap:?}");
     assert!(gap.half_width > 0.05 - 3.0 * NOISE && gap.half_width < 0.075, "{gap:?}");
@@ -20,7 +20,7 @@ fn a_value_alone_tells_a_gap() {
 
 /// Noise reaches from either side into it, and nothing is empty for long.
 #[test]
-fn a_narrow_gap_is_told_by_how_many_samples_show_its_value() {
+fn a_narrow_gap_is_found_by_how_many_samples_show_its_value() {
     let gap = gap(&wave(8.0 * NOISE), NOISE).expect("there is one");
     assert!((gap.middle - 0.2).abs() < NOISE, "{gap:?}");
     assert!((4.5 * NOISE..11.0 * NOISE).contains(&gap.half_width), "{gap:?}");

@@ -54,7 +54,7 @@ fn one_wrong_sample_does_not_count_however_wrong() {
 }
 
 #[test]
-fn few_samples_and_samples_that_never_change_tell_no_noise() {
+fn few_samples_and_samples_that_never_change_show_no_noise() {
     let (times, values) = samples(0.02);
     assert!(noise_of(&[(&times[..6], &values[..6])]).is_none() && noise_of(&[(&times, &[1.5; 400])]).is_none());
 }

@@ -7,7 +7,7 @@ fn wave(size: f64, noise: f64) -> Vec<f64> {
 }
 
 #[test]
-fn the_size_of_steps_is_told_by_the_values_alone() {
+fn the_size_of_steps_follows_from_the_values_alone() {
     for (size, noise) in [(0.017, 1e-3), (0.017, 2.5e-3), (0.0093, 0.0), (0.05, 1e-3)] {
         let found = quantum(&wave(size, noise), 3e-3, 0.06).expect("they are multiples");
         assert!((found / size - 1.0).abs() < 3e-3, "{found} of {size}");
@@ -15,7 +15,7 @@ fn the_size_of_steps_is_told_by_the_values_alone() {
 }
 
 #[test]
-fn values_at_rest_tell_nothing_and_a_wide_range_is_looked_at_as_far_as_it_goes() {
+fn values_at_rest_show_nothing_and_a_wide_range_is_looked_at_as_far_as_it_goes() {
     let rests: Vec<f64> = wave(0.017, 1e-3).into_iter().chain(white("rest", 1e-3, 3000)).collect();
     let found = quantum(&rests, 5e-3, 0.06).expect("those that move are multiples");
     assert!((found / 0.017 - 1.0).abs() < 3e-3, "{found}");

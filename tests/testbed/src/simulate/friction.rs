@@ -45,10 +45,10 @@ impl World<'_> {
     pub(super) fn break_away(&mut self, t: f64, x: &State) {
         for j in 0..self.plant.places.len() {
             if self.modes[j] == Mode::Rests {
-                let (mut dx, mut held) = ([0.0; SIZE], [0.0; FEW]);
-                self.rates(t, x, &mut dx, &mut held);
-                let way = -held[j].signum();
-                if held[j].abs() > self.hold(j, t, x, way) {
+                let (mut dx, mut fixed) = ([0.0; SIZE], [0.0; FEW]);
+                self.rates(t, x, &mut dx, &mut fixed);
+                let way = -fixed[j].signum();
+                if fixed[j].abs() > self.hold(j, t, x, way) {
                     self.modes[j] = Mode::Slides(way);
                 }
             }

@@ -171,7 +171,7 @@ impl<'a> World<'a> {
     }
 
     /// Computes the derivatives, and the forces that keep joints at rest.
-    pub(super) fn rates(&self, t: f64, x: &State, dx: &mut [f64], held: &mut [f64; FEW]) {
+    pub(super) fn rates(&self, t: f64, x: &State, dx: &mut [f64], fixed: &mut [f64; FEW]) {
         let (n, m) = (self.plant.states.len(), self.plant.places.len());
         let (mut u, mut w, mut p) = (self.u, [0.0; FEW], [0.0; MANY]);
         p[..self.p.len()].copy_from_slice(self.p);
@@ -200,7 +200,7 @@ impl<'a> World<'a> {
         }
         let rates = |w: &[f64; FEW], dx: &mut [f64]| (self.plant.rates)(&x[..n], &u, &p[..self.p.len()], w, dx);
         rates(&w, dx);
-        *held = [0.0; FEW];
+        *fixed = [0.0; FEW];
         if !self.modes[..m].contains(&Mode::Rests) {
             return;
         }
@@ -216,7 +216,7 @@ impl<'a> World<'a> {
                 rates(&pushed, &mut moved);
                 let force = -dx[equation] / (moved[equation] - dx[equation]);
                 w[j] += force;
-                held[j] += force;
+                fixed[j] += force;
                 rates(&w, dx);
             }
         }

@@ -57,7 +57,7 @@ fn first_of(diagnosis: &Diagnosis) -> (&Found, Vec<&str>) {
 }
 
 #[test]
-fn a_break_away_that_the_data_tell_nothing_of_is_as_likely_as_before_and_a_fall_that_they_rule_out_is_not() {
+fn a_break_away_that_the_data_do_not_show_is_as_likely_as_before_and_a_fall_that_they_rule_out_is_not() {
     // Until it rests, and a while longer.
     let all: Vec<Diagnosis> = (0..5).map(|k| let_go(742, &format!("let go {k}"))).collect();
     for diagnosis in &all {
@@ -81,7 +81,7 @@ fn where_the_motion_never_ends_a_break_away_is_as_likely_as_before() {
 
 #[test]
 #[ignore = "full tier"]
-fn a_break_away_that_the_data_tell_costs_the_whole() {
+fn a_break_away_that_the_data_show_costs_the_whole() {
     // It breaks away at every reversal of the push.
     let diagnosis = pushed();
     let (found, rivals) = first_of(&diagnosis);
