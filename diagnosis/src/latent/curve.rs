@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::coordinates::{Coordinate, Value, coordinates};
 use crate::estimation::{Errors, Estimate, Estimation, log_determinant};
-use crate::fit::Piece;
+use crate::fit::{Fit, Piece};
 use crate::motion::Trajectory;
 
 /// Share of the visited values below the first and above the last centre. Basis: the studies.
@@ -43,36 +43,76 @@ const STILL: f64 = 1e-12;
 const POINTS: usize = 41;
 
 impl Estimation<'_> {
-    /// Returns the free curves on top of an estimate, the one with the largest gain first; `None` if a simulation
-    /// fails.
+    /// Returns the free curves on top of an estimate, the one with the largest gain first; `None` if a simulation fails.
     pub fn curves(&self, estimate: &Estimate) -> Option<Vec<Dependence>> {
         let fit = self.along(&estimate.errors);
         let mut slopes = fit.slopes(&estimate.point)?;
         estimate.errors.take_force_out_of(&mut slopes);
-        let trajectory = |piece: usize| Trajectory::new(&fit, self.model, piece, &estimate.point).ok();
-        let trajectories: Vec<Trajectory> = (0..fit.pieces.len()).map(trajectory).collect::<Option<_>>()?;
+        let trajectories = self.trajectories(&fit, estimate)?;
         let coordinates = coordinates(self, &trajectories);
-        let shapes: Vec<Shape> = coordinates
-            .iter()
-            .filter_map(|c| Shape::new(c, &trajectories, self.fit.subject.settings.coverage.periods))
-            .collect();
         let free = self.free();
-        let columns = free.len() + COLUMNS * shapes.len();
-        let records: Vec<Vec<(usize, Vec<f64>)>> = (0..fit.pieces.len())
-            .map(|index| {
-                let mut record = vec![(columns, slopes[index].r.clone())];
-                record.extend(self.moving(&free, index, &slopes[index]));
-                for (s, shape) in shapes.iter().enumerate() {
-                    let of = |b: usize| shape.response(b, &trajectories[index], &fit.pieces[index]);
-                    record.extend((0..COLUMNS).map(|b| (free.len() + COLUMNS * s + b, of(b))));
-                }
-                record
-            })
-            .collect();
-        let precision: Vec<f64> = free.iter().map(|&k| self.priors[k].precision()).collect();
+        let unknowns = slopes.iter().enumerate().map(|(index, piece)| self.moving(&free, index, piece).collect());
+        let unknowns = Unknowns {
+            columns: unknowns.collect(),
+            precision: free.iter().map(|&k| self.priors[k].precision()).collect(),
+        };
+        let residuals = slopes.into_iter().map(|piece| piece.r).collect();
+        Some(self.over(&coordinates, &estimate.errors, &trajectories, residuals, &unknowns))
+    }
+
+    /// Returns the free curves at a place on top of an estimate without what effects add to the residuals of each record,
+    /// everything else fixed; `None` if a simulation fails.
+    pub fn curves_without(&self, estimate: &Estimate, place: &str, added: &[Vec<f64>]) -> Option<Vec<Dependence>> {
+        let fit = self.along(&estimate.errors);
+        let trajectories = self.trajectories(&fit, estimate)?;
+        let mut coordinates = coordinates(self, &trajectories);
+        coordinates.retain(|coordinate| coordinate.names.place == place);
+        let response = |piece: usize| match &estimate.errors {
+            Errors::Force(_, motions) => motions[piece].response.clone(),
+            _ => vec![0.0; added[piece].len()],
+        };
+        let all = fit.all(&estimate.point)?;
+        let without = |(piece, residuals): (usize, Vec<f64>)| {
+            let known = added[piece].iter().zip(response(piece));
+            residuals.iter().zip(known).map(|(r, (added, force))| r - added - force).collect()
+        };
+        let residuals: Vec<Vec<f64>> = all.into_iter().enumerate().map(without).collect();
+        let fixed = Unknowns { columns: vec![Vec::new(); residuals.len()], precision: Vec::new() };
+        Some(self.over(&coordinates, &estimate.errors, &trajectories, residuals, &fixed))
+    }
+
+    fn trajectories(&self, fit: &Fit<'_>, estimate: &Estimate) -> Option<Vec<Trajectory>> {
+        let trajectory = |piece: usize| Trajectory::new(fit, self.model, piece, &estimate.point).ok();
+        (0..fit.pieces.len()).map(trajectory).collect()
+    }
+
+    /// Returns the free curves over coordinates for residuals beside unknowns, the one with the largest gain first.
+    fn over(
+        &self,
+        coordinates: &[Coordinate],
+        errors: &Errors,
+        trajectories: &[Trajectory],
+        residuals: Vec<Vec<f64>>,
+        unknowns: &Unknowns,
+    ) -> Vec<Dependence> {
+        let (pieces, settings) = (&self.fit.pieces, &self.fit.subject.settings);
+        let shape = |coordinate| Shape::new(coordinate, trajectories, settings.coverage.periods);
+        let shapes: Vec<Shape> = coordinates.iter().filter_map(shape).collect();
+        let free = unknowns.precision.len();
+        let columns = free + COLUMNS * shapes.len();
+        let record = |(index, residuals): (usize, Vec<f64>)| {
+            let mut record = vec![(columns, residuals)];
+            record.extend(unknowns.columns[index].iter().cloned());
+            for (s, shape) in shapes.iter().enumerate() {
+                let of = |b: usize| shape.response(b, &trajectories[index], &pieces[index]);
+                record.extend((0..COLUMNS).map(|b| (free + COLUMNS * s + b, of(b))));
+            }
+            record
+        };
+        let records: Vec<Vec<(usize, Vec<f64>)>> = residuals.into_iter().enumerate().map(record).collect();
         let grid: Vec<Option<Reduced>> = SHRINKS
             .par_iter()
-            .map(|&shrink| self.reduced(&fit.pieces, &estimate.errors.scaled(shrink), &records, columns, &precision))
+            .map(|&shrink| self.reduced(pieces, &errors.scaled(shrink), &records, columns, &unknowns.precision))
             .collect();
         let grid: Vec<Reduced> = grid.into_iter().flatten().collect();
         let least = |a: &(f64, Vec<f64>), b: &(f64, Vec<f64>)| a.0.total_cmp(&b.0);
@@ -86,7 +126,7 @@ impl Estimation<'_> {
         };
         let mut curves: Vec<Dependence> = shapes.iter().enumerate().filter_map(gain).collect();
         curves.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        Some(curves)
+        curves
     }
 
     /// Returns the normal equations of all columns under an error model, with the unknowns projected out.
@@ -120,7 +160,7 @@ impl Estimation<'_> {
         let determinant = log_determinant(&unknowns);
         let across = gram.view((0, free), (free, columns + 1 - free)).into_owned();
         let rest = gram.view((free, free), (columns + 1 - free, columns + 1 - free)).into_owned();
-        let rest = rest - across.transpose() * unknowns.cholesky()?.solve(&across);
+        let rest = if free == 0 { rest } else { rest - across.transpose() * unknowns.cholesky()?.solve(&across) };
         let penalty = logarithms + rest[(rest.nrows() - 1, rest.ncols() - 1)] + determinant;
         Some(Reduced { rest, penalty, input_gain: self.fit.subject.settings.input_gain })
     }
@@ -217,6 +257,13 @@ impl<'c> Shape<'c> {
         }
         sum.unwrap_or_default()
     }
+}
+
+/// What parameters and initial states can absorb: columns of each record by their positions, and precisions of their
+/// priors.
+struct Unknowns {
+    columns: Vec<Vec<(usize, Vec<f64>)>>,
+    precision: Vec<f64>,
 }
 
 /// Normal equations of the curves and the residuals, with the unknowns projected out.

@@ -1,20 +1,21 @@
 //! Course of what is missing at a place: the smooth force of the force error at a balance, the smooth error at a
 //! sensor.
 //!
-//! Where effects were added, their formulas are drawn beside formula plus remainder: a component-plus-residual plot.
-//! Where the formula is right, the points lie about its curve.
+//! Where effects were added, their formulas are drawn: over time beside formula plus remainder, a component-plus-residual
+//! plot, and over a coordinate beside the free curve on top of the set without them. Where the formula is right, both
+//! agree.
 //!
 //! Source: F. R. Wood, The use of individual effects and residuals in fitting equations to data, Technometrics 15
 //! (1973) 677.
 
 use mops_core::effect::Port;
 use mops_language::Unit;
-use mops_outcome::diagnosis::{Curve, LatentInput};
+use mops_outcome::diagnosis::{Curve, Dependence, LatentInput};
 
 use super::coordinates::{Coordinate, coordinates};
 use crate::candidates::Candidate;
 use crate::error_models::{ForceError, LinearisedMotion, Measured, OutputError};
-use crate::estimation::{ErrorModel, Errors, Estimate};
+use crate::estimation::{ErrorModel, Errors, Estimate, Estimation};
 use crate::fit::{Fit, Point};
 use crate::motion::{PortIndex, Trajectory, View, between, port_index};
 use crate::selection::FittedSet;
@@ -83,6 +84,7 @@ impl Course<'_, '_> {
         let at_place = |c: &Coordinate| c.names.place == place && c.names.other.is_none() && c.value.is_local();
         let coordinates: Vec<Coordinate> =
             coordinates(&estimation, &trajectories).into_iter().filter(at_place).collect();
+        let curves = self.curves(&estimation, &fit, &trajectories).unwrap_or_default();
         let mut over_time = Vec::new();
         let mut over: Vec<Curve> = vec![Curve::default(); coordinates.len()];
         for (piece, trajectory) in trajectories.iter().enumerate() {
@@ -109,8 +111,10 @@ impl Course<'_, '_> {
             for (coordinate, curve) in coordinates.iter().zip(&mut over) {
                 let moments: Vec<f64> = trajectory.moments.iter().map(|m| m.t).collect();
                 let values: Vec<f64> = trajectory.moments.iter().map(|m| coordinate.value.at(m)).collect();
-                curve.x.extend(thin(times.iter().map(|&t| between(&moments, &values, t)).collect()));
-                curve.estimated.extend_from_slice(&estimated);
+                let x = thin(times.iter().map(|&t| between(&moments, &values, t)).collect());
+                let free = curves.iter().find(|free| free.coordinate == coordinate.names.coordinate);
+                curve.estimated.extend(free.map_or_else(|| estimated.clone(), |free| at(free, &x)));
+                curve.x.extend(x);
                 curve.found.extend_from_slice(&found);
             }
             let begins = fit.pieces[piece].case.begins;
@@ -130,6 +134,21 @@ impl Course<'_, '_> {
         })
     }
 
+    /// Returns the free curves at a balance on top of the set without its effects there, everything else fixed.
+    fn curves(&self, estimation: &Estimation<'_>, fit: &Fit<'_>, along: &[Trajectory]) -> Option<Vec<Dependence>> {
+        let estimate = self.set.estimate(ErrorModel::Force).filter(|_| !self.effects.is_empty())?;
+        let of = |piece: usize| -> Option<Vec<f64>> {
+            let samples = fit.pieces[piece].series.iter().map(|s| s.times.len()).sum();
+            let mut sum = vec![0.0; samples];
+            for (view, strengths) in self.views(fit, piece, &along[piece], &estimate.point)? {
+                sum.iter_mut().zip(view.trace(&strengths)?).for_each(|(sum, trace)| *sum += trace);
+            }
+            Some(sum)
+        };
+        let added: Option<Vec<Vec<f64>>> = (0..along.len()).map(of).collect();
+        estimation.curves_without(estimate, &self.port.to_string(), &added?)
+    }
+
     /// Returns the unit of the place, if the model determines it.
     fn unit(&self) -> Option<Unit> {
         let interface = self.set.variant.model.model().interface();
@@ -142,15 +161,29 @@ impl Course<'_, '_> {
         }
     }
 
-    /// Returns what the effects add in a record with the parameters of a point, in the unit of the place, at the nodes
-    /// of its motion or the samples of its sensor.
-    fn added(&self, fit: &Fit<'_>, piece: usize, trajectory: &Trajectory, point: &Point) -> Option<Vec<f64>> {
-        let (set, mut sum) = (self.set, Vec::new());
-        for &index in self.effects {
+    /// Returns the views of the effects in a record, with their parameters at a point.
+    fn views<'v>(
+        &'v self,
+        fit: &'v Fit<'_>,
+        piece: usize,
+        trajectory: &'v Trajectory,
+        point: &Point,
+    ) -> Option<Vec<(View<'v>, Vec<f64>)>> {
+        let set = self.set;
+        let view = |&index: &usize| {
             let candidate = &set.added[index].candidate;
             let count = candidate.effect.parameters().len();
             let strengths = set.variant.strengths(&set.fit, point, index, count, piece);
-            let view = View::new(candidate, &set.variant.model, &fit.pieces[piece], trajectory)?;
+            Some((View::new(candidate, &set.variant.model, &fit.pieces[piece], trajectory)?, strengths))
+        };
+        self.effects.iter().map(view).collect()
+    }
+
+    /// Returns what the effects add in a record with the parameters of a point, in the unit of the place, at the nodes
+    /// of its motion or the samples of its sensor.
+    fn added(&self, fit: &Fit<'_>, piece: usize, trajectory: &Trajectory, point: &Point) -> Option<Vec<f64>> {
+        let mut sum = Vec::new();
+        for (view, strengths) in self.views(fit, piece, trajectory, point)? {
             let added = view.added(&strengths)?;
             sum.resize(sum.len().max(added.len()), 0.0);
             sum.iter_mut().zip(added).for_each(|(sum, added)| *sum += added);
@@ -225,4 +258,10 @@ fn smoothed(error: &OutputError, times: &[f64], residuals: &[f64]) -> Vec<f64> {
     };
     let OutputError { deviation, length, noise, .. } = *error;
     ForceError { deviation, length, noise: vec![noise] }.smooth(&motion, residuals)
+}
+
+/// Returns the values of a curve, at its ends beyond these.
+fn at(curve: &Dependence, x: &[f64]) -> Vec<f64> {
+    let [places, values] = [0, 1].map(|k| curve.curve.iter().map(|point| point[k]).collect::<Vec<f64>>());
+    x.iter().map(|&x| between(&places, &values, x)).collect()
 }

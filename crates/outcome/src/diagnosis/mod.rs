@@ -347,7 +347,8 @@ pub struct Curve {
 }
 
 /// Course of what is missing at a place, without a catalogue: a smooth force at a balance, a smooth error at a sensor.
-/// Where effects were added, their formulas plus what remains with them; else what the nominal model lacks.
+/// Where effects were added, their formulas plus what remains with them, and over a coordinate the free curve in their
+/// place; else what the nominal model lacks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LatentInput {
     /// The place, as `kind:name`.

@@ -105,8 +105,9 @@ fn group(diagnosis: &Diagnosis, latent: &LatentInput) -> Group {
     let with_formula = latent.over.iter().any(|(_, _, points)| !points.found.is_empty());
     let about = if with_formula {
         vec![format!(
-            "Component-plus-residual plot of the recalibrated model: the formula of {effects}, and the formula plus the smooth \
-             remainder with all parameters fixed. If the formula is correct, the estimate follows it."
+            "Component-plus-residual plots of the recalibrated model. Over time: the formula of {effects}, and the formula plus \
+             the smooth remainder. Over a coordinate: the formula, and the free curve that describes the data best in its \
+             place, all parameters fixed. If the formula is correct, the estimate follows it."
         )]
     } else {
         Vec::new()
