@@ -32,9 +32,10 @@ file = 'swing.csv'
 fn edited(edit: impl FnOnce(&mut TomlText)) -> String {
     let mut text = TomlText::new(TEXT);
     edit(&mut text);
-    let read: Table = toml::from_str(&text.0).unwrap_or_else(|e| panic!("{e}\n{}", text.0));
+    let text = text.into_text();
+    let read: Table = toml::from_str(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
     assert!(read.contains_key("study"));
-    text.0
+    text
 }
 
 #[test]
@@ -87,6 +88,30 @@ fn a_removed_entry_becomes_a_comment_with_the_reason() {
 }
 
 #[test]
+fn comments_within_braces_and_at_the_end_stay_where_they_are() {
+    let text = "a = {\n  x = 1, # one\n  y = 2 # two\n}\nb = {\n  x = 1, # one\n}\n[c]\nd = 1\n# e = 2\n";
+    let mut edited = TomlText::new(text);
+    edited.set(&["a", "z"], "3");
+    edited.set(&["b", "z"], "3");
+    edited.set(&["f", "g"], "1");
+    edited.set(&["f", "h"], "2");
+    let expected = text.replace("y = 2 #", "y = 2, z = 3 #").replace("1, # one\n}", "1, z = 3, # one\n}");
+    assert_eq!(edited.into_text(), expected + "\n[f]\ng = 1\nh = 2\n");
+}
+
+#[test]
+fn an_array_of_tables_is_edited_as_a_whole_and_its_data_files_are_converted() {
+    let text = "[[cases.a.inputs.u]]\nconstant = 2\n\n[study]\nname = \"s\"\n\n[[cases.a.inputs.u]] # data\n\
+                file.path = \"u.csv\"\n";
+    let moved = settled(text, &[], &|path| format!("../{path}")).into_text();
+    assert_eq!(moved, text.replace("u.csv", "../u.csv"));
+    let replaced = settled(text, &["cases.a.inputs.u.constant=3".to_owned()], &str::to_owned).into_text();
+    let expected = "# replaced\n# [[cases.a.inputs.u]]\n# constant = 2\n\n[study]\nname = \"s\"\n\n\
+                    # [[cases.a.inputs.u]] # data\n# file.path = \"u.csv\"\n\n[cases.a.inputs.u]\nconstant = 3\n";
+    assert_eq!(replaced, expected);
+}
+
+#[test]
 fn keys_and_texts_are_quoted_where_they_must_be() {
     assert_eq!([key("arm"), key("arm.torque"), key("")], ["arm", "\"arm.torque\"", "\"\""]);
     for odd in ["a\nb", "\"\"\"", "'\n\"", "\u{1b}[2J", "a\r\nfn", "\\", "\u{85}\u{7f}", "\t", "\0", "é\n"] {
@@ -95,7 +120,7 @@ fn keys_and_texts_are_quoted_where_they_must_be() {
         assert!(!key(odd).contains('\n') && !quoted(odd).contains('\n'), "{odd:?}");
     }
     let text = TomlText::new(TEXT);
-    assert_eq!(text.words(&["experiments", "swing", "file"]).as_deref(), Some("swing.csv"));
+    assert_eq!(text.item(&["experiments", "swing", "file"]).and_then(Item::as_str), Some("swing.csv"));
     assert_eq!(text.keys(&["tuners"]), ["b", "bp", "d"]);
 }
 
@@ -158,10 +183,11 @@ fn a_value_written_with_dots_within_braces_is_replaced_as_a_whole() {
         ("b = { c = 2, a . \"x\\\" y\".'z' = 0 }", ["b", "a"], "1", "b = { c = 2, a = 1 }"),
         ("b = { a.x = 0, a.y = 3 }", ["b", "a"], "1", "b = { a = 1 }"),
     ] {
-        let mut edited = TomlText(text.to_owned());
+        let mut edited = TomlText::new(text);
         edited.set(&path, value);
+        let edited = edited.into_text();
         let parsed = |text: &str| text.parse::<Table>().unwrap();
-        assert_eq!(parsed(&edited.0), parsed(expected), "{text}: {}", edited.0);
+        assert_eq!(parsed(&edited), parsed(expected), "{text}: {edited}");
     }
 }
 

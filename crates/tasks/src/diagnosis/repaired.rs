@@ -70,15 +70,15 @@ fn alignment(text: &mut TomlText, diagnosis: &Diagnosis) {
     for experiment in text.keys(&["experiments"]) {
         for Alignment { input, shift, hold } in &diagnosis.alignment {
             let place = ["experiments", &experiment, "inputs", input];
-            if let Some(column) = text.words(&place) {
-                text.set(&place, &format!("{{ column = {} }}", quoted(&column)));
+            if let Some(column) = text.item(&place).and_then(|column| column.as_str().map(quoted)) {
+                text.set(&place, &format!("{{ column = {column} }}"));
             }
             if text.has(&place) {
                 let own = |key| [&place[..], &[key]].concat();
                 text.set(&own("hold"), &quoted(hold.name()));
                 let second = Unit::known("s");
-                let declared =
-                    text.words(&own("shift")).and_then(|shift| Quantity::parse(&shift).ok()?.to(&second).ok());
+                let declared = text.item(&own("shift"));
+                let declared = declared.and_then(|shift| Quantity::parse(shift.as_str()?).ok()?.to(&second).ok());
                 let shift = shift + declared.unwrap_or(0.0);
                 if shift != 0.0 {
                     text.set(&own("shift"), &quoted(&format!("{} s", number(shift))));
@@ -119,10 +119,10 @@ fn initial_states(text: &mut TomlText, original: &Original<'_>, diagnosis: &Diag
         let starts = diagnosis.starts.iter().filter(|(name, _, value)| *name == experiment && value.is_finite());
         let starts: Vec<FreeStart> =
             starts.filter_map(|(_, p, value)| free_start(original, diagnosis, p, *value)).collect();
-        let listed = text.get(&place).and_then(|list| format!("free = {list}").parse::<toml::Table>().ok());
-        if let (Some(list), false) = (listed.as_ref().and_then(|table| table["free"].as_array()), starts.is_empty()) {
-            let states = list.iter().filter_map(toml::Value::as_str).map(|state| format!("{} = {{}}", key(state)));
-            text.set(&place, &format!("{{ {} }}", states.collect::<Vec<_>>().join(", ")));
+        if let (Some(list), false) = (text.item(&place).and_then(|free| free.as_array()), starts.is_empty()) {
+            let states = list.iter().filter_map(|state| Some(format!("{} = {{}}", key(state.as_str()?))));
+            let states = states.collect::<Vec<_>>().join(", ");
+            text.set(&place, &format!("{{ {states} }}"));
         }
         for (state, values) in starts {
             let state_place = ["experiments", &experiment, "free", &state];
