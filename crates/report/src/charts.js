@@ -1,3 +1,5 @@
+// @ts-check
+/// <reference path="types.d.ts" />
 // Draws plots of curves over x with uPlot, in place of their SVGs: zoom, values at the cursor, curves on and off by name.
 // Plots of one group share the names of their curves, and those with the same x axis also cursor and range.
 (() => {
@@ -6,16 +8,24 @@
   const NEAR = 24; // distance in pixels at which a curve is highlighted
   const MOST_VALUES = 8; // number of values in the readout
 
+  /** @typedef {CurveData & { owner: string, isLine: boolean, index: (number | undefined)[] }} Curve */
+
+  /** @param {string} name */
   const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  /** @param {number} value @param {number} low @param {number} high */
   const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
-  /** Formats a number to `digits` significant digits, without trailing zeros. */
+  /** Formats a number to `digits` significant digits, without trailing zeros. @param {number} value */
   function number(value, digits = 5) {
     if (value === 0 || (Math.abs(value) >= 1e-4 && Math.abs(value) < 1e6)) return String(Number(value.toPrecision(digits)));
     return value.toExponential(digits - 1).replace(/\.?0+e/, "e").replace("e+", "e");
   }
 
-  /** Creates an element with attributes and children; text is never parsed as markup. */
+  /**
+   * Creates an element with attributes and children; text is never parsed as markup.
+   * @template {keyof HTMLElementTagNameMap} Name
+   * @param {Name} name @param {Record<string, string>} attributes @param {(Node | string)[]} children
+   */
   function element(name, attributes = {}, ...children) {
     const node = document.createElement(name);
     for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
@@ -23,13 +33,13 @@
     return node;
   }
 
-  /** Splits a label such as `time (s)` into name and unit. */
+  /** Splits a label such as `time (s)` into name and unit. @param {string} label */
   function parts(label) {
-    const [, name, unit] = label.match(/^(.*?)(?: \(([^()]*)\))?$/);
+    const [, name, unit] = label.match(/^(.*?)(?: \(([^()]*)\))?$/) ?? ["", label];
     return { name, unit: unit ? ` ${unit}` : "" };
   }
 
-  /** Returns the largest index with `xs[index] <= x`; -1 if there is none. */
+  /** Returns the largest index with `xs[index] <= x`; -1 if there is none. @param {number[]} xs @param {number} x */
   function before(xs, x) {
     let [low, high] = [-1, xs.length];
     while (high - low > 1) {
@@ -39,7 +49,11 @@
     return low;
   }
 
-  /** Prepares the curves: strictly increasing x, and each nameless curve with the name of the curve that it belongs to. */
+  /**
+   * Prepares the curves: strictly increasing x, and each nameless curve with the name of the curve that it belongs to.
+   * @param {PlotData} data
+   * @returns {Curve[]}
+   */
   function prepared(data) {
     const finite = data.curves.flatMap((curve) => [curve.x[0], curve.x[curve.x.length - 1]]).filter(Number.isFinite);
     const size = Math.max(...finite) - Math.min(...finite) || 1;
@@ -52,12 +66,15 @@
       const [x, y] = [order.map((i) => curve.x[i]), order.map((i) => curve.y[i])];
       // Both values of a jump have the same x.
       for (let i = 1; i < x.length; i++) if (x[i] <= x[i - 1]) x[i] = x[i - 1] + 1e-9 * (data.logX ? x[i - 1] : size);
-      return { ...curve, owner, isLine, x, y };
+      return { ...curve, owner, isLine, x, y, index: [] };
     });
   }
 
-  /** Value of a curve at x: interpolated for a line, else the sample nearest to x within `reach`; null without one. */
-  function valueAt(curve, x, reach) {
+  /**
+   * Value of a curve at x: interpolated for a line, else the sample nearest to x within `reach`; null without one.
+   * @param {Curve} curve @param {number} x
+   */
+  function valueAt(curve, x, reach = 0) {
     const i = before(curve.x, x);
     if (!curve.isLine) {
       const near = [i, i + 1].filter((k) => k >= 0 && k < curve.x.length && Math.abs(curve.x[k] - x) <= reach);
@@ -70,7 +87,10 @@
     return a === null || b === null ? null : a + ((b - a) * (x - curve.x[i])) / (curve.x[i + 1] - curve.x[i]);
   }
 
-  /** Returns the grid of a logarithmic axis: multiples of powers of ten, or round numbers within less than a decade. */
+  /**
+   * Returns the grid of a logarithmic axis: multiples of powers of ten, or round numbers within less than a decade.
+   * @param {number} low @param {number} high
+   */
   function roundNumbers(low, high) {
     const found = [];
     for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
@@ -84,7 +104,10 @@
     return Array.from({ length: 60 }, (_, i) => Number(((Math.ceil(low / step) + i) * step).toPrecision(12))).filter((v) => v <= high);
   }
 
-  /** Returns the labels of a logarithmic axis: powers of ten, with 2 and 5 for few decades; all of less than a decade. */
+  /**
+   * Returns the labels of a logarithmic axis: powers of ten, with 2 and 5 for few decades; all of less than a decade.
+   * @param {number[]} values
+   */
   function decades(values) {
     const span = Math.log10(values[values.length - 1] / values[0]);
     const shown = span < 0.9 ? null : span < 3 ? [1, 2, 5] : [1];
@@ -97,15 +120,25 @@
   }
 
   class Chart {
+    /** @param {HTMLElement} node @param {Group} group */
     constructor(node, group) {
       this.node = node;
       this.group = group;
+      /** @type {uPlot | null} */
       this.plot = null;
-      this.load(JSON.parse(node.querySelector("script").textContent));
+      this.readout = element("p", { class: "readout" });
+      this.place = element("div", { class: "canvas", tabindex: "0", role: "group", "aria-roledescription": "interactive plot" });
+      /** @type {PlotData} */
+      this.data = JSON.parse(node.querySelector("script")?.textContent ?? "");
+      /** @type {Curve[]} */
+      this.curves = [];
+      /** @type {Pair} Ends of x. */
+      this.whole = [0, 1];
+      this.load(this.data);
       this.shown = this.whole;
     }
 
-    /** Reads the data of the plot. */
+    /** Reads the data of the plot. @param {PlotData} data */
     load(data) {
       this.data = data;
       this.curves = prepared(data);
@@ -114,6 +147,7 @@
       if (this.whole[0] === this.whole[1]) this.whole = [this.whole[0] - 0.5, this.whole[1] + 0.5];
     }
 
+    /** @param {Curve} curve */
     isShown(curve) {
       return !this.group.off.has(curve.owner) && !this.group.offVariants.has(curve.variant);
     }
@@ -121,12 +155,16 @@
     /** The bounds of which a curve is shown, each cut at the range of x: name, ends, values there, side, names of its curves. */
     bounds() {
       const [low, high] = this.shown;
+      /** @type {(bound: BoundData) => [string, Pair, number[], number, string[]]} */
       const cut = ([name, x, y, side, names]) => {
         const [from, to] = [x[0] ?? low, x[1] ?? high];
+        /** @type {Pair} */
         const ends = [Math.max(from, low), Math.min(to, high)];
+        /** @param {number} t */
         const at = (t) => (y[0] === y[1] ? y[0] : y[0] + ((y[1] - y[0]) * (t - from)) / (to - from));
         return [name, ends, ends.map(at), side, names];
       };
+      /** @param {string[]} names */
       const isShown = (names) => names.length === 0 || names.some((name) => !this.group.off.has(name));
       return this.data.bounds.filter((bound) => isShown(bound[4])).map(cut).filter(([, [from, to]]) => from < to);
     }
@@ -135,14 +173,12 @@
     create() {
       if (this.plot) return;
       const { data, node } = this;
-      this.readout = element("p", { class: "readout" });
-      this.place = element("div", { class: "canvas", tabindex: "0", role: "group", "aria-roledescription": "interactive plot",
-        "aria-label": `${data.title}. ${data.about}` });
+      this.place.setAttribute("aria-label", `${data.title}. ${data.about}`);
       this.place.addEventListener("keydown", (event) => this.onKey(event));
       node.append(element("p", { class: "title" }, data.title), this.place, this.readout);
       node.classList.add("live");
       this.plot = new uPlot(this.options(), this.joined(), this.place);
-      this.touch();
+      this.touch(this.plot);
       new ResizeObserver(() => this.resize()).observe(this.place);
       this.show(this.group.ranges.get(data.x) ?? data.window ?? this.whole);
     }
@@ -155,7 +191,7 @@
 
     resize() {
       const { width, height } = this.size();
-      if (width !== this.plot.width || height !== this.plot.height) this.plot.setSize({ width, height });
+      if (this.plot && (width !== this.plot.width || height !== this.plot.height)) this.plot.setSize({ width, height });
     }
 
     /** Returns common x and the values of each curve there; undefined where a curve has no sample. Values far outside of the
@@ -168,15 +204,17 @@
       const columns = this.curves.map((curve) => {
         const column = new Array(xs.length);
         curve.index = curve.x.map((x) => at.get(x));
-        curve.index.forEach((k, i) => { column[k] = curve.y[i] === null ? null : clamp(curve.y[i], low - far, high + far); });
+        curve.y.forEach((y, i) => { column[curve.index[i] ?? 0] = y === null ? null : clamp(y, low - far, high + far); });
         return column;
       });
       return [xs, ...columns];
     }
 
+    /** @returns {uPlot.Options} */
     options() {
       const { data } = this;
       const font = "12px system-ui, sans-serif";
+      /** @type {(label: string, size: number, log: boolean, more?: Partial<uPlot.Axis>) => uPlot.Axis} */
       const axis = (label, size, log, more) => ({
         label, size, font, labelFont: font, labelSize: 20, stroke: () => color("faint"),
         grid: { stroke: () => color("grid"), width: 1 }, ticks: { show: false },
@@ -216,22 +254,28 @@
       };
     }
 
-    /** Returns the index in the common x of the sample of a curve nearest to x. */
+    /** Returns the index in the common x of the sample of a curve nearest to x. @param {Curve} curve @param {number} x */
     nearest(curve, x) {
       const i = before(curve.x, x);
       const near = [i, i + 1].filter((k) => k >= 0 && k < curve.x.length);
       near.sort((a, b) => Math.abs(curve.x[a] - x) - Math.abs(curve.x[b] - x));
-      return near.length ? curve.index[near[0]] : null;
+      return near.length ? curve.index[near[0]] ?? null : null;
     }
 
-    /** Returns the range of y in the range of x. Curves that may leave, and levels, widen it at most to three times. */
+    /**
+     * Returns the range of y in the range of x. Curves that may leave, and levels, widen it at most to three times.
+     * @returns {Pair}
+     */
     height() {
       const { data, shown: [from, to] } = this;
+      /** @type {(v: number) => number} */
       const f = data.logY ? Math.log10 : (v) => v;
+      /** @param {boolean} mayLeave */
       const values = (mayLeave) => this.curves.filter((c) => c.mayLeave === mayLeave && this.isShown(c)).flatMap((curve) => {
         const inside = curve.y.slice(before(curve.x, from) + 1, before(curve.x, to) + 1);
         return curve.isLine ? inside.concat(valueAt(curve, from), valueAt(curve, to)) : inside;
       }).filter((v) => v !== null).map(f).filter(Number.isFinite);
+      /** @param {number[]} all */
       const ends = (all) => all.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]);
       let [low, high] = ends(values(false).concat(data.bands.flatMap((band) => band[1]).map(f).filter(Number.isFinite)));
       if (low > high) [low, high] = ends(values(true));
@@ -246,24 +290,31 @@
         if (v >= low - room && v <= high + room) range = [Math.min(range[0], v), Math.max(range[1], v)];
       }
       const margin = 0.05 * (range[1] - range[0]);
+      /** @type {(v: number) => number} */
       const back = data.logY ? (v) => 10 ** v : (v) => v;
       return [back(range[0] - margin), back(range[1] + margin)];
     }
 
-    /** Calls a function with the context, clipped to the frame, and the positions of values. */
+    /**
+     * Calls a function with the context, clipped to the frame, and the positions of values.
+     * @typedef {(value: number) => number} Position
+     * @param {uPlot} plot @param {(ctx: CanvasRenderingContext2D, x: Position, y: Position, box: uPlot.Box) => void} paint
+     */
     painting(plot, paint) {
       const { ctx, bbox } = plot;
       ctx.save();
       ctx.beginPath();
       ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
       ctx.clip();
+      /** @type {Position} */
       const x = (value) => plot.valToPos(value, "x", true);
+      /** @type {Position} */
       const y = (value) => plot.valToPos(value, "y", true);
       paint(ctx, x, y, bbox);
       ctx.restore();
     }
 
-    /** Draws bands and excluded regions behind the curves. */
+    /** Draws bands and excluded regions behind the curves. @param {uPlot} plot */
     regions(plot) {
       this.painting(plot, (ctx, x, y, box) => {
         const [top, bottom] = [box.top, box.top + box.height];
@@ -276,28 +327,31 @@
           if (side === 0 || (names.length && [...owners].some((name) => !names.includes(name)))) continue;
           const [a, b, far] = [x(from), x(to), side > 0 ? top : bottom];
           ctx.beginPath();
-          for (const point of [[a, y(start)], [b, y(end)], [b, far], [a, far]]) ctx.lineTo(...point);
+          for (const [px, py] of [[a, y(start)], [b, y(end)], [b, far], [a, far]]) ctx.lineTo(px, py);
           if (side > 0 ? Math.max(y(start), y(end)) > top : Math.min(y(start), y(end)) < bottom) ctx.fill();
         }
       });
     }
 
-    /** Draws levels, bounds and vertical lines, with their names. */
+    /** Draws levels, bounds and vertical lines, with their names. @param {uPlot} plot */
     lines(plot) {
       this.painting(plot, (ctx, x, y, box) => {
         const [left, right] = [box.left, box.left + box.width];
         const scale = window.devicePixelRatio;
         ctx.font = `${11 * scale}px system-ui, sans-serif`;
+        /** @type {(points: number[][], name: string, end: number[], stroke: string) => void} */
         const line = (points, name, end, stroke) => {
           ctx.strokeStyle = stroke;
           ctx.beginPath();
-          for (const point of points) ctx.lineTo(...point);
+          for (const [px, py] of points) ctx.lineTo(px, py);
           ctx.stroke();
           ctx.fillStyle = stroke;
           ctx.textAlign = "right";
           if (name) ctx.fillText(name, end[0] - 4 * scale, place(end[1]));
         };
+        /** @type {number[]} */
         const taken = [];
+        /** @param {number} end */
         const place = (end) => {
           let at = clamp(end - 4 * scale, box.top + 12 * scale, box.top + box.height - 4 * scale);
           while (taken.some((other) => Math.abs(other - at) < 12 * scale)) at += 12 * scale;
@@ -325,23 +379,23 @@
       });
     }
 
-    /** Shows a range of x in this plot. */
+    /** Shows a range of x in this plot. @param {Pair} range */
     show(range) {
       this.shown = range;
-      this.plot.setScale("x", { min: range[0], max: range[1] });
+      this.plot?.setScale("x", { min: range[0], max: range[1] });
       this.tell();
     }
 
-    /** Zooms to a part selected by dragging. */
+    /** Zooms to a part selected by dragging. @param {uPlot} plot */
     selected(plot) {
       const { left, width } = plot.select;
       if (width < 3) return;
-      const range = [left, left + width].map((at) => plot.posToVal(at, "x"));
+      const [from, to] = [left, left + width].map((at) => plot.posToVal(at, "x"));
       plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
-      this.range(range);
+      this.range([from, to]);
     }
 
-    /** After a move of the cursor. */
+    /** After a move of the cursor. @param {uPlot} plot */
     pointed(plot) {
       const { left } = plot.cursor;
       if (!this.group.quiet) {
@@ -365,12 +419,17 @@
       }
       const x = plot.posToVal(left, "x");
       const reach = Math.abs(plot.posToVal(left + 6, "x") - x);
-      let values = this.curves.filter((curve) => curve.name && this.isShown(curve))
-        .map((curve) => ({ curve, value: valueAt(curve, x, reach) })).filter(({ value }) => value !== null);
+      /** @typedef {{ curve: Curve, value: number }} Reading */
+      let values = this.curves.filter((curve) => curve.name && this.isShown(curve)).flatMap((curve) => {
+        const value = valueAt(curve, x, reach);
+        return value === null ? [] : [{ curve, value }];
+      });
       if (values.length > MOST_VALUES) {
+        /** @param {Reading} reading */
         const far = ({ value }) => Math.abs(plot.valToPos(value, "y") - top);
         values = values.sort((a, b) => far(a) - far(b)).slice(0, MOST_VALUES);
       }
+      /** @param {Reading} reading */
       const of = ({ curve, value }) => {
         const swatch = element("span", { class: "swatch" });
         swatch.style.background = color(curve.color);
@@ -387,30 +446,37 @@
       return min <= this.whole[0] + slack && max >= this.whole[1] - slack;
     }
 
-    /** Zooms by a factor about the cursor, or about the middle. */
+    /** Returns the functions from x to even distances on its axis, and back. @returns {((v: number) => number)[]} */
+    along() {
+      return this.data.logX ? [Math.log, Math.exp] : [(v) => v, (v) => v];
+    }
+
+    /** Zooms by a factor about the cursor, or about the middle. @param {number} factor */
     zoom(factor) {
+      if (!this.plot) return;
       const [min, max] = this.shown;
-      const [f, back] = this.data.logX ? [Math.log, Math.exp] : [(v) => v, (v) => v];
+      const [f, back] = this.along();
       const { left } = this.plot.cursor;
       const [a, b] = [f(min), f(max)];
       const about = left >= 0 ? f(this.plot.posToVal(left, "x")) : (a + b) / 2;
       this.range([back(about - (about - a) * factor), back(about + (b - about) * factor)]);
     }
 
-    /** Shows a range of x, at most the whole. */
+    /** Shows a range of x, at most the whole. @param {Pair} range */
     range([from, to]) {
       this.group.show(this.data.x, [Math.max(from, this.whole[0]), Math.min(to, this.whole[1])]);
     }
 
-    /** Moves the cursor by a share of the width; beyond an end the range moves along. */
+    /** Moves the cursor by a share of the width; beyond an end the range moves along. @param {number} share */
     step(share) {
       const { plot } = this;
+      if (!plot) return;
       const width = plot.over.clientWidth;
       const { left } = plot.cursor;
       let next = (left >= 0 ? left : width / 2) + share * width;
       if (next < 0 || next > width) {
         const [min, max] = this.shown;
-        const [f, back] = this.data.logX ? [Math.log, Math.exp] : [(v) => v, (v) => v];
+        const [f, back] = this.along();
         const [low, high] = [f(this.whole[0]), f(this.whole[1])];
         const move = clamp(Math.sign(share) * 0.25 * (f(max) - f(min)), low - f(min), high - f(max));
         this.group.show(this.data.x, [back(f(min) + move), back(f(max) + move)]);
@@ -419,16 +485,20 @@
       plot.setCursor({ left: next, top: plot.over.clientHeight / 2 });
     }
 
+    /** @param {KeyboardEvent} event */
     onKey(event) {
-      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      const { plot } = this;
+      if (!plot || event.ctrlKey || event.metaKey || event.altKey) return;
       const fast = event.shiftKey ? 10 : 1;
-      const act = {
+      /** @type {Record<string, () => void>} */
+      const acts = {
         ArrowLeft: () => this.step(-0.01 * fast), ArrowRight: () => this.step(0.01 * fast),
-        Home: () => this.plot.setCursor({ left: 0, top: 0 }), End: () => this.plot.setCursor({ left: this.plot.over.clientWidth, top: 0 }),
+        Home: () => plot.setCursor({ left: 0, top: 0 }), End: () => plot.setCursor({ left: plot.over.clientWidth, top: 0 }),
         "+": () => this.zoom(0.5), "=": () => this.zoom(0.5), "-": () => this.zoom(2), _: () => this.zoom(2),
         0: () => this.group.show(this.data.x, this.whole),
-        Escape: () => this.plot.setCursor({ left: -10, top: -10 }),
-      }[event.key];
+        Escape: () => plot.setCursor({ left: -10, top: -10 }),
+      };
+      const act = acts[event.key];
       if (!act) return;
       // Values at a cursor moved by keys are announced.
       this.readout.setAttribute("aria-live", "polite");
@@ -436,10 +506,11 @@
       event.preventDefault();
     }
 
-    /** One finger moves the cursor, two fingers zoom and shift. */
-    touch() {
-      const { plot } = this;
+    /** One finger moves the cursor, two fingers zoom and shift. @param {uPlot} plot */
+    touch(plot) {
+      /** @type {Map<number, { left: number, x: number }>} */
       const fingers = new Map();
+      /** @param {PointerEvent} event */
       const at = (event) => event.clientX - plot.over.getBoundingClientRect().left;
       plot.over.addEventListener("pointerdown", (event) => {
         if (event.pointerType === "touch") fingers.set(event.pointerId, { left: at(event), x: plot.posToVal(at(event), "x") });
@@ -451,18 +522,21 @@
         if (fingers.size === 1) plot.setCursor({ left: clamp(finger.left, 0, plot.over.clientWidth), top: 0 });
         if (fingers.size !== 2) return;
         // The values that were first under the fingers stay there.
-        const [f, back] = this.data.logX ? [Math.log, Math.exp] : [(v) => v, (v) => v];
+        const [f, back] = this.along();
         const [p, q] = [...fingers.values()];
         if (Math.abs(q.left - p.left) < 20) return;
         const slope = (f(q.x) - f(p.x)) / (q.left - p.left);
         if (slope > 0) this.range([back(f(p.x) - slope * p.left), back(f(p.x) + slope * (plot.over.clientWidth - p.left))]);
       });
-      for (const kind of ["pointerup", "pointercancel", "pointerleave"]) {
+      for (const kind of /** @type {const} */ (["pointerup", "pointercancel", "pointerleave"])) {
         plot.over.addEventListener(kind, (event) => fingers.delete(event.pointerId));
       }
     }
 
-    /** Replaces the data, with as many curves as before, such as during a run. The range stays unless it was the whole. */
+    /**
+     * Replaces the data, with as many curves as before, such as during a run. The range stays unless it was the whole.
+     * @param {PlotData} data
+     */
     update(data) {
       const whole = !this.plot || this.isWhole();
       this.load(data);
@@ -472,33 +546,49 @@
     }
 
     refresh() {
-      if (!this.plot) return;
+      const { plot } = this;
+      if (!plot) return;
       this.curves.forEach((curve, i) => {
         const show = this.isShown(curve);
-        if (this.plot.series[i + 1].show !== show) this.plot.setSeries(i + 1, { show });
+        if (plot.series[i + 1].show !== show) plot.setSeries(i + 1, { show });
       });
       this.tell();
     }
   }
 
+  /** Creates a button. @param {string} text @param {string} label @param {() => void} act */
+  function action(text, label, act) {
+    const button = element("button", { type: "button", "aria-label": label }, text);
+    button.addEventListener("click", act);
+    return button;
+  }
+
   /** Plots of a group, with the names and ranges that they share. */
   class Group {
+    /** @param {HTMLElement} node */
     constructor(node) {
       this.node = node;
+      /** @type {Set<string>} */
       this.off = new Set();
+      /** @type {Set<string>} */
       this.offVariants = new Set();
+      /** @type {Map<string, Pair>} */
       this.ranges = new Map();
       this.quiet = false;
-      this.charts = [...node.querySelectorAll(".chart")].map((one) => new Chart(one, this));
+      /** @type {NodeListOf<HTMLElement>} */
+      const places = node.querySelectorAll(".chart");
+      this.charts = [...places].map((one) => new Chart(one, this));
       for (const curve of this.curves()) if (curve.hidden) this.offVariants.add(curve.variant);
-      this.node.prepend(this.toolbar());
+      this.extent = action("show all", "Switch between the transient and the whole range", () => this.toggleRange());
+      this.bar = this.toolbar();
+      this.node.prepend(this.bar);
     }
 
     curves() {
       return this.charts.flatMap((chart) => chart.curves);
     }
 
-    /** Calls a function without passing its changes on to the other plots. */
+    /** Calls a function without passing its changes on to the other plots. @param {() => void} act */
     quietly(act) {
       const before = this.quiet;
       this.quiet = true;
@@ -506,7 +596,7 @@
       this.quiet = before;
     }
 
-    /** Shows a range of x in all plots with this axis. */
+    /** Shows a range of x in all plots with this axis. @param {string} label @param {Pair} range */
     show(label, range) {
       if (!(range[1] > range[0])) return;
       this.ranges.set(label, range);
@@ -514,7 +604,7 @@
       this.name();
     }
 
-    /** Moves the cursors of all plots with this axis to x. */
+    /** Moves the cursors of all plots with this axis to x. @param {string} label @param {number | null} x @param {Chart} source */
     point(label, x, source) {
       this.quietly(() => {
         for (const chart of this.charts) {
@@ -537,12 +627,13 @@
       const first = this.charts.find((chart) => chart.plot);
       if (!first) return;
       const whole = first.isWhole();
-      for (const label of new Set(this.charts.map((chart) => chart.data.x))) {
-        const chart = this.charts.find((one) => one.data.x === label);
+      const firsts = new Map(this.charts.map((chart) => /** @type {const} */ ([chart.data.x, chart])).reverse());
+      for (const [label, chart] of firsts) {
         this.show(label, whole && chart.data.window ? chart.data.window : chart.whole);
       }
     }
 
+    /** @param {number} factor */
     zoom(factor) {
       const seen = new Set();
       for (const chart of this.charts) {
@@ -555,18 +646,20 @@
     toolbar() {
       const bar = element("div", { class: "toolbar", role: "toolbar", "aria-label": "Curves and range" });
       const variants = new Set(this.curves().map((curve) => curve.variant).filter((name) => name));
+      /** @type {Map<string, Curve>} */
       const firsts = new Map();
       for (const curve of this.curves()) {
         const known = firsts.get(curve.owner);
         // The swatch is that of a line at the reported point.
         if (curve.owner && (!known || (known.style === "dashed" && curve.style !== "dashed" && curve.variant))) firsts.set(curve.owner, curve);
       }
+      /** @param {string} name @param {Set<string>} set @param {{ style: string, color: string }} curve */
       const chip = (name, set, curve) => {
         const swatch = element("span", { class: `swatch ${curve.style}` });
         swatch.style.setProperty("--tone", `var(--${curve.color})`);
         const button = element("button", { type: "button", class: "chip", "aria-pressed": String(!set.has(name)) }, swatch, name);
         button.addEventListener("click", (event) => {
-          if (event.shiftKey && set === this.off) this.only(name, bar);
+          if (event.shiftKey && set === this.off) this.only(name);
           else {
             if (set.has(name)) set.delete(name); else set.add(name);
             button.setAttribute("aria-pressed", String(!set.has(name)));
@@ -583,7 +676,8 @@
         all.addEventListener("click", () => {
           const none = this.off.size === 0;
           for (const button of names) {
-            if (none) this.off.add(button.dataset.name); else this.off.delete(button.dataset.name);
+            const name = button.dataset.name ?? "";
+            if (none) this.off.add(name); else this.off.delete(name);
             button.setAttribute("aria-pressed", String(!none));
           }
           for (const chart of this.charts) chart.refresh();
@@ -592,19 +686,21 @@
       }
       if (variants.size > 1) {
         for (const name of variants) {
-          const curve = this.curves().find((one) => one.variant === name);
-          bar.append(chip(name, this.offVariants, { ...curve, color: "faint" }));
+          const style = this.curves().find((one) => one.variant === name)?.style ?? "line";
+          bar.append(chip(name, this.offVariants, { style, color: "faint" }));
         }
       }
-      const request = [...this.node.querySelectorAll("figure[data-signal]")];
+      /** @type {NodeListOf<HTMLElement>} */
+      const figures = this.node.querySelectorAll("figure[data-signal]");
+      const request = [...figures];
       if (request.length) {
         const select = element("select", { "aria-label": "Show another signal" }, element("option", { value: "" }, "other signals"));
-        for (const figure of request) select.append(element("option", { value: figure.dataset.signal }, figure.dataset.signal));
+        for (const { dataset: { signal = "" } } of request) select.append(element("option", { value: signal }, signal));
         select.addEventListener("change", () => {
           const figure = request.find((one) => one.dataset.signal === select.value);
           if (figure) {
             figure.hidden = false;
-            this.node.querySelector(".toolbar").after(figure);
+            bar.after(figure);
             for (const chart of this.charts) if (figure.contains(chart.node)) chart.create();
             select.querySelector(`option[value="${CSS.escape(select.value)}"]`)?.remove();
           }
@@ -612,40 +708,38 @@
         });
         bar.append(select);
       }
-      const action = (text, label, act) => {
-        const button = element("button", { type: "button", "aria-label": label }, text);
-        button.addEventListener("click", act);
-        return button;
-      };
-      this.extent = action("show all", "Switch between the transient and the whole range", () => this.toggleRange());
       const range = element("span", { class: "range-buttons" }, action("\u2212", "Zoom out", () => this.zoom(2)), action("+", "Zoom in", () => this.zoom(0.5)), this.extent);
       bar.append(range);
       return bar;
     }
 
-    /** Shows one curve only. */
-    only(name, bar) {
-      for (const button of bar.querySelectorAll(".chip")) {
-        if (!this.curves().some((curve) => curve.owner === button.dataset.name)) continue;
-        const on = button.dataset.name === name;
-        if (on) this.off.delete(name); else this.off.add(button.dataset.name);
+    /** Shows one curve only. @param {string} name */
+    only(name) {
+      /** @type {NodeListOf<HTMLElement>} */
+      const chips = this.bar.querySelectorAll(".chip");
+      for (const button of chips) {
+        const of = button.dataset.name ?? "";
+        if (!this.curves().some((curve) => curve.owner === of)) continue;
+        const on = of === name;
+        if (on) this.off.delete(name); else this.off.add(of);
         button.setAttribute("aria-pressed", String(on));
       }
     }
   }
 
+  /** @type {Chart[]} */
   const charts = [];
   const seen = new IntersectionObserver((entries) => {
     for (const entry of entries) {
       if (!entry.isIntersecting) continue;
       const chart = charts.find((one) => one.node === entry.target);
-      chart.create();
-      chart.group.name();
+      chart?.create();
+      chart?.group.name();
       seen.unobserve(entry.target);
     }
   }, { rootMargin: "600px" });
 
-  /** Starts the plots of an element; each is drawn when it comes into view. */
+  /** Starts the plots of an element; each is drawn when it comes into view. @param {HTMLElement} node */
   function start(node) {
     const group = new Group(node);
     for (const chart of group.charts) {
@@ -655,7 +749,9 @@
     return group;
   }
 
-  for (const node of document.querySelectorAll(".figures")) if (node.querySelector(".chart")) start(node);
+  /** @type {NodeListOf<HTMLElement>} */
+  const groups = document.querySelectorAll(".figures");
+  for (const node of groups) if (node.querySelector(".chart")) start(node);
   window.startPlots = start;
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     for (const chart of charts) chart.plot?.redraw(false);

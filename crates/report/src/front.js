@@ -1,19 +1,32 @@
+// @ts-check
 // Selects a point of the front in all plots and in the table. Elements of a point have its number as data-point.
 (() => {
   "use strict";
+  /** @type {Record<string, number>} */
+  const STEPS = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 };
+  /** @type {HTMLTableElement | null} */
   const table = document.querySelector("table.front");
   if (!table) return;
   const body = table.tBodies[0];
-  const plots = [...document.querySelectorAll("svg.plot")].filter((svg) => svg.querySelector("[data-point]"));
+  /** @type {NodeListOf<SVGSVGElement>} */
+  const all = document.querySelectorAll("svg.plot");
+  const plots = [...all].filter((svg) => svg.querySelector("[data-point]"));
+  /** @type {string | null} */
   let kept = null; // point selected by a click
+  /** @type {string | null} */
   let shown = null;
 
-  // Positions of the dots of a plot, in its own units.
-  const dots = (svg) => [...svg.querySelectorAll("g.dot[data-point]")].map((g) => {
-    const [x, y] = g.querySelector("path").getAttribute("d").slice(1).split(/[ h]/).map(Number);
-    return { point: g.dataset.point, x, y };
-  });
+  /** Positions of the dots of a plot, in its own units. @param {SVGSVGElement} svg */
+  function dots(svg) {
+    /** @type {NodeListOf<SVGElement>} */
+    const groups = svg.querySelectorAll("g.dot[data-point]");
+    return [...groups].map((g) => {
+      const [x, y] = (g.querySelector("path")?.getAttribute("d") ?? "").slice(1).split(/[ h]/).map(Number);
+      return { point: g.dataset.point ?? null, x, y };
+    });
+  }
 
+  /** @param {string | null} point */
   function show(point) {
     if (point === shown) return;
     for (const element of document.querySelectorAll(".chosen")) element.classList.remove("chosen");
@@ -22,17 +35,22 @@
     for (const element of document.querySelectorAll(`[data-point="${point}"]`)) {
       element.classList.add("chosen");
       // The selected element is drawn on top.
-      if (element.tagName === "g") element.parentNode.append(element);
+      if (element.tagName === "g") element.parentElement?.append(element);
     }
   }
 
+  /** @param {string | null} point */
   function keep(point) {
     kept = kept === point ? null : point;
     for (const row of body.rows) row.setAttribute("aria-selected", String(row.dataset.point === kept));
     show(kept ?? point);
   }
 
-  // Dot nearest to the pointer, within 24 units.
+  /**
+   * Returns the point of the dot nearest to the pointer, within 24 units.
+   * @param {SVGSVGElement} svg @param {MouseEvent} event
+   * @returns {string | null}
+   */
   function nearest(svg, event) {
     const box = svg.getBoundingClientRect();
     const scale = svg.viewBox.baseVal.width / box.width;
@@ -42,33 +60,36 @@
       const distance = Math.hypot(dot.x - x, dot.y - y);
       if (distance < 24 && (!best || distance < best.distance)) best = { distance, point: dot.point };
     }
+    if (best) return best.point;
     // Lines, such as responses, are selected by hovering.
-    return best ? best.point : event.target.closest?.("[data-point]")?.dataset.point ?? null;
+    const line = event.target instanceof Element ? event.target.closest("[data-point]") : null;
+    return line?.getAttribute("data-point") ?? null;
   }
 
-  // Selects the next (right, down) or previous (left, up) row of the table in its present order.
+  /** Selects the next (1) or previous (-1) row of the table in its present order. @param {number} by */
   function step(by) {
     const rows = [...body.rows];
     const at = rows.findIndex((row) => row.dataset.point === shown);
     const next = at < 0 ? (by > 0 ? 0 : rows.length - 1) : Math.min(Math.max(at + by, 0), rows.length - 1);
-    kept = rows[next].dataset.point;
+    kept = rows[next].dataset.point ?? null;
     for (const row of rows) row.setAttribute("aria-selected", String(row.dataset.point === kept));
     show(kept);
     return rows[next];
   }
 
-  function onKey(event) {
-    const by = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+  /** @param {KeyboardEvent} event @param {HTMLTableRowElement} [of] Row that has the focus. */
+  function onKey(event, of) {
+    const by = STEPS[event.key];
     if (by) {
       const row = step(by);
-      if (event.currentTarget.tagName === "TR") row.focus();
+      if (of) row.focus();
       event.preventDefault();
     } else if (event.key === "Escape") {
       kept = null;
       for (const row of body.rows) row.setAttribute("aria-selected", "false");
       show(null);
-    } else if (event.key === "Enter" && event.currentTarget.tagName === "TR") {
-      keep(event.currentTarget.dataset.point);
+    } else if (event.key === "Enter" && of) {
+      keep(of.dataset.point ?? null);
     }
   }
 
@@ -77,17 +98,17 @@
     svg.addEventListener("pointermove", (event) => { const point = nearest(svg, event); if (point !== null) show(point); });
     svg.addEventListener("pointerleave", () => show(kept));
     svg.addEventListener("click", (event) => { const point = nearest(svg, event); if (point !== null) keep(point); });
-    svg.addEventListener("keydown", onKey);
+    svg.addEventListener("keydown", (event) => onKey(event));
   }
   for (const row of body.rows) {
     row.tabIndex = 0;
     row.setAttribute("aria-selected", "false");
-    row.addEventListener("pointerenter", () => show(row.dataset.point));
+    row.addEventListener("pointerenter", () => show(row.dataset.point ?? null));
     row.addEventListener("pointerleave", () => show(kept));
-    row.addEventListener("focus", () => show(row.dataset.point));
-    row.addEventListener("click", () => keep(row.dataset.point));
-    row.addEventListener("keydown", onKey);
+    row.addEventListener("focus", () => show(row.dataset.point ?? null));
+    row.addEventListener("click", () => keep(row.dataset.point ?? null));
+    row.addEventListener("keydown", (event) => onKey(event, row));
   }
 
-  for (const hint of document.querySelectorAll(".hint")) hint.hidden = false;
+  for (const hint of document.querySelectorAll(".hint")) hint.removeAttribute("hidden");
 })();
