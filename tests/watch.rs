@@ -124,7 +124,7 @@ fn events_count_only_committed_evaluations() {
     let state = run.first_state();
     assert_eq!((state["study"].as_str(), state["budget"].as_u64()), (Some("pid-design"), Some(100_000)));
     let reported = state["evaluations"].as_i64().unwrap();
-    assert!(reported > 0 && !state["curve"].as_array().unwrap().is_empty(), "{state}");
+    assert!(reported > 0 && !state["convergence"][0]["curves"].as_array().unwrap().is_empty(), "{state}");
     let criteria: Vec<&str> =
         state["criteria"].as_array().unwrap().iter().map(|criterion| criterion["name"].as_str().unwrap()).collect();
     assert_eq!(criteria, ["overshoot", "settling"]);
@@ -229,18 +229,24 @@ fn a_browser_shows_values_during_the_run_and_its_end() {
     assert!(seen.windows(2).all(|pair| pair[0][0] < pair[1][0] && pair[0][1] < pair[1][1]), "{seen:?}");
     let shown = page.evaluate(
         "({ study: document.querySelector('h1').textContent, page: document.body.textContent, \
-            curve: document.querySelectorAll('#curve path.result, #curve path.measured').length, \
-            dot: document.querySelectorAll('#curve circle').length })",
+            about: document.querySelector('#convergence .canvas')?.getAttribute('aria-label') })",
     );
     assert_eq!(shown["study"], "pid-design");
     let text = shown["page"].as_str().unwrap();
     for part in ["of 100000", "Best objective", "overshoot", "settling", "Td"] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    assert!(shown["curve"].as_u64().unwrap() > 0 && shown["dot"] == 1, "{shown}");
+    let about = shown["about"].as_str().unwrap();
+    assert!(about.contains("worst scaled criterion over evaluations") && about.contains("best so far: from"), "{shown}");
+    // The curve grows with the run, as does its description.
+    page.evaluate("document.querySelector('#convergence').scrollIntoView()");
+    page.once("document.querySelector('#convergence .uplot canvas') ? 1 : null");
+    let end = "Number(document.querySelector('#convergence .readout')?.textContent.match(/^evaluations 1 to ([0-9]+)/)?.[1] ?? 0) || null";
+    let first = page.once(end).as_u64().unwrap();
+    page.once(&format!("{end} > {first} ? 1 : null"));
     // Responses of the best point are drawn, and replaced by those of better points.
-    let shown = "document.querySelector('#responses .chart .uplot') ? Number(document.querySelector('#responses').dataset.shown) : null";
-    assert!(page.once(shown).as_u64().unwrap() > 0);
+    let best = "document.querySelector('#responses .chart .uplot') ? Number(document.querySelector('#responses').dataset.shown) : null";
+    assert!(page.once(best).as_u64().unwrap() > 0);
     page.once("document.querySelector('#responses .readout').textContent.startsWith('time 0 to') ? 1 : null");
     // By keyboard alone: the first focus is the table of criteria, which scrolls on a narrow screen.
     page.press("Tab");

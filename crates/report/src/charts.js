@@ -141,6 +141,7 @@
     /** Reads the data of the plot. @param {PlotData} data */
     load(data) {
       this.data = data;
+      this.place.setAttribute("aria-label", `${data.title}. ${data.about}`);
       this.curves = prepared(data);
       const ends = this.curves.flatMap((curve) => [curve.x[0], curve.x[curve.x.length - 1]]).concat(data.range ?? []);
       this.whole = [Math.min(...ends), Math.max(...ends)];
@@ -173,7 +174,6 @@
     create() {
       if (this.plot) return;
       const { data, node } = this;
-      this.place.setAttribute("aria-label", `${data.title}. ${data.about}`);
       this.place.addEventListener("keydown", (event) => this.onKey(event));
       node.append(element("p", { class: "title" }, data.title), this.place, this.readout);
       node.classList.add("live");
@@ -541,6 +541,8 @@
       const whole = !this.plot || this.isWhole();
       this.load(data);
       if (!this.plot) return;
+      // A range that grows is not announced.
+      this.readout.removeAttribute("aria-live");
       this.plot.setData(this.joined(), false);
       this.show(whole ? this.whole : this.shown);
     }
@@ -728,7 +730,7 @@
   }
 
   /** @type {Chart[]} */
-  const charts = [];
+  let charts = [];
   const seen = new IntersectionObserver((entries) => {
     for (const entry of entries) {
       if (!entry.isIntersecting) continue;
@@ -742,6 +744,8 @@
   /** Starts the plots of an element; each is drawn when it comes into view. @param {HTMLElement} node */
   function start(node) {
     const group = new Group(node);
+    // Plots that were replaced are not drawn any more.
+    charts = charts.filter((chart) => chart.node.isConnected);
     for (const chart of group.charts) {
       charts.push(chart);
       seen.observe(chart.node);

@@ -1,7 +1,9 @@
 //! Convergence: objective and constraint violation of the best point over the evaluations.
 
 use mops_core::{Merit, Objective, Study, Usage, evaluation::FEASIBLE, run::Record};
+use serde_json::Value;
 
+use super::chart;
 use mops_content::{
     figures::{Figure, Group},
     numbers::counted,
@@ -30,12 +32,33 @@ pub(super) fn group(study: &Study, archive: &[Record]) -> Group {
             None => "No point is feasible.".to_owned(),
         });
     }
-    let mut plots = vec![("convergence".to_owned(), objective(study, archive, &best))];
+    let all = archive.iter().enumerate().map(|(i, r)| ((i + 1) as f64, r.merit.objective)).collect();
+    let points = Curve {
+        name: "all points".into(),
+        points: all,
+        style: CurveStyle::Dots,
+        color: Color::Start,
+        may_leave: true,
+        ..Curve::default()
+    };
+    let mut plot = objective(study, &best, archive.len(), 100.0);
+    plot.curves.insert(0, points);
+    let mut plots = vec![("convergence".to_owned(), plot)];
     if best.iter().any(|(_, merit)| merit.violation.is_finite() && !feasible(merit)) {
         plots.push(("convergence-violation".to_owned(), violation(&best, archive.len())));
     }
     let figures = plots.into_iter().map(|plot| Figure { plots: vec![plot], ..Figure::default() }).collect();
     Group { about, figures, ..Group::default() }
+}
+
+/// Returns the data of the plot of the objective for the live page of a run, from the improvements so far: number of
+/// evaluations and merit. Empty without one.
+#[must_use]
+pub fn live(study: &Study, best: &[(usize, Merit)], evaluations: usize) -> Vec<Value> {
+    if best.is_empty() {
+        return Vec::new();
+    }
+    vec![chart::data(&objective(study, best, evaluations.max(2), 20.0))]
 }
 
 /// Returns the evaluations, counted from 1, at which the best point improved, with its merit from then on.
@@ -49,26 +72,19 @@ fn improvements(archive: &[Record]) -> Vec<(usize, Merit)> {
     best
 }
 
-fn objective(study: &Study, archive: &[Record], best: &[(usize, Merit)]) -> Plot {
+/// Returns the plot of the objective at the best point; its axis is logarithmic if the values span more than this
+/// factor.
+fn objective(study: &Study, best: &[(usize, Merit)], evaluations: usize, factor: f64) -> Plot {
     let name = match study.objective() {
         Objective::Max | Objective::Each => "worst scaled criterion",
         Objective::Sum => "sum of weighted scaled criteria",
     };
     // The objective of an infeasible point may be low because constraints are violated, so its colour differs.
     let split = best.iter().position(|(_, merit)| merit.is_feasible()).unwrap_or(best.len());
-    let end = best.get(split).map_or(archive.len(), |(at, _)| *at);
+    let end = best.get(split).map_or(evaluations, |(at, _)| *at);
     let before = steps(&best[..split], end, |m| m.objective);
-    let after = steps(&best[split..], archive.len(), |m| m.objective);
-    let all = archive.iter().enumerate().map(|(i, r)| ((i + 1) as f64, r.merit.objective)).collect();
+    let after = steps(&best[split..], evaluations, |m| m.objective);
     let curves = vec![
-        Curve {
-            name: "all points".into(),
-            points: all,
-            style: CurveStyle::Dots,
-            color: Color::Start,
-            may_leave: true,
-            ..Curve::default()
-        },
         Curve { name: "best so far, infeasible".into(), points: before, color: Color::Measured, ..Curve::default() },
         Curve { name: "best so far".into(), points: after, ..Curve::default() },
     ];
@@ -79,9 +95,9 @@ fn objective(study: &Study, archive: &[Record], best: &[(usize, Merit)]) -> Plot
     Plot {
         title: "Objective at the best point".into(),
         x_label: "evaluations".into(),
-        x_range: Some([1.0, archive.len() as f64]),
+        x_range: Some([1.0, evaluations as f64]),
         y_label: name.into(),
-        log_y: spans_decades(best.iter().map(|(_, merit)| merit.objective)),
+        log_y: spans(factor, best.iter().map(|(_, merit)| merit.objective)),
         curves,
         levels,
         ..Plot::default()
@@ -100,7 +116,7 @@ fn violation(best: &[(usize, Merit)], evaluations: usize) -> Plot {
         x_label: "evaluations".into(),
         x_range: Some([1.0, evaluations as f64]),
         y_label: "scaled violation".into(),
-        log_y: spans_decades(values),
+        log_y: spans(100.0, values),
         curves: vec![Curve {
             name: "best so far, infeasible".into(),
             points,
@@ -121,10 +137,10 @@ fn steps(best: &[(usize, Merit)], end: usize, value: impl Fn(&Merit) -> f64) -> 
     points
 }
 
-/// Returns true if the finite values are positive and span more than two decades.
-fn spans_decades(values: impl Iterator<Item = f64>) -> bool {
+/// Returns true if the finite values are positive and span more than a factor.
+fn spans(factor: f64, values: impl Iterator<Item = f64>) -> bool {
     let range = values.filter(|v| v.is_finite()).map(|v| [v, v]).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
-    range.is_some_and(|[low, high]| low > 0.0 && high > 100.0 * low)
+    range.is_some_and(|[low, high]| low > 0.0 && high > factor * low)
 }
 
 #[cfg(test)]
@@ -149,6 +165,6 @@ mod tests {
         let best = improvements(&archive);
         assert_eq!(best.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [1, 3, 5]);
         assert_eq!(steps(&best[1..], 5, |m| m.objective), [(3.0, 3.0), (5.0, 3.0), (5.0, 2.0), (5.0, 2.0)]);
-        assert!(spans_decades([1.0, 1e3, f64::INFINITY].into_iter()) && !spans_decades([-1.0, 1e3].into_iter()));
+        assert!(spans(100.0, [1.0, 1e3, f64::INFINITY].into_iter()) && !spans(100.0, [-1.0, 1e3].into_iter()));
     }
 }

@@ -57,10 +57,11 @@ use mops_tasks::{Room, Solution, Solved, calibration};
 
 pub use bode::{FrequencyCurve, bode};
 pub use chart::{SCRIPTS as CHART_SCRIPTS, STYLE as CHART_STYLE};
+pub use convergence::live as live_convergence;
 pub use nyquist::nyquist;
 pub use page::page;
 use plot_files::PlotFiles;
-pub use responses::live;
+pub use responses::live as live_responses;
 use scene::Scene;
 pub use side_by_side::{Responses, Rows, comparison_page};
 

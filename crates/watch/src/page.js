@@ -33,7 +33,7 @@
  * @property {{ objective: Value, violation: Value, feasible: boolean } | null} best
  * @property {Criterion[] | null} criteria
  * @property {Tuner[] | null} tuners
- * @property {[number, Value, Value, boolean][]} curve
+ * @property {PlotData[]} convergence
  */
 
 /** @param {string} id */
@@ -112,65 +112,6 @@ function tunerRow(tuner) {
     element("td", {}, tuner.unit), cell);
 }
 
-/** Returns about `count` round numbers between two ends. @param {number} low @param {number} high @param {number} count */
-function ticks(low, high, count) {
-  const rough = (high - low) / count;
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= rough) ?? rough;
-  const found = [];
-  for (let i = Math.ceil(low / step); i * step <= high + 1e-9 * step; i++) found.push(Number((i * step).toPrecision(12)));
-  return found;
-}
-
-const NS = "http://www.w3.org/2000/svg";
-
-/** Creates an SVG element. @param {string} name @param {Record<string, string | number>} attributes */
-function drawn(name, attributes, content = "") {
-  const node = document.createElementNS(NS, name);
-  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, String(value));
-  node.textContent = content;
-  return node;
-}
-
-/** Draws the best objective as a step curve, in another colour while a constraint is violated. @param {State} state */
-function curve(state) {
-  /** @type {[number, number, boolean][]} */
-  const points = state.curve.flatMap(([n, value, , feasible]) => (value === null ? [] : [[n, value, feasible]]));
-  const svg = at("curve");
-  if (points.length === 0) return svg.replaceChildren();
-  const [left, right, top, bottom] = [64, 626, 12, 262];
-  const end = Math.max(state.evaluations, 2);
-  const values = points.map((p) => p[1]);
-  let [low, high] = [Math.min(...values), Math.max(...values)];
-  const log = low > 0 && high / low > 20;
-  /** @type {(v: number) => number} */
-  const f = log ? Math.log10 : (v) => v;
-  const room = (f(high) - f(low)) * 0.06 || Math.abs(f(high)) * 0.1 || 1;
-  const [from, to] = [f(low) - room, f(high) + room];
-  /** @param {number} n */
-  const x = (n) => left + (right - left) * (n - 1) / (end - 1);
-  /** @param {number} v */
-  const y = (v) => bottom - (bottom - top) * (f(v) - from) / (to - from);
-  const parts = [];
-  for (const tick of ticks(from, to, 5)) {
-    const value = log ? 10 ** tick : tick;
-    parts.push(drawn("path", { class: "grid", d: `M${left} ${y(value)}H${right}` }));
-    parts.push(drawn("text", { class: "faint", x: left - 6, y: y(value) + 4, "text-anchor": "end" }, number(value, 3)));
-  }
-  for (const tick of ticks(1, end, 5)) {
-    parts.push(drawn("text", { class: "faint", x: x(tick), y: bottom + 18, "text-anchor": "middle" }, String(tick)));
-  }
-  parts.push(drawn("text", { class: "faint", x: (left + right) / 2, y: bottom + 36, "text-anchor": "middle" }, "evaluations"));
-  points.forEach((point, i) => {
-    const until = i + 1 < points.length ? points[i + 1] : [end, point[1]];
-    const d = `M${x(point[0])} ${y(point[1])}H${x(until[0])}V${y(until[1])}`;
-    parts.push(drawn("path", { class: point[2] ? "result" : "measured", d }));
-  });
-  const last = points[points.length - 1];
-  parts.push(drawn("circle", { cx: x(end), cy: y(last[1]), r: 4 }));
-  svg.replaceChildren(...parts);
-}
-
 /** @param {State} state */
 function verdict(state) {
   const best = state.best;
@@ -188,29 +129,33 @@ function verdict(state) {
 
 /** @typedef {{ of: number, plots: PlotData[] }} Responses */
 
-/** @type {{ names: string, group: ReturnType<Window["startPlots"]> } | null} */
-let plots = null;
+/** @type {Map<string, { key: string, group: ReturnType<Window["startPlots"]> }>} */
+const drawn = new Map();
 
-/** Draws the responses of the best point: the first time as new plots, later with new data. @param {Responses} found */
-function draw(found) {
-  if (found.plots.length === 0) return;
-  at("responses-section").hidden = false;
-  // A signal is missing while its simulation fails; the plots are then made anew.
-  const names = JSON.stringify(found.plots.map((plot) => [plot.title, plot.curves.map((curve) => curve.name)]));
-  if (plots?.names === names) {
-    plots.group.charts.forEach((chart, i) => chart.update(found.plots[i]));
+/**
+ * Draws plots in the element of this name: as new plots if axes or curves differ from those drawn, else with new data.
+ * @param {string} id @param {PlotData[]} plots
+ */
+function draw(id, plots) {
+  if (plots.length === 0) return;
+  // A signal is missing while its simulation fails, and a curve as long as it has no point.
+  const key = JSON.stringify(plots.map((plot) => [plot.title, plot.y, plot.logY, plot.curves.map((curve) => curve.name)]));
+  const known = drawn.get(id);
+  if (known?.key === key) {
+    known.group.charts.forEach((chart, i) => chart.update(plots[i]));
     return;
   }
-  at("responses").replaceChildren(...found.plots.map((plot) => {
+  at(id).parentElement?.removeAttribute("hidden");
+  at(id).replaceChildren(...plots.map((plot) => {
     const data = element("script", { type: "application/json" }, JSON.stringify(plot));
     return element("figure", {}, element("div", { class: "chart" }, data));
   }));
-  plots = { names, group: window.startPlots(at("responses")) };
+  drawn.set(id, { key, group: window.startPlots(at(id)) });
 }
 
 /** Shows the responses of a new best point. @param {Responses} found */
 function responses(found) {
-  draw(found);
+  draw("responses", found.plots);
   at("responses").dataset.shown = String(found.of);
 }
 
@@ -228,7 +173,7 @@ function show(state) {
   verdict(state);
   if (state.criteria) at("criteria").replaceChildren(...state.criteria.map(criterionRow));
   if (state.tuners) at("tuners").replaceChildren(...state.tuners.map(tunerRow));
-  curve(state);
+  draw("convergence", state.convergence);
   document.body.dataset.shown = String(state.evaluations);
 }
 

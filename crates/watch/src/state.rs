@@ -33,6 +33,7 @@ struct Responses {
     next: Option<Instant>,
 }
 
+#[derive(Clone)]
 struct Newest {
     /// Number of changes, starting at 1.
     version: u64,
@@ -41,7 +42,7 @@ struct Newest {
     best: Option<Evaluation>,
     /// Number of best points so far.
     improvements: u64,
-    /// Number of evaluations, objective and violation at each change of the best point.
+    /// Number of evaluations and merit at each change of the best point.
     curve: Vec<(usize, Merit)>,
     /// Reason why evaluations cannot be written, if so.
     write_error: Option<String>,
@@ -135,7 +136,10 @@ impl Live {
         let newest = self.newest();
         let is_old = |newest: &mut Newest| newest.version <= seen;
         let waited = self.changed.wait_timeout_while(newest, timeout, is_old);
-        let (newest, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let (guard, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        // The run does not wait until a viewer has its text.
+        let newest = guard.clone();
+        drop(guard);
         (newest.version, newest.over.is_some(), self.json(&newest).to_string())
     }
 
@@ -151,7 +155,7 @@ impl Live {
         drop(newest);
         if let Some(tuners) = tuners.filter(|_| due && of > last.of) {
             let start = Instant::now();
-            last.json = json!({ "of": of, "plots": mops_report::live(&self.problem, &tuners) }).to_string();
+            last.json = json!({ "of": of, "plots": mops_report::live_responses(&self.problem, &tuners) }).to_string();
             (last.of, last.next) = (of, Some(Instant::now() + SHARE * start.elapsed()));
         }
         (last.of > drawn).then(|| (last.of, last.json.clone()))
@@ -168,9 +172,6 @@ impl Live {
         };
         // Extrapolated from the speed so far; an upper bound, as a solver that converges ends earlier.
         let left = (share > 0.0).then(|| (seconds * (1.0 / share - 1.0)).max(0.0));
-        let curve: Vec<Value> = (newest.curve.iter())
-            .map(|(at, merit)| json!([at, merit.objective, merit.violation, merit.is_feasible()]))
-            .collect();
         json!({
             "study": self.problem.study().name(), "task": self.problem.study().task(), "solver": self.solver,
             "evaluations": run.evaluations, "budget": run.budget, "failed": run.failed,
@@ -183,7 +184,7 @@ impl Live {
             })),
             "criteria": newest.best.as_ref().map(|best| self.criteria(best)),
             "tuners": newest.best.as_ref().map(|best| self.tuners(best)),
-            "curve": curve,
+            "convergence": mops_report::live_convergence(self.problem.study(), &newest.curve, run.evaluations),
         })
     }
 
