@@ -16,6 +16,12 @@ pub(super) struct Axis {
     pub(super) factor: Option<String>,
 }
 
+/// Steps between ticks of angles in degrees: parts of a turn from 15 on, and from 45 on for ranges of 90 or more.
+pub(super) const DEGREES: [f64; 23] = [
+    0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0,
+    720.0, 1440.0, 3600.0, 7200.0,
+];
+
 impl Axis {
     /// Creates an axis with about `count` ticks. If `log`, `range` is the range of the decimal logarithms.
     pub(super) fn new(range: [f64; 2], log: bool, count: f64) -> Self {
@@ -25,12 +31,12 @@ impl Axis {
         Self::linear(range, round_step((range[1] - range[0]) / count), count)
     }
 
-    /// Creates an axis of angles in degrees, with ticks at multiples of 45 for ranges of 90 or more.
+    /// Creates an axis of angles in degrees, with ticks at [`DEGREES`].
     pub(super) fn degrees(range: [f64; 2], count: f64) -> Self {
         let room = range[1] - range[0];
-        let multiples = [45.0, 90.0, 180.0, 360.0, 720.0, 1440.0, 3600.0];
-        match multiples.into_iter().find(|step| room <= step * count) {
-            Some(step) if room >= 90.0 => Self::linear(range, step, count),
+        let least = if room >= 90.0 { 45.0 } else { 0.0 };
+        match DEGREES.into_iter().find(|step| *step >= least && room <= step * count) {
+            Some(step) if room >= 1.0 => Self::linear(range, step, count),
             _ => Self::new(range, false, count),
         }
     }

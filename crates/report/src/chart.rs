@@ -1,18 +1,18 @@
 //! Interactive plots of a page: data for the script `charts.js`, which draws them with uPlot in place of the SVG.
 
-use mops_core::criterion::Side;
-
 use super::Draw;
 use maud::{Markup, PreEscaped, html};
 use serde_json::{Value, json};
 
 use mops_content::{
-    plot::{Bound, Color, Curve, CurveStyle, Level, Plot},
+    plot::{Color, Curve, CurveStyle, Plot},
     sampling::thinned,
 };
 use mops_language::plain::escaped;
 
+use super::axis::DEGREES;
 use super::clip::{Point, simplified};
+use super::overlay::{Line, Region, lines, regions};
 use super::range::{drawable, x_range, y_range};
 use super::svg::class;
 
@@ -60,21 +60,26 @@ pub(super) fn data(plot: &Plot) -> Value {
     let size = [whole[1] - whole[0], height[1] - height[0]];
     let curves: Vec<Value> =
         plot.curves.iter().filter(|c| !c.points.is_empty()).map(|c| curve(plot, c, size)).collect();
-    let level = |level: &Level| json!([level.name, number(level.value)]);
-    let bound = |bound: &Bound| {
-        let side = bound.excluded.map_or(0, |side| if side == Side::Above { 1 } else { -1 });
-        json!([bound.name, bound.x.map(number), bound.y.map(number), side, bound.applies_to])
+    let line = |line: &Line<'_>| {
+        json!({
+            "name": line.name, "x": line.x.map(number), "y": line.y.map(number), "dashed": line.dashed,
+            "color": class(line.color), "nameColor": class(line.name_color), "of": line.applies_to,
+        })
     };
-    let bands: Vec<Value> = plot.bands.iter().map(|band| json!([band.name, band.range.map(number)])).collect();
+    let region = |region: &Region<'_>| {
+        json!({
+            "x": region.x.map(number), "lower": region.lower.map(number), "upper": region.upper.map(number),
+            "color": class(region.color), "of": region.applies_to,
+        })
+    };
     json!({
         "title": plot.title, "about": plot.description(),
         "x": plot.x_label, "y": plot.y_label,
-        "logX": plot.log_x, "logY": plot.log_y, "degrees": plot.degrees, "supplement": plot.supplement,
+        "logX": plot.log_x, "logY": plot.log_y, "steps": plot.degrees.then_some(DEGREES), "supplement": plot.supplement,
         "range": plot.x_range.map(|range| range.map(number)), "window": plot.window.map(|window| window.map(number)),
-        "curves": curves, "bands": bands,
-        "levels": plot.levels.iter().map(level).collect::<Vec<_>>(),
-        "verticals": plot.verticals.iter().map(level).collect::<Vec<_>>(),
-        "bounds": plot.bounds.iter().map(bound).collect::<Vec<_>>(),
+        "curves": curves,
+        "lines": lines(plot).iter().map(line).collect::<Vec<_>>(),
+        "regions": regions(plot).iter().map(region).collect::<Vec<_>>(),
     })
 }
 

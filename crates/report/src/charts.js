@@ -15,6 +15,9 @@
   /** @param {number} value @param {number} low @param {number} high */
   const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
+  /** Functions from values to even distances on an axis, and back. @type {(log: boolean) => ((v: number) => number)[]} */
+  const along = (log) => (log ? [Math.log10, (v) => 10 ** v] : [(v) => v, (v) => v]);
+
   /** Formats a number to `digits` significant digits, without trailing zeros. @param {number} value */
   function number(value, digits = 5) {
     if (value === 0 || (Math.abs(value) >= 1e-4 && Math.abs(value) < 1e6)) return String(Number(value.toPrecision(digits)));
@@ -88,10 +91,10 @@
   }
 
   /**
-   * Returns the grid of a logarithmic axis: multiples of powers of ten, or round numbers within less than a decade.
-   * @param {number} low @param {number} high
+   * Returns the grid of a logarithmic axis: multiples of powers of ten, or of a step in a range with at most two of them.
+   * @param {number} low @param {number} high @param {number} step
    */
-  function roundNumbers(low, high) {
+  function roundNumbers(low, high, step) {
     const found = [];
     for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
       for (let k = 1; k < 10; k++) {
@@ -100,8 +103,8 @@
       }
     }
     if (found.length > 2) return found;
-    const step = 10 ** Math.floor(Math.log10((high - low) / 2));
-    return Array.from({ length: 60 }, (_, i) => Number(((Math.ceil(low / step) + i) * step).toPrecision(12))).filter((v) => v <= high);
+    const first = Math.ceil(low / step);
+    return Array.from({ length: Math.floor(high / step) - first + 1 }, (_, i) => Number(((first + i) * step).toPrecision(12)));
   }
 
   /**
@@ -153,21 +156,21 @@
       return !this.group.off.has(curve.owner) && !this.group.offVariants.has(curve.variant);
     }
 
-    /** The bounds of which a curve is shown, each cut at the range of x: name, ends, values there, side, names of its curves. */
-    bounds() {
+    /** Returns true if a line or region applies to a curve that is shown. @param {LineData | RegionData} one */
+    applies({ of }) {
+      return of.length === 0 || of.some((name) => !this.group.off.has(name));
+    }
+
+    /** Returns the points where a line starts and ends in the range of x; none outside. @param {LineData} line */
+    ends({ x, y: [start, end] }) {
       const [low, high] = this.shown;
-      /** @type {(bound: BoundData) => [string, Pair, number[], number, string[]]} */
-      const cut = ([name, x, y, side, names]) => {
-        const [from, to] = [x[0] ?? low, x[1] ?? high];
-        /** @type {Pair} */
-        const ends = [Math.max(from, low), Math.min(to, high)];
-        /** @param {number} t */
-        const at = (t) => (y[0] === y[1] ? y[0] : y[0] + ((y[1] - y[0]) * (t - from)) / (to - from));
-        return [name, ends, ends.map(at), side, names];
-      };
-      /** @param {string[]} names */
-      const isShown = (names) => names.length === 0 || names.some((name) => !this.group.off.has(name));
-      return this.data.bounds.filter((bound) => isShown(bound[4])).map(cut).filter(([, [from, to]]) => from < to);
+      const [from, to] = [x[0] ?? low, x[1] ?? high];
+      const inside = [Math.max(from, low), Math.min(to, high)];
+      if (start === null || end === null || inside[0] >= inside[1]) return [];
+      if (start === end) return inside.map((at) => [at, start]);
+      // The line is straight on the drawing.
+      const [[f], [g, back]] = [along(this.data.logX), along(this.data.logY)];
+      return inside.map((at) => [at, back(g(start) + ((g(end) - g(start)) * (f(at) - f(from))) / (f(to) - f(from)))]);
     }
 
     /** Creates the plot when it comes into view. */
@@ -219,7 +222,7 @@
         label, size, font, labelFont: font, labelSize: 20, stroke: () => color("faint"),
         grid: { stroke: () => color("grid"), width: 1 }, ticks: { show: false },
         values: (plot, splits) => (log ? decades(splits) : splits.map((v) => number(v, 6))), ...more,
-        ...(log ? { filter: (plot, splits) => splits, splits: (plot, i, low, high) => roundNumbers(low, high) } : {}),
+        ...(log ? { filter: (plot, splits) => splits, splits: (plot, i, low, high, step) => roundNumbers(low, high, step) } : {}),
       });
       const series = this.curves.map((curve) => {
         const stroke = () => color(curve.color);
@@ -236,7 +239,7 @@
           x: { time: false, distr: data.logX ? 3 : 1, range: (plot, low, high) => [low, high] },
           y: { distr: data.logY ? 3 : 1, range: () => this.height() },
         },
-        axes: [axis(data.x, 30, data.logX), axis(data.y, 64, data.logY, data.degrees ? { incrs: [1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720, 3600] } : {})],
+        axes: [axis(data.x, 30, data.logX), axis(data.y, 64, data.logY, data.steps ? { incrs: data.steps } : {})],
         series: [{}, ...series],
         focus: { alpha: 0.35 },
         cursor: {
@@ -268,8 +271,7 @@
      */
     height() {
       const { data, shown: [from, to] } = this;
-      /** @type {(v: number) => number} */
-      const f = data.logY ? Math.log10 : (v) => v;
+      const [f, back] = along(data.logY);
       /** @param {boolean} mayLeave */
       const values = (mayLeave) => this.curves.filter((c) => c.mayLeave === mayLeave && this.isShown(c)).flatMap((curve) => {
         const inside = curve.y.slice(before(curve.x, from) + 1, before(curve.x, to) + 1);
@@ -277,7 +279,9 @@
       }).filter((v) => v !== null).map(f).filter(Number.isFinite);
       /** @param {number[]} all */
       const ends = (all) => all.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]);
-      let [low, high] = ends(values(false).concat(data.bands.flatMap((band) => band[1]).map(f).filter(Number.isFinite)));
+      // A region between two values, such as a band, is in the range.
+      const between = data.regions.map(({ lower, upper }) => [...lower, ...upper].filter((v) => v !== null));
+      let [low, high] = ends(values(false).concat(between.filter((all) => all.length === 4).flat().map(f)));
       if (low > high) [low, high] = ends(values(true));
       if (low > high) return data.logY ? [1, 10] : [0, 1];
       const size = Math.max(Math.abs(low), Math.abs(high));
@@ -285,19 +289,16 @@
       const room = high - low;
       let range = [low, high];
       for (const v of values(true)) range = [Math.min(range[0], Math.max(v, low - room)), Math.max(range[1], Math.min(v, high + room))];
-      const bounds = this.bounds().flatMap((bound) => bound[2]);
-      for (const v of data.levels.map((level) => level[1]).concat(bounds).map(f)) {
+      for (const v of data.lines.filter((line) => this.applies(line)).flatMap((line) => this.ends(line)).map((end) => f(end[1]))) {
         if (v >= low - room && v <= high + room) range = [Math.min(range[0], v), Math.max(range[1], v)];
       }
       const margin = 0.05 * (range[1] - range[0]);
-      /** @type {(v: number) => number} */
-      const back = data.logY ? (v) => 10 ** v : (v) => v;
       return [back(range[0] - margin), back(range[1] + margin)];
     }
 
     /**
      * Calls a function with the context, clipped to the frame, and the positions of values.
-     * @typedef {(value: number) => number} Position
+     * @typedef {(value: number | null, edge: number) => number} Position Place of a value, or of an edge if it is null.
      * @param {uPlot} plot @param {(ctx: CanvasRenderingContext2D, x: Position, y: Position, box: uPlot.Box) => void} paint
      */
     painting(plot, paint) {
@@ -307,74 +308,68 @@
       ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
       ctx.clip();
       /** @type {Position} */
-      const x = (value) => plot.valToPos(value, "x", true);
+      const x = (value, edge) => (value === null ? edge : plot.valToPos(value, "x", true));
       /** @type {Position} */
-      const y = (value) => plot.valToPos(value, "y", true);
+      const y = (value, edge) => (value === null ? edge : plot.valToPos(value, "y", true));
       paint(ctx, x, y, bbox);
       ctx.restore();
     }
 
-    /** Draws bands and excluded regions behind the curves. @param {uPlot} plot */
+    /** Draws the regions behind the curves. @param {uPlot} plot */
     regions(plot) {
+      const owners = this.curves.filter((curve) => this.isShown(curve)).map((curve) => curve.owner);
+      // A region for some of the curves would cover the others.
+      const covers = (/** @type {RegionData} */ { of }) => of.length > 0 && owners.some((name) => !of.includes(name));
       this.painting(plot, (ctx, x, y, box) => {
-        const [top, bottom] = [box.top, box.top + box.height];
-        ctx.fillStyle = color("band");
-        for (const [, [low, high]] of this.data.bands) ctx.fillRect(box.left, y(high), box.width, y(low) - y(high));
-        ctx.fillStyle = color("excluded");
-        const owners = new Set(this.curves.filter((curve) => this.isShown(curve)).map((curve) => curve.owner));
-        for (const [, [from, to], [start, end], side, names] of this.bounds()) {
-          // A region for some of the curves would cover the others.
-          if (side === 0 || (names.length && [...owners].some((name) => !names.includes(name)))) continue;
-          const [a, b, far] = [x(from), x(to), side > 0 ? top : bottom];
+        const [top, right, bottom] = [box.top, box.left + box.width, box.top + box.height];
+        for (const region of this.data.regions) {
+          if (!this.applies(region) || covers(region)) continue;
+          const [a, b] = [x(region.x[0], box.left), x(region.x[1], right)];
+          const [lower, upper] = [region.lower.map((v) => y(v, bottom)), region.upper.map((v) => y(v, top))];
+          ctx.fillStyle = color(region.color);
           ctx.beginPath();
-          for (const [px, py] of [[a, y(start)], [b, y(end)], [b, far], [a, far]]) ctx.lineTo(px, py);
-          if (side > 0 ? Math.max(y(start), y(end)) > top : Math.min(y(start), y(end)) < bottom) ctx.fill();
+          for (const [px, py] of [[a, upper[0]], [b, upper[1]], [b, lower[1]], [a, lower[0]]]) ctx.lineTo(px, py);
+          ctx.fill();
         }
       });
     }
 
-    /** Draws levels, bounds and vertical lines, with their names. @param {uPlot} plot */
+    /** Draws the lines beside the curves, with their names. @param {uPlot} plot */
     lines(plot) {
       this.painting(plot, (ctx, x, y, box) => {
-        const [left, right] = [box.left, box.left + box.width];
+        const [top, right, bottom] = [box.top, box.left + box.width, box.top + box.height];
         const scale = window.devicePixelRatio;
         ctx.font = `${11 * scale}px system-ui, sans-serif`;
-        /** @type {(points: number[][], name: string, end: number[], stroke: string) => void} */
-        const line = (points, name, end, stroke) => {
-          ctx.strokeStyle = stroke;
-          ctx.beginPath();
-          for (const [px, py] of points) ctx.lineTo(px, py);
-          ctx.stroke();
-          ctx.fillStyle = stroke;
-          ctx.textAlign = "right";
-          if (name) ctx.fillText(name, end[0] - 4 * scale, place(end[1]));
-        };
+        ctx.lineWidth = 1.2 * scale;
+        const named = new Set();
         /** @type {number[]} */
         const taken = [];
-        /** @param {number} end */
-        const place = (end) => {
-          let at = clamp(end - 4 * scale, box.top + 12 * scale, box.top + box.height - 4 * scale);
-          while (taken.some((other) => Math.abs(other - at) < 12 * scale)) at += 12 * scale;
-          taken.push(at);
-          return at;
-        };
-        ctx.lineWidth = 1.2 * scale;
-        ctx.setLineDash([6 * scale, 4 * scale]);
-        for (const [name, value] of this.data.levels) line([[left, y(value)], [right, y(value)]], name, [right, y(value)], color("demand"));
-        const named = new Set();
-        for (const [name, [from, to], [start, end]] of this.bounds()) {
-          const [a, b] = [[x(from), y(start)], [x(to), y(end)]];
-          const label = `${name} ${b[1].toFixed(0)}`;
-          line([a, b], named.has(label) ? "" : name, b, color("demand"));
+        for (const line of this.data.lines) {
+          const isVertical = line.y[0] === null;
+          const ends = isVertical
+            ? [[x(line.x[0], right), top], [x(line.x[1], right), bottom]]
+            : this.ends(line).map(([px, py]) => [x(px, right), y(py, bottom)]);
+          if (!this.applies(line) || ends.length === 0) continue;
+          const [[ax, ay], [bx, by]] = ends;
+          ctx.strokeStyle = color(line.color);
+          ctx.setLineDash(line.dashed ? [6 * scale, 4 * scale] : []);
+          ctx.beginPath();
+          ctx.moveTo(ax, ay);
+          ctx.lineTo(bx, by);
+          ctx.stroke();
+          ctx.fillStyle = color(line.nameColor);
+          const label = `${line.name} ${by.toFixed(0)}`;
+          if (isVertical) {
+            ctx.textAlign = bx > right - 120 * scale ? "right" : "left";
+            ctx.fillText(line.name, bx + (ctx.textAlign === "left" ? 4 : -4) * scale, top + 14 * scale);
+          } else if (line.name && !named.has(label) && Math.max(ay, by) >= top && Math.min(ay, by) <= bottom) {
+            let at = clamp(by - 4 * scale, top + 12 * scale, bottom - 4 * scale);
+            while (taken.some((other) => Math.abs(other - at) < 12 * scale)) at += 12 * scale;
+            taken.push(at);
+            ctx.textAlign = "right";
+            ctx.fillText(line.name, bx - 4 * scale, at);
+          }
           named.add(label);
-        }
-        ctx.setLineDash([]);
-        for (const [name, value] of this.data.verticals) {
-          const at = x(value);
-          line([[at, box.top], [at, box.top + box.height]], "", [0, 0], color("start"));
-          ctx.fillStyle = color("faint");
-          ctx.textAlign = at > right - 120 * scale ? "right" : "left";
-          ctx.fillText(name, at + (ctx.textAlign === "left" ? 4 : -4) * scale, box.top + 14 * scale);
         }
       });
     }
@@ -446,16 +441,11 @@
       return min <= this.whole[0] + slack && max >= this.whole[1] - slack;
     }
 
-    /** Returns the functions from x to even distances on its axis, and back. @returns {((v: number) => number)[]} */
-    along() {
-      return this.data.logX ? [Math.log, Math.exp] : [(v) => v, (v) => v];
-    }
-
     /** Zooms by a factor about the cursor, or about the middle. @param {number} factor */
     zoom(factor) {
       if (!this.plot) return;
       const [min, max] = this.shown;
-      const [f, back] = this.along();
+      const [f, back] = along(this.data.logX);
       const { left } = this.plot.cursor;
       const [a, b] = [f(min), f(max)];
       const about = left >= 0 ? f(this.plot.posToVal(left, "x")) : (a + b) / 2;
@@ -476,7 +466,7 @@
       let next = (left >= 0 ? left : width / 2) + share * width;
       if (next < 0 || next > width) {
         const [min, max] = this.shown;
-        const [f, back] = this.along();
+        const [f, back] = along(this.data.logX);
         const [low, high] = [f(this.whole[0]), f(this.whole[1])];
         const move = clamp(Math.sign(share) * 0.25 * (f(max) - f(min)), low - f(min), high - f(max));
         this.group.show(this.data.x, [back(f(min) + move), back(f(max) + move)]);
@@ -522,7 +512,7 @@
         if (fingers.size === 1) plot.setCursor({ left: clamp(finger.left, 0, plot.over.clientWidth), top: 0 });
         if (fingers.size !== 2) return;
         // The values that were first under the fingers stay there.
-        const [f, back] = this.along();
+        const [f, back] = along(this.data.logX);
         const [p, q] = [...fingers.values()];
         if (Math.abs(q.left - p.left) < 20) return;
         const slope = (f(q.x) - f(p.x)) / (q.left - p.left);

@@ -19,7 +19,7 @@ impl Frame {
 
     /// Returns the part of a segment inside the frame, as two numbers from 0 at `a` to 1 at `b`.
     /// Source: Y.-D. Liang, B. A. Barsky, ACM Transactions on Graphics 3 (1984) 1-22.
-    fn inside(&self, a: Point, b: Point) -> Option<[f64; 2]> {
+    pub(super) fn inside(&self, a: Point, b: Point) -> Option<[f64; 2]> {
         let [mut enter, mut leave] = [0.0f64, 1.0f64];
         for i in 0..2 {
             let d = b[i] - a[i];

@@ -1,10 +1,10 @@
 //! Layout of a plot.
 
-use mops_content::plot::{Bound, Color, CurveStyle, Plot};
-use mops_core::criterion::Side;
+use mops_content::plot::{Color, CurveStyle, Plot};
 
 use super::axis::Axis;
 use super::clip::{Frame, Point, visible};
+use super::overlay::{Line, Region, lines, regions};
 use super::range::{equal, x_range, y_range};
 use super::scene::{ADVANCE, Anchor, LETTER, Mark, SIZE, Scene};
 use super::surface::SCALE_WIDTH;
@@ -31,52 +31,33 @@ impl Scene {
         let [x_shown, y_shown] = if plot.equal { equal(shown[0], shown[1], room[0] / room[1]) } else { shown };
         let x = x_axis(x_shown, plot.log_x);
         let y = if plot.degrees { Axis::degrees(y_shown, 7.0) } else { Axis::new(y_shown, plot.log_y, 7.0) };
-        // Labels of levels, and of bounds that reach the right end.
-        let levels = plot.levels.iter().filter_map(|level| Some((y.position(level.value)?, level.name.as_str(), true)));
-        let at_end = plot.bounds.iter().filter(|bound| x.position(bound.x[1]).is_none_or(|at| at >= 1.0));
-        let bounds = at_end.filter_map(|bound| Some((y.position(bound.y[1])?, bound.name.as_str(), false)));
-        let levels: Vec<(f64, &str, bool)> = levels.chain(bounds).filter(|(at, ..)| (0.0..=1.0).contains(at)).collect();
+        let lines = lines(plot);
+        let lines: Vec<(&Line<'_>, [Point; 2])> =
+            lines.iter().filter_map(|line| Some((line, part(line, &x, &y)?))).collect();
+        // Names of levels, and of bounds that reach the right end.
+        let at_right = lines.iter().filter(|(line, [_, end])| !line.is_vertical() && end[0] >= 1.0 - 1e-9);
+        let mut names: Vec<(f64, &str)> = at_right.map(|(line, [_, end])| (end[1], line.name)).collect();
+        names.sort_by(|a, b| b.0.total_cmp(&a.0));
 
         scene.text(&plot.title, [10.0, 16.0], Anchor::Start, Color::Text);
         let labels = longest(y.ticks.iter().map(|(_, label)| label.as_str()));
         let left = 38.0 + ADVANCE * if plot.equal { labels.max(5.0) } else { labels };
         let beside = if plot.surface.is_some() { SCALE_WIDTH } else { 0.0 };
-        let right = SIZE[0] - 16.0 - beside - ADVANCE * longest(levels.iter().map(|(_, name, _)| *name));
+        let right = SIZE[0] - 16.0 - beside - ADVANCE * longest(names.iter().map(|(_, name)| *name));
         let frame = Frame { from: [left, top], to: [right.max(left + 100.0), SIZE[1] - 46.0] };
-        let place = |p: &(f64, f64)| {
-            let (px, py) = (x.position(p.0)?, y.position(p.1)?);
-            Some([left + px * (frame.to[0] - left), frame.to[1] - py * (frame.to[1] - top)])
-        };
-        let height = |at: f64| frame.to[1] - at.clamp(0.0, 1.0) * (frame.to[1] - top);
-        let edges: Vec<Vec<Point>> = plot.bounds.iter().map(|bound| edge(bound, (&x, &y), frame)).collect();
-        for (bound, edge) in plot.bounds.iter().zip(&edges) {
-            // A region for some of the curves would cover the others.
-            if let (Some(side), [from, .., to], true) = (bound.excluded, edge.as_slice(), bound.applies_to.is_empty()) {
-                let end = if side == Side::Above { frame.from[1] } else { frame.to[1] };
-                let inside = edge.iter().map(|p| [p[0], p[1].clamp(frame.from[1], frame.to[1])]);
-                let points = inside.chain([[to[0], end], [from[0], end]]).collect();
-                scene.marks.push(Mark::Area { points, color: Color::Excluded });
-            }
-        }
-
-        for band in &plot.bands {
-            if let [Some(low), Some(high)] = band.range.map(|v| y.position(v)) {
-                let (from, to) = ([left, height(low.max(high))], [frame.to[0], height(low.min(high))]);
-                scene.marks.push(Mark::Box { frame: Frame { from, to }, color: Color::Band });
+        let on_frame = |at: Point| [left + at[0] * (frame.to[0] - left), frame.to[1] - at[1] * (frame.to[1] - top)];
+        let place = |p: &(f64, f64)| Some(on_frame([x.position(p.0)?, y.position(p.1)?]));
+        // A region for some of the curves would cover the others.
+        for region in regions(plot).iter().filter(|region| region.applies_to.is_empty()) {
+            let points: Vec<Point> = outline(region, &x, &y).into_iter().map(on_frame).collect();
+            if !points.is_empty() {
+                scene.marks.push(Mark::Area { points, color: region.color });
             }
         }
         if plot.parallel_axes.is_empty() {
             scene.axes(plot, &x, &y, frame);
         } else {
             scene.parallel_axes(&plot.parallel_axes, [&x, &y], frame);
-        }
-        for line in &plot.verticals {
-            if let Some(at) = x.position(line.value).filter(|at| (0.0..=1.0).contains(at)) {
-                let px = left + at * (frame.to[0] - left);
-                let points = vec![[px, top], [px, frame.to[1]]];
-                scene.marks.push(Mark::Line { points, color: Color::Start, width: 0.8, dashed: false });
-                scene.text(&line.name, [px + 4.0, top + 8.0], Anchor::Start, Color::Faint);
-            }
         }
         if let Some(surface) = &plot.surface {
             scene.surface(surface, &x, &y, frame);
@@ -105,20 +86,18 @@ impl Scene {
                 scene.marks.push(Mark::FrontPoint { point, marks });
             }
         }
-        for edge in edges {
-            let points: Vec<Option<Point>> = edge.into_iter().map(Some).collect();
-            for points in visible(&points, frame, 0.1) {
-                scene.marks.push(Mark::Line { points, color: Color::Demand, width: 1.2, dashed: true });
+        for (line, ends) in lines {
+            let [from, to] = ends.map(on_frame);
+            let width = if line.dashed { 1.2 } else { 0.8 };
+            scene.marks.push(Mark::Line { points: vec![from, to], color: line.color, width, dashed: line.dashed });
+            if line.is_vertical() {
+                scene.text(line.name, [to[0] + 4.0, to[1] + 8.0], Anchor::Start, line.name_color);
             }
         }
-        let mut lowest = f64::INFINITY;
-        for (at, name, is_level) in descending(levels) {
-            if is_level {
-                let line = vec![[left, height(at)], [frame.to[0], height(at)]];
-                scene.marks.push(Mark::Line { points: line, color: Color::Demand, width: 1.2, dashed: true });
-            }
-            // Labels of neighbouring levels must not overlap.
-            lowest = if lowest.is_finite() { height(at).max(lowest + 14.0) } else { height(at) };
+        let mut lowest = f64::NEG_INFINITY;
+        for (at, name) in names {
+            // Names of neighbouring lines must not overlap.
+            lowest = on_frame([1.0, at])[1].max(lowest + 14.0);
             scene.text(name, [frame.to[0] + 6.0, lowest], Anchor::Start, Color::Demand);
         }
         if y_range.is_none() {
@@ -180,28 +159,37 @@ fn longest<'a>(labels: impl Iterator<Item = &'a str>) -> f64 {
     labels.map(|label| label.chars().count()).max().unwrap_or(0) as f64
 }
 
-/// Returns the line of a bound within the range of x, with points where it crosses the lower or the upper edge of the
-/// frame; empty outside. Other points may lie above or below the frame.
-fn edge(bound: &Bound, (x, y): (&Axis, &Axis), frame: Frame) -> Vec<Point> {
-    let [Some(start), Some(end)] = bound.y.map(|value| y.position(value)) else { return Vec::new() };
-    let whole = [x.position(bound.x[0]).unwrap_or(0.0), x.position(bound.x[1]).unwrap_or(1.0)];
-    let [from, to] = whole.map(|at| at.clamp(0.0, 1.0));
+/// Returns the position of a value, 0 at the start and 1 at the end of the axis; the edge for an infinite value.
+fn position(axis: &Axis, value: f64) -> f64 {
+    axis.position(value).unwrap_or(if value > 0.0 { 1.0 } else { 0.0 })
+}
+
+/// Returns the ends of the part of a line within the frame, with coordinates from 0 to 1.
+fn part(line: &Line<'_>, x: &Axis, y: &Axis) -> Option<[Point; 2]> {
+    let [a, b] = [0, 1].map(|i| [position(x, line.x[i]), position(y, line.y[i])]);
+    let within = Frame { from: [0.0, 0.0], to: [1.0, 1.0] }.inside(a, b)?;
+    Some(within.map(|s| [0, 1].map(|i| a[i] + s * (b[i] - a[i]))))
+}
+
+/// Returns the outline of the part of a region within the frame, with coordinates from 0 to 1; empty outside.
+fn outline(region: &Region<'_>, x: &Axis, y: &Axis) -> Vec<Point> {
+    let [start, end] = region.x.map(|value| position(x, value));
+    let [from, to] = [start, end].map(|at| at.clamp(0.0, 1.0));
     if from >= to {
         return Vec::new();
     }
-    let height =
-        |at: f64| if start == end { start } else { start + (end - start) * (at - whole[0]) / (whole[1] - whole[0]) };
-    let crossing = |level: f64| whole[0] + (whole[1] - whole[0]) * (level - start) / (end - start);
-    let mut places = vec![from, to];
-    places.extend([0.0, 1.0].map(crossing).into_iter().filter(|at| *at > from && *at < to));
+    let [lower, upper] = [region.lower, region.upper].map(|ends| ends.map(|value| position(y, value)));
+    let height = |[a, b]: [f64; 2], at: f64| if a == b { a } else { a + (b - a) * (at - start) / (end - start) };
+    // With the places where an edge enters or leaves the frame.
+    let crossing = |[a, b]: [f64; 2], level: f64| start + (end - start) * (level - a) / (b - a);
+    let crossings = [lower, upper].into_iter().flat_map(|edge| [0.0, 1.0].map(|level| crossing(edge, level)));
+    let mut places: Vec<f64> = crossings.filter(|at| *at > from && *at < to).chain([from, to]).collect();
     places.sort_by(f64::total_cmp);
-    let size = [frame.to[0] - frame.from[0], frame.to[1] - frame.from[1]];
-    places.into_iter().map(|at| [frame.from[0] + at * size[0], frame.to[1] - height(at) * size[1]]).collect()
-}
-
-fn descending(mut levels: Vec<(f64, &str, bool)>) -> Vec<(f64, &str, bool)> {
-    levels.sort_by(|a, b| b.0.total_cmp(&a.0));
-    levels
+    let along = |edge: [f64; 2]| places.iter().map(move |&at| [at, height(edge, at).clamp(0.0, 1.0)]);
+    if along(upper).zip(along(lower)).all(|(above, below)| above[1] <= below[1]) {
+        return Vec::new();
+    }
+    along(upper).chain(along(lower).rev()).collect()
 }
 
 #[cfg(test)]
@@ -209,18 +197,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sloping_bound_is_cut_at_the_frame_and_keeps_its_slope() {
-        let frame = Frame { from: [0.0, 0.0], to: [100.0, 100.0] };
-        let bound =
-            |y: [f64; 2]| Bound { name: String::new(), x: [0.0, 10.0], y, excluded: None, applies_to: Vec::new() };
-        // The frame shows x from 5 to 15 and y from 0 to 10, the second upwards.
+    fn a_sloping_region_is_cut_at_the_frame_and_keeps_its_slope() {
+        // The frame shows x from 5 to 15 and y from 0 to 10.
         let (x, y) = (Axis::new([5.0, 15.0], false, 5.0), Axis::new([0.0, 10.0], false, 5.0));
-        assert_eq!(edge(&bound([0.0, 10.0]), (&x, &y), frame), [[0.0, 50.0], [50.0, 0.0]]);
-        // From 10 at x = 5 to 20 at x = 10: above the frame from its upper edge on.
-        assert_eq!(edge(&bound([0.0, 20.0]), (&x, &y), frame), [[0.0, 0.0], [50.0, -100.0]]);
+        let above = |lower: [f64; 2]| {
+            let upper = [f64::INFINITY; 2];
+            outline(&Region { x: [0.0, 10.0], lower, upper, color: Color::Excluded, applies_to: &[] }, &x, &y)
+        };
+        assert_eq!(above([0.0, 10.0]), [[0.0, 1.0], [0.5, 1.0], [0.5, 1.0], [0.0, 0.5]]);
+        // Above the frame from its upper edge on.
+        assert!(above([0.0, 20.0]).is_empty());
         // From 8 at x = 5 to 16 at x = 10, through the upper edge at x = 6.25.
-        assert_eq!(edge(&bound([0.0, 16.0]), (&x, &y), frame), [[0.0, 20.0], [12.5, 0.0], [50.0, -60.0]]);
-        let ended = Bound { x: [0.0, 5.0], ..bound([1.0, 1.0]) };
-        assert!(edge(&ended, (&x, &y), frame).is_empty());
+        let cut = above([0.0, 16.0]);
+        assert_eq!(cut, [[0.0, 1.0], [0.125, 1.0], [0.5, 1.0], [0.5, 1.0], [0.125, 1.0], [0.0, 0.8]]);
+        let line = |x: [f64; 2], y: [f64; 2]| Line {
+            name: "",
+            x,
+            y,
+            color: Color::Demand,
+            name_color: Color::Demand,
+            dashed: true,
+            applies_to: &[],
+        };
+        assert_eq!(part(&line([0.0, 10.0], [0.0, 16.0]), &x, &y), Some([[0.0, 0.8], [0.125, 1.0]]));
+        assert_eq!(part(&line([0.0, f64::INFINITY], [5.0, 5.0]), &x, &y), Some([[0.0, 0.5], [1.0, 0.5]]));
+        assert_eq!(part(&line([0.0, 5.0 - 1e-3], [1.0, 1.0]), &x, &y), None);
     }
 }

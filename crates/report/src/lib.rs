@@ -13,6 +13,7 @@
 //! | `side_by_side` | the page of a comparison of runs |
 //! | `markup` | sections of `mops-content` as HTML |
 //! | `chart` | data of interactive plots, which `charts.js` draws with uPlot |
+//! | `overlay` | lines and regions beside the curves, for both drawings of a plot |
 //! | `layout` | from a plot to a scene; its parts are in `axis`, `range`, `clip`, `legend`, `surface`, `parallel_axes` and `space` |
 //! | `scene`, `view` | a drawing as marks, in a box as seen from a viewpoint; `svg` and `png` draw it |
 //! | `plot_files` | the files of the plots, of which those of earlier runs are removed |
@@ -30,6 +31,7 @@ mod legend;
 mod markup;
 mod matrix;
 mod nyquist;
+mod overlay;
 mod page;
 mod parallel_axes;
 mod plot_files;

@@ -16,8 +16,28 @@ interface CurveData {
   y: (number | null)[];
 }
 
-/** Bound: name, ends along x (`null`: no end), values there, excluded side, and the curves that it applies to. */
-type BoundData = [string, [number | null, number | null], Pair, -1 | 0 | 1, string[]];
+/** Coordinates of two points; `null` is the edge of the frame. */
+type Ends = [number | null, number | null];
+
+/** Line beside the curves, and the names of the curves that it applies to, empty for all: `Line` of overlay.rs. */
+interface LineData {
+  name: string;
+  x: Ends;
+  y: Ends;
+  color: string;
+  nameColor: string;
+  dashed: boolean;
+  of: string[];
+}
+
+/** Region behind the curves: `Region` of overlay.rs. */
+interface RegionData {
+  x: Ends;
+  lower: Ends;
+  upper: Ends;
+  color: string;
+  of: string[];
+}
 
 /** Interactive plot: `data` of chart.rs. */
 interface PlotData {
@@ -27,15 +47,13 @@ interface PlotData {
   y: string;
   logX: boolean;
   logY: boolean;
-  degrees: boolean;
+  steps: number[] | null;
   supplement: boolean;
   range: Pair | null;
   window: Pair | null;
   curves: CurveData[];
-  bands: [string, Pair][];
-  levels: [string, number][];
-  verticals: [string, number][];
-  bounds: BoundData[];
+  lines: LineData[];
+  regions: RegionData[];
 }
 
 declare namespace uPlot {
@@ -49,7 +67,7 @@ declare namespace uPlot {
     grid: { stroke: () => string; width: number };
     ticks: { show: boolean };
     values: (plot: uPlot, splits: number[]) => string[];
-    splits?: (plot: uPlot, axis: number, low: number, high: number) => number[];
+    splits?: (plot: uPlot, axis: number, low: number, high: number, step: number) => number[];
     filter?: (plot: uPlot, splits: number[]) => number[];
     incrs?: number[];
   }
