@@ -237,7 +237,10 @@ fn a_browser_shows_values_during_the_run_and_its_end() {
         assert!(text.contains(part), "{part}: {text}");
     }
     let about = shown["about"].as_str().unwrap();
-    assert!(about.contains("worst scaled criterion over evaluations") && about.contains("best so far: from"), "{shown}");
+    assert!(
+        about.contains("worst scaled criterion over evaluations") && about.contains("best so far: from"),
+        "{shown}"
+    );
     // The curve grows with the run, as does its description.
     page.evaluate("document.querySelector('#convergence').scrollIntoView()");
     page.once("document.querySelector('#convergence .uplot canvas') ? 1 : null");

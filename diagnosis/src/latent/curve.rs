@@ -43,7 +43,8 @@ const STILL: f64 = 1e-12;
 const POINTS: usize = 41;
 
 impl Estimation<'_> {
-    /// Returns the free curves on top of an estimate, the one with the largest gain first; `None` if a simulation fails.
+    /// Returns the free curves on top of an estimate, the one with the largest gain first; `None` if a simulation
+    /// fails.
     pub fn curves(&self, estimate: &Estimate) -> Option<Vec<Dependence>> {
         let fit = self.along(&estimate.errors);
         let mut slopes = fit.slopes(&estimate.point)?;
@@ -60,8 +61,8 @@ impl Estimation<'_> {
         Some(self.over(&coordinates, &estimate.errors, &trajectories, residuals, &unknowns))
     }
 
-    /// Returns the free curves at a place on top of an estimate without what effects add to the residuals of each record,
-    /// everything else fixed; `None` if a simulation fails.
+    /// Returns the free curves at a place on top of an estimate without what effects add to the residuals of each
+    /// record, everything else fixed; `None` if a simulation fails.
     pub fn curves_without(&self, estimate: &Estimate, place: &str, added: &[Vec<f64>]) -> Option<Vec<Dependence>> {
         let fit = self.along(&estimate.errors);
         let trajectories = self.trajectories(&fit, estimate)?;

@@ -1,9 +1,9 @@
 //! Course of what is missing at a place: the smooth force of the force error at a balance, the smooth error at a
 //! sensor.
 //!
-//! Where effects were added, their formulas are drawn: over time beside formula plus remainder, a component-plus-residual
-//! plot, and over a coordinate beside the free curve on top of the set without them. Where the formula is right, both
-//! agree.
+//! Where effects were added, their formulas are drawn: over time beside formula plus remainder, a
+//! component-plus-residual plot, and over a coordinate beside the free curve on top of the set without them. Where the
+//! formula is right, both agree.
 //!
 //! Source: F. R. Wood, The use of individual effects and residuals in fitting equations to data, Technometrics 15
 //! (1973) 677.
