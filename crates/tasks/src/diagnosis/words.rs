@@ -378,12 +378,6 @@ mod tests {
         let equal = "cannot distinguish `coulomb-friction` in the joint `phi` from `stribeck-friction`";
         assert!(text.contains(equal), "{text}");
         assert!(text.contains("not excluded: `quadratic-drag`"), "{text}");
-        let text = &remarks(&made_up::coulomb().found[0])[1];
-        assert!(
-            text.contains("best effect in 83 % of block bootstrap samples")
-                && text.contains("without `swing`, the best is"),
-            "{text}"
-        );
     }
 
     #[test]
