@@ -1,14 +1,13 @@
 //! `mops linearise`: linearises a model of a study and designs state feedback for it.
 
+mod arguments;
 mod feedback;
 mod files;
 mod text;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use clap::Args;
 use mops_core::{
     Analysis, AnalysisKind, Catalogue, Failure, Job, Study, StudyError,
     model::{Linearise, Linearised, Resting},
@@ -20,48 +19,10 @@ use serde_json::{Value, json};
 
 use self::feedback::Wanted;
 use self::text::MANY;
-use super::study::{StudyArguments, home, open, outputs};
-use crate::terminal::{CommandError, Limit, exit_after, print};
-
-/// Arguments of `mops linearise`.
-#[derive(Args)]
-pub(super) struct Arguments {
-    #[command(flatten)]
-    study: StudyArguments,
-    /// Model; required if the study has several.
-    #[arg(long)]
-    model: Option<String>,
-    /// Value of a tuner, parameter, state or input: --at theta="180 deg". Other states have their initial value, other
-    /// inputs the initial value of the case.
-    #[arg(long = "at", value_name = "NAME=VALUE")]
-    at: Vec<String>,
-    /// Case that supplies parameters and inputs [default: the first].
-    #[arg(long)]
-    case: Option<String>,
-    /// Show this input only.
-    #[arg(long)]
-    input: Option<String>,
-    /// Show this output only.
-    #[arg(long)]
-    output: Option<String>,
-    /// Move the operating point to the nearest equilibrium; inputs and the states of --at stay fixed.
-    #[arg(long)]
-    equilibrium: bool,
-    /// Fixed state or input that the equilibrium search may change nevertheless.
-    #[arg(long, value_name = "NAME", requires = "equilibrium")]
-    free: Vec<String>,
-    /// State feedback u = -K x by pole placement: --place=-5,-8,-2+3i,-2-3i (1/s).
-    #[arg(long, value_name = "POLES", allow_hyphen_values = true)]
-    place: Option<String>,
-    /// State feedback u = -K x by linear-quadratic regulation (LQR): weights of the states, then of the inputs.
-    #[arg(long, value_name = "WEIGHTS", conflicts_with = "place")]
-    lqr: Option<String>,
-    #[command(flatten)]
-    limit: Limit,
-    /// Folder for plots and linearised.json; without it, no files are written.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-}
+use super::study::{home, open, outputs};
+use crate::terminal::{CommandError, exit_after, print};
+pub(super) use arguments::Arguments;
+use arguments::{WHERE, complex, rows};
 
 pub(super) fn linearise(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
     exit_after(arguments.limit);
@@ -167,9 +128,6 @@ fn channels(
     }
     Ok(values)
 }
-
-/// File that contains the parts that are not printed.
-const WHERE: &str = "linearised.json (--out DIR)";
 
 /// Returns the requested model in the requested case. Unless a case is given, it is the first one in which a criterion
 /// reads the model, or else the first of all.
@@ -302,12 +260,4 @@ fn narrowed(system: &StateSpace, arguments: &Arguments) -> Result<StateSpace, Di
         outputs: outputs.iter().map(|&i| system.outputs[i].clone()).collect(),
         ..system.clone()
     })
-}
-
-fn rows(matrix: &nalgebra::DMatrix<f64>) -> Vec<Vec<f64>> {
-    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
-}
-
-fn complex(numbers: &[Complex]) -> Vec<[f64; 2]> {
-    numbers.iter().map(|z| [z.re, z.im]).collect()
 }

@@ -13,6 +13,7 @@ mod sources;
 mod stamps;
 #[cfg(test)]
 mod tests;
+mod variable;
 
 use std::collections::{HashMap, HashSet};
 use std::fmt;
@@ -29,6 +30,7 @@ pub use encoding::Encoding;
 pub use formulas::as_text;
 pub use sources::{FILE as SOURCES, source_of};
 pub use stamps::{Origin, Reference};
+pub use variable::Variable;
 
 /// File format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,26 +51,6 @@ impl fmt::Display for Format {
             Self::Mat5 => "MATLAB level 5",
         })
     }
-}
-
-/// Numeric variable: a CSV column, or a MATLAB matrix.
-///
-/// Each row is a sample; a MATLAB matrix with more columns than rows (1 x n, 2 x n) is transposed. Integers beyond 2^53
-/// are rounded to the nearest `f64`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Variable {
-    /// Name in the file, without the unit; `Y{2}` is the second element of the cell array `Y`.
-    pub name: String,
-    /// Unit as given in the header of a CSV file.
-    pub unit: Option<String>,
-    /// Number of samples.
-    pub rows: usize,
-    /// Number of signals; 1 for CSV.
-    pub columns: usize,
-    /// Values column by column, `rows * columns` of them; NaN is a gap.
-    pub values: Vec<f64>,
-    /// First stamp of a column of time stamps, whose values are in s from there on.
-    pub origin: Option<Origin>,
 }
 
 /// Data file in memory.

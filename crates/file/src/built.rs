@@ -15,8 +15,9 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::solver::read_solver;
 use super::tree::{Node, Text};
-use super::{StudyFile, content, digest, read_solver, schema, tasks, uncertain};
+use super::{StudyFile, content, digest, schema, tasks, uncertain};
 
 /// What settings may replace in `[study]`.
 #[derive(Debug, serde::Deserialize, JsonSchema)]

@@ -6,10 +6,13 @@ use mops_core::{
 };
 use mops_language::Diagnostic;
 
+use mops_language::files::Files;
+
+use super::cases::read_cases;
+use super::criterion::read_criterion;
 use super::experiment::read as read_experiments;
 use super::models::read_model;
 use super::tree::Text;
-use super::{Files, read_cases, read_criterion};
 
 /// Reads a model from the contents of `[models.NAME]`: its kind with options, `parameters` and other common keys.
 ///

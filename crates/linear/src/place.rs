@@ -1,14 +1,15 @@
 //! Pole placement by state feedback.
 
+mod complement;
 mod deflation;
 mod robust;
 
 use mops_math::{complex, stream};
-use nalgebra::{ComplexField, DMatrix};
-use rand::Rng;
+use nalgebra::DMatrix;
 
 use super::controllability::{Scaled, Staircase};
 use super::{Complex, eigenvalues};
+use rand::Rng;
 
 /// Largest relative distance of a closed-loop pole from its specified value with which a feedback is returned.
 ///
@@ -249,15 +250,6 @@ fn paired(poles: &[Complex]) -> Result<Vec<Complex>, String> {
         Some(alone) => Err(format!("the pole at {alone} has no conjugate among the others")),
         None => Ok(sorted),
     }
-}
-
-/// Returns orthonormal columns that complete those of `m` to a basis; `m` has full column rank.
-pub(super) fn complement<T: ComplexField>(m: &DMatrix<T>) -> DMatrix<T> {
-    let (rows, columns) = m.shape();
-    let mut square = DMatrix::<T>::zeros(rows, rows);
-    square.columns_mut(0, columns).copy_from(m);
-    // Factor Q of the padded matrix: zero columns have trivial reflections.
-    square.qr().q().columns(columns, rows - columns).into_owned()
 }
 
 #[cfg(test)]

@@ -13,9 +13,8 @@
 //! Source: K. J. Åström, B. Wittenmark, Computer-Controlled Systems, 3rd edition (1997), sections 2.3 (sampling), 3.2
 //! (stability).
 
+mod clock;
 mod equivalent;
-
-use std::ops::Range;
 
 use equivalent::Equivalent;
 use mops_math as math;
@@ -23,30 +22,14 @@ use mops_math::complex;
 use nalgebra::DMatrix;
 
 use super::components::paths;
-use super::extended::{Entry, Extended, Real, extended, product, rounded, solved, sum};
+use super::extended::Entry;
+use super::extended::Real;
+use super::extended::{Extended, extended, product, rounded, solved, sum};
 use super::{Complex, StateSpace};
-
-/// Clock: some states, its memory, change at its instants only.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Clock {
-    /// Indices of the states that are its memory.
-    pub memory: Range<usize>,
-    /// Time between two instants, s, above 0.
-    pub period: f64,
-    /// First instant, s.
-    pub offset: f64,
-    /// Time between an instant and the change of the memory, s, from 0 to the period.
-    pub delay: f64,
-}
+pub use clock::{Clock, NEXT, OWN};
 
 /// Entries of a matrix that are smaller than this part of the sum of the magnitudes of their terms are rounding errors.
 const ROUNDING: f64 = 1e-14;
-
-/// Prefix of the name of a value that a clock has computed and not applied yet.
-pub const NEXT: &str = "next ";
-
-/// Prefix of the name of memory at which a loop is cut: the value that its clock has computed.
-pub const OWN: &str = "own ";
 
 impl StateSpace {
     /// Returns the discrete equivalent of a system with clocks, for inputs that are constant between its instants. The

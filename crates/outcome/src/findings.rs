@@ -110,3 +110,9 @@ impl Serialize for Findings {
         map.end()
     }
 }
+
+/// Returns a block of `result.json`, for [`finding!`].
+#[doc(hidden)]
+pub fn to_value<T: Serialize>(of: &T) -> Value {
+    serde_json::to_value(of).expect("a finding is JSON")
+}

@@ -17,6 +17,8 @@ mod outcome;
 
 pub use conclude::{Ending, conclude};
 pub use end::End;
+#[doc(hidden)]
+pub use findings::to_value;
 pub use findings::{BlockKind, Finding, Findings};
 pub use outcome::{
     CalibrationReport, ChannelReport, CriterionReport, Design, ExperimentReport, FailureReport, Outcome,
@@ -24,9 +26,3 @@ pub use outcome::{
 };
 #[doc(hidden)]
 pub use serde_json::Value;
-
-/// Returns a block of `result.json`, for [`finding!`].
-#[doc(hidden)]
-pub fn to_value<T: serde::Serialize>(of: &T) -> Value {
-    serde_json::to_value(of).expect("a finding is JSON")
-}

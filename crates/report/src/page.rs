@@ -15,6 +15,9 @@ use mops_tasks::verdict;
 use super::markup::{self, figures, rich, section};
 use super::{Report, chart, criteria, matrix, tuners};
 
+/// Style sheet of all pages.
+pub const STYLE: &str = include_str!("style.css");
+
 /// Content of the page by section.
 pub(super) struct Content {
     pub(super) findings: Vec<Section>,
@@ -55,7 +58,7 @@ pub(super) fn document(title: &str, body: Markup) -> Markup {
                 meta name="color-scheme" content="light dark";
                 meta name="generator" content={ "mops " (env!("CARGO_PKG_VERSION")) };
                 title { (title) }
-                style { (PreEscaped(super::STYLE)) }
+                style { (PreEscaped(STYLE)) }
                 @if charts { style { (PreEscaped(chart::STYLE)) } }
             }
             body {

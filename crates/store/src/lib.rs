@@ -8,6 +8,7 @@
 //! | module | content |
 //! |---|---|
 //! | `recorder` | the database of a run, before, during and after the run |
+//! | `folder` | the database in the folder of a run |
 //! | `identity` | content of a study, and the part of it that determines values |
 //! | `memory` | points known to a run, and new ones on their way to the writer |
 //! | `writer` | the thread that writes points in batches; reports follow the commit |
@@ -25,6 +26,7 @@ mod columns;
 mod companions;
 mod database;
 mod ending;
+mod folder;
 mod identity;
 mod lock;
 mod memory;
@@ -38,25 +40,9 @@ mod sizes;
 mod tests;
 mod writer;
 
-use std::path::{Path, PathBuf};
-
-use database::Database;
+pub use folder::{FILE, file, last_run};
 pub use identity::Identity;
 pub use lock::FolderLock;
 pub use open_error::OpenError;
 pub use recorder::{FinishedRun, Recorder, Start, lock_folder};
 pub use runs::{RunRow, RunState};
-
-/// Returns the last run in a folder, and true if it is in progress; `None` if there is none or it cannot be read.
-pub fn last_run(folder: &Path) -> Option<(RunRow, bool)> {
-    let run = Database::open(&file(folder), false).ok()??.last_run().ok()??;
-    Some((ending::Ending::complete(folder, run), FolderLock::is_locked(folder)))
-}
-
-/// Name of the database in the folder of a run.
-pub const FILE: &str = "evaluations.sqlite";
-
-/// Returns the path of the database in the folder of a run.
-pub fn file(folder: &Path) -> PathBuf {
-    folder.join(FILE)
-}

@@ -40,12 +40,12 @@ pub mod uncertain;
 pub mod verdict;
 pub mod worst_case;
 
-use mops_core::Catalogue;
 use mops_core::catalogue::TaskKind;
 use mops_core::task::{
     CalibrationTask, DesignTask, DiagnosisTask, ExcitationTask, MonteCarloTask, ParetoTask, SensitivityTask, SweepTask,
     WorstCaseTask,
 };
+use mops_core::{Cancellation, Catalogue};
 
 use mops_outcome::BlockKind;
 
@@ -76,4 +76,21 @@ pub fn kinds() -> Vec<TaskKind> {
         kind::<MonteCarloTask>(monte_carlo::MonteCarlo),
         kind::<DiagnosisTask>(diagnosis::Search),
     ]
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        let solver = mops_solvers::kinds().first().expect("there are solvers").default_choice();
+        Self {
+            solver,
+            max_evaluations: DEFAULT_EVALUATIONS,
+            replayed: None,
+            patience: None,
+            jobs: None,
+            tasks: kinds(),
+            effects: mops_effects::effects(),
+            keeping: None,
+            cancellation: Cancellation::default(),
+        }
+    }
 }

@@ -73,23 +73,6 @@ impl Options {
 /// Default budget of a run, in evaluated points.
 pub const DEFAULT_EVALUATIONS: usize = 20_000;
 
-impl Default for Options {
-    fn default() -> Self {
-        let solver = mops_solvers::kinds().first().expect("there are solvers").default_choice();
-        Self {
-            solver,
-            max_evaluations: DEFAULT_EVALUATIONS,
-            replayed: None,
-            patience: None,
-            jobs: None,
-            tasks: crate::kinds(),
-            effects: mops_effects::effects(),
-            keeping: None,
-            cancellation: Cancellation::default(),
-        }
-    }
-}
-
 /// Result of [`crate::solve()`].
 #[non_exhaustive]
 pub struct Solved {

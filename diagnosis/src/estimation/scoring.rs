@@ -1,9 +1,10 @@
 //! Maximum of a log-likelihood with bounds, by Fisher scoring.
 
 use mops_math as math;
-
-use super::estimate::ITERATIONS;
 use nalgebra::{DMatrix, DVector};
+
+/// Largest number of iterations of the search of hyperparameters. Basis: an assumption.
+const ITERATIONS: usize = 60;
 
 /// Predicted gain below which the search of hyperparameters ends, nats. Basis: an assumption.
 const FINE: f64 = 1e-3;

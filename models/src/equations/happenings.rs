@@ -1,27 +1,15 @@
 //! Events of a user's model: arming, resets, and rest states.
 
-use mops_core::{
-    Instant, Plant,
-    plant::{EventInstant, Events, InputRates},
-};
+use mops_core::Instant;
+use mops_core::plant::{EventInstant, InputRates};
 use mops_language::{Dual, Scalar, enclosure::Enclosure};
 
 use super::bank::{Bank, Large};
 use super::bounds::{moved, signed};
+use super::phase::Phase;
 use super::running::{Running, set_up};
-
-/// Phase of an event: the condition that it waits for.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Phase {
-    /// The event occurs when its guard falls below this value. The value is 0, or the guard after a reset that left it
-    /// at or below 0 and not falling.
-    Armed(f64),
-    /// The guard became negative: the event is armed again when the guard is positive.
-    Passed,
-    /// The events have accumulated and states are fixed. The event waits until the weighted rates of these states would
-    /// increase the guard.
-    AtRest(Vec<(usize, f64)>),
-}
+use mops_core::Plant;
+use mops_core::plant::Events;
 
 /// Permitted distance of a state from its `at-rest` value, relative to its size. A thousand times the distance that
 /// remains after accumulated events (see [`crate::kernel`]), so that a wrong rest state is detected.

@@ -18,11 +18,13 @@ mod layout;
 mod lower;
 mod modes;
 mod options;
+mod phase;
 mod program;
 mod running;
 mod system;
 mod tables;
 mod tape;
+mod ticking;
 
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};

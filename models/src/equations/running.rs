@@ -11,10 +11,10 @@ use mops_linear as linear;
 
 use super::bank::{Bank, Large, Register};
 use super::bounds::{self, moved, signed};
-use super::clocks::Ticking;
 use super::compiled::{Clock, Compiled, Signal};
-use super::happenings::Phase;
+use super::phase::Phase;
 use super::program::Program;
+use super::ticking::Ticking;
 use crate::kernel::elements::delay::{Delay, Restart, pass_delays, remember_delays};
 use crate::kernel::{Tolerance, next_of};
 

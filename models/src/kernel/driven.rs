@@ -6,11 +6,12 @@ use mops_core::{
 };
 use mops_language::{Scalar, enclosure::Enclosure};
 
+use super::attempt::Attempt;
 use super::dormand_prince::DormandPrince;
 use super::inputs::Inputs;
+use super::instants::{common, next_of};
 use super::integrable::Integrable;
-use super::integrate::Attempt;
-use super::{Step, common, next_of, shift};
+use super::step::Step;
 
 /// Plant with its inputs and the forces on it. The plant comes last so that it can be of any kind: `dyn Integrable`
 /// too.
@@ -334,4 +335,20 @@ pub(crate) fn mobility<S: Scalar>(
         rates[state]
     };
     rate(1.0) - rate(0.0)
+}
+
+/// Moves the state by `delay` along its derivative, to first order; the value of the state does not change.
+pub(crate) fn shift<S: Scalar, P: Plant<S> + ?Sized>(
+    f: &Driven<'_, S, P>,
+    t: f64,
+    x: &mut [S],
+    dx: &mut [S],
+    delay: S,
+) {
+    if S::DIRECTIONS > 0 {
+        f.derivative(t, x, dx);
+        for (x, dx) in x.iter_mut().zip(dx.iter()) {
+            *x += *dx * delay;
+        }
+    }
 }

@@ -17,8 +17,9 @@ use mops_linear::{Banded, column_groups};
 use mops_math as math;
 
 use super::Driven;
+use super::attempt::Attempt;
 use super::integrable::Integrable;
-use super::integrate::{Attempt, Method};
+use super::method::Method;
 use super::weights::Weights;
 
 /// Diagonal coefficient of every implicit stage.

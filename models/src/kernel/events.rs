@@ -33,13 +33,15 @@
 //! Esposito, V. Kumar, G. Pappas, Accurate event detection for simulating hybrid systems, HSCC 2001, 204-217; J. Zhang,
 //! K. Johansson, J. Lygeros, S. Sastry, Zeno hybrid systems, Int. J. Robust Nonlinear Control 11 (2001) 435-451.
 
-use mops_core::{Failure, Plant};
+use mops_core::Failure;
 use mops_language::{Scalar, enclosure::Enclosure};
 use mops_math as math;
 
+use super::driven::{Driven, shift};
+use super::instants::common;
 use super::integrable::Integrable;
+use super::sink::Sink;
 use super::step::Step;
-use super::{Driven, Sink};
 
 /// Number of successive switches of a guard at decreasing intervals from which its events count as accumulating. A
 /// sequence that does not accumulate reaches this number very rarely by chance, and intervals still exceed rounding.
@@ -434,9 +436,6 @@ pub(super) struct Crossing<S> {
     late: S,
 }
 
-/// Difference of the derivatives of two times, relative to the larger one, up to which they are the same.
-const SAME: f64 = 1e-6;
-
 impl<S: Scalar> Crossing<S> {
     /// Returns the crossings at the end of the step, the first of them found in it; only that one without tangents.
     pub(super) fn all<P: Integrable<S> + ?Sized>(
@@ -464,13 +463,6 @@ impl<S: Scalar> Crossing<S> {
     }
 }
 
-/// Returns the derivatives of the time of two coincident instants; NaN if they differ.
-pub(crate) fn common<S: Scalar>(a: S, b: S) -> S {
-    let size = a.tangents().iter().chain(b.tangents()).fold(0.0, |most: f64, d| most.max(d.abs()));
-    let is_same = a.tangents().iter().zip(b.tangents()).all(|(a, b)| (a - b).abs() <= SAME * size);
-    if is_same { a } else { a * f64::NAN }
-}
-
 /// Returns the tangents of the event time, as a number with zero value: `dt = -dg / (dg/dt)` by the implicit function
 /// theorem. The rate of the guard along the solution is exact if the plant provides it, else taken from the dense
 /// output. If the guard only grazes zero, the event time has no derivative and 0 is returned.
@@ -495,20 +487,4 @@ fn delay<S: Scalar, P: Integrable<S> + ?Sized>(f: &Driven<'_, S, P>, index: usiz
     });
     let delay = -(here - here.value()) / rate;
     if delay.tangents().iter().all(|d| d.is_finite()) { delay } else { S::from(0.0) }
-}
-
-/// Moves the state by `delay` along its derivative, to first order; the value of the state does not change.
-pub(crate) fn shift<S: Scalar, P: Plant<S> + ?Sized>(
-    f: &Driven<'_, S, P>,
-    t: f64,
-    x: &mut [S],
-    dx: &mut [S],
-    delay: S,
-) {
-    if S::DIRECTIONS > 0 {
-        f.derivative(t, x, dx);
-        for (x, dx) in x.iter_mut().zip(dx.iter()) {
-            *x += *dx * delay;
-        }
-    }
 }

@@ -3,9 +3,11 @@
 use mops_core::Plant;
 use mops_language::Scalar;
 
+use super::attempt::Attempt;
+use super::by_size::by_size;
 use super::dormand_prince::DormandPrince;
 use super::inputs::Inputs;
-use super::integrate::Attempt;
+use super::with_inputs::WithInputs;
 
 /// Plant that can be integrated: every plant. The loop over steps is compiled once for all plants; what it does many
 /// times in a step is compiled with the equations of each. As calls, the stages take 6 % of the instructions of
@@ -28,28 +30,6 @@ pub trait Integrable<S: Scalar>: Plant<S> {
     /// Returns the values of a guard at several instants.
     #[doc(hidden)]
     fn guards(&self, inputs: &Inputs<'_, S>, index: usize, times: &[f64; 3], states: &[Vec<S>; 3]) -> [S; 3];
-}
-
-/// Plant with its inputs.
-pub(super) struct WithInputs<'p, 'a, S, P> {
-    plant: &'p P,
-    inputs: &'p Inputs<'a, S>,
-}
-
-impl<S: Scalar, P: Plant<S>> WithInputs<'_, '_, S, P> {
-    // Not a closure: those are not inlined into the stages.
-    #[inline(always)]
-    pub(super) fn derivative(&self, t: f64, x: &[S], dx: &mut [S]) {
-        let varying;
-        let at = match self.inputs.constant_at(t, x) {
-            Some(at) => at,
-            None => {
-                varying = self.inputs.varying_at(t);
-                varying.at(x)
-            }
-        };
-        self.plant.rates(&at, dx);
-    }
 }
 
 impl<S: Scalar, P: Plant<S>> Integrable<S> for P {

@@ -3,62 +3,21 @@
 use mops_core::{Failure, Plant, model::Work};
 use mops_language::Scalar;
 
+use super::attempt::Attempt;
 use super::dormand_prince::DormandPrince;
 use super::esdirk::Esdirk;
-use super::events::{Crossing, Events, common};
+use super::events::{Crossing, Events};
+use super::instants::common;
 use super::integrable::Integrable;
+use super::method::Method;
+use super::sink::{Integrated, Sink};
 use super::step::Step;
 use super::step_size::{StepSizes, first_step};
 use super::weights::Weights;
-use super::{Driven, Integrated, IntegrationMethod, Sink, Tolerance};
+use super::{Driven, IntegrationMethod, Tolerance};
 
 /// Growth of the longest stable step over a step that does not show it.
 const RELAXED: f64 = 1.5;
-
-/// Input of a method: a step of length `h` from `x` at `t`.
-pub struct Attempt<'a, S> {
-    pub(super) t: f64,
-    pub(super) h: f64,
-    pub(super) x: &'a [S],
-    pub(super) weights: &'a Weights,
-}
-
-/// One-step method with error estimate and dense output.
-pub(super) trait Method<S: Scalar> {
-    /// Order of the error of a step in its length `h`.
-    const ERROR_ORDER: f64;
-    /// True for an explicit method, which damps fast decaying modes only in short steps.
-    const IS_EXPLICIT: bool;
-
-    fn new<P: Integrable<S> + ?Sized>(f: &Driven<'_, S, P>, x: &[S]) -> Self;
-
-    /// Restarts at `x`: at the start, and where an event or a break made the right-hand side jump.
-    fn restart<P: Integrable<S> + ?Sized>(&mut self, f: &Driven<'_, S, P>, t: f64, x: &[S], work: &mut Work);
-
-    /// Returns the derivative at the start of the next step.
-    fn slope(&self) -> &[S];
-
-    /// Computes the state after the step. Returns the weighted error norm, NaN if there is none.
-    fn attempt<P: Integrable<S> + ?Sized>(
-        &mut self,
-        f: &Driven<'_, S, P>,
-        at: Attempt<'_, S>,
-        next: &mut [S],
-        work: &mut Work,
-    ) -> f64;
-
-    /// Returns the longest step that damps all modes, estimated from the step last attempted; `None` for a method that
-    /// damps them in every step, or if the step does not show it.
-    fn stable_step(&self, _next: &[S], _weights: &Weights) -> Option<f64> {
-        None
-    }
-
-    /// Moves to the start of the next step after the step was accepted.
-    fn advance(&mut self);
-
-    /// Computes the coefficients of [`Step`] for the step last attempted.
-    fn dense(&self, h: f64, x: &[S], next: &[S], dense: &mut [Vec<S>; 5]);
-}
 
 /// What limits the steps of an integration.
 #[derive(Debug, Default)]
@@ -130,7 +89,7 @@ fn run<S: Scalar, P: Integrable<S> + ?Sized, M: Method<S>>(
     let mut x = start.to_vec();
     let mut work = Work::default();
     let mut method = M::new(system, &x);
-    let mut weights = Weights::new(system, &x, span, tolerance);
+    let mut weights = Weights::new(|state| system.plant.scale(state), &x, span, tolerance);
     let mut events = Events::new(span, &x);
     let mut next = x.clone();
     let mut spare = x.clone();
@@ -174,7 +133,7 @@ fn run<S: Scalar, P: Integrable<S> + ?Sized, M: Method<S>>(
         if !reaches && h <= 16.0 * f64::EPSILON * t.abs() {
             return Err(Failure::StepTooSmall(t));
         }
-        work.derivatives += weights.feel(system, (t, h, &x), rejected);
+        work.derivatives += weights.feel(|t, x, dx| system.derivative(t, x, dx), (t, h, &x), rejected);
         let error = method.attempt(system, Attempt { t, h, x: &x, weights: &weights }, &mut next, &mut work);
         if !error.is_finite() || error > 1.0 {
             if !error.is_finite() && (h < 1e-12 * span || !all_finite(&x)) {

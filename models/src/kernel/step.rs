@@ -5,6 +5,8 @@ use mops_language::{
     enclosure::{Enclosure, Interval},
 };
 
+use super::by_size::by_size;
+
 /// Accepted step from `start` to `start + taken`, with its dense output.
 pub struct Step<S> {
     /// Start time of the step, s.

@@ -3,8 +3,7 @@
 use mops_core::plant::Tolerance;
 use mops_language::Scalar;
 
-use super::Driven;
-use super::integrable::Integrable;
+use super::by_size::by_size;
 
 /// Weights of the errors of all states: `relative |x_i| + floor_i`.
 ///
@@ -52,14 +51,15 @@ const OFTEN: usize = 64;
 pub(super) const PERTURBATION: f64 = 16.0 * f64::EPSILON;
 
 impl Weights {
-    pub(super) fn new<S: Scalar, P: Integrable<S> + ?Sized>(
-        f: &Driven<'_, S, P>,
+    /// Returns the weights at the start; `declared` gives the scale of a state, if the plant declares it.
+    pub(super) fn new<S: Scalar>(
+        declared: impl Fn(usize) -> Option<f64>,
         x: &[S],
         span: f64,
         tolerance: &Tolerance,
     ) -> Self {
         let n = x.len();
-        let scales = (0..n).map(|i| f.plant.scale(i).unwrap_or(0.0)).collect();
+        let scales = (0..n).map(|i| declared(i).unwrap_or(0.0)).collect();
         let mut weights = Self {
             relative: tolerance.relative,
             floor: tolerance
@@ -92,13 +92,13 @@ impl Weights {
         }
     }
 
-    /// Measures the roughness of the rates, after every [`OFTEN`] attempts and after the third rejection of a step. The
-    /// rates are compared with those of a [`perturbed`] state. After the third rejection, the state after a step of
-    /// length `h` along the rates counts as well: states that are 0 before the step have no rounding errors yet.
-    /// Returns the number of evaluations of the rates.
-    pub(super) fn feel<S: Scalar, P: Integrable<S> + ?Sized>(
+    /// Measures the roughness of the rates that `rates_at` gives, after every [`OFTEN`] attempts and after the third
+    /// rejection of a step. The rates are compared with those of a [`perturbed`] state. After the third rejection, the
+    /// state after a step of length `h` along the rates counts as well: states that are 0 before the step have no
+    /// rounding errors yet. Returns the number of evaluations of the rates.
+    pub(super) fn feel<S: Scalar>(
         &mut self,
-        f: &Driven<'_, S, P>,
+        rates_at: impl Fn(f64, &[S], &mut [S]),
         (t, h, x): (f64, f64, &[S]),
         rejected: usize,
     ) -> usize {
@@ -109,10 +109,10 @@ impl Weights {
         self.attempts = 0;
         self.roughness.fill(0.0);
         let mut rates = x.to_vec();
-        self.compare(f, (t, x), &mut rates);
+        self.compare(&rates_at, (t, x), &mut rates);
         if rejected == 3 {
             let ahead: Vec<S> = x.iter().zip(&rates).map(|(&x, &rate)| x + rate * h).collect();
-            self.compare(f, (t + h, &ahead), &mut rates);
+            self.compare(&rates_at, (t + h, &ahead), &mut rates);
         }
         // Floors do not decrease.
         let limits = self.floors.iter().zip(&self.roughness);
@@ -122,15 +122,10 @@ impl Weights {
 
     /// Raises the roughness to the difference of the rates at a state and at the perturbed state. `here` becomes the
     /// rates.
-    fn compare<S: Scalar, P: Integrable<S> + ?Sized>(
-        &mut self,
-        f: &Driven<'_, S, P>,
-        (t, x): (f64, &[S]),
-        here: &mut [S],
-    ) {
+    fn compare<S: Scalar>(&mut self, rates_at: &impl Fn(f64, &[S], &mut [S]), (t, x): (f64, &[S]), here: &mut [S]) {
         let mut there = x.to_vec();
-        f.derivative(t, x, here);
-        f.derivative(t, &perturbed(x), &mut there);
+        rates_at(t, x, here);
+        rates_at(t, &perturbed(x), &mut there);
         let differences = here.iter().zip(&there).map(|(a, b)| (a.value() - b.value()).abs());
         for (roughness, difference) in self.roughness.iter_mut().zip(differences) {
             if difference.is_finite() {

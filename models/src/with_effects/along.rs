@@ -8,7 +8,7 @@ use mops_language::{DIRECTIONS, Dual, Dual7, Scalar};
 use mops_linear::Clock;
 use nalgebra::DMatrix;
 
-use super::WithEffects;
+use super::model::WithEffects;
 use super::plant::{Affected, fixed};
 use crate::kernel::{Driven, Sink, Step, integrate_for, is_due};
 

@@ -7,7 +7,7 @@ use mops_core::{
     plant::{EventInstant, PlantScalar, Stretch},
 };
 
-use super::Site;
+use super::place::Site;
 use super::plant::{Affected, PlacedEffect, fixed, with_states};
 
 /// Half the time over which the rate of a value at an actuator or a sensor is a difference, as a fraction of the

@@ -11,7 +11,7 @@ use mops_language::{Scalar, enclosure::Enclosure};
 use mops_linear as linear;
 
 use super::contacts::{Contacts, solve};
-use super::{Place, Site};
+use super::place::{Place, Site};
 use crate::kernel::{common, is_due, latest, mobility};
 
 /// Effect at its place in a plant.

@@ -2,7 +2,7 @@
 
 use mops_core::{plant::PlantScalar, trace::Earlier};
 
-use super::Site;
+use super::place::Site;
 use super::plant::Affected;
 use crate::kernel::Recording;
 

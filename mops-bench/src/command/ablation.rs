@@ -9,7 +9,7 @@ use mops::{
     terminal::{CommandError, Progress, print, table},
 };
 
-use super::write;
+use super::files::write;
 use crate::diagnosis::settings;
 use crate::parallel::each;
 

@@ -9,7 +9,8 @@ use mops_testbed::Setting;
 
 use mops::terminal::{CommandError, Progress, print};
 
-use super::{folder, tables, write};
+use super::files::write;
+use super::{folder, tables};
 use crate::diagnosis::{self, Comparisons, Kind, Plan, Tools, settings as by_name};
 
 /// Options of `mops-bench diagnosis`.

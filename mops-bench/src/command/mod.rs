@@ -2,19 +2,18 @@
 
 mod ablation;
 mod diagnosis;
+mod files;
 mod folder;
 mod kinds;
 mod suite;
 mod tables;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use mops::{
-    Catalogue,
-    terminal::{CommandError, print},
-};
+use mops::Catalogue;
+use mops::terminal::print;
 
 /// Benchmarks of mops: solvers on problems with known solutions, the diagnosis on simulated experiments.
 #[derive(Parser)]
@@ -69,11 +68,4 @@ pub(crate) fn main(catalogue: &Catalogue) -> ExitCode {
         Benchmark::Suite(chosen) => suite::bench(catalogue, &chosen),
     };
     done.unwrap_or_else(|error| error.report())
-}
-
-/// Writes a file of a benchmark; creates the folder if it does not exist.
-fn write(folder: &Path, name: &str, content: &str) -> Result<(), CommandError> {
-    std::fs::create_dir_all(folder).map_err(CommandError::cannot_write(folder))?;
-    let path = folder.join(name);
-    std::fs::write(&path, content).map_err(CommandError::cannot_write(&path))
 }

@@ -9,7 +9,7 @@ use mops_problems::{Answer, Slope};
 
 use mops::terminal::{CommandError, Progress, number, print, table};
 
-use super::write;
+use super::files::write;
 use crate::solvers::figures::{self, Figure};
 use crate::solvers::{self, Plan, Results, Row, Score, Suite, data_profile, published, spreads, suites};
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use mops::{Unit, language::files::Files};
 
-use super::guarded;
+use super::guarded::guarded;
 use super::tool::{Answer, Tools};
 use crate::parallel::each;
 use answer::{answer, predictions};

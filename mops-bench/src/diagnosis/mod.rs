@@ -3,6 +3,7 @@
 #[cfg(test)]
 pub(crate) mod answers;
 mod folder;
+mod guarded;
 mod judge;
 mod names;
 mod page;
@@ -14,15 +15,16 @@ mod tool;
 
 use mops::{Catalogue, math::stream};
 use mops_testbed::Trial;
-use rand::seq::SliceRandom;
 
 use crate::parallel::each;
 pub(crate) use folder::{Cases, Reply, schema};
+use guarded::guarded;
 pub(crate) use judge::Row;
 #[cfg(test)]
 pub(crate) use judge::{Judgement, Stated};
 pub(crate) use page::page;
 pub(crate) use plan::{Kind, Plan, Wish};
+use rand::seq::SliceRandom;
 pub(crate) use statistics::{Bin, Rate, brier, deciles, reliability, uniformity};
 pub(crate) use table::{csv, strengths};
 pub(crate) use tool::{Answer, Statement, Tools, spelt};
@@ -63,12 +65,6 @@ pub(crate) fn run(plan: &Plan, tools: Tools<'_>, jobs: usize, comparisons: Compa
     let unmade = if plan.only.is_empty() { done.iter().filter(|case| case.is_none()).count() } else { 0 };
     let (rows, brute): (Vec<Row>, Vec<Option<Row>>) = done.into_iter().flatten().unzip();
     Results { rows, brute: brute.into_iter().flatten().collect(), unmade }
-}
-
-/// Runs `work` and converts a panic to an error.
-fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    let panicked = |_| Err("the program panicked".to_owned());
-    std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)).unwrap_or_else(panicked)
 }
 
 fn answered(plan: &Plan, wish: &Wish, trial: &Trial, tools: Tools<'_>, comparisons: Comparisons) -> (Row, Option<Row>) {

@@ -4,6 +4,7 @@ mod control;
 pub(crate) mod figures;
 mod fronts;
 mod page;
+mod plan;
 mod profiles;
 mod relative;
 mod results;
@@ -12,63 +13,21 @@ mod timed;
 
 use std::time::Instant;
 
-use mops::{
-    Catalogue, Watch,
-    core::{Merit, Shape, Stop, catalogue::SolverChoice, problem::Evaluator},
-};
+use mops::core::Stop;
+use mops::core::catalogue::SolverChoice;
+use mops::core::problem::Evaluator;
+use mops::{Catalogue, Watch};
 use mops_problems::{Posed, Slope, Truth, measure};
 
 use crate::parallel::each;
 pub(crate) use fronts::{Spread, published, spreads};
 pub(crate) use page::page;
+pub(crate) use plan::{Plan, ROUGH};
 pub(crate) use profiles::{Score, data_profile, performance_profile};
+use results::Done;
 pub(crate) use results::{Front, Results, Row};
 pub(crate) use suite::{Subject, Suite, suites};
 use timed::Timed;
-
-/// Plan of a benchmark.
-pub(crate) struct Plan {
-    pub suite: Suite,
-    pub solvers: Vec<SolverChoice>,
-    pub slope: Slope,
-    /// Number of seeds, starting at 1.
-    pub seeds: u64,
-    /// Budget as a multiple of n + 1 evaluations for n variables; that of the suite if absent.
-    pub budget: Option<usize>,
-    /// Relative noise added to all values.
-    pub noise: f64,
-    /// Names of the selected problems; all if empty.
-    pub only: Vec<String>,
-}
-
-impl Plan {
-    /// Returns the selected problems.
-    fn subjects(&self) -> Vec<Subject> {
-        let mut subjects = self.suite.subjects();
-        subjects.retain(|subject| self.only.is_empty() || self.only.iter().any(|name| name == subject.name()));
-        subjects
-    }
-
-    /// Returns a solver that accepts none of the problems, if there is one.
-    pub fn idle(&self, catalogue: &Catalogue) -> Option<&SolverChoice> {
-        let shapes: Vec<Shape> = self.subjects().iter().map(|subject| subject.shape(catalogue)).collect();
-        let accepts = |solver: &SolverChoice| shapes.iter().any(|shape| solver.make().accepts(shape).is_ok());
-        self.solvers.iter().find(|solver| !accepts(solver))
-    }
-
-    fn evaluations(&self, variables: usize) -> usize {
-        self.budget.map_or_else(|| (self.suite.budget)(variables), |budget| budget * (variables + 1))
-    }
-}
-
-/// Accuracy of the first count of evaluations.
-pub(crate) const ROUGH: f64 = 1e-3;
-
-/// Finished run, with the merit of every point.
-struct Done {
-    row: Row,
-    history: Vec<Merit>,
-}
 
 /// Runs a plan on `jobs` threads; each run uses one thread, so that times are comparable.
 pub(crate) fn run(catalogue: &Catalogue, plan: &Plan, jobs: usize, watch: &dyn Watch) -> Results {

@@ -2,8 +2,9 @@
 
 use mops::report::{Color, Curve, CurveStyle, Draw, ParallelAxis, Plot};
 
+use super::plan::ROUGH;
 use super::results::{Results, Row};
-use super::{ROUGH, Score, data_profile, performance_profile};
+use super::{Score, data_profile, performance_profile};
 
 /// Number of different colours.
 const COLORS: usize = 6;

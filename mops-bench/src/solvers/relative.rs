@@ -11,7 +11,8 @@ use mops::{
     core::{Merit, catalogue::SolverChoice, evaluation::FEASIBLE},
 };
 
-use super::{Done, ROUGH};
+use super::plan::ROUGH;
+use super::results::Done;
 
 /// Returns the additional solvers.
 pub(super) fn rivals(catalogue: &Catalogue) -> Vec<SolverChoice> {

@@ -1,9 +1,10 @@
 //! Results of a solver benchmark, and their summary.
 
+use mops::core::Merit;
 use mops_problems::{FrontFound, Slope};
 use serde::{Deserialize, Serialize};
 
-use super::Plan;
+use super::plan::Plan;
 
 /// Results of a benchmark, with its settings.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -177,6 +178,12 @@ fn median(counts: impl Iterator<Item = usize>) -> Option<f64> {
     let upper = *counts.get(counts.len() / 2)?;
     let lower = counts[(counts.len() - 1) / 2];
     Some(0.5 * (lower + upper) as f64)
+}
+
+/// Finished run, with the merit of every point.
+pub(super) struct Done {
+    pub(super) row: Row,
+    pub(super) history: Vec<Merit>,
 }
 
 #[cfg(test)]

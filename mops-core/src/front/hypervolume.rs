@@ -1,6 +1,6 @@
 //! Hypervolume of a front.
 
-use super::{compare, non_dominated};
+use super::sort::{compare, non_dominated};
 
 /// Returns the hypervolume between the points and `reference`. Points that are not better than `reference` in every
 /// objective do not count.

@@ -13,18 +13,7 @@ mod sort;
 pub use hypervolume::hypervolume;
 pub use read_outs::{knee, normalised, ranges};
 pub use sort::FrontSorter;
-
-/// Returns the indices of the non-dominated points, in increasing order; only the first of equal points.
-pub fn non_dominated(objectives: &[f64], m: usize) -> Vec<usize> {
-    let mut sorter = FrontSorter::default();
-    let ranks = sorter.sort(objectives, m);
-    let row = |i: usize| &objectives[i * m..(i + 1) * m];
-    let mut first: Vec<usize> = (0..ranks.len()).filter(|&i| ranks[i] == 0).collect();
-    first.sort_by(|&a, &b| compare(row(a), row(b)).then(a.cmp(&b)));
-    first.dedup_by(|b, a| row(*a) == row(*b));
-    first.sort_unstable();
-    first
-}
+pub use sort::{compare, non_dominated};
 
 /// Returns at most `count` points, spread evenly.
 ///
@@ -94,13 +83,6 @@ pub fn inverted_generational_distance(objectives: &[f64], m: usize, reference: &
         objectives.chunks_exact(m).map(square).fold(f64::INFINITY, f64::min).sqrt()
     };
     reference.iter().map(nearest).sum::<f64>() / reference.len() as f64
-}
-
-/// Compares lexicographically: by the first objective, then the second, and so on.
-pub fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {
-    // Zeros of either sign are equal, consistent with the operator `<`.
-    let order = |(a, b): (&f64, &f64)| a.partial_cmp(b).unwrap_or_else(|| a.total_cmp(b));
-    a.iter().zip(b).map(order).find(|order| order.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! Non-dominated sorting.
 
-use super::compare;
 use super::divide::Divide;
 
 /// Sorter of points into fronts: rank 0 is dominated by none, rank 1 only by points of rank 0, and so on.
@@ -101,6 +100,25 @@ impl FrontSorter {
             self.ranks[i as usize] = ranks[place];
         }
     }
+}
+
+/// Returns the indices of the non-dominated points, in increasing order; only the first of equal points.
+pub fn non_dominated(objectives: &[f64], m: usize) -> Vec<usize> {
+    let mut sorter = FrontSorter::default();
+    let ranks = sorter.sort(objectives, m);
+    let row = |i: usize| &objectives[i * m..(i + 1) * m];
+    let mut first: Vec<usize> = (0..ranks.len()).filter(|&i| ranks[i] == 0).collect();
+    first.sort_by(|&a, &b| compare(row(a), row(b)).then(a.cmp(&b)));
+    first.dedup_by(|b, a| row(*a) == row(*b));
+    first.sort_unstable();
+    first
+}
+
+/// Compares lexicographically: by the first objective, then the second, and so on.
+pub fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {
+    // Zeros of either sign are equal, consistent with the operator `<`.
+    let order = |(a, b): (&f64, &f64)| a.partial_cmp(b).unwrap_or_else(|| a.total_cmp(b));
+    a.iter().zip(b).map(order).find(|order| order.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
 }
 
 #[cfg(test)]

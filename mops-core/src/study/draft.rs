@@ -2,13 +2,13 @@
 
 use mops_language::{Quantity, Unit};
 
-use super::{Study, UncertainBuilder};
+use super::UncertainBuilder;
 use crate::case::{Input, ResponseData, Role};
 use crate::criterion::{CriterionSpec, Usage};
 use crate::evaluation::Objective;
 use crate::model::Model;
+use crate::study::Scale;
 use crate::study::task::Task;
-use crate::study::{Scale, StudyError};
 
 /// A study as written, not yet checked. [`StudyBuilder::build`] checks it.
 #[derive(Default)]
@@ -35,16 +35,6 @@ pub struct StudyBuilder {
     pub sensors: Vec<(String, Quantity)>,
     /// Criteria, by name.
     pub criteria: Vec<(String, CriterionBuilder)>,
-}
-
-impl StudyBuilder {
-    /// Checks all names, sizes, bounds and units.
-    ///
-    /// # Errors
-    /// Returns the first error, with the path of keys to its location.
-    pub fn build(self) -> Result<Study, StudyError> {
-        super::build::build(self)
-    }
 }
 
 /// A model with values for some of its parameters.

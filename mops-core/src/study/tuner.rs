@@ -140,6 +140,11 @@ impl Tuner {
     }
 }
 
+/// Returns the fact that a share, a ratio or a logarithm of a parameter on a temperature scale has no meaning.
+pub(super) fn ratio_of_temperatures(name: &str, unit: &Unit) -> String {
+    format!("`{name}` is a temperature in {unit}, of which a share or a ratio depends on the zero of the scale")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

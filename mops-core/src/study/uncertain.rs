@@ -3,8 +3,9 @@
 use mops_language::{Quantity, suggestion};
 use mops_math as math;
 
+use super::Study;
 use super::distribution::{Distribution, Uncertain};
-use super::{Study, ratio_of_temperatures};
+use super::tuner::ratio_of_temperatures;
 use crate::error::StudyError;
 
 /// An uncertain parameter, not yet checked.

@@ -5,7 +5,7 @@ use mops_core::{
     solver::{Linearisation, SMALL_OBJECTIVE},
 };
 
-use super::{CURVATURE, MAX_CUT_VALUE, Model, NEGLIGIBLE, Step, TRIAL_STEP, steepest_step};
+use super::model::{CURVATURE, MAX_CUT_VALUE, Model, NEGLIGIBLE, Step, TRIAL_STEP, steepest_step};
 use crate::active_set::dot;
 use crate::linearised_criteria::{LinearModel, LinearisedCriteria};
 

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use mops_core::{Evaluation, Shape, evaluation::FEASIBLE};
+use mops_core::{Evaluation, Shape, evaluation::FEASIBLE, front::SAME};
 
 use super::scalarisation::Scalarisation;
 
@@ -78,4 +78,22 @@ impl Archive {
         }
         selected
     }
+}
+
+/// Inserts a point into the front and removes points that it dominates; returns false if the point is dominated itself,
+/// or if it is the same as one of the front. `range` holds the range of every objective over the front; it is empty
+/// until the ends of the front are known.
+pub(super) fn insert(front: &mut Vec<Candidate>, candidate: Candidate, range: &[f64]) -> bool {
+    let one = vec![1.0; candidate.objectives.len()];
+    let is_dominated =
+        |other: &Candidate| other.objectives == candidate.objectives || other.dominates(&candidate, &one, 0.0);
+    if front.iter().any(is_dominated) {
+        return false;
+    }
+    front.retain(|other| !candidate.dominates(other, &one, 0.0));
+    if !range.is_empty() && front.iter().any(|other| other.separation(&candidate, range) <= SAME) {
+        return false;
+    }
+    front.push(candidate);
+    true
 }

@@ -4,13 +4,15 @@ mod archive;
 mod rectangles;
 mod reference_directions;
 mod scalarisation;
+mod scalarised_problem;
 mod subproblem;
 
-use mops_core::{Evaluation, Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions, front::SAME};
+use mops_core::{Evaluation, Halt, Objective, Oracle, Progress, Shape, Solver, SolverOptions};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use archive::Candidate;
+use archive::insert;
 use rectangles::Rectangles;
 use reference_directions::ReferenceDirections;
 use scalarisation::Scalarisation;
@@ -256,21 +258,3 @@ pub fn remove_slack(oracle: &mut dyn Oracle, point: &[f64]) -> Result<Option<Eva
 
 /// Maximum number of rounds that replace dominated points.
 const MAX_ROUNDS: usize = 5;
-
-/// Inserts a point into the front and removes points that it dominates; returns false if the point is dominated itself,
-/// or if it is the same as one of the front. `range` holds the range of every objective over the front; it is empty
-/// until the ends of the front are known.
-fn insert(front: &mut Vec<Candidate>, candidate: Candidate, range: &[f64]) -> bool {
-    let one = vec![1.0; candidate.objectives.len()];
-    let is_dominated =
-        |other: &Candidate| other.objectives == candidate.objectives || other.dominates(&candidate, &one, 0.0);
-    if front.iter().any(is_dominated) {
-        return false;
-    }
-    front.retain(|other| !candidate.dominates(other, &one, 0.0));
-    if !range.is_empty() && front.iter().any(|other| other.separation(&candidate, range) <= SAME) {
-        return false;
-    }
-    front.push(candidate);
-    true
-}

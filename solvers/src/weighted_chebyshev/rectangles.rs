@@ -4,7 +4,7 @@ use mops_core::{Halt, Oracle, evaluation::FEASIBLE};
 use mops_math as math;
 
 use super::archive::Candidate;
-use super::insert;
+use super::archive::insert;
 use super::scalarisation::Scalarisation;
 use super::subproblem::Subproblems;
 

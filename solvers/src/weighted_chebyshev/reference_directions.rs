@@ -5,8 +5,9 @@ use mops_core::{Halt, Oracle, front::SAME};
 use mops_math as math;
 
 use super::archive::Candidate;
-use super::insert;
+use super::archive::insert;
 use super::scalarisation::Scalarisation;
+use super::subproblem::MIN_WEIGHT;
 use super::subproblem::Subproblems;
 use crate::simplex_lattice::{max_divisions, simplex_lattice};
 
@@ -21,9 +22,6 @@ pub struct ReferenceDirections {
     /// Evaluated points whose directions were solved.
     tried: Vec<Candidate>,
 }
-
-/// Offset of every weight, which turns directions on the boundary of the simplex inwards.
-pub const MIN_WEIGHT: f64 = 0.01;
 
 /// Number of directions for gaps, per requested point.
 const FINE: usize = 8;

@@ -3,8 +3,8 @@
 use mops_core::{Halt, Merit, Oracle, Progress, Solver, front};
 
 use super::archive::{Archive, Candidate};
-use super::reference_directions::MIN_WEIGHT;
-use super::scalarisation::{Role, Scalarisation, ScalarisedProblem};
+use super::scalarisation::{Role, Scalarisation};
+use super::scalarised_problem::ScalarisedProblem;
 use crate::multistart::Multistart;
 use crate::optimality::certificate;
 use crate::pattern_search::PatternSearchOptions;
@@ -262,3 +262,6 @@ fn run(problem: &mut ScalarisedProblem<'_>, solver: &mut dyn Solver, start: &[f6
         }
     }
 }
+
+/// Offset of every weight, which turns directions on the boundary of the simplex inwards.
+pub const MIN_WEIGHT: f64 = 0.01;

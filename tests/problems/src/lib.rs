@@ -15,28 +15,13 @@ mod minimax;
 mod more_wild;
 mod posed;
 mod problem;
+mod suite;
 
 pub use formula::{Formula, Functions, Outputs};
 pub use measure::{FrontFound, Measured, Truth, measure};
 pub use posed::{Posed, Slope};
 pub use problem::{Answer, Problem, Sense};
-
-/// Suite of related problems.
-#[derive(Debug, Clone, Copy)]
-pub struct Suite {
-    /// Name on the command line.
-    pub name: &'static str,
-    /// Contents, in one sentence.
-    pub about: &'static str,
-    /// Source of the definitions.
-    pub source: &'static str,
-    /// Accuracy that counts as solved, relative to the larger of 1 and the magnitude of the optimum.
-    pub accuracy: f64,
-    /// Maximum number of evaluated points, as a function of the number of variables.
-    pub budget: fn(usize) -> usize,
-    /// Problems of the suite.
-    pub problems: fn() -> Vec<Problem>,
-}
+pub use suite::Suite;
 
 /// Returns every suite. A new suite is one file and one line here.
 pub fn suites() -> Vec<Suite> {

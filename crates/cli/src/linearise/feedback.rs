@@ -6,8 +6,8 @@ use mops_math::complex;
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
 
+use super::arguments::{Arguments, complex, rows};
 use super::text::{labels, named, poles_table, rounded_matrix};
-use super::{Arguments, complex, rows};
 use crate::terminal::number;
 
 /// Requested design of state feedback.

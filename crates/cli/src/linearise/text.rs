@@ -7,7 +7,7 @@ use mops_math as math;
 use mops_math::complex;
 use nalgebra::DMatrix;
 
-use super::WHERE;
+use super::arguments::WHERE;
 use crate::families::folded;
 use crate::terminal::{number, table};
 

@@ -8,7 +8,7 @@ use clap::Args;
 use mops_core::{Cancellation, Halt};
 use mops_language::{Quantity, Unit};
 
-use super::write::eprint_line;
+use super::eprint::eprint_line;
 
 /// Time limit of a command.
 #[derive(Args, Clone, Copy)]

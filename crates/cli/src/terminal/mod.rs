@@ -1,6 +1,8 @@
 //! Shared parts of the command-line programs: error messages, tables, progress, Ctrl-C.
 
+mod command_error;
 mod date;
+mod eprint;
 mod limits;
 mod mistake;
 mod panics;
@@ -9,58 +11,12 @@ mod sparkline;
 mod table;
 mod write;
 
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
-
-use mops_language::Diagnostic;
-use mops_output::Overwrites;
-
+pub use command_error::CommandError;
 pub use date::date;
+pub(crate) use eprint::eprint_line;
 pub(crate) use limits::{Limit, cancel_after, cancel_on_signal, exit_after};
 pub(crate) use panics::show_each_panic_once;
 pub use progress::Progress;
 pub use table::{number, table};
 pub use write::print;
-pub(crate) use write::{eprint_line, print_json};
-
-/// Reason why a command ends without its result.
-#[derive(Debug)]
-#[non_exhaustive]
-pub enum CommandError {
-    /// Mistake of the user, in a file or on the command line: exit status 2.
-    Mistake(Box<Diagnostic>),
-    /// Failure of the run or of the machine, as one sentence: exit status 3.
-    Failure(String),
-}
-
-impl From<Diagnostic> for CommandError {
-    fn from(diagnostic: Diagnostic) -> Self {
-        Self::Mistake(Box::new(diagnostic))
-    }
-}
-
-impl CommandError {
-    /// Returns a conversion of write errors at `path`, for `map_err`. To overwrite an input is a mistake of the user.
-    pub fn cannot_write(path: &Path) -> impl FnOnce(std::io::Error) -> Self + use<> {
-        let path: PathBuf = path.to_owned();
-        move |error| match error.get_ref().and_then(|error| error.downcast_ref::<Overwrites>()) {
-            Some(refusal) => Diagnostic::new(refusal.to_string()).with_help("write to another place with --out").into(),
-            None => Self::Failure(format!("cannot write {}: {error}", path.display())),
-        }
-    }
-
-    /// Writes the error to standard error, a mistake with its source line, and returns the exit status.
-    #[must_use]
-    pub fn report(&self) -> ExitCode {
-        match self {
-            Self::Mistake(diagnostic) => {
-                mistake::show(diagnostic);
-                ExitCode::from(2)
-            }
-            Self::Failure(message) => {
-                eprint_line(&format!("error: {message}"));
-                ExitCode::from(3)
-            }
-        }
-    }
-}
+pub(crate) use write::print_json;

@@ -11,10 +11,10 @@ use mops_core::{Cancellation, Evaluation, Halt, Study, Usage, Watch, run::State 
 use mops_language::plain::plain;
 use mops_outcome::{CriterionReport, criterion_reports};
 
+use super::eprint::eprint_line;
 use super::limits::{Limit, cancel_on_signal};
 use super::sparkline::sparkline;
 use super::table::number;
-use super::write::eprint_line;
 
 /// Progress bar on standard error with the best objective so far; forwards stop requests to the run.
 pub struct Progress {

@@ -1,11 +1,13 @@
 //! Output to the terminal. Write errors are reported. Control characters from a study, a data file or a result are
 //! escaped: they could move the cursor, change the title or clear the screen.
 
-use std::io::{self, ErrorKind, Write};
+use std::io;
+use std::io::ErrorKind;
 
 use mops_language::plain::{escaped, plain};
 
-use super::CommandError;
+use super::command_error::CommandError;
+use std::io::Write;
 
 /// Writes a text to standard output, with control characters escaped. A closed pipe is not an error.
 ///
@@ -30,9 +32,4 @@ fn write_all(text: &str) -> Result<(), CommandError> {
         }
         _ => Ok(()),
     }
-}
-
-/// Writes a line to standard error; a failure to do so is ignored.
-pub(crate) fn eprint_line(text: &str) {
-    let _ = writeln!(io::stderr(), "{}", plain(text));
 }

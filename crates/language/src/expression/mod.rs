@@ -12,6 +12,7 @@ pub use tree::{Comparison, Form, Node, Operator, REDUCTIONS, Reduction};
 use std::collections::HashSet;
 
 use crate::Scalar;
+pub use parse::IN_CRITERIA;
 
 /// Expression over named quantities, parsed once and evaluated with values or with tangents.
 ///
@@ -101,9 +102,6 @@ impl Expression {
         })
     }
 }
-
-/// Message for a reduction in an expression that has none.
-pub const IN_CRITERIA: &str = "a time response is reduced to a number in criteria only";
 
 /// Reduction of a time response in an expression.
 #[derive(Debug, Clone, PartialEq)]

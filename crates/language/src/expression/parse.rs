@@ -22,7 +22,6 @@ use winnow::prelude::*;
 use winnow::stream::{LocatingSlice, Stateful};
 use winnow::token::{one_of, take_while};
 
-use super::IN_CRITERIA;
 use super::functions::{FUNCTIONS, Function};
 use super::tree::{Comparison, Form, Node, Operator, REDUCTIONS};
 use crate::Unit;
@@ -516,3 +515,6 @@ fn name_or_call(input: &mut Input<'_>) -> ModalResult<Spanned> {
         None => quantity,
     })
 }
+
+/// Message for a reduction in an expression that has none.
+pub const IN_CRITERIA: &str = "a time response is reduced to a number in criteria only";

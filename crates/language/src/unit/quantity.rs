@@ -5,7 +5,7 @@ use std::fmt;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserialize, Deserializer, Visitor};
 
-use super::Unit;
+use super::conversion::Unit;
 
 /// Number with an optional unit: `15`, `"15 s"`, `"30 deg"`.
 ///

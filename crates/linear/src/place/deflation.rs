@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::complement;
+use super::complement::complement;
 use super::robust::most_independent;
 use crate::Complex;
 

@@ -3,7 +3,7 @@
 use mops_math::complex;
 use nalgebra::{DMatrix, DVector};
 
-use super::complement;
+use super::complement::complement;
 use crate::Complex;
 use crate::system::beside;
 

@@ -1,5 +1,7 @@
 use std::f64::consts::PI;
 
+use std::ops::Range;
+
 use super::*;
 use crate::testing::{assert_near, assert_same_set, c};
 use crate::{Loop, Mask, Masked, bandwidth, disk_margin, eigenvalues, h2_norm, hinf_norm};

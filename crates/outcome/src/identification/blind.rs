@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::sensitivity::Coordinate;
+use super::coordinate::Coordinate;
 use super::words::{coefficient, listed, percent};
 
 /// Share of the largest entry below which a tuner takes no part in a direction, in coordinates with unit-length

@@ -1,9 +1,7 @@
 //! Covariance of estimates, and its effect on predictions.
 
-use mops_core::{problem::Problem, task::SensitivityTask};
 use nalgebra::DMatrix;
 
-use super::local::{Point, local};
 use super::noise::{Noise, Part, Spread};
 use super::sensitivity::Sensitivity;
 
@@ -32,13 +30,6 @@ pub struct Covariance {
 }
 
 impl Covariance {
-    /// Computes the covariance at the estimates; `None` without measurements, if a simulation fails, or if no residual
-    /// shows the noise.
-    pub fn at(problem: &Problem, tuners: &[f64]) -> Option<Self> {
-        let zero = problem.study().options::<SensitivityTask>().and_then(|task| task.zero);
-        local(problem, tuners, Point::Minimum, zero)?.covariance
-    }
-
     /// Computes the covariance from the noise of the residuals, their Jacobian in the tuners' own units, and the
     /// resolved directions. Returns `None` if no noise level is known.
     pub(super) fn of(noise: Noise, jacobian: &DMatrix<f64>, sensitivity: &Sensitivity) -> Option<Self> {

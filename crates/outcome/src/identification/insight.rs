@@ -4,11 +4,11 @@ use mops_core::{evaluation::Evaluation, problem::Problem, solver::SMALL_OBJECTIV
 use mops_math as math;
 use nalgebra::DMatrix;
 
-use super::NEGLIGIBLE;
 use super::blind::{BlindDirection, Limit};
-use super::local::{Local, Point, counting, local};
+use super::coordinate::Coordinate;
+use super::local::{Local, NEGLIGIBLE, Point, counting, local};
 use super::report::{DirectionReport, RelativeReport, SensitivityReport, TunerSensitivity};
-use super::sensitivity::{Coordinate, Eigen};
+use super::sensitivity::Eigen;
 use super::sentences::sentences;
 use super::words::listed;
 

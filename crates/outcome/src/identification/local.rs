@@ -6,15 +6,19 @@ use mops_core::{
     run::{Budget, Run},
     solver::{Oracle, SMALL_OBJECTIVE},
     study::{Grid, Study, Tuner},
+    task::SensitivityTask,
 };
 use nalgebra::{DMatrix, DVector};
 
-use super::NEGLIGIBLE;
 use super::alike::{Alike, alike};
+use super::coordinate::Coordinate;
 use super::covariance::Covariance;
 use super::noise::{Noise, Spread};
 use super::records::{Record, records};
-use super::sensitivity::{Coordinate, DIFFERENCES, Sensitivity, TANGENTS};
+use super::sensitivity::{DIFFERENCES, Sensitivity, TANGENTS};
+
+/// Change of a scaled value over the whole range of a tuner, relative to the value, that is negligible.
+pub const NEGLIGIBLE: f64 = 1e-3;
 
 /// Kind of point at which sensitivities are evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +52,15 @@ impl Local {
     pub fn spread(&self, k: usize) -> Spread {
         let unknown = Spread { deviation: f64::NAN, freedom: f64::NAN };
         self.covariance.as_ref().map_or(unknown, |covariance| covariance.of_tuner(k))
+    }
+}
+
+impl Covariance {
+    /// Computes the covariance at the estimates; `None` without measurements, if a simulation fails, or if no residual
+    /// shows the noise.
+    pub fn at(problem: &Problem, tuners: &[f64]) -> Option<Self> {
+        let zero = problem.study().options::<SensitivityTask>().and_then(|task| task.zero);
+        local(problem, tuners, Point::Minimum, zero)?.covariance
     }
 }
 
@@ -108,7 +121,7 @@ pub fn local(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>)
     let mut alone = vec![f64::NAN; n];
     let mut alike = None;
     if let Some(covariance) = &covariance {
-        sensitivity.judge(&jacobian, covariance);
+        sensitivity.judge(&jacobian, covariance.noise(), &covariance.matrix());
         alike = self::alike(covariance.noise());
         let error =
             |column: &DVector<f64>| covariance.noise().along((column / column.norm_squared()).as_slice()).deviation;

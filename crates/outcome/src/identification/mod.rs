@@ -3,6 +3,7 @@
 
 mod alike;
 mod blind;
+mod coordinate;
 mod covariance;
 mod excitation;
 mod excited;
@@ -22,6 +23,7 @@ mod whiteness;
 mod words;
 
 pub use blind::{BlindDirection, Limit};
+pub use coordinate::Coordinate;
 pub use covariance::Covariance;
 pub use excitation::{Excitation, excitation};
 pub use excited::{excitation_report, excitation_words, excitations, spacing};
@@ -29,16 +31,13 @@ pub use fitted::regressions;
 pub(crate) use insight::report as report_of;
 pub use insight::sensitivity_at;
 pub use least_squares::{Estimate, least_squares};
-pub use local::Point;
 pub(crate) use local::{Local, local};
+pub use local::{NEGLIGIBLE, Point};
 pub use noise::{Noise, Spread};
 pub use recursive::Recursive;
 pub use regression::{Regression, RegressionTooShort};
 pub use report::{
     DirectionReport, ExcitationReport, RegressionReport, RelativeReport, SensitivityReport, TunerSensitivity,
 };
-pub use sensitivity::{Coordinate, DIFFERENCES, Sensitivity, TANGENTS};
+pub use sensitivity::{DIFFERENCES, Sensitivity, TANGENTS};
 pub use whiteness::{Whiteness, whiteness, whiteness_words};
-
-/// Change of a scaled value over the whole range of a tuner, relative to the value, that is negligible.
-pub const NEGLIGIBLE: f64 = 1e-3;

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector, RowDVector, SymmetricEigen};
 
 use super::blind::{self, BlindDirection, Limit, NO_PART};
-use super::covariance::Covariance;
+use super::coordinate::Coordinate;
+use super::noise::Noise;
 
 /// Relative singular value that tangents of the simulation do not resolve: their accuracy is that of the integration,
 /// 1e-8 at its default tolerance.
@@ -16,36 +17,6 @@ pub const DIFFERENCES: f64 = 1e-4;
 
 /// Share of the largest column, scaled by the tuners' ranges, below which a column is rounding error: no effect.
 const NO_EFFECT: f64 = 1e-15;
-
-/// Tuner as a coordinate of the sensitivity matrix.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Coordinate {
-    /// Name of the tuner.
-    pub name: String,
-    /// Value at which the derivatives are evaluated.
-    pub value: f64,
-    /// Largest minus smallest value; replaces the value if that is 0, or counts from an arbitrary zero.
-    pub range: f64,
-    /// Change over the whole range at the derivative of the tuner's scale: the range, or `value ln(max/min)` for a
-    /// logarithmic tuner.
-    pub span: f64,
-    /// Unit of value and range.
-    pub unit: String,
-    /// True if the value counts from an arbitrary zero, such as that of degC, so that a share of it has no meaning.
-    pub counts_from_any_zero: bool,
-}
-
-impl Coordinate {
-    /// Returns true if relative changes are related to the range instead of the value.
-    pub fn is_by_range(&self) -> bool {
-        self.value == 0.0 || self.counts_from_any_zero
-    }
-
-    /// Returns the scale of a relative change: the value, or the range.
-    pub fn scale(&self) -> f64 {
-        if self.is_by_range() { self.range } else { self.value.abs() }
-    }
-}
 
 /// Eigenvalues, descending, with their unit-length eigenvectors.
 pub type Eigen = Vec<(f64, Vec<f64>)>;
@@ -165,7 +136,7 @@ impl Sensitivity {
     /// A direction is not determined if one standard error along it moves a tuner through its whole range. The change
     /// of the residuals is then below the noise. An unresolved direction is unknown if its computed change would be
     /// above the noise.
-    pub(super) fn judge(&mut self, jacobian: &DMatrix<f64>, covariance: &Covariance) {
+    pub(super) fn judge(&mut self, jacobian: &DMatrix<f64>, noise: &Noise, covariance: &DMatrix<f64>) {
         let n = self.coordinates.len();
         let spans: Vec<f64> = self.coordinates.iter().map(|coordinate| coordinate.span).collect();
         let hidden = |row: &RowDVector<f64>| {
@@ -174,13 +145,12 @@ impl Sensitivity {
             let change = jacobian * step;
             let size = change.norm();
             // N.B.: an unknown noise level hides everything.
-            let noise = covariance.noise().along((&change / size.max(f64::MIN_POSITIVE)).as_slice()).deviation;
-            size / farthest <= noise || noise.is_nan()
+            let level = noise.along((&change / size.max(f64::MIN_POSITIVE)).as_slice()).deviation;
+            size / farthest <= level || level.is_nan()
         };
         let (nothing, unknown): (Vec<_>, Vec<_>) =
             self.null.row_iter().map(|row| row.into_owned()).partition(|row| hidden(row));
-        let matrix = covariance.matrix();
-        let own = SymmetricEigen::new(DMatrix::from_fn(n, n, |a, b| matrix[(a, b)] / (spans[a] * spans[b])));
+        let own = SymmetricEigen::new(DMatrix::from_fn(n, n, |a, b| covariance[(a, b)] / (spans[a] * spans[b])));
         let mut noisy = Vec::new();
         for (value, vector) in own.eigenvalues.iter().zip(own.eigenvectors.column_iter()) {
             let error = value.max(0.0).sqrt();
@@ -199,7 +169,7 @@ impl Sensitivity {
         self.blind = (classes.into_iter())
             .flat_map(|(class, limit)| blind::directions(rows(class), &self.lengths, &self.coordinates, limit))
             .collect();
-        self.correlation = correlation(&matrix, &self.undetermined);
+        self.correlation = correlation(covariance, &self.undetermined);
     }
 
     /// Computes the sensitivities from the matrix `J' J`, in the tuners' own units. Half of the digits are lost if the

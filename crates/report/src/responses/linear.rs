@@ -13,8 +13,8 @@ use mops_math::complex;
 
 use super::super::bode::{FrequencyCurve, bode, unwrapped};
 use super::super::nyquist::nyquist;
-use super::Simulated;
-use super::of_model::Cases;
+use super::cases::Cases;
+use super::simulated::Simulated;
 
 /// Largest number of tuners with a plot of the poles.
 const MOST_TUNERS: usize = 6;

@@ -2,11 +2,13 @@
 //! measurements.
 
 mod active;
+mod cases;
 mod inputs;
 mod linear;
 mod live;
 mod of_case;
 mod of_model;
+mod simulated;
 
 use mops_core::{Analysis, AnalysisKind, Failure};
 use rayon::prelude::*;
@@ -17,15 +19,10 @@ use mops_content::{figures::Group, numbers::counted};
 
 use super::Report;
 use super::comparison::Comparison;
+use simulated::{Simulated, worst};
 
 /// Largest number of simulations with plots; beyond it, those with the largest scaled values are shown.
 const MOST_JOBS: usize = 30;
-
-/// Simulation of a job at the initial guess and at the reported point.
-struct Simulated {
-    job: usize,
-    both: Comparison,
-}
 
 /// Returns the groups of plots, for at most [`MOST_JOBS`] simulations, and a sentence if some are omitted. Each
 /// experiment has a group, and each model a group with all cases. With a Pareto front, each case has a group with the
@@ -78,16 +75,4 @@ fn shown(report: &Report<'_>) -> Vec<usize> {
         jobs.sort_unstable();
     }
     jobs
-}
-
-/// Returns the largest scaled value of every job at the reported point; infinity if a criterion has no value.
-fn worst(report: &Report<'_>) -> Vec<f64> {
-    let study = report.solution.problem.study();
-    let mut worst = vec![f64::NEG_INFINITY; study.jobs().len()];
-    for (row, reading) in study.rows().iter().zip(&report.solution.best.readings) {
-        let scaled = reading.map_or(f64::INFINITY, |reading| reading.scaled);
-        // N.B.: `max` ignores NaN.
-        worst[row.job] = worst[row.job].max(scaled);
-    }
-    worst
 }

@@ -10,7 +10,8 @@ use mops_tasks::calibration::{self, Around, UncertaintyReport};
 
 use super::super::comparison::over_time;
 use super::super::{Report, criteria, front};
-use super::{Simulated, active, inputs};
+use super::simulated::Simulated;
+use super::{active, inputs};
 
 /// Returns the plots of a simulation.
 pub(super) fn group(report: &Report<'_>, Simulated { job, both }: &Simulated) -> Group {

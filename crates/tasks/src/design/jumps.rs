@@ -1,6 +1,6 @@
 //! Look for jumps of the criteria near the design: how near, in what, what comes beyond, and how to design against it.
 
-use super::is_robust;
+use super::searched::is_robust;
 use std::sync::Arc;
 
 use mops_core::{

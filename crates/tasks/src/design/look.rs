@@ -1,7 +1,7 @@
 //! Jumps of the criteria near the reported point: how far a tuner, a constant or an initial value may move before a
 //! criterion jumps.
 
-use super::is_robust;
+use super::searched::is_robust;
 use std::sync::Arc;
 
 use rayon::prelude::*;

@@ -4,33 +4,24 @@ mod jumps;
 mod look;
 mod robust;
 mod rounds;
+mod searched;
 mod section;
 
 use mops_content::numbers::counted;
 use mops_content::section::{Block, Part, Section, Tone, Verdict};
 use mops_core::Usage;
-use mops_core::task::DesignTask;
 use mops_core::{Study, Watch};
 use mops_outcome::{BlockKind, Outcome};
 
 use crate::derivatives::DerivativesReport;
 use crate::room::{Judgement, Room, SCALED, Solution};
-use crate::search::{Extras, Options, SolveError, Solved, search_for};
+use crate::search::{Options, SolveError, Solved};
 use crate::uncertain::RobustReport;
 use crate::verdict::{changed, missed, used_as};
 
 pub use crate::slopes::{CriterionSlopes, SlopesReport};
 pub use look::{AwayReport, JumpReport, JumpsReport, MovedKind, ON_JUMP, WITHIN as JUMPS_WITHIN};
-
-/// Returns true if a design is made against worst cases.
-fn is_robust(study: &Study) -> bool {
-    study.options::<DesignTask>().is_some_and(|task| task.robust.is_some())
-}
-
-/// Searches the best design, with the sensitivities of its criteria.
-fn search_design(study: Study, options: &Options, watch: &dyn Watch) -> Result<Solved, SolveError> {
-    search_for(Extras { slopes: true, ..Extras::default() }, study, options, watch)
-}
+use searched::{is_robust, search_design};
 
 /// `task = "design"`.
 pub struct Design;

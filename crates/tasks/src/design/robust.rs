@@ -18,7 +18,7 @@ use crate::uncertain::{AddedReport, RobustReport, RoundReport, uncertain_reports
 
 use mops_content::numbers::{counted, significant};
 
-use super::search_design;
+use super::searched::search_design;
 use crate::batches::Stage;
 use crate::copies::Copies;
 use crate::search::{EvaluationStore, Options, SolveError, Solved};

@@ -2,7 +2,7 @@
 
 use mops_language::{Quantity, Unit, suggestion};
 
-use super::Models;
+use super::models::Models;
 use super::values::{check_horizon, converted, in_range, signal_names};
 use crate::cancellation::Cancellation;
 use crate::case::{Case, Channel, Experiment, Input, ResponseData};

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use mops_language::{Quantity, Unit, suggestion};
 
-use super::Models;
 use super::jobs::job;
+use super::models::Models;
 use super::values::converted;
 use crate::case::Case;
 use crate::criterion::{Criterion, CriterionSpec, Demand, InUnit, Other, Sense, Usage};

@@ -3,6 +3,7 @@
 mod cases;
 mod criteria;
 mod jobs;
+mod models;
 mod ties;
 mod tuners;
 mod values;
@@ -21,9 +22,17 @@ use jobs::{complete, job};
 use tuners::{build_tuner, check_use, free_start, tie_tuners};
 use values::{check_horizon, fixed_values, section};
 
-type Models = [(String, Arc<dyn Model>)];
+impl StudyBuilder {
+    /// Checks all names, sizes, bounds and units.
+    ///
+    /// # Errors
+    /// Returns the first error, with the path of keys to its location.
+    pub fn build(self) -> Result<Study, StudyError> {
+        build(self)
+    }
+}
 
-pub(super) fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
+fn build(draft: StudyBuilder) -> Result<Study, StudyError> {
     if draft.models.is_empty() {
         return Err(StudyError::new("models", "the study has no model")
             .with_help("add a table such as [models.loop.pid-loop]; `mops list` shows the kinds"));

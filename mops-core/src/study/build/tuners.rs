@@ -3,12 +3,13 @@
 use mops_language::{Expression, Quantity, Unit, suggestion};
 use mops_math as math;
 
-use super::Models;
+use super::models::Models;
 use super::values::{check_range, converted, names, parameter};
 use crate::case::{Case, Channel, Experiment, Role};
 use crate::model::Parameter;
 use crate::study::draft::{Free, TunerBuilder};
-use crate::study::{Grid, Scale, StudyError, Tuner, matches_pattern, ratio_of_temperatures};
+use crate::study::tuner::ratio_of_temperatures;
+use crate::study::{Grid, Scale, StudyError, Tuner, matches_pattern};
 
 /// Adds the tuner, or one for every case.
 pub(super) fn build_tuner(

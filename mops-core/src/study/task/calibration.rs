@@ -5,7 +5,8 @@ use serde::{Deserialize, Deserializer};
 
 use mops_language::suggestion;
 
-use super::{Place, TaskOptions, TaskSpec, count, level};
+use super::checks::{count, level};
+use super::{Place, Task, TaskOptions, TaskSpec};
 use crate::evaluation::Objective;
 use crate::study::{Study, StudyError};
 
@@ -161,5 +162,12 @@ impl UncertaintyTask {
             );
         }
         level(self.level)
+    }
+}
+
+impl Task {
+    /// Returns the task that estimates the tuners from measurements.
+    pub fn calibration() -> Self {
+        CalibrationTask::default().into()
     }
 }

@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{MOST_SAMPLES, Place, TaskOptions, TaskSpec, count, needs_box, no_uncertain};
+use super::checks::{MOST_SAMPLES, count, needs_box, no_uncertain};
+use super::{Place, Task, TaskOptions, TaskSpec};
 use crate::evaluation::Objective;
 use crate::study::{Study, StudyError};
 
@@ -109,5 +110,21 @@ impl RobustTask {
         }
         let fact = format!("expected a tolerance between 0 and 1 in scaled values, found {}", self.tolerance);
         Err(StudyError::new("tolerance", fact).with_help("the default 0.001 is a thousandth of a demand"))
+    }
+}
+
+impl Default for Task {
+    fn default() -> Self {
+        DesignTask::default().into()
+    }
+}
+
+/// What a robust design means for the other tasks.
+impl Study {
+    /// Returns true if the task rests on a design for the given cases, although the study has the table of a design
+    /// against worst cases.
+    pub fn leaves_worst_cases_out(&self) -> bool {
+        let is_robust = self.options::<DesignTask>().is_some_and(|design| design.robust.is_some());
+        is_robust && !self.task.is::<DesignTask>() && self.task.at() == Some(Place::Optimum)
     }
 }

@@ -4,7 +4,8 @@ use mops_statistics::Sampling;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{MOST_SAMPLES, Place, TaskOptions, TaskSpec, count, level, needs_uncertain};
+use super::checks::{MOST_SAMPLES, count, level, needs_uncertain};
+use super::{Place, TaskOptions, TaskSpec};
 use crate::study::{Study, StudyError};
 
 /// Settings of `task = "monte-carlo"`: sampling of the parameters of `[uncertain]`, and reported statistics.

@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{MOST_SAMPLES, Place, TaskOptions, TaskSpec, count, needs_box, needs_uncertain};
+use super::checks::{MOST_SAMPLES, count, needs_box, needs_uncertain};
+use super::{Place, TaskOptions, TaskSpec};
 use crate::study::{Study, StudyError};
 
 /// Method of `task = "sensitivity"`.

@@ -4,7 +4,8 @@ use mops_language::suggestion;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{MOST_SAMPLES, Place, TaskOptions, TaskSpec, count, needs_box, needs_uncertain};
+use super::checks::{MOST_SAMPLES, count, needs_box, needs_uncertain};
+use super::{Place, TaskOptions, TaskSpec};
 use crate::study::{Study, StudyError};
 
 /// Settings of `task = "worst-case"`: the search of the box of `[uncertain]` for the largest scaled value of every

@@ -3,7 +3,7 @@
 use mops_language::Scalar;
 use mops_math as math;
 
-use super::{best_of, evenly, problem, sampled};
+use super::definition::{best_of, evenly, problem, sampled};
 use crate::arithmetic::atan;
 use crate::{Problem, Suite};
 

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use mops_language::Scalar;
 use mops_math as math;
 
-use super::{best_of, evenly, known, problem, sampled};
+use super::definition::{best_of, evenly, known, problem, sampled};
 use crate::Suite;
 
 pub(crate) const SUITE: Suite = Suite {

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use mops_language::Scalar;
 
-use super::{Points, best_of, evenly, known, problem, sampled};
+use super::definition::{Points, best_of, evenly, known, problem, sampled};
 use crate::{Problem, Suite};
 
 pub(crate) const SUITE: Suite = Suite {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use mops_language::Scalar;
 use mops_math as math;
 
-use super::{Points, best_of, evenly, known, problem, sampled};
+use super::definition::{Points, best_of, evenly, known, problem, sampled};
 use crate::Suite;
 
 pub(crate) const SUITE: Suite = Suite {

@@ -2,7 +2,7 @@
 
 use mops_language::Scalar;
 
-use super::{FREE, POSITIVE, hs, within};
+use super::notation::{FREE, POSITIVE, hs, within};
 use crate::arithmetic::{c, cube, sq};
 use crate::formula::Functions;
 use crate::problem::Problem;

@@ -2,7 +2,7 @@
 
 use mops_language::Scalar;
 
-use super::{POSITIVE, hs, within};
+use super::notation::{POSITIVE, hs, within};
 use crate::arithmetic::{c, dot, normal, sq, sum};
 use crate::formula::Functions;
 use crate::problem::Problem;

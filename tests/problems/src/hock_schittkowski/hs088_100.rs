@@ -4,7 +4,7 @@ use mops_language::Scalar;
 use mops_math as math;
 
 use super::common::hs100;
-use super::{POSITIVE, hs, within};
+use super::notation::{POSITIVE, hs, within};
 use crate::arithmetic::{c, dot, sq, sum};
 use crate::formula::Functions;
 use crate::problem::Problem;

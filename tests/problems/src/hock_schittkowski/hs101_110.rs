@@ -3,7 +3,7 @@
 use mops_language::Scalar;
 use mops_math as math;
 
-use super::{POSITIVE, hs, within};
+use super::notation::{POSITIVE, hs, within};
 use crate::arithmetic::{cube, sq, sum};
 use crate::formula::Functions;
 use crate::problem::Problem;

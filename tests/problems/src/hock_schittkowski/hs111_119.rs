@@ -4,7 +4,7 @@ use mops_language::Scalar;
 
 use super::common::hs113;
 use super::hs071_086::colville;
-use super::{hs, within};
+use super::notation::{hs, within};
 use crate::arithmetic::{c, cube, dot, sq, sum};
 use crate::formula::Functions;
 use crate::problem::Problem;

@@ -3,7 +3,7 @@
 use mops_language::Scalar;
 use mops_math as math;
 
-use super::{hs, within};
+use super::notation::{hs, within};
 use crate::arithmetic::{c, power, sq, sum};
 use crate::formula::Functions;
 use crate::problem::{Problem, Sense};

@@ -13,10 +13,10 @@ mod hs088_100;
 mod hs101_110;
 mod hs111_119;
 mod least_squares;
+mod notation;
 
 use crate::Suite;
-use crate::formula::Functions;
-use crate::problem::{Answer, Problem};
+use crate::problem::Problem;
 
 pub(crate) const SUITE: Suite = Suite {
     name: "hock-schittkowski",
@@ -46,23 +46,3 @@ fn problems() -> Vec<Problem> {
     all.sort_by_key(|(number, _)| *number);
     all.into_iter().map(|(_, problem)| problem).collect()
 }
-
-/// Creates a problem from its number and its counts of inequalities and equalities.
-fn hs(
-    number: u32,
-    start: &[f64],
-    counts: [usize; 2],
-    answer: impl Into<Answer>,
-    functions: Functions,
-) -> (u32, Problem) {
-    let [inequalities, equalities] = counts;
-    (number, Problem { inequalities, equalities, ..Problem::new(&format!("HS{number}"), start, answer, functions) })
-}
-
-/// Adds bounds to a problem.
-fn within(bounds: &[[f64; 2]], (number, problem): (u32, Problem)) -> (u32, Problem) {
-    (number, Problem { bounds: bounds.to_vec(), ..problem })
-}
-
-const FREE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
-const POSITIVE: [f64; 2] = [0.0, f64::INFINITY];

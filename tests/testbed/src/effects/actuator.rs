@@ -2,7 +2,8 @@
 
 use mops_math as math;
 
-use super::{Effect, Family, any_actuator, real_actuator};
+use super::Family;
+use super::fits::{Effect, any_actuator, real_actuator};
 use crate::law::{At, Law, Own, Spot};
 use crate::plant::{Place, Plant};
 

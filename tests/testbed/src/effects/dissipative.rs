@@ -2,7 +2,8 @@
 
 use mops_math as math;
 
-use super::{Effect, Family, any_joint, joints};
+use super::Family;
+use super::fits::{Effect, any_joint, joints};
 use crate::law::{Dry, Law, Spot};
 use crate::plant::{Place, Plant};
 

@@ -4,7 +4,8 @@ use std::f64::consts::TAU;
 
 use mops_math as math;
 
-use super::{Effect, Family, Scene, any_joint, any_place, real_actuator};
+use super::fits::{Effect, any_joint, any_place, real_actuator};
+use super::{Family, Scene};
 use crate::law::{At, Law, Spot};
 use crate::plant::Plant;
 

@@ -2,7 +2,8 @@
 
 use mops_math as math;
 
-use super::{Effect, Family, Scene, any_joint, joints};
+use super::fits::{Effect, any_joint, joints};
+use super::{Family, Scene};
 use crate::law::{Law, Spot};
 use crate::plant::{Place, Plant};
 

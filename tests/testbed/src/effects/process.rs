@@ -2,7 +2,8 @@
 
 use mops_math as math;
 
-use super::{Effect, Family, processes};
+use super::Family;
+use super::fits::{Effect, processes};
 use crate::law::{At, Law, Spot};
 use crate::plant::Plant;
 

@@ -2,7 +2,8 @@
 
 use mops_math as math;
 
-use super::{Effect, Family, any_sensor};
+use super::Family;
+use super::fits::{Effect, any_sensor};
 use crate::law::{Law, Spot};
 use crate::plant::Plant;
 

@@ -1,6 +1,6 @@
 //! Linear axis driven by a force.
 
-use super::length;
+use super::places::length;
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Plant, Setup, Traits};
 

@@ -1,6 +1,6 @@
 //! Ball thrown up or dropped, y upwards, with linear drag.
 
-use super::length;
+use super::places::length;
 use crate::plant::{Output, PLAIN, Parameter, Plant, Setup, Traits};
 
 /// Gravity, m/s2.

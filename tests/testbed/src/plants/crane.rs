@@ -3,7 +3,7 @@
 
 use mops_math as math;
 
-use super::length;
+use super::places::length;
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Place, Plant, Setup, Traits};
 

@@ -1,6 +1,6 @@
 //! Two-mass drive: motor and load, coupled by an elastic shaft.
 
-use super::angle;
+use super::places::angle;
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Plant, Setup, Traits};
 

@@ -2,7 +2,7 @@
 
 use mops_math as math;
 
-use super::angle;
+use super::places::angle;
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Plant, Setup};
 

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use mops_math as math;
 
-use super::angle;
+use super::places::angle;
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Plant, Setup};
 

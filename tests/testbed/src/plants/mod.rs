@@ -10,6 +10,7 @@ mod driven_pendulum;
 mod furuta;
 mod jacket;
 mod pendulum;
+mod places;
 mod room;
 mod sampled_drive;
 mod servo;
@@ -18,7 +19,7 @@ mod tanks;
 mod torsion;
 mod two_masses;
 
-use crate::plant::{Place, Plant};
+use crate::plant::Plant;
 
 /// Returns all plants.
 pub fn plants() -> &'static [&'static Plant] {
@@ -50,14 +51,4 @@ pub fn disturbed_plants() -> &'static [&'static Plant] {
 /// Returns further plants of cases with a model error in the background: one whose controller samples.
 pub fn further_plants() -> &'static [&'static Plant] {
     &[&sampled_drive::PLANT]
-}
-
-/// Creates an angle with viscous friction and without a spring in the baseline model.
-const fn angle(q: usize, v: usize, rest: f64) -> Place {
-    Place::Joint { q, v, rest, angle: true, damped: true, sprung: false }
-}
-
-/// Creates a length with viscous friction and without a spring in the baseline model.
-const fn length(q: usize, v: usize) -> Place {
-    Place::Joint { q, v, rest: 0.0, angle: false, damped: true, sprung: false }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use mops_math as math;
 
-use super::angle;
+use super::places::angle;
 use crate::plant::{Output, PLAIN, Parameter, Plant, Setup};
 
 /// Gravity, m/s2.

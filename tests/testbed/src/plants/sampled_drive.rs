@@ -1,6 +1,6 @@
 //! Motor whose speed a sampled PI controller sets, with a time to compute.
 
-use super::angle;
+use super::places::angle;
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Plant, Sampled, Setup, Traits};
 

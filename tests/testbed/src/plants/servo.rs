@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::angle;
+use super::places::angle;
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Plant, Setup, Traits};
 

@@ -1,6 +1,6 @@
 //! Two masses coupled by an elastic shaft: motor and load, with the gain of the motor unknown.
 
-use super::angle;
+use super::places::angle;
 use crate::excitation;
 use crate::plant::{Output, PLAIN, Parameter, Plant, Setup, Traits};
 

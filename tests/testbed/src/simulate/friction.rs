@@ -8,20 +8,10 @@
 //! At rest, the force that keeps the acceleration at 0 is computed. The joint breaks away when a command drives that
 //! force beyond the level, or at the end of a step that exceeds it.
 
+use super::step::{FEW, SIZE, State, runge_kutta};
+use super::world::Mode;
 use super::world::World;
-use super::{FEW, SIZE, State, runge_kutta};
 use crate::law::Spot;
-
-/// Mode of a joint.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Mode {
-    /// No dry friction.
-    Free,
-    /// Sliding in this direction, 1 or -1.
-    Slides(f64),
-    /// At rest.
-    Rests,
-}
 
 impl World<'_> {
     /// Returns the sum of the breakaway levels of all effects at a joint, for a direction.

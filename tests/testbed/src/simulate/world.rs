@@ -1,7 +1,6 @@
 //! Simulation of a plant with effects through an experiment.
 
-use super::friction::Mode;
-use super::{FEW, MANY, SIZE, STEPS, State, sample};
+use super::step::{FEW, MANY, SIZE, STEPS, State, sample};
 use crate::law::{At, Installed, Spot};
 use crate::plant::{Place, Plant, Setup};
 
@@ -231,4 +230,15 @@ fn earlier(past: &[(f64, State)], t: f64, state: usize) -> f64 {
     let i = past.partition_point(|(at, _)| *at <= t).clamp(1, past.len() - 1);
     let ((t0, x0), (t1, x1)) = (&past[i - 1], &past[i]);
     x0[state] + (x1[state] - x0[state]) * ((t - t0) / (t1 - t0)).clamp(0.0, 1.0)
+}
+
+/// Mode of a joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Mode {
+    /// No dry friction.
+    Free,
+    /// Sliding in this direction, 1 or -1.
+    Slides(f64),
+    /// At rest.
+    Rests,
 }

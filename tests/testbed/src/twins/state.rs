@@ -1,8 +1,9 @@
 //! State of a twin, and its rates.
 
 use super::law::{At, Law};
+use super::laws::law;
 use super::plants::Body;
-use super::{Command, Declared, Site, law};
+use super::{Command, Declared, Site};
 
 /// Maximum number of states of a plant with its effects, and of its signals.
 pub(super) const SIZE: usize = 12;

@@ -5,7 +5,7 @@ use mops_outcome::identification::Spread;
 
 use crate::calibration::BandReport;
 
-use super::Calibrated;
+use super::calibrated::Calibrated;
 
 /// Largest number of times of a band.
 const MOST_TIMES: usize = 400;

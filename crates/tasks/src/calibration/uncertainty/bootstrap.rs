@@ -9,7 +9,7 @@ use crate::calibration::{BootstrapParameter, BootstrapReport};
 
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 
-use super::{Calibrated, fixed_at, refit};
+use super::calibrated::{Calibrated, fixed_at, refit};
 use crate::batches::{Stage, each};
 
 /// Measured channel of calibration data.

@@ -2,13 +2,11 @@
 
 mod bands;
 mod bootstrap;
+mod calibrated;
 mod profile;
 
-use mops_core::{
-    Evaluation, Oracle, Problem, Run, Solver, Study, Watch,
-    run::{Budget, Quiet},
-    task::CalibrationTask,
-};
+use mops_core::Watch;
+use mops_core::task::CalibrationTask;
 use mops_outcome::identification::Covariance;
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 
@@ -18,15 +16,7 @@ use mops_content::numbers::significant;
 use profile::Profiles;
 
 use crate::search::Solved;
-
-/// Calibrated problem, the common input of all three methods.
-struct Calibrated<'a> {
-    problem: &'a Problem,
-    best: &'a Evaluation,
-    covariance: Covariance,
-    /// Confidence of the intervals.
-    level: f64,
-}
+use calibrated::Calibrated;
 
 /// Adds the uncertainty analyses that the study requests.
 pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
@@ -88,34 +78,6 @@ pub(super) fn add(solved: &mut Solved, watch: &dyn Watch) {
     }
     solved.outcome.simulations += simulations;
     solved.outcome.found.add(report);
-}
-
-/// Estimates the active tuners of a study again, from their start values; returns the fit and the number of
-/// simulations.
-fn refit(study: Study, mut solver: Box<dyn Solver>, watch: &dyn Watch) -> (Option<Evaluation>, usize) {
-    let problem = Problem::new(std::sync::Arc::new(study));
-    let start = problem.start();
-    if problem.active().is_empty() {
-        let at = problem.evaluate(&start);
-        return (Some(at).filter(|e| e.scaled.is_some()), problem.simulations());
-    }
-    let quiet = Quiet(watch);
-    let mut run = Run::new(&problem, Budget { evaluations: 100 * (problem.active().len() + 1) }, &quiet);
-    run.solve(solver.as_mut(), &start);
-    let simulations = (run.archive().len() + run.linearisations()) * problem.simulations();
-    (run.best().filter(|best| best.scaled.is_some()).cloned(), simulations)
-}
-
-/// Returns the study with its tuners at given values, and one of them fixed.
-fn fixed_at(problem: &Problem, tuners: &[f64], fixed: Option<usize>) -> Study {
-    let mut study = Study::clone(problem.study());
-    for (i, &value) in tuners.iter().enumerate() {
-        study.set_start(i, value);
-        if Some(i) == fixed || !problem.active().contains(&i) {
-            study.fix(i);
-        }
-    }
-    study
 }
 
 /// Formats the findings as sentences.

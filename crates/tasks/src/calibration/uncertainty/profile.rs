@@ -7,7 +7,7 @@ use mops_statistics::t_quantile;
 
 use crate::calibration::ProfileReport;
 
-use super::{Calibrated, fixed_at, refit};
+use super::calibrated::{Calibrated, fixed_at, refit};
 use crate::batches::{Stage, each};
 
 /// First distance from the estimate of a parameter without a standard error, as a share of its range.
