@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::scoring::{Maximum, Score, maximise};
 use crate::error_models::{ForceError, Kernel, LinearisedMotion, OutputError};
-use crate::fit::{Piece, Residuals};
+use crate::fit::Piece;
 use crate::settings::Settings;
 
 /// Smallest noise, as a share of that of the sensor. Basis: the studies.
@@ -216,12 +216,10 @@ impl Errors {
         }
     }
 
-    /// Takes the responses to the force along which the records are linearised out of their residuals.
-    pub fn take_force_out_of(&self, all: &mut [Residuals]) {
+    /// Takes the responses to the force along which the records are linearised out of the residuals of each record.
+    pub fn take_force_out_of<'r>(&self, residuals: impl Iterator<Item = &'r mut Vec<f64>>) {
         let Self::Force(_, motions) = self else { return };
-        for (found, motion) in all.iter_mut().zip(motions) {
-            found.r = motion.without_force(&found.r);
-        }
+        residuals.zip(motions).for_each(|(residuals, motion)| *residuals = motion.without_force(residuals));
     }
 
     /// Fits the hyperparameters of a kind to what was observed, from `before` and, where `thoroughly`, from both ends
@@ -246,7 +244,7 @@ impl Errors {
                     .collect();
                 let fitted = fitted?;
                 Some(Fitted {
-                    count: 3 * fitted.len(),
+                    count: OutputError::HYPERPARAMETERS * fitted.len(),
                     log_prior: fitted.iter().map(|f| f.1).sum(),
                     log_determinant: fitted.iter().map(|f| f.2).sum(),
                     errors: Self::Output(fitted.into_iter().map(|f| f.0).collect()),

@@ -424,7 +424,7 @@ impl Estimation<'_> {
         };
         let look = |values: &[f64]| {
             let mut all = fit.slopes(&self.point(values))?;
-            errors.take_force_out_of(&mut all);
+            errors.take_force_out_of(all.iter_mut().map(|piece| &mut piece.r));
             Some(all)
         };
         let whitened = |values: &[f64], all: &[Residuals]| {

@@ -48,7 +48,7 @@ impl Estimation<'_> {
     pub fn curves(&self, estimate: &Estimate) -> Option<Vec<Dependence>> {
         let fit = self.along(&estimate.errors);
         let mut slopes = fit.slopes(&estimate.point)?;
-        estimate.errors.take_force_out_of(&mut slopes);
+        estimate.errors.take_force_out_of(slopes.iter_mut().map(|piece| &mut piece.r));
         let trajectories = self.trajectories(&fit, estimate)?;
         let coordinates = coordinates(self, &trajectories);
         let free = self.free();
@@ -62,27 +62,27 @@ impl Estimation<'_> {
     }
 
     /// Returns the free curves at a place on top of an estimate without what effects add to the residuals of each
-    /// record, everything else fixed; `None` if a simulation fails.
-    pub fn curves_without(&self, estimate: &Estimate, place: &str, added: &[Vec<f64>]) -> Option<Vec<Dependence>> {
-        let fit = self.along(&estimate.errors);
-        let trajectories = self.trajectories(&fit, estimate)?;
-        let mut coordinates = coordinates(self, &trajectories);
+    /// record, everything else fixed, from its fit and motions; `None` if a simulation fails.
+    pub(super) fn curves_without(
+        &self,
+        estimate: &Estimate,
+        (fit, trajectories): (&Fit<'_>, &[Trajectory]),
+        place: &str,
+        added: &[Vec<f64>],
+    ) -> Option<Vec<Dependence>> {
+        let mut coordinates = coordinates(self, trajectories);
         coordinates.retain(|coordinate| coordinate.names.place == place);
-        let response = |piece: usize| match &estimate.errors {
-            Errors::Force(_, motions) => motions[piece].response.clone(),
-            _ => vec![0.0; added[piece].len()],
-        };
-        let all = fit.all(&estimate.point)?;
-        let without = |(piece, residuals): (usize, Vec<f64>)| {
-            let known = added[piece].iter().zip(response(piece));
-            residuals.iter().zip(known).map(|(r, (added, force))| r - added - force).collect()
-        };
-        let residuals: Vec<Vec<f64>> = all.into_iter().enumerate().map(without).collect();
+        let mut residuals = fit.all(&estimate.point)?;
+        estimate.errors.take_force_out_of(residuals.iter_mut());
+        for (residuals, added) in residuals.iter_mut().zip(added) {
+            residuals.iter_mut().zip(added).for_each(|(r, added)| *r -= added);
+        }
         let fixed = Unknowns { columns: vec![Vec::new(); residuals.len()], precision: Vec::new() };
-        Some(self.over(&coordinates, &estimate.errors, &trajectories, residuals, &fixed))
+        Some(self.over(&coordinates, &estimate.errors, trajectories, residuals, &fixed))
     }
 
-    fn trajectories(&self, fit: &Fit<'_>, estimate: &Estimate) -> Option<Vec<Trajectory>> {
+    /// Returns the motion in each record of a fit at an estimate; `None` if a simulation fails.
+    pub(super) fn trajectories(&self, fit: &Fit<'_>, estimate: &Estimate) -> Option<Vec<Trajectory>> {
         let trajectory = |piece: usize| Trajectory::new(fit, self.model, piece, &estimate.point).ok();
         (0..fit.pieces.len()).map(trajectory).collect()
     }

@@ -29,12 +29,27 @@ pub fn latent_inputs(ports: &[&Port], [declared, set]: [&FittedSet<'_>; 2], nomi
     let of = |port: &&Port| {
         let here: Vec<usize> = (0..set.added.len()).filter(|&k| set.added[k].candidate.port == **port).collect();
         if !here.is_empty() && here.iter().all(|&k| can_be_drawn(&set.added[k].candidate)) {
-            Course { set, nominal, port, effects: &here }.latent_input()
+            latent_input(set, nominal, port, &here)
         } else {
-            Course { set: declared, nominal, port, effects: &[] }.latent_input()
+            latent_input(declared, nominal, port, &[])
         }
     };
     ports.iter().filter_map(of).collect()
+}
+
+/// Returns the latent input at a place on top of a set, with effects there by their positions in the set; `None` if
+/// the place has none, or the error model of the place was not fitted.
+fn latent_input(set: &FittedSet<'_>, nominal: &[f64], port: &Port, effects: &[usize]) -> Option<LatentInput> {
+    let kind = match port {
+        Port::Joint { .. } | Port::Process { .. } => ErrorModel::Force,
+        Port::Sensor { .. } => ErrorModel::SmoothOutput,
+        Port::Actuator { .. } => return None,
+    };
+    let (estimate, estimation) = (set.estimate(kind)?, set.estimation(nominal));
+    let fit = estimation.along(&estimate.errors);
+    let trajectories = estimation.trajectories(&fit, estimate)?;
+    let (estimation, fit, trajectories) = (&estimation, &fit, &trajectories);
+    Course { set, estimate, estimation, fit, trajectories, port, effects }.latent_input()
 }
 
 /// Returns true if the formula of an effect can be drawn along a motion that has it already: inertia adds to the
@@ -47,14 +62,19 @@ fn can_be_drawn(candidate: &Candidate) -> bool {
 /// Course at a place on top of a set at its optimum under the error model of the place.
 struct Course<'c, 'a> {
     set: &'c FittedSet<'a>,
-    /// Nominal rates of the balances.
-    nominal: &'c [f64],
+    /// Fit under the error model of the place.
+    estimate: &'c Estimate,
+    estimation: &'c Estimation<'c>,
+    /// Fit with the force of the error model in its records.
+    fit: &'c Fit<'c>,
+    /// Motion in each record.
+    trajectories: &'c [Trajectory],
     port: &'c Port,
     /// Effects at the place, by their positions in the set.
     effects: &'c [usize],
 }
 
-/// Instants of a record with what is missing there, and with the effects found.
+/// Instants of a record with what is missing there, and with the effects found; these are empty without effects.
 struct Remainder {
     /// Since the beginning of the record, s.
     times: Vec<f64>,
@@ -69,39 +89,15 @@ struct Remainder {
 impl Course<'_, '_> {
     /// Returns the course in all records, over time and over the coordinates of the place; `None` if it has none.
     fn latent_input(&self) -> Option<LatentInput> {
-        let kind = match self.port {
-            Port::Joint { .. } | Port::Process { .. } => ErrorModel::Force,
-            Port::Sensor { .. } => ErrorModel::SmoothOutput,
-            Port::Actuator { .. } => return None,
-        };
-        let (set, model) = (self.set, &self.set.variant.model);
-        let Estimate { point, errors, .. } = set.estimate(kind)?;
-        let estimation = set.estimation(self.nominal);
-        let fit = estimation.along(errors);
-        let along = |piece: usize| Trajectory::new(&fit, model, piece, point).ok();
-        let trajectories: Vec<Trajectory> = (0..fit.pieces.len()).map(along).collect::<Option<_>>()?;
         let place = self.port.to_string();
         let at_place = |c: &Coordinate| c.names.place == place && c.names.other.is_none() && c.value.is_local();
         let coordinates: Vec<Coordinate> =
-            coordinates(&estimation, &trajectories).into_iter().filter(at_place).collect();
-        let curves = self.curves(&estimation, &fit, &trajectories).unwrap_or_default();
+            coordinates(self.estimation, self.trajectories).into_iter().filter(at_place).collect();
+        let curves = self.curves().unwrap_or_default();
         let mut over_time = Vec::new();
         let mut over: Vec<Curve> = vec![Curve::default(); coordinates.len()];
-        for (piece, trajectory) in trajectories.iter().enumerate() {
-            let remainder = match (errors, port_index(self.port, model, &fit.pieces[piece])) {
-                (Errors::Force(_, motions), Some(PortIndex::Joint(w, ..) | PortIndex::Process(w, _))) => {
-                    let forces = motions[piece].forces.iter().skip(w).step_by(self.nominal.len());
-                    let size = trajectory.forward[w] * self.nominal[w] / trajectory.mobilities[w];
-                    let times = &motions[piece].linearised.times;
-                    self.of_forces(&fit, piece, trajectory, times, forces.map(|f| f * size).collect())
-                }
-                (Errors::Output(errors), Some(PortIndex::Sensor(series))) => {
-                    let error = &errors[estimation.channels.of(piece, series)];
-                    self.at_sensor(&fit, piece, series, trajectory, error)
-                }
-                _ => None,
-            };
-            let Some(Remainder { times, missing, fitted, found }) = remainder else { continue };
+        for (index, (piece, trajectory)) in self.fit.pieces.iter().zip(self.trajectories).enumerate() {
+            let Some(Remainder { times, missing, fitted, found }) = self.remainder(index) else { continue };
             let thin = |values: Vec<f64>| -> Vec<f64> {
                 let step = times.len().div_ceil(POINTS).max(1);
                 values.into_iter().step_by(step).collect()
@@ -109,18 +105,16 @@ impl Course<'_, '_> {
             let estimated = thin(missing.iter().enumerate().map(|(k, m)| m + fitted.get(k).unwrap_or(&0.0)).collect());
             let found = thin(found);
             for (coordinate, curve) in coordinates.iter().zip(&mut over) {
-                let moments: Vec<f64> = trajectory.moments.iter().map(|m| m.t).collect();
                 let values: Vec<f64> = trajectory.moments.iter().map(|m| coordinate.value.at(m)).collect();
-                let x = thin(times.iter().map(|&t| between(&moments, &values, t)).collect());
+                let x = thin(at_times(trajectory, &values, &times));
                 let free = curves.iter().find(|free| free.coordinate == coordinate.names.coordinate);
                 curve.estimated.extend(free.map_or_else(|| estimated.clone(), |free| at(free, &x)));
                 curve.x.extend(x);
                 curve.found.extend_from_slice(&found);
             }
-            let begins = fit.pieces[piece].case.begins;
-            let x = thin(times.iter().map(|t| begins + t).collect());
-            let name = &fit.subject.measurements[fit.pieces[piece].measurement].name;
-            over_time.push((name.clone(), Curve { x, estimated, found }));
+            let x = thin(times.iter().map(|t| piece.case.begins + t).collect());
+            let name = self.set.fit.subject.measurements[piece.measurement].name.clone();
+            over_time.push((name, Curve { x, estimated, found }));
         }
         if over_time.is_empty() {
             return None;
@@ -132,21 +126,6 @@ impl Course<'_, '_> {
             over_time,
             over: coordinates.into_iter().zip(over).map(named).collect(),
         })
-    }
-
-    /// Returns the free curves at a balance on top of the set without its effects there, everything else fixed.
-    fn curves(&self, estimation: &Estimation<'_>, fit: &Fit<'_>, along: &[Trajectory]) -> Option<Vec<Dependence>> {
-        let estimate = self.set.estimate(ErrorModel::Force).filter(|_| !self.effects.is_empty())?;
-        let of = |piece: usize| -> Option<Vec<f64>> {
-            let samples = fit.pieces[piece].series.iter().map(|s| s.times.len()).sum();
-            let mut sum = vec![0.0; samples];
-            for (view, strengths) in self.views(fit, piece, &along[piece], &estimate.point)? {
-                sum.iter_mut().zip(view.trace(&strengths)?).for_each(|(sum, trace)| *sum += trace);
-            }
-            Some(sum)
-        };
-        let added: Option<Vec<Vec<f64>>> = (0..along.len()).map(of).collect();
-        estimation.curves_without(estimate, &self.port.to_string(), &added?)
     }
 
     /// Returns the unit of the place, if the model determines it.
@@ -162,89 +141,99 @@ impl Course<'_, '_> {
     }
 
     /// Returns the views of the effects in a record, with their parameters at a point.
-    fn views<'v>(
-        &'v self,
-        fit: &'v Fit<'_>,
-        piece: usize,
-        trajectory: &'v Trajectory,
-        point: &Point,
-    ) -> Option<Vec<(View<'v>, Vec<f64>)>> {
+    fn views(&self, index: usize, point: &Point) -> Option<Vec<(View<'_>, Vec<f64>)>> {
         let set = self.set;
-        let view = |&index: &usize| {
-            let candidate = &set.added[index].candidate;
+        let view = |&effect: &usize| {
+            let candidate = &set.added[effect].candidate;
             let count = candidate.effect.parameters().len();
-            let strengths = set.variant.strengths(&set.fit, point, index, count, piece);
-            Some((View::new(candidate, &set.variant.model, &fit.pieces[piece], trajectory)?, strengths))
+            let strengths = set.variant.strengths(&set.fit, point, effect, count, index);
+            let (piece, along) = (&self.fit.pieces[index], &self.trajectories[index]);
+            Some((View::new(candidate, &set.variant.model, piece, along)?, strengths))
         };
         self.effects.iter().map(view).collect()
     }
 
-    /// Returns what the effects add in a record with the parameters of a point, in the unit of the place, at the nodes
-    /// of its motion or the samples of its sensor.
-    fn added(&self, fit: &Fit<'_>, piece: usize, trajectory: &Trajectory, point: &Point) -> Option<Vec<f64>> {
-        let mut sum = Vec::new();
-        for (view, strengths) in self.views(fit, piece, trajectory, point)? {
-            let added = view.added(&strengths)?;
-            sum.resize(sum.len().max(added.len()), 0.0);
-            sum.iter_mut().zip(added).for_each(|(sum, added)| *sum += added);
+    /// Returns the sum of what the effects do in a record with their parameters at a point, over
+    /// so many values.
+    fn sum(
+        &self,
+        index: usize,
+        point: &Point,
+        length: usize,
+        of: impl Fn(&View<'_>, &[f64]) -> Option<Vec<f64>>,
+    ) -> Option<Vec<f64>> {
+        let mut sum = vec![0.0; length];
+        for (view, strengths) in self.views(index, point)? {
+            // Nothing where it does not act.
+            sum.iter_mut().zip(of(&view, &strengths)?).for_each(|(sum, own)| *sum += own);
         }
         Some(sum)
     }
 
-    /// Returns the forces of a record, which are kept from sample to sample, in the middle of these.
-    fn of_forces(
-        &self,
-        fit: &Fit<'_>,
-        piece: usize,
-        trajectory: &Trajectory,
-        samples: &[f64],
-        mut missing: Vec<f64>,
-    ) -> Option<Remainder> {
-        let times: Vec<f64> = samples.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
-        missing.truncate(times.len());
-        let moments: Vec<f64> = trajectory.moments.iter().map(|m| m.t).collect();
-        let of = |point: &Point| -> Option<Vec<f64>> {
-            let added = self.added(fit, piece, trajectory, point)?;
-            // Nothing where they do not act.
-            let added = if added.is_empty() { vec![0.0; moments.len()] } else { added };
-            Some(times.iter().map(|&t| between(&moments, &added, t)).collect())
+    /// Returns the free curves at a balance on top of the set without its effects there, everything else fixed.
+    fn curves(&self) -> Option<Vec<Dependence>> {
+        if self.effects.is_empty() || !matches!(self.estimate.errors, Errors::Force(..)) {
+            return None;
+        }
+        let of = |index: usize| {
+            let samples = self.fit.pieces[index].series.iter().map(|s| s.times.len()).sum();
+            self.sum(index, &self.estimate.point, samples, |view, strengths| view.trace(strengths))
         };
-        let [fitted, found] = self.with_effects(of, ErrorModel::Force)?;
-        Some(Remainder { times, missing, fitted, found })
+        let added: Vec<Vec<f64>> = (0..self.trajectories.len()).map(of).collect::<Option<_>>()?;
+        let place = self.port.to_string();
+        self.estimation.curves_without(self.estimate, (self.fit, self.trajectories), &place, &added)
     }
 
-    /// Returns the smoothed error of a sensor in a record.
-    fn at_sensor(
-        &self,
-        fit: &Fit<'_>,
-        piece: usize,
-        series: usize,
-        trajectory: &Trajectory,
-        error: &OutputError,
-    ) -> Option<Remainder> {
-        let samples = &fit.pieces[piece].series[series];
-        // What the model lacks: measured minus simulated.
-        let predicted = &trajectory.predicted[series];
-        let lacking: Vec<f64> = samples.values.iter().zip(predicted).map(|(y, p)| (y - p) / samples.noise).collect();
-        let missing = smoothed(error, &samples.times, &lacking).into_iter().map(|e| e * samples.noise).collect();
-        let count = samples.times.len();
-        let of = |point: &Point| -> Option<Vec<f64>> {
-            let mut added = self.added(fit, piece, trajectory, point)?;
-            added.resize(count, 0.0);
-            Some(added)
-        };
-        let [fitted, found] = self.with_effects(of, ErrorModel::SmoothOutput)?;
-        Some(Remainder { times: samples.times.clone(), missing, fitted, found })
+    /// Returns what is missing in a record; `None` where the place is not measured.
+    fn remainder(&self, index: usize) -> Option<Remainder> {
+        let (piece, trajectory) = (&self.fit.pieces[index], &self.trajectories[index]);
+        match (&self.estimate.errors, port_index(self.port, &self.set.variant.model, piece)?) {
+            (Errors::Force(_, motions), PortIndex::Joint(w, ..) | PortIndex::Process(w, _)) => {
+                let nominal = &self.estimation.nominal;
+                let size = trajectory.forward[w] * nominal[w] / trajectory.mobilities[w];
+                // Forces are kept from sample to sample: they are those of the middle.
+                let samples = &motions[index].linearised.times;
+                let times: Vec<f64> = samples.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+                let forces = motions[index].forces.iter().skip(w).step_by(nominal.len());
+                let missing = forces.map(|f| f * size).take(times.len()).collect();
+                let of = |point: &Point| -> Option<Vec<f64>> {
+                    let nodes = trajectory.moments.len();
+                    let added = self.sum(index, point, nodes, |view, strengths| view.added(strengths))?;
+                    Some(at_times(trajectory, &added, &times))
+                };
+                let [fitted, found] = self.with_effects(of)?;
+                Some(Remainder { times, missing, fitted, found })
+            }
+            (Errors::Output(errors), PortIndex::Sensor(series)) => {
+                let samples = &piece.series[series];
+                // What the model lacks: measured minus simulated.
+                let lacking = samples.values.iter().zip(&trajectory.predicted[series]);
+                let lacking: Vec<f64> = lacking.map(|(y, predicted)| (y - predicted) / samples.noise).collect();
+                let smoothed = smoothed(&errors[self.estimation.channels.of(index, series)], &samples.times, &lacking);
+                let missing = smoothed.into_iter().map(|e| e * samples.noise).collect();
+                let count = samples.times.len();
+                let of = |point: &Point| self.sum(index, point, count, |view, strengths| view.added(strengths));
+                let [fitted, found] = self.with_effects(of)?;
+                Some(Remainder { times: samples.times.clone(), missing, fitted, found })
+            }
+            _ => None,
+        }
     }
 
-    /// Returns what is computed at the optimum under an error model and at that of least squares; nothing without
+    /// Returns what is computed at the optimum under the error model and at that of least squares; nothing without
     /// effects.
-    fn with_effects(&self, of: impl Fn(&Point) -> Option<Vec<f64>>, kind: ErrorModel) -> Option<[Vec<f64>; 2]> {
+    fn with_effects(&self, of: impl Fn(&Point) -> Option<Vec<f64>>) -> Option<[Vec<f64>; 2]> {
         if self.effects.is_empty() {
             return Some([Vec::new(), Vec::new()]);
         }
-        Some([of(&self.set.estimate(kind)?.point)?, of(&self.set.least_squares.point)?])
+        Some([of(&self.estimate.point)?, of(&self.set.least_squares.point)?])
     }
+}
+
+/// Returns values at the nodes of a motion read at other times.
+fn at_times(trajectory: &Trajectory, values: &[f64], times: &[f64]) -> Vec<f64> {
+    let nodes: Vec<f64> = trajectory.moments.iter().map(|m| m.t).collect();
+    times.iter().map(|&t| between(&nodes, values, t)).collect()
 }
 
 /// Returns the most probable smooth errors of a channel behind its residuals: a force that acts on the output alone.

@@ -91,7 +91,7 @@ impl<'a> Findings<'_, 'a> {
             made.noticeable = self.noticeable();
         }
         made.places = first_of_each(self.curves.clone(), |curve| curve.place.clone());
-        made.latent = self.latent([declared, sets.get(chosen).unwrap_or(set)], &made);
+        made.latent = self.latent([sets.declared(), sets.get(chosen).unwrap_or(set)], &made);
         made.predictions = before.predictions(&after);
         let names: Vec<String> = made.found.iter().map(|found| found.name.clone()).collect();
         made.starts = after.starts(&names);

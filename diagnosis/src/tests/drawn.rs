@@ -1,7 +1,7 @@
 //! What was found is drawn through the signal that the data show at its place without any formula.
 
 use mops_math as math;
-use mops_outcome::diagnosis::{Curve, LatentInput};
+use mops_outcome::diagnosis::{Curve, LatentInput, Verdict};
 
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
@@ -63,4 +63,20 @@ fn a_drift_is_drawn_at_its_sensor_in_the_unit_of_the_sensor() {
     let formula = rms(over_time, |t, _, found| Some(found - DRIFT * t));
     let estimate = rms(over_time, |t, estimated, _| Some(estimated - DRIFT * t));
     assert!(formula < NOISE && estimate < NOISE, "{formula}, {estimate}");
+}
+
+#[test]
+fn what_no_effect_explains_has_a_course_at_the_place_where_it_acts() {
+    const FRICTION: f64 = 0.4;
+    let rates = |_: f64, x: &[f64; 2]| [x[1], -9.0 * x[0] - 0.1 * x[1] - FRICTION * math::tanh(x[1] / 1e-3)];
+    let states = integrated(rates, [1.0, 0.0], 0.02, 150);
+    let record = Record::of_first("x", &states, 0.02, NOISE, "unexplained");
+    let subject = subject(BLOCK, &[8.0, 0.5, 1.0, 0.0], 2, vec![record]);
+    let options = Options { max_effects: 1, level: 0.01, ..Options::default() };
+    let diagnosis = diagnose(&study(&subject), &catalogue(&["sensor-gain"]), &options, &()).expect("it simulates");
+    assert_eq!(diagnosis.verdict, Verdict::Unexplained);
+    assert!(diagnosis.found.is_empty(), "{:?}", diagnosis.found);
+    assert_eq!((diagnosis.places[0].place.as_str(), diagnosis.latent.len()), ("joint:x", 1));
+    let course = &diagnosis.latent[0].over_time[0].1;
+    assert!(course.x.len() > 50 && course.estimated.len() == course.x.len() && course.found.is_empty(), "{course:?}");
 }
