@@ -230,7 +230,17 @@ fn faults(text: &str) -> Vec<String> {
 
 /// The comment and the string literals of a line of Rust.
 fn prose_of(line: &str) -> String {
-    let mut prose = String::new();
+    split(line).1
+}
+
+/// A line of Rust without its comment and its string literals.
+fn code_of(line: &str) -> String {
+    split(line).0
+}
+
+/// The code of a line of Rust, and its prose: string literals and comment.
+fn split(line: &str) -> (String, String) {
+    let (mut code, mut prose) = (String::new(), String::new());
     let mut rest = line;
     let mut in_string = false;
     while let Some(c) = rest.chars().next() {
@@ -247,33 +257,12 @@ fn prose_of(line: &str) -> String {
             prose.push_str(if in_string { "" } else { " " });
         } else if in_string {
             prose.push(c);
-        }
-        rest = &rest[c.len_utf8()..];
-    }
-    prose
-}
-
-/// A line of Rust without its comment and its string literals.
-fn code_of(line: &str) -> String {
-    let mut code = String::new();
-    let mut rest = line;
-    let mut in_string = false;
-    while let Some(c) = rest.chars().next() {
-        if !in_string && rest.starts_with("//") {
-            break;
-        }
-        if in_string && rest.starts_with('\\') {
-            rest = rest.get(2..).unwrap_or("");
-            continue;
-        }
-        if c == '"' {
-            in_string = !in_string;
-        } else if !in_string {
+        } else {
             code.push(c);
         }
         rest = &rest[c.len_utf8()..];
     }
-    code
+    (code, prose)
 }
 
 /// The words that the identifiers of a line consist of.

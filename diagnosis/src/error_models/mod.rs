@@ -16,5 +16,4 @@ mod process;
 mod tests;
 
 pub use force_error::{ForceError, LinearisedMotion, Measured};
-pub use likelihood::Likelihood;
 pub use output_error::{Kernel, OutputError};

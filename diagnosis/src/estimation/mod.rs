@@ -7,7 +7,7 @@ mod scoring;
 mod steps;
 
 pub(crate) use errors::Observed;
-pub use errors::{Channels, ErrorModel, Errors, Motion};
+pub use errors::{Channels, ErrorModel, Errors};
 pub(crate) use estimate::{ALLOWANCE, CLEARLY, ITERATIONS, LOOK, ROUND_ITERATIONS};
 pub use estimate::{Estimate, Estimation};
 pub(crate) use priors::{log_choices, nominal_rates, priors};

@@ -14,7 +14,7 @@ pub fn globals(subject: &Subject) -> Vec<Global> {
         let scale = (tuner.bounds[1] - tuner.bounds[0])
             .abs()
             .min(tuner.start.abs().max(1e-3 * (tuner.bounds[1] - tuner.bounds[0])));
-        Global { sets: Sets::Tuner(k), bounds: tuner.bounds, open: false, log, scale, steps: false }
+        Global { sets: Sets::Tuner(k), bounds: tuner.bounds, log, scale, steps: false }
     };
     subject.globals.iter().enumerate().map(global).collect()
 }

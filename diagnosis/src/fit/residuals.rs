@@ -16,8 +16,6 @@ pub struct Global {
     pub sets: Sets,
     /// Smallest and largest value.
     pub bounds: [f64; 2],
-    /// Whether physics knows no largest value, only the fit.
-    pub open: bool,
     /// Whether it is looked for in its logarithm.
     pub log: bool,
     /// Typical size of a change.

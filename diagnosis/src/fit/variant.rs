@@ -228,8 +228,7 @@ pub fn problem<'a>(
                     _ => scale,
                 };
                 let bounds = a.sizes.bounds(strength);
-                let open = strength.bounds[1].is_infinite();
-                all.push(Global { sets: Sets::Parameter(parameter), bounds, open, log, scale, steps });
+                all.push(Global { sets: Sets::Parameter(parameter), bounds, log, scale, steps });
                 values.push(value.clamp(bounds[0], bounds[1]));
             }
         }

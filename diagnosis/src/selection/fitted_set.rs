@@ -81,6 +81,11 @@ impl FittedSet<'_> {
         (0..self.fit.pieces.len()).into_par_iter().map(of).collect()
     }
 
+    /// Returns the position of a candidate among the effects of the set.
+    pub fn position(&self, index: usize) -> usize {
+        self.added.iter().position(|added| added.candidate.index == index).expect("the set holds it")
+    }
+
     /// Returns the fit under an error model.
     pub fn estimate(&self, kind: ErrorModel) -> Option<&Estimate> {
         self.under.iter().find(|(of, _)| *of == kind).map(|(_, estimate)| estimate)

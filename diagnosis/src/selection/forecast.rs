@@ -25,7 +25,7 @@ pub enum Forecast {
 
 /// Forecasts of the sets that were tested, and which of them passed.
 pub struct Forecasts {
-    kinds: Vec<Forecast>,
+    kinds: &'static [Forecast],
     known: HashMap<(Key, Forecast), Option<f64>>,
     tested: HashMap<Key, bool>,
     /// Sets that passed, the most probable first.
@@ -49,9 +49,8 @@ impl Forecasts {
         let posterior = |sets: &FittedSets<'_, '_>, key: &Key| {
             sets.get(key).map_or(f64::NEG_INFINITY, |set| sets.log_posterior(set))
         };
-        let kinds = kinds(sets.refit.subject).to_vec();
         let mut forecasts = Self {
-            kinds,
+            kinds: kinds(sets.refit.subject),
             known: HashMap::new(),
             tested: HashMap::new(),
             passed: Vec::new(),
@@ -91,7 +90,7 @@ impl Forecasts {
     fn beats(&mut self, sets: &FittedSets<'_, '_>, key: &Key, rivals: &[Key]) -> bool {
         rivals.iter().all(|rival| {
             self.forecast(sets, &[key, rival]);
-            self.kinds.clone().into_iter().all(|kind| {
+            self.kinds.iter().all(|&kind| {
                 let own = self.error(sets, key, kind);
                 let theirs = self.error(sets, rival, kind);
                 own.is_some_and(|own| theirs.is_none_or(|theirs| own < theirs))

@@ -163,7 +163,7 @@ impl<'a> FittedSets<'_, 'a> {
             }
             let (Some(set), Some(parent)) = (self.get(key), self.get(&smaller).cloned()) else { continue };
             // Where the set is at its optimum, what an effect does is all that is missing without it.
-            let position = Self::position(set, key[k]);
+            let position = set.position(key[k]);
             let start = set.start_at(&set.least_squares.point);
             let exchanged = start.added[position].clone();
             let start = start.without(position);

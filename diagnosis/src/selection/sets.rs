@@ -105,11 +105,6 @@ impl<'r, 'a> FittedSets<'r, 'a> {
         kinds
     }
 
-    /// Returns the position of a candidate among the effects of a set.
-    pub fn position(set: &FittedSet<'a>, index: usize) -> usize {
-        set.added.iter().position(|added| added.candidate.index == index).expect("the set holds it")
-    }
-
     /// Returns true if an effect of a set does nothing under every error model.
     pub fn is_inert(&self, set: &FittedSet<'a>) -> bool {
         let gain = |smaller: &FittedSet<'a>, kind: ErrorModel| {
@@ -165,7 +160,7 @@ impl<'r, 'a> FittedSets<'r, 'a> {
     /// determines.
     fn is_wide(&self, set: &FittedSet<'a>, added: &Added, parameter: usize) -> bool {
         let of = &added.candidate.effect.parameters()[parameter];
-        let sets = Sets::Parameter(set.variant.first[Self::position(set, added.candidate.index)] + parameter);
+        let sets = Sets::Parameter(set.variant.first[set.position(added.candidate.index)] + parameter);
         let position = set.fit.globals.iter().position(|global| global.sets == sets && global.is_stepped());
         let mut tried = added.sizes.values(of.dimension, of.grid, of.bounds);
         tried.retain(|value| !of.bounds.contains(value));
@@ -285,6 +280,7 @@ impl<'r, 'a> FittedSets<'r, 'a> {
         Some(larger.start_at(&larger.least_squares.point).without(extra))
     }
 
+    /// Brings the sets into the order of their probabilities.
     pub fn sort(&mut self) {
         let mut keyed: Vec<(f64, FittedSet<'a>)> =
             std::mem::take(&mut self.sets).into_iter().map(|set| (self.log_posterior(&set), set)).collect();

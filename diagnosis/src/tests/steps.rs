@@ -26,8 +26,8 @@ fn stairs(value: f64, size: f64) -> f64 {
     if size > 0.0 { size * (value / size).round() } else { value }
 }
 
-/// What a search finds first, its strength and what it leaves, where input and measurement come in steps of these
-/// sizes.
+/// Returns the first effect found, its strength and the error that remains, for input and measurement in steps of
+/// these sizes.
 fn found(input: f64, measurement: f64) -> (String, f64, f64) {
     let fixed = |t: f64| command((t / STEP).floor() * STEP);
     let rates = |t: f64, x: &[f64; 1]| [1.3 * stairs(fixed(t), input) - 0.9 * x[0]];
