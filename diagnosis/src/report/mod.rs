@@ -244,11 +244,12 @@ impl<'a> Findings<'_, 'a> {
         next_experiment::separating(set, rival, [&names(set, rival), &names(rival, set)])
     }
 
-    /// Returns the course of what is missing at the places of the effects found, or else at the place with the largest
-    /// gain, of the declared model and a repaired one.
+    /// Returns the course of what is missing at the places of the effects found; without any, but with a lack of fit,
+    /// at the place with the largest gain. `sets` are the declared model and a repaired one.
     fn latent(&self, sets: [&FittedSet<'a>; 2], made: &Diagnosis) -> Vec<LatentInput> {
         let at_effects = sets[1].added.iter().map(|added| added.candidate.place());
-        let first = made.places.first().filter(|_| sets[1].added.is_empty()).map(|curve| curve.place.clone());
+        let is_open = sets[1].added.is_empty() && made.verdict != Verdict::None;
+        let first = made.places.first().filter(|_| is_open).map(|curve| curve.place.clone());
         let wanted: Vec<String> = at_effects.chain(first).collect();
         let ports = &self.sets.refit.subject.model.interface().ports;
         let ports: Vec<&Port> = ports.iter().filter(|port| wanted.contains(&port.to_string())).collect();

@@ -461,7 +461,8 @@ pub struct Diagnosis {
     /// Free curve with the largest gain of each place, the largest first: where the missing input acts, whatever its
     /// form.
     pub places: Vec<Dependence>,
-    /// Course of what is missing at the places of the effects found, or else at the first place.
+    /// Course of what is missing at the places of the effects found; without any, but with a lack of fit, at the first
+    /// place.
     pub latent: Vec<LatentInput>,
     /// Measured outputs and their predictions.
     pub predictions: Vec<Prediction>,
