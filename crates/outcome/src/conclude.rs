@@ -15,9 +15,10 @@ use mops_core::{
     study::Study,
     task::{CalibrationTask, SensitivityTask},
 };
+use mops_identification::{Local, Point, Whiteness, local, whiteness};
 use mops_math as math;
 
-use crate::identification::{self, Local, Point, SensitivityReport, Whiteness};
+use crate::identification::{SensitivityReport, excitations, report_of, whiteness_words};
 use crate::{
     CalibrationReport, ChannelReport, Design, End, ExperimentReport, FailureReport, Findings, Outcome, ParameterReport,
     StartReport, outcome,
@@ -79,18 +80,18 @@ pub fn conclude(run: &Run<'_>, solver: &SolverChoice, ending: Ending) -> (Outcom
     let calibration = (study.task().is::<CalibrationTask>() || study.cases().iter().any(|c| c.experiment.is_some()))
         .then(|| {
             let point = if ending.stop == Stop::Interrupted { Point::Elsewhere } else { Point::Minimum };
-            let local = identification::local(problem, &best.tuners, point, sensitivity_zero(&study));
+            let local = local(problem, &best.tuners, point, sensitivity_zero(&study));
             let experiments = experiments(problem, &best, &unknown);
-            let mut sensitivity = local.as_ref().map(|local| identification::report_of(problem, &best.tuners, local));
+            let mut sensitivity = local.as_ref().map(|local| report_of(problem, &best.tuners, local));
             let shows_noise = |found: &&mut SensitivityReport| found.of == "residuals" && point == Point::Minimum;
             if let Some(found) = sensitivity.as_mut().filter(shows_noise) {
-                found.words.extend(whiteness_words(&experiments));
+                found.words.extend(findings_on_whiteness(&experiments));
             }
             CalibrationReport {
                 parameters: standard_errors(problem, &best, local.as_ref()),
                 experiments,
                 sensitivity,
-                excitation: identification::excitations(&study),
+                excitation: excitations(&study),
             }
         });
     if problem.is_cancelled() {
@@ -211,8 +212,8 @@ fn bound_warnings(study: &Study, problem: &Problem, best: &Evaluation) -> Vec<St
 /// Confidence level of the parameter intervals of a calibration.
 const LEVEL: f64 = 0.95;
 
-/// Returns the standard errors of the active tuners, to first order ([`identification::Covariance`]), and intervals by
-/// Student's t. NaN if the data do not determine a tuner.
+/// Returns the standard errors of the active tuners, to first order ([`mops_identification::Covariance`]), and their
+/// intervals by Student's t. NaN if the data do not determine a tuner.
 fn standard_errors(problem: &Problem, best: &Evaluation, local: Option<&Local>) -> Vec<ParameterReport> {
     let study = problem.study();
     let report = |(k, &i): (usize, &usize)| {
@@ -266,12 +267,12 @@ fn experiments(problem: &Problem, best: &Evaluation, unknown: &[usize]) -> Vec<E
 }
 
 /// Returns the findings on the whiteness of the residuals of the calibration channels, as sentences.
-fn whiteness_words(experiments: &[ExperimentReport]) -> Vec<String> {
+fn findings_on_whiteness(experiments: &[ExperimentReport]) -> Vec<String> {
     let fitted = experiments.iter().filter(|experiment| experiment.role == Role::Calibration);
     let channels = fitted.flat_map(|experiment| experiment.channels.iter().map(move |channel| (experiment, channel)));
     let found: Vec<(&str, &str, Whiteness)> =
         channels.filter_map(|(e, c)| Some((c.name.as_str(), e.name.as_str(), c.whiteness?))).collect();
-    identification::whiteness_words(&found)
+    whiteness_words(&found)
 }
 
 fn channel_report(channel: &Channel, unit: &str, analysis: Option<&Analysis>) -> ChannelReport {
@@ -290,6 +291,6 @@ fn channel_report(channel: &Channel, unit: &str, analysis: Option<&Analysis>) ->
         noise: channel.noise,
         fit_percent: 100.0 * (1.0 - (squares / spread).sqrt()),
         unit: unit.to_owned(),
-        whiteness: residuals.and_then(|residuals| identification::whiteness(&residuals)),
+        whiteness: residuals.and_then(|residuals| whiteness(&residuals)),
     }
 }

@@ -1,11 +1,11 @@
-//! From a run to its result: conclusions, identification, and the content of `result.json`.
+//! From a run to its result: conclusions, and the content of `result.json`, its sentences included.
 //!
 //! | module | content |
 //! |---|---|
 //! | [`Outcome`], [`conclude`](conclude()) | the result of a run |
 //! | [`Findings`] | what tasks add to it |
 //! | [`End`] | what is known of the reported point |
-//! | [`identification`] | sensitivities, covariance of estimates, noise of residuals, excitation, regressions |
+//! | [`identification`] | excitation, sensitivities and regressions, as numbers with sentences |
 //! | [`diagnosis`] | result of a diagnosis |
 
 mod conclude;

@@ -10,13 +10,14 @@ use mops_core::{
     solver::{Pareto, Stop},
     study::Study,
 };
+use mops_identification::Whiteness;
 use schemars::generate::SchemaSettings;
 use schemars::transform::RecursiveTransform;
 use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::identification::{ExcitationReport, SensitivityReport, Whiteness};
+use crate::identification::{ExcitationReport, SensitivityReport};
 use crate::{BlockKind, End, Findings};
 
 /// The result of a run.

@@ -1,6 +1,6 @@
 //! Derivatives at the reported point, compared with differences of simulations.
 
-use mops_outcome::identification::NEGLIGIBLE;
+use mops_identification::NEGLIGIBLE;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::Serialize;

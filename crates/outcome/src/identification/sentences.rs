@@ -1,11 +1,13 @@
 //! Findings about tuners in sentences.
 
 use mops_core::problem::Problem;
+use mops_identification::{
+    FAR, Local,
+    blind::{BlindDirection, Limit},
+    noise::OneSided,
+};
 
-use super::blind::{BlindDirection, Limit};
-use super::local::Local;
-use super::noise::OneSided;
-use super::records::FAR;
+use super::remarks::remarks;
 use super::report::{DirectionReport, TunerSensitivity};
 use super::words::{coefficient, counted, estimate, listed, percent};
 
@@ -41,7 +43,7 @@ pub(super) fn sentences(
     }
     sentences.extend(pairs(local, tuners));
     if let Some(covariance) = &local.covariance {
-        sentences.extend(covariance.noise().remarks(problem.study()));
+        sentences.extend(remarks(covariance.noise(), problem.study()));
     }
     sentences.extend(one_sided(problem, local, tuners));
     sentences.extend(alike(local, tuners));
@@ -154,7 +156,7 @@ fn one_sided(problem: &Problem, local: &Local, tuners: &[TunerSensitivity]) -> V
             problem.study().cases()[found.case].name
         )
     };
-    local.covariance.iter().flat_map(|covariance| &covariance.noise().one_sided).map(sentence).collect()
+    local.covariance.iter().flat_map(|covariance| covariance.noise().one_sided()).map(sentence).collect()
 }
 
 /// Lists the first items as text, and the number of the others.

@@ -5,7 +5,8 @@ use mops_core::{
     Study, Watch,
     task::{Place, SensitivityMethod, SensitivityTask},
 };
-use mops_outcome::identification::{Point, sensitivity_at};
+use mops_identification::Point;
+use mops_outcome::identification::sensitivity_at;
 
 mod global;
 mod section;

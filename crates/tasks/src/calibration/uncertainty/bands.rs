@@ -1,7 +1,7 @@
 //! Linearised prediction bands of a calibrated model.
 
+use mops_identification::noise::Spread;
 use mops_math as math;
-use mops_outcome::identification::Spread;
 
 use crate::calibration::BandReport;
 

@@ -2,7 +2,7 @@
 
 use mops_core::run::{Budget, Quiet};
 use mops_core::{Evaluation, Oracle, Problem, Run, Solver, Study, Watch};
-use mops_outcome::identification::Covariance;
+use mops_identification::Covariance;
 
 /// Calibrated problem, the common input of all three methods.
 pub(super) struct Calibrated<'a> {

@@ -7,7 +7,7 @@ mod profile;
 
 use mops_core::Watch;
 use mops_core::task::CalibrationTask;
-use mops_outcome::identification::Covariance;
+use mops_identification::Covariance;
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 
 use crate::calibration::UncertaintyReport;

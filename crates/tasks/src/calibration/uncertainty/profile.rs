@@ -1,7 +1,7 @@
 //! Profile likelihood: one parameter is fixed, all others are estimated again.
 
 use mops_core::{Evaluation, Solver, SolverOptions, Watch, study::Tuner, task::Chosen};
-use mops_outcome::identification::Spread;
+use mops_identification::noise::Spread;
 use mops_solvers::levenberg_marquardt::LevenbergMarquardtOptions;
 use mops_statistics::t_quantile;
 

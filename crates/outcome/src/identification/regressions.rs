@@ -4,12 +4,12 @@ use mops_core::{
     study::Study,
     task::{self, ExcitationTask},
 };
+use mops_identification::{Recursive, Regression, RegressionTooShort, excitation, least_squares, whiteness};
 use nalgebra::DVector;
 
-use super::excited::spacing;
+use super::excitations::spacing;
 use super::report::RegressionReport;
 use super::words::{coefficient, counted, percent};
-use super::{Recursive, Regression, RegressionTooShort, excitation, least_squares, whiteness};
 
 /// Initial covariance of the recursion, relative to the mean square of the regressors: practically no prior knowledge.
 const UNKNOWN: f64 = 1e8;

@@ -10,12 +10,12 @@ use mops_core::{
 };
 use nalgebra::{DMatrix, DVector};
 
-use super::alike::{Alike, alike};
-use super::coordinate::Coordinate;
-use super::covariance::Covariance;
-use super::noise::{Noise, Spread};
-use super::records::{Record, records};
-use super::sensitivity::{DIFFERENCES, Sensitivity, TANGENTS};
+use crate::alike::{Alike, alike};
+use crate::coordinate::Coordinate;
+use crate::covariance::Covariance;
+use crate::noise::{Noise, Spread};
+use crate::records::{Record, records};
+use crate::sensitivity::{DIFFERENCES, Sensitivity, TANGENTS};
 
 /// Change of a scaled value over the whole range of a tuner, relative to the value, that is negligible.
 pub const NEGLIGIBLE: f64 = 1e-3;
@@ -36,15 +36,15 @@ pub struct Local {
     /// Covariance of the estimates; `None` without residuals, or if they do not show the noise.
     pub covariance: Option<Covariance>,
     /// Estimates with equal sample weights, if records differ much in length.
-    pub(super) alike: Option<Alike>,
+    pub alike: Option<Alike>,
     /// Standard error of every tuner if all others were known; NaN without a covariance.
-    pub(super) alone: Vec<f64>,
+    pub alone: Vec<f64>,
     /// True if the derivatives are exact.
-    pub(super) exact: bool,
+    pub exact: bool,
     /// True for derivatives of residuals; false for those of the scaled criteria that count.
-    pub(super) residuals: bool,
+    pub residuals: bool,
     /// True for each tuner that is an initial state of an experiment.
-    pub(super) starts: Vec<bool>,
+    pub starts: Vec<bool>,
 }
 
 impl Local {
@@ -143,12 +143,12 @@ fn unit_slope(tuner: &Tuner, value: f64) -> f64 {
 }
 
 /// Returns the indices of rows that enter the objective or a constraint.
-pub(super) fn counting(problem: &Problem) -> Vec<usize> {
+pub fn counting(problem: &Problem) -> Vec<usize> {
     let rows = problem.shape().rows.iter().enumerate();
     rows.filter(|(_, (usage, _))| *usage != Usage::Monitor).map(|(i, _)| i).collect()
 }
 
 /// Returns the names of parameters that are initial states.
-pub(super) fn start_parameters(study: &Study) -> Vec<&str> {
+pub fn start_parameters(study: &Study) -> Vec<&str> {
     study.models().iter().flat_map(|(_, m)| m.interface().states.iter().map(|s| s.start.as_str())).collect()
 }

@@ -1,16 +1,15 @@
-//! Sensitivities of a problem's tuners at a point, as numbers and sentences.
+//! Report on the sensitivities of a problem's tuners at a point.
 
 use mops_core::{evaluation::Evaluation, problem::Problem, solver::SMALL_OBJECTIVE};
+use mops_identification::{
+    Coordinate, Local, NEGLIGIBLE, Point, blind::BlindDirection, counting, local, sensitivity::Eigen,
+};
 use mops_math as math;
 use nalgebra::DMatrix;
 
-use super::blind::{BlindDirection, Limit};
-use super::coordinate::Coordinate;
-use super::local::{Local, NEGLIGIBLE, Point, counting, local};
+use super::directions::{at_point, clause, suffix, sum};
 use super::report::{DirectionReport, RelativeReport, SensitivityReport, TunerSensitivity};
-use super::sensitivity::Eigen;
 use super::sentences::sentences;
-use super::words::listed;
 
 /// Relative standard error up to which an estimate counts as determined.
 const TRUSTED: f64 = 0.1;
@@ -20,22 +19,23 @@ const TRUSTED: f64 = 0.1;
 /// `zero` replaces the default share of the largest singular value that the derivatives still resolve.
 pub fn sensitivity_at(problem: &Problem, tuners: &[f64], point: Point, zero: Option<f64>) -> Option<SensitivityReport> {
     let local = local(problem, tuners, point, zero)?;
-    Some(report(problem, tuners, &local))
+    Some(report_of(problem, tuners, &local))
 }
 
 /// Returns the report on computed sensitivities.
-pub(crate) fn report(problem: &Problem, at: &[f64], local: &Local) -> SensitivityReport {
+pub(crate) fn report_of(problem: &Problem, at: &[f64], local: &Local) -> SensitivityReport {
     let found = &local.sensitivity;
     let directions: Vec<DirectionReport> = found
         .blind
         .iter()
         .map(|blind| {
             let along = |straight: bool| remaining(problem, at, (blind, straight), &found.coordinates);
-            let step = along(blind.straight);
+            let is_straight = blind.invariant.is_straight();
+            let step = along(is_straight);
             // A sum and a product of two tuners may have the same direction at a point: a step decides.
-            let sum =
-                blind.sum.as_ref().map(|words| (words, along(true))).filter(|(_, of)| of.remaining < step.remaining);
-            let (words, step) = sum.unwrap_or((&blind.words, step));
+            let sum = if is_straight { None } else { sum(blind, &found.coordinates) };
+            let sum = sum.map(|words| (words, along(true))).filter(|(_, of)| of.remaining < step.remaining);
+            let (words, step) = sum.unwrap_or_else(|| (clause(blind, &found.coordinates), step));
             let has_effect = !local.residuals && step.has_effect;
             DirectionReport {
                 words: if has_effect {
@@ -75,15 +75,6 @@ pub(crate) fn report(problem: &Problem, at: &[f64], local: &Local) -> Sensitivit
     }
 }
 
-/// Returns the reason why a direction is not determined, as the end of a clause.
-fn suffix(limit: Limit) -> &'static str {
-    match limit {
-        Limit::Nothing => "",
-        Limit::Noise => ", within the noise",
-        Limit::Slopes => ", within the accuracy of the derivatives",
-    }
-}
-
 fn tuner(local: &Local, k: usize) -> TunerSensitivity {
     let found = &local.sensitivity;
     let coordinate = &found.coordinates[k];
@@ -109,15 +100,6 @@ fn tuner(local: &Local, k: usize) -> TunerSensitivity {
             _ => "determined",
         },
     }
-}
-
-/// Returns a clause on a direction that has no effect to first order only.
-fn at_point(blind: &BlindDirection, coordinates: &[Coordinate]) -> String {
-    let names: Vec<String> = blind.changes.iter().map(|&(k, _)| format!("`{}`", coordinates[k].name)).collect();
-    let along = if names.len() == 1 { names.concat() } else { format!("a direction of {}", listed(&names)) };
-    format!(
-        "along {along} the derivatives are 0 at this point, but a step of 10 % has an effect: the point is stationary or at a kink"
-    )
 }
 
 /// Change for a 10 % step along a blind direction.

@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::noise::{Noise, Part, Spread};
-use super::sensitivity::Sensitivity;
+use crate::noise::{Noise, Part, Spread};
+use crate::sensitivity::Sensitivity;
 
 /// Share of a tuner's largest influence below which an entry counts as rounding error.
 const ROUNDING: f64 = 1e-12;
@@ -32,7 +32,7 @@ pub struct Covariance {
 impl Covariance {
     /// Computes the covariance from the noise of the residuals, their Jacobian in the tuners' own units, and the
     /// resolved directions. Returns `None` if no noise level is known.
-    pub(super) fn of(noise: Noise, jacobian: &DMatrix<f64>, sensitivity: &Sensitivity) -> Option<Self> {
+    pub(crate) fn of(noise: Noise, jacobian: &DMatrix<f64>, sensitivity: &Sensitivity) -> Option<Self> {
         let mut influence = jacobian * &sensitivity.inverse;
         for mut column in influence.column_iter_mut() {
             let least = ROUNDING * column.amax();
@@ -44,7 +44,7 @@ impl Covariance {
     }
 
     /// Returns the covariance with these tuners marked as not determined.
-    pub(super) fn without(self, undetermined: &[bool]) -> Self {
+    pub(crate) fn without(self, undetermined: &[bool]) -> Self {
         Self { undetermined: undetermined.to_vec(), ..self }
     }
 
@@ -66,7 +66,7 @@ impl Covariance {
     }
 
     /// Returns the covariance matrix, in the tuners' own units, as far as the noise is known.
-    pub(super) fn matrix(&self) -> DMatrix<f64> {
+    pub(crate) fn matrix(&self) -> DMatrix<f64> {
         let n = self.parts.first().map_or(0, |part| part.matrix.nrows());
         let known = self.parts.iter().filter(|part| part.pool.variance.is_finite());
         known.fold(DMatrix::zeros(n, n), |sum, part| sum + &part.matrix * part.pool.variance)

@@ -61,8 +61,8 @@ mod tests {
     use mops_math as math;
     use rand::Rng;
 
-    use super::super::least_squares;
     use super::*;
+    use crate::least_squares;
     use mops_math::stream;
 
     fn data(rows: usize) -> (DMatrix<f64>, DVector<f64>) {

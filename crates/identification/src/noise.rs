@@ -1,13 +1,12 @@
 //! Noise of the residuals of a calibration, record by record: the basis of the standard errors of estimates.
 
-use mops_core::{criterion::Loss, study::Study};
+use mops_core::criterion::Loss;
 use mops_math as math;
 use nalgebra::{DMatrix, DVector};
 
-use super::pools::{self, Fitted, Pool, SHOWN, Sharing, Weighted};
-use super::records::Record;
-use super::whiteness::whiteness;
-use super::words::{MANY, coefficient, distinct};
+use crate::pools::{self, Fitted, Pool, SHOWN, Sharing, Weighted};
+use crate::records::Record;
+use crate::whiteness::whiteness;
 
 /// Largest leverage of a sample whose residual still shows its noise.
 ///
@@ -35,18 +34,36 @@ pub struct Noise {
     /// first order.
     weighted: Vec<(f64, f64)>,
     /// Large deviations on one side, beside robust losses.
-    pub(super) one_sided: Vec<OneSided>,
+    one_sided: Vec<OneSided>,
+}
+
+/// Noise of one record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RecordNoise<'a> {
+    /// Index of the record's case.
+    pub case: usize,
+    /// Measured signal.
+    pub signal: &'a str,
+    /// Noise level of one sample that the residuals show, in the unit of the signal; NaN if they do not show it.
+    pub level: f64,
+    /// Declared noise level of one sample.
+    pub declared: Option<f64>,
+    /// True if the residuals contradict the declared noise level.
+    pub is_disputed: bool,
+    /// True if the residuals are white but their variance changes.
+    pub is_changing: bool,
 }
 
 /// Large deviations of a record that are on one side.
 #[derive(Debug, Clone)]
-pub(super) struct OneSided {
+pub struct OneSided {
     /// Index of the record's case.
     pub case: usize,
     /// Measured signal.
     pub signal: String,
-    /// Number of large deviations, and of those with a measured value above the simulated one.
+    /// Number of large deviations.
     pub count: usize,
+    /// Number of them with a measured value above the simulated one.
     pub above: usize,
     /// Change of the estimate of every tuner without these samples, in its unit, to first order.
     pub changes: Vec<f64>,
@@ -84,7 +101,7 @@ enum Shape {
 /// Contribution `variance * matrix` to the covariance of estimates; the pool has the variance and its degrees of
 /// freedom.
 #[derive(Debug, Clone)]
-pub(super) struct Part {
+pub(crate) struct Part {
     pub matrix: DMatrix<f64>,
     pub pool: Pool,
 }
@@ -110,7 +127,7 @@ impl Spread {
 
     /// Returns the square root of a weighted sum of pool variances. Source: F. E. Satterthwaite, Biometrics Bulletin 2
     /// (1946) 110-114.
-    pub(super) fn of_sum(shares: impl Iterator<Item = (f64, Pool)>) -> Self {
+    pub(crate) fn of_sum(shares: impl Iterator<Item = (f64, Pool)>) -> Self {
         let (mut total, mut uncertain) = (0.0, 0.0);
         // N.B.: an unknown variance with weight zero does not count.
         for (share, pool) in shares.filter(|(share, _)| *share != 0.0) {
@@ -128,7 +145,7 @@ impl Noise {
     ///
     /// `basis` spans the directions of the tuners that the Jacobian resolves, such that `J basis` has orthonormal
     /// columns.
-    pub(super) fn of(records: Vec<Record>, residuals: &[f64], jacobian: &DMatrix<f64>, basis: &DMatrix<f64>) -> Self {
+    pub(crate) fn of(records: Vec<Record>, residuals: &[f64], jacobian: &DMatrix<f64>, basis: &DMatrix<f64>) -> Self {
         let fitted = |record: Record| {
             let deviations = DVector::from_vec(record.deviations(residuals));
             let slopes = record.per_deviation(jacobian) * basis;
@@ -177,7 +194,7 @@ impl Noise {
     }
 
     /// Returns the noise declared in a study, for records whose residuals show none; `tuners` is the number of tuners.
-    pub(super) fn declared(records: Vec<Record>, tuners: usize) -> Self {
+    pub(crate) fn declared(records: Vec<Record>, tuners: usize) -> Self {
         let known = Pool { variance: 1.0, freedom: f64::INFINITY };
         let unknown = Pool { variance: f64::NAN, freedom: 0.0 };
         let source = |record: Record| Source {
@@ -197,7 +214,7 @@ impl Noise {
     }
 
     /// Returns the covariance of `columns' * residuals`, in parts of independent noise.
-    pub(super) fn parts(&self, columns: &DMatrix<f64>) -> Vec<Part> {
+    pub(crate) fn parts(&self, columns: &DMatrix<f64>) -> Vec<Part> {
         let n = columns.ncols();
         let mut matrices = vec![DMatrix::zeros(n, n); self.pools.len()];
         for source in &self.sources {
@@ -236,42 +253,23 @@ impl Noise {
         self.records().find(is_wanted).map(Record::loss)
     }
 
-    /// Returns remarks on the noise of records, a sentence each.
-    pub(super) fn remarks(&self, study: &Study) -> Vec<String> {
-        let disputed = || self.sources.iter().filter(|source| source.disputed);
-        let signals = disputed().filter_map(|source| source.record.signal.as_deref());
-        let of = |signal: &str| -> Vec<&Source> {
-            disputed().filter(|source| source.record.signal.as_deref() == Some(signal)).collect()
-        };
-        let often: Vec<&str> = distinct(signals).into_iter().filter(|signal| of(signal).len() > MANY).collect();
-        let summary = |signal: &&str| {
-            let shown: Vec<f64> = of(signal).into_iter().map(|source| self.deviation(source)).collect();
-            let [low, high] = [shown.iter().copied().reduce(f64::min), shown.iter().copied().reduce(f64::max)]
-                .map(|level| coefficient(level.unwrap_or(f64::NAN)));
-            format!(
-                "The residuals of `{signal}` in {} experiments have noise levels of {low} to {high}, which differ from the declared \
-                 ones: the standard errors are based on the residuals.",
-                shown.len()
-            )
-        };
-        let remark = |source: &Source| {
-            let signal = source.record.signal.as_deref()?;
-            let place = format!("`{signal}` in `{}`", study.cases()[source.record.case].name);
-            if source.disputed && often.contains(&signal) {
-                return None;
-            }
-            if source.disputed {
-                let [shown, declared] = [self.deviation(source), source.record.noise?].map(coefficient);
-                return Some(format!(
-                    "The residuals of {place} show a noise level of {shown}, not {declared} as declared: the standard errors are \
-                     based on the residuals."
-                ));
-            }
-            source.changing.then(|| {
-                format!("The residuals of {place} are white, but their variance changes: the standard errors allow for this.")
+    /// Returns the noise of every record of a measured signal.
+    pub fn of_records(&self) -> impl Iterator<Item = RecordNoise<'_>> {
+        self.sources.iter().filter_map(|source| {
+            Some(RecordNoise {
+                case: source.record.case,
+                signal: source.record.signal.as_deref()?,
+                level: self.deviation(source),
+                declared: source.record.noise,
+                is_disputed: source.disputed,
+                is_changing: source.changing,
             })
-        };
-        often.iter().map(summary).chain(self.sources.iter().filter_map(remark)).collect()
+        })
+    }
+
+    /// Returns the large deviations on one side, beside robust losses.
+    pub fn one_sided(&self) -> &[OneSided] {
+        &self.one_sided
     }
 
     /// Returns the change and standard error of the estimate of every tuner, in its unit, with samples weighted by
@@ -279,12 +277,12 @@ impl Noise {
     ///
     /// The change is one Gauss-Newton step. Source: E. L. Lehmann, G. Casella, Theory of Point Estimation, 2nd edition
     /// (1998), section 6.4.
-    pub(super) fn weighted(&self) -> &[(f64, f64)] {
+    pub(crate) fn weighted(&self) -> &[(f64, f64)] {
         &self.weighted
     }
 
     /// Returns all records.
-    pub(super) fn records(&self) -> impl Iterator<Item = &Record> {
+    pub(crate) fn records(&self) -> impl Iterator<Item = &Record> {
         self.sources.iter().map(|source| &source.record)
     }
 

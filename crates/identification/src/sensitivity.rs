@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector, RowDVector, SymmetricEigen};
 
-use super::blind::{self, BlindDirection, Limit, NO_PART};
-use super::coordinate::Coordinate;
-use super::noise::Noise;
+use crate::blind::{self, BlindDirection, Limit, NO_PART};
+use crate::coordinate::Coordinate;
+use crate::noise::Noise;
 
 /// Relative singular value that tangents of the simulation do not resolve: their accuracy is that of the integration,
 /// 1e-8 at its default tolerance.
@@ -136,7 +136,7 @@ impl Sensitivity {
     /// A direction is not determined if one standard error along it moves a tuner through its whole range. The change
     /// of the residuals is then below the noise. An unresolved direction is unknown if its computed change would be
     /// above the noise.
-    pub(super) fn judge(&mut self, jacobian: &DMatrix<f64>, noise: &Noise, covariance: &DMatrix<f64>) {
+    pub(crate) fn judge(&mut self, jacobian: &DMatrix<f64>, noise: &Noise, covariance: &DMatrix<f64>) {
         let n = self.coordinates.len();
         let spans: Vec<f64> = self.coordinates.iter().map(|coordinate| coordinate.span).collect();
         let hidden = |row: &RowDVector<f64>| {
@@ -209,9 +209,10 @@ fn eigen(matrix: &DMatrix<f64>) -> Eigen {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::blind::Invariant;
     use mops_math as math;
 
-    pub(super) fn coordinates(values: &[(&str, f64)]) -> Vec<Coordinate> {
+    pub(crate) fn coordinates(values: &[(&str, f64)]) -> Vec<Coordinate> {
         let of = |(name, value): &(&str, f64)| Coordinate {
             name: (*name).into(),
             value: *value,
@@ -235,7 +236,9 @@ mod tests {
             assert!((found - exact).abs() < 1e-6, "{found} {exact}");
         }
         assert_eq!(found.rank, 1);
-        assert_eq!(found.blind[0].words, "only `J_c` + 0.0150 `m_arm` can be estimated");
+        assert_eq!(found.blind[0].invariant, Invariant::Sum(0, 1));
+        let weight = found.blind[0].weight(&found.coordinates).unwrap();
+        assert!((weight - 0.015).abs() < 5e-5, "{weight}");
         assert!(found.together.iter().all(|error| error.is_nan()));
     }
 
@@ -265,7 +268,7 @@ mod tests {
     fn fewer_residuals_than_tuners_leave_directions_open() {
         let jacobian = DMatrix::from_row_slice(1, 2, &[1.0, 0.0]);
         let found = Sensitivity::of(&jacobian, coordinates(&[("a", 1.0), ("b", 1.0)]), TANGENTS);
-        assert_eq!((found.rank, found.blind[0].words.as_str()), (1, "`b` has no effect"));
+        assert_eq!((found.rank, found.blind[0].invariant), (1, Invariant::Everything(1)));
         assert!((found.together[0] - 1.0).abs() < 1e-12 && found.together[1].is_nan());
     }
 }

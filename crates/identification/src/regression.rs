@@ -52,8 +52,8 @@ impl Regression {
 mod tests {
     use rand::Rng;
 
-    use super::super::least_squares;
     use super::*;
+    use crate::least_squares;
     use mops_math::stream;
 
     #[test]

@@ -1,6 +1,6 @@
 //! Estimates with every sample weighted by its noise level only.
 
-use super::noise::Noise;
+use crate::noise::Noise;
 
 /// Ratio of sample counts from which on the weights of records are reported.
 const UNLIKE: usize = 2;
@@ -15,7 +15,7 @@ pub struct Alike {
 }
 
 /// Returns the estimates with equal sample weights, or `None` if the records have similar lengths.
-pub(super) fn alike(noise: &Noise) -> Option<Alike> {
+pub(crate) fn alike(noise: &Noise) -> Option<Alike> {
     let counts = || noise.records().filter(|record| record.signal.is_some()).map(|record| record.len());
     let samples = [counts().min()?, counts().max()?];
     let tuners = noise.weighted().to_vec();

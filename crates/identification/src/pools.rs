@@ -4,13 +4,13 @@ use mops_math as math;
 use mops_statistics::f_cdf;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::records::Record;
+use crate::records::Record;
 
 /// Probability below which a record contradicts the noise level declared for it and for the others.
 const CONTRADICTED: f64 = 0.01;
 
 /// Degrees of freedom below which residuals do not show their noise.
-pub(super) const SHOWN: f64 = 1.0;
+pub(crate) const SHOWN: f64 = 1.0;
 
 /// Relative change of the variances that ends the iteration: far below their uncertainty at any degrees of freedom.
 const ACCURATE: f64 = 1e-6;
@@ -34,7 +34,7 @@ pub struct Pool {
 }
 
 /// Record with its fitted model, in tuner coordinates in which the estimates are uncorrelated.
-pub(super) struct Fitted {
+pub(crate) struct Fitted {
     pub record: Record,
     /// Simulated minus measured value of every sample.
     pub deviations: DVector<f64>,
@@ -65,7 +65,7 @@ impl Fitted {
 
 /// Assignment of records to shared variances.
 #[derive(Debug, Clone)]
-pub(super) struct Sharing {
+pub(crate) struct Sharing {
     /// Index of the pool of every record.
     pub of_record: Vec<usize>,
     /// Standard deviation of every record for a pool variance of 1.
@@ -75,7 +75,7 @@ pub(super) struct Sharing {
 }
 
 /// Variances, and the fit weighted by them.
-pub(super) struct Weighted {
+pub(crate) struct Weighted {
     pub pools: Vec<Pool>,
     /// Change of the coordinates from the estimates to that fit.
     pub step: DVector<f64>,
@@ -218,7 +218,7 @@ fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 /// Returns the pools of records, and the records whose residuals contradict the declared noise level.
 ///
 /// `own` has the variance of each record alone. Records that are not `white` share no pool.
-pub(super) fn sharing(fitted: &[Fitted], own: &[Pool], white: &[bool]) -> (Sharing, Vec<usize>) {
+pub(crate) fn sharing(fitted: &[Fitted], own: &[Pool], white: &[bool]) -> (Sharing, Vec<usize>) {
     let declares = |&i: &usize| white[i] && fitted[i].record.noise.is_some();
     let (declared, disputed) = undisputed((0..fitted.len()).filter(declares).collect(), fitted, own);
     // If a record is too short to show its noise, all records of that channel share one variance.

@@ -5,9 +5,8 @@ use mops_core::{
     study::{Study, Tuner},
     task::ExcitationTask,
 };
+use mops_identification::{excitation, start_parameters};
 
-use super::excitation;
-use super::local::start_parameters;
 use super::report::ExcitationReport;
 use super::words::{MANY, counted, distinct, percent};
 
