@@ -173,8 +173,11 @@ fn idle_and_faulty_viewers_do_not_affect_a_run() {
     let rebound = head.replacen("Host: 127.0.0.1", "Host: rebound.example", 1);
     for i in 0..60 {
         // Viewers send nothing or half a request, never read, disconnect at once, or request a wrong address. A
-        // finished run accepts no connection.
-        let Ok(mut viewer) = TcpStream::connect(("127.0.0.1", run.port)) else { break };
+        // finished run accepts no connection: by then, viewers of each kind must have come.
+        let Ok(mut viewer) = TcpStream::connect(("127.0.0.1", run.port)) else {
+            assert!(i >= 12, "the run ended after {i} viewers");
+            break;
+        };
         let request = ["", &head[..head.len() / 2], &head, &head, &elsewhere, &rebound][i % 6];
         let _ = viewer.write_all(request.as_bytes());
         if i % 6 != 3 {

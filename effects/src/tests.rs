@@ -256,11 +256,26 @@ fn tangents_agree_with_differences() {
     }
 }
 
+/// An experiment that began elsewhere differs from the first instant on, in what the effect passes on or in its rates.
 #[test]
-fn free_start_values_are_those_of_all_states_or_that_of_a_memory() {
-    for effect in effects() {
-        let all = if effect.hysteresis_states() > 0 { 1 } else { effect.states() };
-        assert!([0, all].contains(&effect.free_starts().len()), "{}", effect.name());
+fn free_initial_values_are_those_of_all_states_and_each_matters_at_once() {
+    let mut even = Even(0.3);
+    for effect in effects().iter().filter(|effect| !effect.free_starts().is_empty()) {
+        // Of a hysteresis state the output is free, which a model begins with.
+        let (first, all) = if effect.hysteresis_states() > 0 { (9, 1) } else { (7, effect.states()) };
+        assert_eq!(effect.free_starts().len(), all, "{}", effect.name());
+        for k in first..first + all {
+            let (parameters, mut seen) = (parameters(effect.as_ref(), &mut even), place(&mut even));
+            // Away from both flanks of a play.
+            seen[10] = 0.0;
+            let acting = effect.bind(&parameters);
+            let [low, high] = [-0.5, 0.5].map(|start| {
+                let mut seen = seen;
+                seen[k] = start;
+                answer(effect.as_ref(), acting.as_ref(), &seen)
+            });
+            assert!(low != high, "{}: {}", effect.name(), SEEN[k]);
+        }
     }
 }
 
