@@ -20,7 +20,8 @@ use super::svg::class;
 /// licence.
 pub const STYLE: &str = include_str!("../assets/uPlot.min.css");
 /// Scripts of pages with interactive plots.
-pub const SCRIPTS: [&str; 2] = [include_str!("../assets/uPlot.iife.min.js"), include_str!("charts.js")];
+pub const SCRIPTS: [&str; 3] =
+    [include_str!("../assets/uPlot.iife.min.js"), include_str!("elements.js"), include_str!("charts.js")];
 
 /// Largest distance of a simplified line from the original, as a share of the ranges of the axes. At a magnification of
 /// 20 it is less than a quarter of a pixel of a plot 1000 pixels wide.

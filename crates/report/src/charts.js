@@ -18,24 +18,6 @@
   /** Functions from values to even distances on an axis, and back. @type {(log: boolean) => ((v: number) => number)[]} */
   const along = (log) => (log ? [Math.log10, (v) => 10 ** v] : [(v) => v, (v) => v]);
 
-  /** Formats a number to `digits` significant digits, without trailing zeros. @param {number} value */
-  function number(value, digits = 5) {
-    if (value === 0 || (Math.abs(value) >= 1e-4 && Math.abs(value) < 1e6)) return String(Number(value.toPrecision(digits)));
-    return value.toExponential(digits - 1).replace(/\.?0+e/, "e").replace("e+", "e");
-  }
-
-  /**
-   * Creates an element with attributes and children; text is never parsed as markup.
-   * @template {keyof HTMLElementTagNameMap} Name
-   * @param {Name} name @param {Record<string, string>} attributes @param {(Node | string)[]} children
-   */
-  function element(name, attributes = {}, ...children) {
-    const node = document.createElement(name);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    node.append(...children);
-    return node;
-  }
-
   /** Splits a label such as `time (s)` into name and unit. @param {string} label */
   function parts(label) {
     const [, name, unit] = label.match(/^(.*?)(?: \(([^()]*)\))?$/) ?? ["", label];

@@ -46,28 +46,11 @@ function at(id) {
 /** @param {string} id @param {string} value */
 const text = (id, value) => { if (at(id).textContent !== value) at(id).textContent = value; };
 
-/** Formats a number to `digits` significant digits, without trailing zeros. @param {Value | undefined} value */
-function number(value, digits = 5) {
-  if (value === null || value === undefined) return "n/a";
-  return String(Number(value.toPrecision(digits)));
-}
-
 /** Formats a time in s, min or h. @param {Value} seconds */
 function time(seconds) {
   if (seconds === null || seconds === undefined) return "unknown";
   if (seconds < 120) return `${number(seconds, seconds < 10 ? 2 : 3)} s`;
   return seconds < 7200 ? `${number(seconds / 60, 3)} min` : `${number(seconds / 3600, 3)} h`;
-}
-
-/**
- * Creates an element with attributes and children; text is never parsed as markup.
- * @param {string} name @param {Record<string, string>} attributes @param {(Node | string)[]} children
- */
-function element(name, attributes = {}, ...children) {
-  const node = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-  node.append(...children);
-  return node;
 }
 
 /** @param {Criterion} criterion */

@@ -75,7 +75,7 @@ mod tests {
     /// problems, 0.083 for those with one variable for several terms.
     const NEAR: f64 = 0.1;
 
-    /// The same for WFG1, whose objectives change with the power 0.02 of its variables.
+    /// Distance for WFG1, whose objectives change with the power 0.02 of its variables.
     const NEAR_OF_WFG1: f64 = 0.25;
 
     /// Distance by which a point may lie beyond those of a disconnected front, whose ends are between two points.
