@@ -140,7 +140,7 @@ const HOMONYMS: usize = 64;
 
 /// Constants of the diagnosis whose basis is "an assumption". It may only fall: `mops-bench ablation` gives them
 /// another.
-const ASSUMPTIONS: usize = 55;
+const ASSUMPTIONS: usize = 36;
 
 #[test]
 fn names_with_two_meanings_become_no_more() {

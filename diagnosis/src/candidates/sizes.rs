@@ -15,7 +15,8 @@ const FASTEST: f64 = 0.1;
 /// Multiple of the largest value tried that a shape may have, and widths beyond a range. Basis: an assumption.
 const FARTHEST: f64 = 10.0;
 
-/// Frequencies tried from one number of periods in the record to the next. Basis: an assumption.
+/// Frequencies tried from one number of periods in the record to the next. Basis: each frequency is at most a third of
+/// a period from one of them, where `sinc(1/3)^2`, 68 % of the power, is left.
 const PER_PERIOD: f64 = 1.5;
 
 /// Most periods in a record. Basis: an assumption.
@@ -24,7 +25,8 @@ const MOST_PERIODS: f64 = 160.0;
 /// Steps of a quantised sensor up to the largest value of which all sizes are tried. Basis: an assumption.
 const MOST_STEPS: u32 = 24;
 
-/// Finest steps that samples show, noises: the mean cosine is there `exp(-2 pi^2 / 5^2)`, 0.45. Basis: an assumption.
+/// Finest steps that samples show, noises. Basis: the mean cosine is `exp(-2 pi^2 / 5^2)`, 0.45, the least from which
+/// values are multiples of a quantum.
 const NOISES_PER_STEP: f64 = 5.0;
 
 /// Sizes tried from one number of steps to the next.

@@ -33,11 +33,11 @@ pub const ROUND_ITERATIONS: usize = 10;
 /// the studies.
 const CONVERGED: f64 = 0.01;
 
-/// Predicted decrease of log-likelihood where a rough fit ends, nats. Basis: an assumption.
+/// Predicted decrease of log-likelihood where a rough fit ends, nats. Basis: it changes odds by a tenth.
 const ROUGHLY: f64 = 0.1;
 
-/// Share of the sum of squares by which each of `look` iterations in a row must decrease it, or a rough fit ends.
-/// Basis: an assumption.
+/// Share of the sum of squares by which each of [`LOOK`] iterations in a row must decrease it, or a rough fit ends.
+/// Basis: together they bring less than 5 %, a smaller gain than any effect that is claimed.
 const STALLS: f64 = 0.01;
 
 /// Gain in log-likelihood, or decrease of a penalty, below which rounds end, nats. Basis: the studies.
@@ -46,10 +46,11 @@ pub const SETTLED: f64 = 0.05;
 /// Iterations of a smoothed motion. Basis: the studies.
 const SMOOTHINGS: usize = 12;
 
-/// Trials of a step of a smoothed motion. Basis: an assumption.
+/// Trials of a step of a smoothed motion. Basis: the last is 1 % of the step.
 const SHORTENINGS: usize = 6;
 
-/// Ratio of a trial to the one before. Basis: an assumption.
+/// Ratio of a trial to the one before. Basis: within 0.1 to 0.5, the range of step lengths after a quadratic model.
+/// Source: J. E. Dennis, R. B. Schnabel, Numerical Methods for Unconstrained Optimization (1983), section 6.3.
 const SHORTER: f64 = 0.4;
 
 /// Prior of an unknown.

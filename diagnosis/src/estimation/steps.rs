@@ -6,20 +6,21 @@ use mops_math as math;
 use super::errors::Errors;
 use super::estimate::{Estimate, Estimation, SETTLED};
 
-/// Iterations in which the other unknowns follow one that is moved. Basis: an assumption.
+/// Iterations in which the other unknowns follow one that is moved. Basis: where residuals are small each squares the
+/// distance to the optimum. Source: J. Nocedal, S. J. Wright, Numerical Optimization, 2nd edition (2006), section 10.3.
 pub const FOLLOW: usize = 2;
 
-/// Trials for each parameter that no derivative moves. Basis: an assumption.
+/// Trials for each parameter that no derivative moves. Basis: three at each stride.
 const TRIALS: usize = 24;
 
-/// Halvings of their stride, from which the end of an interval is searched with twice as many doublings. Basis: an
-/// assumption.
+/// Halvings of their stride, from which the end of an interval is searched with twice as many doublings. Basis: the
+/// shortest stride is 0.4 % of the typical size, finer than an interval need be.
 const HALVINGS: i32 = 8;
 
 /// Turns of all such parameters. Basis: an assumption.
 pub const TURNS: usize = 3;
 
-/// Bisections in the search for the end of an interval. Basis: an assumption.
+/// Bisections in the search for the end of an interval. Basis: the end is known to 1.6 % of its distance, two digits.
 const BISECTIONS: usize = 6;
 
 /// Decrease of log-likelihood at the ends of a 95 % interval: half the quantile of chi-squared with one degree of

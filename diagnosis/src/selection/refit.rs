@@ -15,7 +15,8 @@ use crate::records::Subject;
 /// Standard errors up to which a declared term may be 0. Basis: a 95 % interval.
 const UNCERTAIN: f64 = 2.0;
 
-/// Distance below the best from which a fit is given up, nats. Basis: an assumption.
+/// Distance below the best from which a fit is given up, nats. Basis: odds of 3e-7, more than the priors and Occam
+/// factors of three parameters.
 pub const HOPELESS: f64 = 15.0;
 
 /// Starts that are fitted to the end; of more, the likeliest third is followed for an iteration, the best third of
@@ -23,11 +24,12 @@ pub const HOPELESS: f64 = 15.0;
 /// hyperparameter optimization, AISTATS (2016).
 const FOLLOWED: usize = 3;
 
-/// Distance of two optima from which each is a start for the other's error model, standard errors. Basis: an
-/// assumption.
+/// Distance of two optima from which each is a start for the other's error model, standard errors. Basis: closer ones
+/// differ by less than 1/8 nat.
 const APART: f64 = 0.5;
 
-/// Decrease of log-likelihood from which a set fits worse than one that it contains, nats. Basis: an assumption.
+/// Decrease of log-likelihood from which a set fits worse than one that it contains, nats. Basis: what a parameter
+/// without effect gains by chance, half the mean of chi-squared with one degree of freedom.
 pub const WORSE: f64 = 0.5;
 
 /// Distances from 0 at which an initial state of an effect is tried, scales. Basis: an assumption.
