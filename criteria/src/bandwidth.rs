@@ -32,8 +32,8 @@ impl CriterionOptions for Bandwidth {
 }
 
 impl CriterionSpec for Bandwidth {
-    fn reads(&self) -> AnalysisKind {
-        AnalysisKind::Linear
+    fn reads(&self) -> Option<AnalysisKind> {
+        Some(AnalysisKind::Linear)
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {

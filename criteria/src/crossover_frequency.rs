@@ -33,8 +33,8 @@ impl CriterionOptions for CrossoverFrequency {
 }
 
 impl CriterionSpec for CrossoverFrequency {
-    fn reads(&self) -> AnalysisKind {
-        AnalysisKind::Linear
+    fn reads(&self) -> Option<AnalysisKind> {
+        Some(AnalysisKind::Linear)
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {

@@ -36,13 +36,17 @@ impl CriterionOptions for DelayMargin {
 }
 
 impl CriterionSpec for DelayMargin {
-    fn reads(&self) -> AnalysisKind {
-        AnalysisKind::Linear
+    fn reads(&self) -> Option<AnalysisKind> {
+        Some(AnalysisKind::Linear)
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.in_loop()?;
-        let value = |system| Ok(capped(feedback(system)?.delay_margin()?, 1e6));
-        Ok(LinearCriterion::boxed(channel, Values::of(second(), Sense::More), value))
+        let value = |system| Ok(capped(feedback(system)?.delay_margin()?, MOST));
+        let values = Values::of(second(), Sense::More).within(f64::NEG_INFINITY, MOST);
+        Ok(LinearCriterion::boxed(channel, values, value))
     }
 }
+
+/// Largest margin, s: one of a loop that no delay destabilises is infinite.
+const MOST: f64 = 1e6;

@@ -46,8 +46,8 @@ impl CriterionOptions for DiskMargin {
 }
 
 impl CriterionSpec for DiskMargin {
-    fn reads(&self) -> AnalysisKind {
-        AnalysisKind::Linear
+    fn reads(&self) -> Option<AnalysisKind> {
+        Some(AnalysisKind::Linear)
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {

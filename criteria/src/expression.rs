@@ -6,7 +6,7 @@ use std::sync::Arc;
 use mops_core::{
     Analysis, AnalysisKind, Case, Criterion, CriterionOptions, CriterionSpec, Interface, StudyError, Trace, Value,
     Variable,
-    criterion::{Missed, Other},
+    criterion::{BindContext, Missed, Other},
 };
 use mops_language::{
     Expression as Formula, Unit,
@@ -51,8 +51,8 @@ impl CriterionOptions for Expression {
 }
 
 impl CriterionSpec for Expression {
-    fn reads_any(&self) -> bool {
-        true
+    fn reads(&self) -> Option<AnalysisKind> {
+        None
     }
 
     fn names(&self) -> Vec<String> {
@@ -60,20 +60,12 @@ impl CriterionSpec for Expression {
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
-        self.bind_with(model, &[])
-    }
-
-    fn bind_with(&self, model: &Interface, others: &[Other]) -> Result<Box<dyn Criterion>, StudyError> {
-        self.bind_within(model, others, [0.0, f64::INFINITY])
+        self.bind_in(model, &BindContext::default())
     }
 
     /// The window restricts the reductions; other criteria have windows of their own.
-    fn bind_within(
-        &self,
-        model: &Interface,
-        others: &[Other],
-        window: [f64; 2],
-    ) -> Result<Box<dyn Criterion>, StudyError> {
+    fn bind_in(&self, model: &Interface, context: &BindContext<'_>) -> Result<Box<dyn Criterion>, StudyError> {
+        let (others, window) = (context.others, context.window.unwrap_or([0.0, f64::INFINITY]));
         let at = |SyntaxError { span, message }: SyntaxError| StudyError::new("value", message).at(span);
         let (formula, reduced) = Formula::with_reductions(&self.value).map_err(at)?;
         let mut dimensions = Dimensions::default();

@@ -42,8 +42,8 @@ impl CriterionOptions for FrequencyFit {
 }
 
 impl CriterionSpec for FrequencyFit {
-    fn reads(&self) -> AnalysisKind {
-        AnalysisKind::Linear
+    fn reads(&self) -> Option<AnalysisKind> {
+        Some(AnalysisKind::Linear)
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {

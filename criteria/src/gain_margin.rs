@@ -36,14 +36,18 @@ impl CriterionOptions for GainMargin {
 }
 
 impl CriterionSpec for GainMargin {
-    fn reads(&self) -> AnalysisKind {
-        AnalysisKind::Linear
+    fn reads(&self) -> Option<AnalysisKind> {
+        Some(AnalysisKind::Linear)
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {
         let channel = Channel::bind(model, self.input.as_ref(), self.output.as_ref())?.in_loop()?;
         let both = self.either_way;
-        let value = move |system| Ok(capped(feedback(system)?.gain_margin(both)?, 200.0));
-        Ok(LinearCriterion::boxed(channel, Values::of(Unit::known("dB"), Sense::More), value))
+        let value = move |system| Ok(capped(feedback(system)?.gain_margin(both)?, MOST));
+        let values = Values::of(Unit::known("dB"), Sense::More).within(-MOST, MOST);
+        Ok(LinearCriterion::boxed(channel, values, value))
     }
 }
+
+/// Largest margin, dB: one of a loop that no gain destabilises is infinite.
+const MOST: f64 = 200.0;

@@ -36,8 +36,8 @@ impl CriterionOptions for H2Norm {
 }
 
 impl CriterionSpec for H2Norm {
-    fn reads(&self) -> AnalysisKind {
-        AnalysisKind::Linear
+    fn reads(&self) -> Option<AnalysisKind> {
+        Some(AnalysisKind::Linear)
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {

@@ -30,8 +30,8 @@ impl CriterionOptions for HinfNorm {
 }
 
 impl CriterionSpec for HinfNorm {
-    fn reads(&self) -> AnalysisKind {
-        AnalysisKind::Linear
+    fn reads(&self) -> Option<AnalysisKind> {
+        Some(AnalysisKind::Linear)
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {

@@ -30,8 +30,8 @@ impl CriterionOptions for MaximumComplementarySensitivity {
 }
 
 impl CriterionSpec for MaximumComplementarySensitivity {
-    fn reads(&self) -> AnalysisKind {
-        AnalysisKind::Linear
+    fn reads(&self) -> Option<AnalysisKind> {
+        Some(AnalysisKind::Linear)
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {

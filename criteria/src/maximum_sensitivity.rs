@@ -32,8 +32,8 @@ impl CriterionOptions for MaximumSensitivity {
 }
 
 impl CriterionSpec for MaximumSensitivity {
-    fn reads(&self) -> AnalysisKind {
-        AnalysisKind::Linear
+    fn reads(&self) -> Option<AnalysisKind> {
+        Some(AnalysisKind::Linear)
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {

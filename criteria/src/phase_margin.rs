@@ -35,8 +35,8 @@ impl CriterionOptions for PhaseMargin {
 }
 
 impl CriterionSpec for PhaseMargin {
-    fn reads(&self) -> AnalysisKind {
-        AnalysisKind::Linear
+    fn reads(&self) -> Option<AnalysisKind> {
+        Some(AnalysisKind::Linear)
     }
 
     fn bind(&self, model: &Interface) -> Result<Box<dyn Criterion>, StudyError> {

@@ -13,4 +13,7 @@ fn the_crossover_of_a_third_order_lag_has_its_closed_form() {
     let never = value(&CrossoverFrequency::default(), &linear(&[0.5], &[1.0, 1.0]));
     assert_eq!((never.missed, never.note), (Some(Missed { horizon: None }), Some("the loop gain is never 1")));
     assert_near(never.number, 1.0 + 0.5 / 0.51, 1e-12);
+    // A distance of 0.75 from the gain 1.
+    let far = value(&CrossoverFrequency::default(), &linear(&[0.25], &[1.0, 1.0]));
+    assert_near(far.number, 1.0 + 0.75 / 0.76, 1e-12);
 }

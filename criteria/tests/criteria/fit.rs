@@ -5,7 +5,7 @@ use mops_criteria::fit::Fit;
 use mops_language::Unit;
 use mops_math as math;
 
-use crate::testing::{assert_near, bound, measured, mistake, simulated, undefined_in, value_in};
+use crate::testing::{assert_near, assert_slope, bound, measured, mistake, simulated, undefined_in, value_in};
 
 #[test]
 fn the_fit_is_the_trapezoid_sum_and_that_of_its_residuals() {
@@ -50,4 +50,10 @@ fn a_single_sample_and_a_weight_of_zero_are_refused() {
     let alone = undefined_in(&measured(&[1.0], &[1.0], None), &fit, &simulated(2.0, |t| t));
     assert_eq!(alone, "the measurement of `y` has a single sample, so that the integral is undefined");
     assert_eq!(mistake(&Fit { weight: 0.0, ..fit }), "weight: `weight` must be positive, not 0");
+}
+
+#[test]
+fn the_slope_is_that_of_the_values() {
+    let case = measured(&[0.5, 1.0, 2.0], &[0.2, 0.9, 0.7], None);
+    assert_slope(&case, &Fit { signal: "y".into(), weight: 2.5 }, 2.0);
 }

@@ -15,6 +15,8 @@ use mops_math as math;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::testing::sampled;
+
 /// Every kind, with options as written in a study file.
 const EXAMPLES: [(&str, &str); 35] = [
     ("overshoot", "{ signal = 'y', target = 1, from = 0, step-time = '0 s', absolute = false }"),
@@ -103,6 +105,106 @@ fn every_kind_is_read_from_a_study_file_and_has_a_value() {
     assert_eq!(evaluation.readings.iter().flatten().count(), 2 * simulated + 3 * linear + measured);
 }
 
+/// Kind, sense, range, default demand, unit, and the signals or channels that it reads, where the model has the signal
+/// `y` in m and the input `u` in m: as the definitions say.
+const FACTS: &str = "
+    overshoot Less 0..inf - 1 y
+    undershoot Less 0..inf - 1 y
+    peak Less 0..inf - m y
+    settling-time Less 0..inf - s y
+    rise-time Less 0..inf - s y
+    delay-time Less 0..inf - s y
+    steady-state-error Less 0..inf - m y
+    final-value Open -inf..inf - m y
+    expression Open -inf..inf - m y,y
+    ise Less 0..inf - m^2 s y
+    iae Less 0..inf - m s y
+    itae Less 0..inf - m s^2 y
+    itse Less 0..inf - m^2 s^2 y
+    control-effort Less 0..inf - m s y
+    maximum-rate Less 0..inf - m/s y
+    step-envelope Less -inf..inf - m y
+    model-tracking Less 0..inf - m y (assumes)
+    fit Less 0..inf - m^2 s y
+    normalised-error Less 0..inf 1 1 y
+    rmse Less 0..inf - m y
+    fit-percent More -inf..100 - % y
+    gain-margin More -200..200 - dB y
+    phase-margin More -3.141592653589793..3.141592653589793 - rad y
+    delay-margin More -inf..1000000 - s y
+    disk-margin More 0..100 - 1 y
+    maximum-sensitivity Less 0..inf - 1 y
+    maximum-complementary-sensitivity Less 0..inf - 1 y
+    bandwidth More 0..inf - rad/s y
+    crossover-frequency Target 0..inf - rad/s y
+    damping-ratio More -1..1 - 1 y
+    slowest-pole Less -inf..0 - 1/s y
+    gain-mask Less 0..inf 1 1 y
+    h2-norm Less 0..inf - 1 y
+    hinf-norm Less 0..inf - 1 y
+    frequency-fit Less 0..inf - 1 y
+";
+
+#[test]
+fn every_kind_states_its_sense_range_demand_unit_and_signals() {
+    let criteria = EXAMPLES.map(|(name, options)| {
+        let model = if is_linear(name) { "linear" } else { "lag" };
+        format!("{name} = {{ {name} = {options}, model = '{model}', usage = 'monitor' }}\n")
+    });
+    let study = read_study(&criteria.concat()).expect("it is a study");
+    let fact = |(name, _): &(&str, &str)| {
+        let row = study.rows().iter().find(|row| row.name == *name).expect("it is evaluated somewhere");
+        let criterion = &row.criterion;
+        let [low, high] = criterion.range();
+        let demand = criterion.natural_demand().map_or_else(|| "-".to_owned(), |demand| demand.to_string());
+        let (sense, unit, signals) = (criterion.sense(), criterion.unit(), criterion.signals().join(","));
+        let assumption = if criterion.assumption().is_some() { " (assumes)" } else { "" };
+        format!("{name} {sense:?} {low}..{high} {demand} {unit} {signals}{assumption}")
+    };
+    let found: Vec<String> = EXAMPLES.iter().map(fact).collect();
+    let expected: Vec<&str> = FACTS.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    assert_eq!(found, expected, "{}", found.join("\n"));
+}
+
+#[test]
+fn without_a_target_a_step_assumes_the_last_value_and_says_so() {
+    for kind in ["overshoot", "undershoot", "settling-time", "rise-time", "delay-time", "iae"] {
+        let band = if kind == "settling-time" { ", relative-band = '2 %'" } else { "" };
+        let text = format!("c = {{ {kind} = {{ signal = 'y'{band} }}, model = 'lag', usage = 'monitor' }}");
+        let study = read_study(&text).expect("it is a study");
+        let assumption = study.rows()[0].criterion.assumption().expect("no target is given");
+        assert!(assumption.contains("the value of the signal at the end"), "{kind}: {assumption}");
+    }
+}
+
+#[test]
+fn a_formula_over_a_time_that_was_not_reached_is_missed_by_as_much() {
+    // The lag never reaches 2, half of the step to 4.
+    let study = |criteria: &str| read_study(criteria).expect("it is a study");
+    let of = "slow = { delay-time = { signal = 'y', target = 4, from = 0 }, model = 'lag', usage = 'monitor' }";
+    let twice = format!("{of}\ntwice = {{ expression = {{ value = '2*slow' }}, model = 'lag', usage = 'monitor' }}");
+    let problem = Problem::new(study(&twice).into());
+    let evaluation = problem.evaluate_at(&problem.study().start());
+    let read = |name: &str| {
+        let row = problem.study().rows().iter().position(|row| row.name == name).expect("it is a row");
+        evaluation.readings[row].expect("it is evaluated")
+    };
+    let (slow, twice) = (read("slow"), read("twice"));
+    assert!(slow.value.is_nan() && twice.value.is_nan());
+    assert_eq!(twice.note, Some("a criterion in the formula was not reached"));
+    // Its size is relative to the time available, so that missed times of different lengths can be added.
+    let trace = sampled(6.0, 500, |t| 1.0 - math::exp(-t));
+    let analysis = Analysis::Time(Response { traces: vec![("y".into(), trace)], ..Response::default() });
+    let value = |row: usize| {
+        let row = &problem.study().rows()[row];
+        row.criterion.value_with(problem.study().case_of(row), &analysis, &[1.0]).expect("it is missed, not undefined")
+    };
+    let place = |name: &str| problem.study().rows().iter().position(|row| row.name == name).expect("it is a row");
+    let (slow, twice) = (value(place("slow")), value(place("twice")));
+    let horizon = slow.missed.and_then(|missed| missed.horizon).expect("a time has a horizon");
+    assert!(twice.number == slow.number / horizon && twice.number > 0.0, "{} {}", twice.number, slow.number);
+}
+
 #[test]
 fn a_criterion_refuses_a_model_of_the_other_sort_and_names_one_that_fits() {
     let wrong =
@@ -177,7 +279,7 @@ impl Model for LagModel {
     }
 
     fn analyse(&self, job: &Job<'_>) -> Result<Analysis, Failure> {
-        let trace: Trace = crate::testing::sampled(job.horizon, 500, |t| 1.0 - math::exp(-t / job.parameters[0]));
+        let trace: Trace = sampled(job.horizon, 500, |t| 1.0 - math::exp(-t / job.parameters[0]));
         Ok(Analysis::Time(Response { traces: vec![("y".into(), trace)], ..Response::default() }))
     }
 }

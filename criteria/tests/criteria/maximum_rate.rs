@@ -36,3 +36,11 @@ fn a_jump_has_no_rate() {
         "`y` jumps by 3 m, so that its rate is infinite: use a continuous signal, or filter this one"
     );
 }
+
+#[test]
+fn a_jump_of_rounding_size_is_none_however_negative_the_signal() {
+    let mut trace = Trace::starting_at(0.0, 2);
+    trace.push_polynomial(1.0, [-1e6, 3.0, 0.0, 0.0, 0.0]);
+    trace.push_polynomial(2.0, [-999_997.0 + 1e-7, -2.0, 0.0, 0.0, 0.0]);
+    assert_near(value(&rate(), &analysis(&trace)).number, 3.0, 1e-9);
+}

@@ -65,3 +65,9 @@ fn a_reference_is_of_one_order_and_well_damped() {
     assert!(mistake(&second_order_reference("1 rad/s", 0.01)).starts_with("damping: a damping of 0.01 is below"));
     assert_eq!(mistake(&first(-1.0)), "time-constant: `time-constant` must be positive, not -1 s");
 }
+
+#[test]
+fn a_reference_with_the_least_damping_is_allowed() {
+    let ringing = second_order_reference("1 rad/s", 0.05);
+    assert_near(value(&ringing, &simulated(100.0, second_order(0.05))).number, 0.0, 1e-9);
+}

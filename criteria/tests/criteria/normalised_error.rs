@@ -3,7 +3,7 @@
 use mops_core::criterion::Loss;
 use mops_criteria::normalised_error::NormalisedError;
 
-use crate::testing::{assert_near, bound, measured, quantity, simulated, undefined_in, value_in};
+use crate::testing::{assert_near, assert_slope, bound, measured, quantity, simulated, undefined_in, value_in};
 
 fn error(noise: Option<&str>) -> NormalisedError {
     NormalisedError { signal: "y".into(), noise: noise.map(quantity), ..NormalisedError::default() }
@@ -32,4 +32,24 @@ fn an_outlier_counts_less_with_a_robust_loss() {
 fn without_a_noise_there_is_no_value() {
     let why = undefined_in(&measured(&[0.0, 1.0], &[0.0, 1.0], None), &error(None), &simulated(1.0, |t| t));
     assert_eq!(why, "the noise level of `y` is unknown");
+}
+
+#[test]
+fn slopes_of_all_losses_are_those_of_the_values() {
+    // Differences of 0.2, 3 and 12 noises.
+    let case = measured(&[0.5, 1.0, 2.0], &[0.39, 0.93, 2.06], Some(0.1));
+    for loss in [Loss::Squares, Loss::Huber, Loss::Student] {
+        assert_slope(&case, &NormalisedError { loss, ..error(None) }, 2.0);
+    }
+}
+
+#[test]
+fn a_residual_far_below_the_noise_is_noted() {
+    let times: Vec<f64> = (0..20).map(f64::from).collect();
+    let off = |by: f64| measured(&times, &times.iter().map(|t| t + by).collect::<Vec<_>>(), Some(1.0));
+    let note = |case| value_in(&case, &error(None), &simulated(19.0, |t| t)).note;
+    assert_eq!(note(off(0.09)), Some("far below the noise: check the unit of `noise`"));
+    assert_eq!(note(off(0.11)), None);
+    // Fewer samples may be that close by chance.
+    assert_eq!(note(measured(&[0.0, 1.0], &[0.0, 1.0], Some(1.0))), None);
 }

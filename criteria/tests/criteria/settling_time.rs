@@ -18,6 +18,18 @@ fn the_demand_excludes_values_outside_of_the_band_after_the_demanded_time() {
     let within = marks[0].clone().within(0.0, 5.0).unwrap();
     assert_eq!(within.times, [3.0, 5.0]);
     assert_eq!(marks[0].clone().within(0.0, 2.0), None);
+    // 5 % of a step from 1 to 3, at 2 s.
+    let step = SettlingTime {
+        from: Some(1.0.into()),
+        target: Some(3.0.into()),
+        step_time: Some(2.0.into()),
+        band: None,
+        relative_band: Some(0.05.into()),
+        ..settling(0.1)
+    };
+    let marks = bound(&step).marks(&Demand::AtMost(4.0), &simulated(10.0, |t| if t < 2.0 { 1.0 } else { 3.0 }));
+    let of = |i: usize| (marks[i].times[0], marks[i].values[0]);
+    assert_eq!((of(0), of(1)), ((6.0, 3.1), (6.0, 2.9)));
 }
 
 fn settling(band: f64) -> SettlingTime {

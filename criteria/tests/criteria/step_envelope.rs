@@ -1,10 +1,14 @@
 //! Tests of the distance of a response from an envelope.
 
+use mops_core::{
+    Demand,
+    criterion::{Mark, Side},
+};
 use mops_criteria::step_envelope::StepEnvelope;
 use mops_language::Quantity;
 use mops_math as math;
 
-use crate::testing::{assert_near, mistake, quantity, second_order, simulated, undefined, value};
+use crate::testing::{assert_near, bound, mistake, quantity, second_order, simulated, undefined, value};
 
 fn points(points: &[[f64; 2]]) -> Vec<[Quantity; 2]> {
     points.iter().map(|point| point.map(Quantity::from)).collect()
@@ -50,5 +54,27 @@ fn an_envelope_needs_a_bound_in_order_within_the_simulation() {
     assert_eq!(
         undefined(&envelope(&[[9.0, 1.0]], &[]), &simulated(4.0, |t| t)),
         "the envelope starts after the end of the simulation at 4 s"
+    );
+}
+
+#[test]
+fn a_slanted_bound_runs_through_both_of_its_points() {
+    // 1 above the line from (1, 0) to (3, 4) at its second point, 5 at t = 3.
+    let ramp = simulated(3.0, |t| if t < 1.0 { 0.0 } else { 2.5 * (t - 1.0) });
+    assert_near(value(&envelope(&[[1.0, 0.0], [3.0, 4.0]], &[]), &ramp).number, 1.0, 1e-12);
+}
+
+#[test]
+fn plots_show_both_bounds_with_what_they_exclude() {
+    let criterion = bound(&envelope(&[[0.0, 1.5], [2.0, 1.1]], &[[1.0, 0.9]]));
+    let marks = criterion.marks(&Demand::None, &simulated(4.0, |t| t));
+    let of = |mark: &Mark| (mark.times, mark.values, mark.excluded);
+    assert_eq!(
+        marks.iter().map(of).collect::<Vec<_>>(),
+        [
+            ([0.0, 2.0], [1.5, 1.1], Some(Side::Above)),
+            ([2.0, f64::INFINITY], [1.1, 1.1], Some(Side::Above)),
+            ([1.0, f64::INFINITY], [0.9, 0.9], Some(Side::Below)),
+        ]
     );
 }

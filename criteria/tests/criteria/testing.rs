@@ -3,6 +3,7 @@
 use mops_core::{
     Analysis, AnalysisKind, Case, Criterion, CriterionSpec, Interface, Response, Role, Trace, Value, Variable,
     case::{Channel, Experiment},
+    criterion::Tangent,
 };
 use mops_language::Quantity;
 use mops_linear::TransferFunction;
@@ -90,7 +91,7 @@ pub fn quantity(text: &str) -> Quantity {
 
 /// Binds the criterion to the model of all tests.
 pub fn bound(spec: &dyn CriterionSpec) -> Box<dyn Criterion> {
-    spec.bind(&model(spec.reads())).expect("the options are right")
+    spec.bind(&model(spec.reads().unwrap_or_default())).expect("the options are right")
 }
 
 /// Returns the value of a criterion.
@@ -115,11 +116,44 @@ pub fn undefined_in(case: &Case, spec: &dyn CriterionSpec, analysis: &Analysis) 
 
 /// Returns the mistake in the options of a criterion.
 pub fn mistake(spec: &dyn CriterionSpec) -> String {
-    spec.bind(&model(spec.reads())).err().expect("the options are wrong").to_string()
+    spec.bind(&model(spec.reads().unwrap_or_default())).err().expect("the options are wrong").to_string()
 }
 
 /// Asserts that two numbers agree within `tolerance`.
 #[track_caller]
 pub fn assert_near(number: f64, expected: f64, tolerance: f64) {
     assert!((number - expected).abs() <= tolerance, "{number} is not {expected} within {tolerance}");
+}
+
+/// Returns a linear model with the inputs `u1` and `u2` and the signals `y1` and `y2`, all in V.
+pub fn two_by_two() -> Interface {
+    let variables = |names: [&str; 2]| names.map(|name| Variable::new(name, "V", "")).to_vec();
+    Interface {
+        signals: variables(["y1", "y2"]),
+        inputs: variables(["u1", "u2"]),
+        analysis: AnalysisKind::Linear,
+        ..Interface::default()
+    }
+}
+
+/// Asserts that the slope of a criterion is the difference of its values, for `1 - exp(-t)` moved along `t exp(-t)`.
+#[track_caller]
+pub fn assert_slope(case: &Case, spec: &dyn CriterionSpec, end: f64) {
+    let at = |by: f64| simulated(end, move |t| 1.0 - math::exp(-t) + by * t * math::exp(-t));
+    let along = simulated(end, |t| t * math::exp(-t));
+    let (analysis, criterion) = (at(0.0), bound(spec));
+    let of = |analysis: &Analysis| criterion.value(case, analysis).expect("it is defined");
+    let value = of(&analysis);
+    let tangent =
+        Tangent { analysis: &analysis, value: &value, along: &along, parameters: &[], seed: &[], reach: 1e-4 };
+    let slope = criterion.slope(case, &tangent).expect("it has a slope");
+    let [down, up] = [-1e-4, 1e-4].map(|by| of(&at(by)));
+    let difference = |a: f64, b: f64| (a - b) / 2e-4;
+    let exact = difference(up.number, down.number);
+    assert!((slope.number - exact).abs() < 1e-5 * (1.0 + exact.abs()), "{} is not {exact}", slope.number);
+    assert_eq!(slope.residuals.len(), value.residuals.len());
+    for (slope, (up, down)) in slope.residuals.iter().zip(up.residuals.iter().zip(&down.residuals)) {
+        let exact = difference(*up, *down);
+        assert!((slope - exact).abs() < 1e-5 * (1.0 + exact.abs()), "{slope} is not {exact}");
+    }
 }

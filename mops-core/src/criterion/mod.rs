@@ -24,14 +24,10 @@ use window::Window;
 
 /// Options of a criterion as written in the study; names and quantities are not yet checked against a model.
 pub trait CriterionSpec: Send + Sync {
-    /// Returns the kind of analysis that the criterion reads. A study rejects models with another kind of analysis.
-    fn reads(&self) -> AnalysisKind {
-        AnalysisKind::Time
-    }
-
-    /// Returns true if the criterion reads both kinds of analysis.
-    fn reads_any(&self) -> bool {
-        false
+    /// Returns the kind of analysis that the criterion reads, `None` for any. A study rejects models with another kind
+    /// of analysis.
+    fn reads(&self) -> Option<AnalysisKind> {
+        Some(AnalysisKind::Time)
     }
 
     /// Checks names and units against the interface of the model.
@@ -52,28 +48,27 @@ pub trait CriterionSpec: Send + Sync {
         Vec::new()
     }
 
-    /// Checks names and units as [`CriterionSpec::bind`] does, with the criteria of the same model that
-    /// [`CriterionSpec::names`] refers to.
+    /// Binds the criterion as [`CriterionSpec::bind`] does, with what the study gives beside the model.
     ///
     /// # Errors
     /// Returns an error as [`CriterionSpec::bind`] does.
-    fn bind_with(&self, model: &Interface, _others: &[Other]) -> Result<Box<dyn Criterion>, StudyError> {
-        self.bind(model)
+    fn bind_in(&self, model: &Interface, context: &BindContext<'_>) -> Result<Box<dyn Criterion>, StudyError> {
+        let criterion = self.bind(model)?;
+        Ok(match context.window {
+            Some([from, until]) => Box::new(Window::new(criterion, from, until)),
+            None => criterion,
+        })
     }
+}
 
-    /// Binds the criterion as [`CriterionSpec::bind_with`] does, restricted to a part of the simulation from one time
-    /// to another, s. All its times then count from the first.
-    ///
-    /// # Errors
-    /// Returns an error as [`CriterionSpec::bind`] does.
-    fn bind_within(
-        &self,
-        model: &Interface,
-        others: &[Other],
-        [from, until]: [f64; 2],
-    ) -> Result<Box<dyn Criterion>, StudyError> {
-        Ok(Box::new(Window::new(self.bind_with(model, others)?, from, until)))
-    }
+/// What a study gives a criterion beside the model.
+#[derive(Clone, Copy, Default)]
+pub struct BindContext<'a> {
+    /// Criteria of the same model that [`CriterionSpec::names`] refers to.
+    pub others: &'a [Other],
+    /// Part of the simulation to which the criterion is restricted, from one time to another, s; all times of the
+    /// criterion then count from the first.
+    pub window: Option<[f64; 2]>,
 }
 
 /// Another criterion of the study, by its name.

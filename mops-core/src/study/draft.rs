@@ -161,6 +161,8 @@ pub struct ChannelBuilder {
 pub struct CriterionBuilder {
     /// Criterion that computes the value.
     pub criterion: Box<dyn CriterionSpec>,
+    /// Kind under whose name the options stand in a study file, for errors; `None` in Rust.
+    pub kind: Option<&'static str>,
     /// Model that the criterion reads; `None` for the only one.
     pub model: Option<String>,
     /// Cases in which the criterion is evaluated; `None` for all.
@@ -189,6 +191,7 @@ impl CriterionBuilder {
     pub fn minimise(criterion: impl CriterionSpec + 'static, demand: f64) -> Self {
         Self {
             criterion: Box::new(criterion),
+            kind: None,
             model: None,
             cases: None,
             usage: Usage::Minimise,

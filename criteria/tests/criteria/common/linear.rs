@@ -1,9 +1,9 @@
 //! Tests of the common parts of criteria of linear systems: channel, value type, criterion.
 
-use mops_core::{Case, CriterionSpec, StudyError};
-use mops_criteria::phase_margin::PhaseMargin;
+use mops_core::{Case, CriterionSpec, Interface, StudyError};
+use mops_criteria::{hinf_norm::HinfNorm, phase_margin::PhaseMargin};
 
-use crate::testing::{assert_near, channel, linear};
+use crate::testing::{assert_near, channel, linear, two_by_two};
 
 #[test]
 fn a_loop_is_closed_in_one_dimension_and_counted_in_one_unit() {
@@ -24,4 +24,15 @@ fn a_loop_is_closed_in_one_dimension_and_counted_in_one_unit() {
             "{mistake}"
         );
     }
+}
+
+#[test]
+fn a_loop_may_lead_from_any_input_to_any_output_and_knows_both() {
+    let named = |input: &str, output: &str| PhaseMargin { input: Some(input.into()), output: Some(output.into()) };
+    let across = named("u2", "y1").bind(&two_by_two()).unwrap();
+    assert_eq!(across.feedback_channel(), Some(["u2".to_owned(), "y1".to_owned()]));
+    let cut = named("u2", "y1").bind(&Interface { is_cut: true, ..two_by_two() }).err().unwrap().to_string();
+    assert_eq!(cut, "output: the output of the loop cut at `u2` is `-u2`, not `y1`; remove `output`");
+    let whole = HinfNorm { input: Some("u1".into()), output: Some("y2".into()) }.bind(&two_by_two()).unwrap();
+    assert_eq!(whole.feedback_channel(), None);
 }

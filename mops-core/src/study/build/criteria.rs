@@ -8,7 +8,7 @@ use super::jobs::job;
 use super::models::Models;
 use super::values::converted;
 use crate::case::Case;
-use crate::criterion::{Criterion, CriterionSpec, Demand, InUnit, Other, Sense, Usage};
+use crate::criterion::{BindContext, Criterion, CriterionSpec, Demand, InUnit, Other, Sense, Usage};
 use crate::model::AnalysisKind;
 use crate::study::draft::CriterionBuilder;
 use crate::study::{Row, Study, StudyError, matches_pattern};
@@ -27,14 +27,15 @@ pub(super) fn add_rows(study: &mut Study, name: &str, draft: CriterionBuilder) -
         }
     };
     let interface = study.models[model].1.interface();
-    let reads = if draft.criterion.reads_any() { interface.analysis } else { draft.criterion.reads() };
+    let reads = draft.criterion.reads().unwrap_or(interface.analysis);
     check_sort(reads, interface.analysis, &study.models, model)?;
     let others = others(study, model, draft.criterion.as_ref());
     let window = window(&draft, reads)?;
-    let criterion = match window {
-        Some(window) => draft.criterion.bind_within(interface, &others, window)?,
-        None => draft.criterion.bind_with(interface, &others)?,
-    };
+    let bound = draft.criterion.bind_in(interface, &BindContext { others: &others, window });
+    let criterion = bound.map_err(|mistake| match draft.kind {
+        Some(kind) => mistake.within(kind),
+        None => mistake,
+    })?;
     // Bare numbers are in the unit that the study states for the criterion, or else in that of its kind.
     let bare = draft.unit.clone().unwrap_or_else(|| criterion.unit());
     let criterion = in_unit(criterion, &draft)?;
