@@ -44,7 +44,7 @@ struct Stamp {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Time {
     nanoseconds: i64,
-    clock: Clock,
+    clock: ClockFormat,
 }
 
 /// Date as written: its three numbers, with the number of digits of each; a month given by its name has 0 digits.
@@ -86,7 +86,7 @@ impl Order {
 
 /// Units of the numbers between colons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Clock {
+enum ClockFormat {
     HoursMinutes,
     HoursMinutesSeconds,
     MinutesSeconds,
@@ -96,7 +96,7 @@ enum Clock {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Form {
     order: Option<Order>,
-    clock: Option<Clock>,
+    clock: Option<ClockFormat>,
 }
 
 impl Form {
@@ -115,25 +115,25 @@ impl Form {
 
     /// Returns true if a stamp has this form; a form of the time alone leaves the date open.
     fn admits(self, stamp: &Stamp) -> bool {
-        let time = |clock: Clock| match stamp.time {
+        let time = |clock: ClockFormat| match stamp.time {
             Some(time) => time.clock == clock,
-            None => stamp.date.is_some() && clock != Clock::MinutesSeconds,
+            None => stamp.date.is_some() && clock != ClockFormat::MinutesSeconds,
         };
         self.clock.is_none_or(time) && self.order.is_none_or(|order| stamp.date.is_some_and(|date| date.is_in(order)))
     }
 }
 
 /// Reads the form of a time, such as `hh:mm:ss.000` or `Min:Sek`.
-fn clock(text: &str) -> Option<Clock> {
+fn clock(text: &str) -> Option<ClockFormat> {
     let text = text.split(['.', ',']).next()?.to_lowercase();
     let unit = |part: &str| match part.chars().next().filter(|_| part.chars().all(char::is_alphabetic))? {
         _ if part == "std" => Some('h'),
         letter => Some(letter),
     };
     match text.split(':').map(unit).collect::<Option<Vec<char>>>()?[..] {
-        ['h', 'm'] => Some(Clock::HoursMinutes),
-        ['h', 'm', 's'] => Some(Clock::HoursMinutesSeconds),
-        ['m', 's'] => Some(Clock::MinutesSeconds),
+        ['h', 'm'] => Some(ClockFormat::HoursMinutes),
+        ['h', 'm', 's'] => Some(ClockFormat::HoursMinutesSeconds),
+        ['m', 's'] => Some(ClockFormat::MinutesSeconds),
         _ => None,
     }
 }
@@ -170,7 +170,7 @@ pub(super) fn column<'t>(
     unit: Option<&str>,
 ) -> Option<Result<Column, String>> {
     let form = unit.and_then(Form::parse);
-    let is_elapsed = form.is_some_and(|form| form.clock == Some(Clock::MinutesSeconds));
+    let is_elapsed = form.is_some_and(|form| form.clock == Some(ClockFormat::MinutesSeconds));
     let mut stamps: Vec<Option<(Stamp, &str)>> = Vec::new();
     for cell in cells {
         stamps.push(match cell {
@@ -438,7 +438,7 @@ fn elapsed(text: &str) -> Option<Stamp> {
     let (minutes, _, rest) = digits(text, MOST)?;
     let (seconds, width, rest) = digits(rest.strip_prefix(':')?, 2)?;
     let (fraction, rest) = fraction(rest)?;
-    let time = Time { nanoseconds: (minutes * 60 + seconds) * SECOND + fraction, clock: Clock::MinutesSeconds };
+    let time = Time { nanoseconds: (minutes * 60 + seconds) * SECOND + fraction, clock: ClockFormat::MinutesSeconds };
     let is_time = width == 2 && seconds < 60 && rest.is_empty();
     is_time.then_some(Stamp { date: None, time: Some(time), zone: None })
 }
@@ -457,7 +457,7 @@ fn fraction(text: &str) -> Option<(i64, &str)> {
 fn time_of_day(text: &str) -> Option<(Time, &str)> {
     let (hour, _, rest) = digits(text, 2)?;
     let (minute, width, mut rest) = digits(rest.strip_prefix(':')?, 2)?;
-    let (mut second, mut part, mut clock) = (0, 0, Clock::HoursMinutes);
+    let (mut second, mut part, mut clock) = (0, 0, ClockFormat::HoursMinutes);
     if width != 2 || minute > 59 {
         return None;
     }
@@ -467,7 +467,7 @@ fn time_of_day(text: &str) -> Option<(Time, &str)> {
         if width != 2 || value > 60 {
             return None;
         }
-        (second, clock) = (value, Clock::HoursMinutesSeconds);
+        (second, clock) = (value, ClockFormat::HoursMinutesSeconds);
         (part, rest) = fraction(after)?;
     }
     let rest = rest.trim_start();

@@ -1,9 +1,7 @@
 //! Compiled model: one tape for the derivatives, and small tapes for guards, resets and signals.
 
-use std::ops::Range;
-
 use mops_core::StudyError;
-use mops_linear::column_groups;
+use mops_linear::{self as linear, column_groups};
 
 use super::graph::{Id, Level, Op};
 use super::layout::Layout;
@@ -68,19 +66,6 @@ pub struct Happening {
     pub leaves: String,
 }
 
-/// Clock.
-#[derive(Debug)]
-pub struct Clock {
-    /// Memory, as states.
-    pub memory: Range<usize>,
-    /// Period, first instant, and time between an instant and the change of the memory, s.
-    pub period: f64,
-    pub offset: f64,
-    pub delay: f64,
-    /// Computes the new values of the memory.
-    pub next: Program,
-}
-
 /// Compiled model.
 #[derive(Debug)]
 pub struct Compiled {
@@ -111,8 +96,8 @@ pub struct Compiled {
     pub joints: Vec<Joint>,
     /// Events.
     pub happenings: Vec<Happening>,
-    /// Clocks.
-    pub clocks: Vec<Clock>,
+    /// Clocks, with the program for the new values of their memory.
+    pub clocks: Vec<(linear::Clock, Program)>,
     /// Computes the delayed quantities, which are inputs after all others.
     pub delayed: Program,
     /// Computes the delays, s.
@@ -168,7 +153,7 @@ impl Compiled {
             wanted.push(happening.resets.iter().map(|(_, id)| *id).collect());
             wanted.push(happening.at_rest.iter().map(|(_, id)| *id).collect());
         }
-        wanted.extend(system.clocks.iter().map(|clock| clock.next.clone()));
+        wanted.extend(system.clocks.iter().map(|(_, next)| next.clone()));
         wanted.push(system.delays.iter().map(|(of, _)| *of).collect());
         wanted.push(system.delays.iter().map(|(_, time)| *time).collect());
         let starts: Vec<(usize, Id)> =
@@ -211,11 +196,7 @@ impl Compiled {
             leaves: format!("{}: leaves rest", h.name),
         };
         let happenings = system.happenings.iter().map(happening).collect();
-        let clock = |c: &system::Clock| {
-            let system::Clock { memory, period, offset, delay, .. } = c.clone();
-            Clock { memory, period, offset, delay, next: next() }
-        };
-        let clocks = system.clocks.iter().map(clock).collect();
+        let clocks = system.clocks.iter().map(|(clock, _)| (clock.clone(), next())).collect();
         let (delayed, delays) = (next(), next());
         let starts = (starts.iter().map(|(s, _)| *s).collect(), next());
         let matrices = system.matrices.iter().map(|_| next()).collect();

@@ -11,7 +11,7 @@ use mops_linear as linear;
 
 use super::bank::{Bank, Large, Register};
 use super::bounds::{self, moved, signed};
-use super::compiled::{Clock, Compiled, Signal};
+use super::compiled::{Compiled, Signal};
 use super::phase::Phase;
 use super::program::Program;
 use super::ticking::Ticking;
@@ -474,7 +474,7 @@ impl<S: Scalar, B: Bank<S>> Events<S> for Running<'_, S, B> {
 
 impl<S: Scalar, B: Bank<S>> Breaks<S> for Running<'_, S, B> {
     fn next(&self, t: f64) -> f64 {
-        let ticks = self.ticking.iter().zip(&self.model.clocks).map(|(ticking, clock)| ticking.next_break(clock));
+        let ticks = self.ticking.iter().zip(&self.model.clocks).map(|(ticking, (clock, _))| ticking.next_break(clock));
         next_of(ticks.chain(self.delays.iter().map(|delay| delay.next_break(t))))
     }
 
@@ -485,21 +485,15 @@ impl<S: Scalar, B: Bank<S>> Breaks<S> for Running<'_, S, B> {
     }
 
     fn clocks(&self) -> Vec<linear::Clock> {
-        let clock = |clock: &Clock| linear::Clock {
-            memory: clock.memory.clone(),
-            period: clock.period,
-            offset: clock.offset,
-            delay: clock.delay,
-        };
-        self.model.clocks.iter().map(clock).collect()
+        self.model.clocks.iter().map(|(clock, _)| clock.clone()).collect()
     }
 
     fn changes(&self, at: &Instant<'_, S>, dx: &mut [S]) {
-        for clock in &self.model.clocks {
+        for (clock, next) in &self.model.clocks {
             let mut bank = self.bank.borrow_mut();
             self.load(&mut bank, at);
-            clock.next.run(&mut *bank);
-            for (state, &register) in clock.memory.clone().zip(&clock.next.results) {
+            next.run(&mut *bank);
+            for (state, &register) in clock.memory.clone().zip(&next.results) {
                 dx[state] = bank.get(register) - at.x[state];
             }
         }

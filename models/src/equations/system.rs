@@ -1,10 +1,10 @@
 //! Model as a graph: equations solved for the derivatives, friction, events, signals and initial values.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 
 use mops_core::StudyError;
 use mops_language::{expression::Form, suggestion};
+use mops_linear as linear;
 
 use super::definition::{self, Definition, Text, under};
 use super::graph::{Block, Graph, Id, Op};
@@ -49,21 +49,6 @@ pub struct Happening {
     pub at_rest: Vec<(usize, Id)>,
 }
 
-/// Clock whose memory changes at fixed instants only.
-#[derive(Debug, Clone)]
-pub struct Clock {
-    /// Memory, as states.
-    pub memory: Range<usize>,
-    /// Period, s.
-    pub period: f64,
-    /// First instant, s.
-    pub offset: f64,
-    /// Time between an instant and the change of the memory, s.
-    pub delay: f64,
-    /// New values of the memory.
-    pub next: Vec<Id>,
-}
-
 /// Model as a graph.
 #[derive(Debug)]
 pub struct System {
@@ -87,8 +72,8 @@ pub struct System {
     pub contacts: Vec<Contact>,
     /// Events.
     pub happenings: Vec<Happening>,
-    /// Clocks.
-    pub clocks: Vec<Clock>,
+    /// Clocks, with the new values of their memory.
+    pub clocks: Vec<(linear::Clock, Vec<Id>)>,
     /// Delayed quantities, which are inputs after all others, and their delays, s.
     pub delays: Vec<(Id, Id)>,
     /// Initial values given in the study.
@@ -225,7 +210,7 @@ impl System {
     /// Returns the selections that act on rates, on new values of memory or on delayed quantities, with the numbers of
     /// these: those of the states, then the delayed quantities.
     pub fn acting_selections(&self) -> Vec<(&Selection, Vec<usize>)> {
-        let of_memory = self.clocks.iter().flat_map(|clock| clock.memory.clone().zip(clock.next.iter().copied()));
+        let of_memory = self.clocks.iter().flat_map(|(clock, next)| clock.memory.clone().zip(next.iter().copied()));
         let first = self.derivatives.len();
         let delayed = self.delays.iter().enumerate().map(|(k, &(of, _))| (first + k, of));
         let roots = self.derivatives.iter().copied().enumerate().chain(of_memory).chain(delayed);
@@ -303,7 +288,7 @@ fn clock(
     d: &Definition,
     clock: &definition::Clock,
     derivatives: &[Id],
-) -> Result<Clock, StudyError> {
+) -> Result<(linear::Clock, Vec<Id>), StudyError> {
     let next = clock.memory.clone().zip(&clock.next).map(|(memory, text)| {
         let affine = l.sampled(text)?;
         let value = with_rates(&mut l.graph, affine, derivatives);
@@ -325,7 +310,7 @@ fn clock(
     let period = time(every, [f64::MIN_POSITIVE, f64::INFINITY], "a positive period")?;
     let offset = time(offset, [0.0, f64::INFINITY], "a first instant of at least 0")?;
     let delay = time(delay, [0.0, period], &format!("a delay between 0 and the period of {period} s"))?;
-    Ok(Clock { memory: clock.memory.clone(), period, offset, delay, next })
+    Ok((linear::Clock { memory: clock.memory.clone(), period, offset, delay }, next))
 }
 
 /// Limit on the number of joints with dry friction: three contacts of every joint at rest are tried, in all

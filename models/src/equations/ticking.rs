@@ -1,6 +1,7 @@
 //! Progress of the clocks of a user's model.
 
-use super::compiled::Clock;
+use mops_linear::Clock;
+
 use crate::kernel::is_due;
 
 /// Progress of a clock.

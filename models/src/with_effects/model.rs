@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::effect::{Dimension, InitialGrid, ParameterKind, Placement, Port};
+use mops_core::effect::{Dimension, ParameterKind, Placement, Port};
 use mops_core::model::{State, WithTangents};
 use mops_core::plant::{PlantScalar, Ported};
 use mops_core::trace::Earlier;
@@ -67,15 +67,13 @@ impl WithEffects {
             for parameter in effect.parameters() {
                 let variable = Variable {
                     name: format!("{name}.{}", parameter.name),
-                    unit: match parameter.grid {
+                    unit: match parameter.kind {
                         // With the unit 1/s, 5 Hz would be read as 5 rad/s.
-                        InitialGrid::Frequencies(_) => Unit::known("rad/s"),
-                        _ if parameter.kind.is_value() && parameter.dimension == Dimension::POSITION => {
+                        ParameterKind::Frequency => Unit::known("rad/s"),
+                        kind if kind.is_value() && parameter.dimension == Dimension::POSITION => {
                             unit_of_place(&placement.port, placement.companion.as_ref(), of)
                         }
-                        _ if parameter.kind == ParameterKind::Zero => {
-                            unit_of_place(&placement.port, None, of).difference().of_unknown_kind()
-                        }
+                        ParameterKind::Zero => unit_of_place(&placement.port, None, of).difference().of_unknown_kind(),
                         _ => unit(parameter.dimension, &placement.port, placement.companion.as_ref(), of),
                     },
                     about: parameter.about.to_owned(),
