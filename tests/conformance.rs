@@ -25,6 +25,10 @@ fn problems(n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> [P
 }
 
 fn study_of(objective: Objective, n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> Study {
+    draft_of(objective, n, usages, f).build().unwrap()
+}
+
+fn draft_of(objective: Objective, n: usize, usages: &[Usage], f: fn(&[f64]) -> Option<Vec<f64>>) -> StudyBuilder {
     let name = |prefix: &str, i: usize| format!("{prefix}{i}");
     let parameters: Vec<String> = (0..n).map(|j| name("x", j)).collect();
     let function = Function::new(&parameters.iter().map(String::as_str).collect::<Vec<_>>(), usages.len(), f);
@@ -40,8 +44,6 @@ fn study_of(objective: Objective, n: usize, usages: &[Usage], f: fn(&[f64]) -> O
             .collect(),
         ..StudyBuilder::default()
     }
-    .build()
-    .unwrap()
 }
 
 /// Sum of squares with its residuals: line `x0 t + x1` against the data `2 t + 0.5`.
@@ -361,11 +363,9 @@ fn a_monitored_criterion_without_a_value_does_not_affect_the_objective() {
 fn an_integer_tuner_with_five_values_ends_at_the_best_without_repeated_evaluations() {
     // The minimum of (x - 1.3)^2 over -2, -1, 0, 1, 2 is at 1.
     let whole = [Objective::Max, Objective::Each].map(|objective| {
-        let whole = study_of(objective, 1, &[Usage::Minimise], |x| Some(vec![math::powi(x[0] - 1.3, 2)]));
-        let mut parts = whole.into_parts();
-        parts.tuners[0].grid = mops::core::study::Grid::Integer;
-        parts.tuners[0].start = -2.0;
-        Problem::new(Arc::new(Study::from_parts(parts)))
+        let mut draft = draft_of(objective, 1, &[Usage::Minimise], |x| Some(vec![math::powi(x[0] - 1.3, 2)]));
+        draft.tuners[0].1 = TunerBuilder { integer: true, ..TunerBuilder::new(-2.0, -2.0, 2.0) };
+        Problem::new(Arc::new(draft.build().unwrap()))
     });
     for (problem, kind) in both(whole) {
         let solved = solve(&problem, &kind, 5000, &());

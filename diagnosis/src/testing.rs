@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use mops_core::{
     Case, Effect, Input, Model, ModelOptions, Role, Study,
     case::{Channel, Experiment},
-    study::{Grid, JobPlan, ParameterSource, Scale, StudyParts, Tuner},
+    study::{Grid, JobPlan, ParameterSource, Scale, Tuner},
     task::DiagnosisTask,
 };
 use mops_effects::effects;
@@ -95,16 +95,13 @@ pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Recor
         jobs.push(JobPlan { model: 0, case: index, parameters, signals: Vec::new(), horizon });
         cases.push(case);
     }
-    let study = Study::from_parts(StudyParts {
-        name: "test".to_owned(),
-        task: DiagnosisTask::default().into(),
-        seed: 1,
-        models: vec![("plant".to_owned(), Arc::clone(&model))],
+    let study = Study::unchecked(
+        DiagnosisTask::default().into(),
+        vec![("plant".to_owned(), Arc::clone(&model))],
         cases,
-        tuners: parameters[..globals].iter().enumerate().map(tuner).collect(),
+        parameters[..globals].iter().enumerate().map(tuner).collect(),
         jobs,
-        ..StudyParts::default()
-    });
+    );
     Subject {
         study: Arc::new(study),
         model,
@@ -117,38 +114,60 @@ pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Recor
     }
 }
 
-/// The study that a subject could have been taken from, with a seed of its own.
-pub fn study(subject: &Subject) -> Study {
-    let mut parts = Study::clone(&subject.study).into_parts();
-    for (index, m) in subject.measurements.iter().enumerate() {
-        let channel = |s: &Series| Channel {
-            signal: s.name.clone(),
-            times: s.times.clone(),
-            values: s.values.clone(),
-            noise: Some(s.noise),
-        };
-        let channels = m.series.iter().map(channel).collect();
-        parts.cases[index].experiment = Some(Experiment { channels, role: m.role, ..Experiment::default() });
-        for local in &m.locals {
-            parts.jobs[index].parameters[local.parameter] =
-                ParameterSource::Tuner { tuner: parts.tuners.len(), factor: 1.0 };
-            let parameter = subject.model.interface().parameters[local.parameter].variable.name.clone();
-            parts.tuners.push(Tuner {
-                name: format!("{}/{parameter}", m.name),
-                parameter,
-                start: local.start,
-                bounds: local.bounds,
-                scale: Scale::Linear,
-                grid: Grid::Continuous,
-                unit: Unit::one(),
-                case: Some(index),
-                active: true,
-                tie: None,
-                guessed: [false; 2],
-            });
+/// Parts of a study that a test may change.
+pub struct Parts {
+    pub task: DiagnosisTask,
+    pub cases: Vec<Case>,
+    pub tuners: Vec<Tuner>,
+    pub jobs: Vec<JobPlan>,
+}
+
+impl Parts {
+    /// The parts of the study that a subject could have been taken from.
+    pub fn of(subject: &Subject) -> Self {
+        let study = &subject.study;
+        let (mut cases, mut tuners, mut jobs) =
+            (study.cases().to_vec(), study.tuners().to_vec(), study.jobs().to_vec());
+        for (index, m) in subject.measurements.iter().enumerate() {
+            let channel = |s: &Series| Channel {
+                signal: s.name.clone(),
+                times: s.times.clone(),
+                values: s.values.clone(),
+                noise: Some(s.noise),
+            };
+            let channels = m.series.iter().map(channel).collect();
+            cases[index].experiment = Some(Experiment { channels, role: m.role, ..Experiment::default() });
+            for local in &m.locals {
+                jobs[index].parameters[local.parameter] = ParameterSource::Tuner { tuner: tuners.len(), factor: 1.0 };
+                let parameter = subject.model.interface().parameters[local.parameter].variable.name.clone();
+                tuners.push(Tuner {
+                    name: format!("{}/{parameter}", m.name),
+                    parameter,
+                    start: local.start,
+                    bounds: local.bounds,
+                    scale: Scale::Linear,
+                    grid: Grid::Continuous,
+                    unit: Unit::one(),
+                    case: Some(index),
+                    active: true,
+                    tie: None,
+                    guessed: [false; 2],
+                });
+            }
         }
+        Self { task: DiagnosisTask::default(), cases, tuners, jobs }
     }
-    Study::from_parts(parts)
+
+    /// The study of these parts and the model of a subject.
+    pub fn study(self, subject: &Subject) -> Study {
+        let models = vec![("plant".to_owned(), Arc::clone(&subject.model))];
+        Study::unchecked(self.task.into(), models, self.cases, self.tuners, self.jobs)
+    }
+}
+
+/// The study that a subject could have been taken from.
+pub fn study(subject: &Subject) -> Study {
+    Parts::of(subject).study(subject)
 }
 
 /// The subject's model fitted to its records by least squares, and the motion there.

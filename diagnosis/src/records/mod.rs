@@ -3,10 +3,13 @@
 
 mod gap;
 mod hygiene;
+mod measurement;
 mod quantum;
+mod sensor_noise;
 mod subject;
 
 pub(crate) use gap::{Gap, gap};
 pub use hygiene::noise_of;
+pub(crate) use measurement::{Local, Measurement, Series};
 pub(crate) use quantum::quantum;
-pub(crate) use subject::{Local, Measurement, Series, Subject, task_of};
+pub(crate) use subject::{Subject, task_of};

@@ -1,17 +1,17 @@
 //! What is diagnosed: the model, its unknowns, and the experiments, taken from a study.
 
-use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 use mops_core::{
-    Case, Job, Model, Role, Study, StudyError,
+    Job, Model, Role, Study, StudyError,
     effect::Port,
-    study::{ParameterSource, Scale},
+    study::{Scale, Tuner},
     task::DiagnosisTask,
 };
 use mops_language::{Dual, Scalar};
 
-use super::hygiene::{noise_of, without_spikes};
+use super::measurement::{Measurement, Series};
+use super::sensor_noise::SensorNoise;
 use crate::settings::Settings;
 
 /// Error of a step of a simulation, noises. Basis: an error of a few hundredths of the noise is indistinguishable from
@@ -20,55 +20,6 @@ const STEP_ERROR: f64 = 0.03;
 
 /// Loosest relative tolerance of a simulation. Basis: an assumption.
 const LOOSEST: f64 = 1e-5;
-
-/// A measured signal.
-#[derive(Debug, Clone)]
-pub struct Series {
-    /// The signal, by its index in the interface of the model.
-    pub signal: usize,
-    /// Its name.
-    pub name: String,
-    /// Its unit.
-    pub unit: String,
-    /// Times, s.
-    pub times: Vec<f64>,
-    /// Samples, in the unit of the signal.
-    pub values: Vec<f64>,
-    /// Standard deviation of the noise.
-    pub noise: f64,
-}
-
-/// An unknown of one experiment: a parameter of the model.
-#[derive(Debug, Clone, Copy)]
-pub struct Local {
-    /// Its index among the parameters of the model.
-    pub parameter: usize,
-    /// Smallest and largest value.
-    pub bounds: [f64; 2],
-    /// First guess.
-    pub start: f64,
-    /// Typical size of a change.
-    pub scale: f64,
-}
-
-/// An experiment.
-#[derive(Debug, Clone)]
-pub struct Measurement {
-    /// Name.
-    pub name: String,
-    /// Role.
-    pub role: Role,
-    /// Inputs.
-    pub case: Case,
-    /// Index into the jobs of the study.
-    pub job: usize,
-    /// What is unknown of it: start values.
-    pub locals: Vec<Local>,
-    /// What was measured.
-    pub series: Vec<Series>,
-    /// Its end, s.
-    pub horizon: f64,
-}
 
 /// What is diagnosed.
 #[derive(Clone)]
@@ -104,6 +55,53 @@ pub(crate) fn task_of(study: &Study) -> DiagnosisTask {
     study.options::<DiagnosisTask>().cloned().unwrap_or_default()
 }
 
+/// Returns the jobs of a study with measured channels, and the index of their model.
+fn jobs_of(study: &Study) -> Result<(Vec<usize>, usize), StudyError> {
+    let is_measured = |job: &usize| {
+        let case = &study.cases()[study.jobs()[*job].case];
+        case.experiment.as_ref().is_some_and(|e| !e.channels.is_empty())
+    };
+    let jobs: Vec<usize> = (0..study.jobs().len()).filter(is_measured).collect();
+    let Some(&first) = jobs.first() else {
+        return Err(StudyError::new("experiments", "a diagnosis needs measured channels")
+            .with_help("add an experiment with `channels`"));
+    };
+    let index = study.jobs()[first].model;
+    if jobs.iter().any(|&job| study.jobs()[job].model != index) {
+        let fact = "a diagnosis looks at one model, and the experiments belong to several";
+        return Err(StudyError::new("models", fact).with_help("keep one model in the study"));
+    }
+    Ok((jobs, index))
+}
+
+/// Checks that effects can be added to a model, and that it has a linear system along a motion.
+fn check(name: &str, model: &dyn Model) -> Result<(), StudyError> {
+    if let Some(why) = model.not_linear() {
+        let fact = format!("the model `{name}` cannot be diagnosed: {why}");
+        return Err(StudyError::new("models", fact).with_help("calibrate it with `mops run`"));
+    }
+    if model.ported().is_none() && model.augmented().is_none() {
+        let fact = format!("the model `{name}` does not open its equations: no effect can be added to it");
+        return Err(StudyError::new("models", fact).with_help("`mops check` lists the places of the models of a study"));
+    }
+    Ok(())
+}
+
+/// Returns what a reader should know of the windows of records, given the parameters of the model.
+fn notes_on_windows(model: &dyn Model, parameters: &[f64]) -> Vec<String> {
+    let mut notes = Vec::new();
+    if model.clocks(parameters).is_ok_and(|clocks| !clocks.is_empty()) {
+        notes.push("windows of a record start with the phase of each clock; its memory is fitted".to_owned());
+    }
+    if model.delays(parameters).is_ok_and(|delays| !delays.is_empty()) {
+        notes.push(
+            "before a window of a record, delayed inputs have their recorded values, and delayed states those at its start"
+                .to_owned(),
+        );
+    }
+    notes
+}
+
 impl Subject {
     /// Takes it from a study.
     ///
@@ -111,144 +109,19 @@ impl Subject {
     /// No experiment for calibration, no channels, several models, or a model without places for effects or without a
     /// linearisation.
     pub fn new(study: &Study, settings: &Settings) -> Result<Self, StudyError> {
-        let measured = |job: &usize| {
-            let case = &study.cases()[study.jobs()[*job].case];
-            case.experiment.as_ref().is_some_and(|e| !e.channels.is_empty())
-        };
-        let jobs: Vec<usize> = (0..study.jobs().len()).filter(measured).collect();
-        let Some(&first) = jobs.first() else {
-            return Err(StudyError::new("experiments", "a diagnosis needs measured channels")
-                .with_help("add an experiment with `channels`"));
-        };
-        let index = study.jobs()[first].model;
-        if jobs.iter().any(|&job| study.jobs()[job].model != index) {
-            return Err(StudyError::new(
-                "models",
-                "a diagnosis looks at one model, and the experiments belong to several",
-            )
-            .with_help("keep one model in the study"));
-        }
+        let (jobs, index) = jobs_of(study)?;
         let (name, model) = &study.models()[index];
-        if let Some(why) = model.not_linear() {
-            let fact = format!("the model `{name}` cannot be diagnosed: {why}");
-            return Err(StudyError::new("models", fact).with_help("calibrate it with `mops run`"));
-        }
-        if model.ported().is_none() && model.augmented().is_none() {
-            let fact = format!("the model `{name}` does not open its equations: no effect can be added to it");
-            return Err(
-                StudyError::new("models", fact).with_help("`mops check` lists the places of the models of a study")
-            );
-        }
-        let globals: Vec<usize> = (0..study.tuners().len())
-            .filter(|&i| {
-                study.tuners()[i].case.is_none() && study.tuners()[i].active && study.tuners()[i].tie.is_none()
-            })
-            .collect();
+        check(name, model.as_ref())?;
+        let is_global = |tuner: &Tuner| tuner.case.is_none() && tuner.active && tuner.tie.is_none();
+        let globals = (0..study.tuners().len()).filter(|&i| is_global(&study.tuners()[i])).collect();
+        let noise = SensorNoise::of(study, &jobs);
         let mut notes = Vec::new();
-        let channels = || {
-            let cases = jobs.iter().map(|&job| &study.cases()[study.jobs()[job].case]);
-            cases.flat_map(|case| case.experiment.iter().flat_map(|e| &e.channels).map(move |channel| (case, channel)))
-        };
-        // One noise for each sensor, for all experiments that give none. Validation decides nothing, unless there is
-        // nothing else.
-        let estimated = |signal: &str| {
-            let of_roles = |only_validation: bool| {
-                let is_of = |case: &Case| {
-                    case.experiment.as_ref().is_some_and(|e| (e.role == Role::Validation) == only_validation)
-                };
-                let of = channels().filter(|(case, channel)| channel.signal == signal && is_of(case));
-                let records: Vec<(&[f64], &[f64])> = of.map(|(_, c)| (&c.times[..], &c.values[..])).collect();
-                noise_of(&records)
-            };
-            of_roles(false).or_else(|| of_roles(true))
-        };
-        let mut estimates: BTreeMap<&str, Option<f64>> = BTreeMap::new();
-        for (_, channel) in channels() {
-            estimates.entry(&channel.signal).or_insert_with(|| estimated(&channel.signal));
-        }
-        let mut measurements = Vec::new();
-        for &job in &jobs {
-            let plan = &study.jobs()[job];
-            let case = &study.cases()[plan.case];
-            let experiment = case.experiment.as_ref().expect("it was looked for");
-            let mut series = Vec::new();
-            for channel in &experiment.channels {
-                let signals = &model.interface().signals;
-                let signal = signals.iter().position(|s| s.name == channel.signal).expect("checked by the study");
-                let estimate = estimates[channel.signal.as_str()];
-                let noise = channel.noise.or(estimate).ok_or_else(|| {
-                    let fact = "the noise cannot be estimated from too few samples, or from samples that never change";
-                    StudyError::new(format!("experiments.{}.channels.{}", case.name, channel.signal), fact)
-                        .with_help("give its `noise`, the standard deviation")
-                })?;
-                let largest = estimate.map_or(noise, |estimate| noise.max(estimate));
-                let (times, values, dropped) = without_spikes(&channel.times, &channel.values, largest);
-                if dropped > 0 {
-                    let (samples, are) = if dropped == 1 {
-                        ("sample", "stands alone, far from its neighbours, and is")
-                    } else {
-                        ("samples", "stand alone, far from their neighbours, and are")
-                    };
-                    notes
-                        .push(format!("{dropped} {samples} of `{}` in `{}` {are} left out", channel.signal, case.name));
-                }
-                let (name, unit) = (channel.signal.clone(), signals[signal].unit.to_string());
-                series.push(Series { signal, name, unit, times, values, noise });
-            }
-            let horizon = series.iter().filter_map(|s| s.times.last().copied()).fold(0.0, f64::max);
-            let mut locals = Vec::new();
-            for (parameter, source) in plan.parameters.iter().enumerate() {
-                let ParameterSource::Tuner { tuner, factor } = *source else { continue };
-                let t = &study.tuners()[tuner];
-                if t.case == Some(plan.case) && t.active && t.tie.is_none() {
-                    let mut bounds = t.bounds.map(|b| b * factor);
-                    let scale = ((bounds[1] - bounds[0]) / 20.0).abs();
-                    // A sensor that saturates or is off lets a start value lie far from what it shows.
-                    for (end, _) in t.guessed.iter().enumerate().filter(|(_, guessed)| **guessed) {
-                        bounds[end] = model.interface().parameters[parameter].range[end];
-                    }
-                    locals.push(Local { parameter, bounds, start: t.start * factor, scale });
-                }
-            }
-            let case = case.clone();
-            measurements.push(Measurement {
-                name: case.name.clone(),
-                role: experiment.role,
-                case,
-                job,
-                locals,
-                series,
-                horizon,
-            });
-        }
-        for (signal, noise) in estimates.iter().filter_map(|(signal, noise)| Some((signal, (*noise)?))) {
-            let without: Vec<&str> = channels()
-                .filter(|(_, channel)| channel.signal == *signal && channel.noise.is_none())
-                .map(|(case, _)| case.name.as_str())
-                .collect();
-            let Some(unit) = model.interface().signals.iter().find(|s| s.name == *signal).map(|s| &s.unit) else {
-                continue;
-            };
-            let experiments = match (without.len(), measurements.len()) {
-                (0, _) => continue,
-                (1, 1) => String::new(),
-                (count, all) if count == all => format!(" of {count} experiments"),
-                _ => format!(" of {}", without.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")),
-            };
-            notes.push(format!(
-                "the noise of `{signal}` was estimated from neighbouring samples{experiments}: {noise:.3e} {unit}"
-            ));
-        }
-        let parameters = study.parameters(&study.jobs()[first], &study.start());
-        if model.clocks(&parameters).is_ok_and(|clocks| !clocks.is_empty()) {
-            notes.push("windows of a record start with the phase of each clock; its memory is fitted".to_owned());
-        }
-        if model.delays(&parameters).is_ok_and(|delays| !delays.is_empty()) {
-            notes.push(
-                "before a window of a record, delayed inputs have their recorded values, and delayed states those at its start"
-                    .to_owned(),
-            );
-        }
+        let measurements: Vec<Measurement> = jobs
+            .iter()
+            .map(|&job| Measurement::new(study, job, model.as_ref(), &noise, &mut notes))
+            .collect::<Result<_, _>>()?;
+        notes.extend(noise.notes(study, &jobs, model.interface()));
+        notes.extend(notes_on_windows(model.as_ref(), &study.parameters(&study.jobs()[jobs[0]], &study.start())));
         if !measurements.iter().any(|m| m.role == Role::Calibration) {
             return Err(StudyError::new("experiments", "no experiment is for calibration")
                 .with_help("give one the role \"calibration\""));

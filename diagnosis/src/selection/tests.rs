@@ -1,6 +1,6 @@
 //! Selections on data that the tests compute themselves.
 
-use mops_core::{Input, Role, Study, case::Hold, task::DiagnosisTask};
+use mops_core::{Input, Role, case::Hold, task::DiagnosisTask};
 use mops_math as math;
 
 use super::baseline::baseline;
@@ -9,7 +9,7 @@ use super::{Conclusion, FittedSet, FittedSets, Forecasts, Key, Verdict};
 use crate::estimation::ErrorModel;
 use crate::fit::Meter;
 use crate::records::Subject;
-use crate::testing::{Record, catalogue, integrated, selected, study, subject, white};
+use crate::testing::{Parts, Record, catalogue, integrated, selected, subject, white};
 use crate::{Options, diagnose};
 
 const OSCILLATOR: &str = r#"
@@ -170,10 +170,9 @@ fn given_effects_are_in_every_set_and_the_search_adds_others() {
     let both = |x: f64, v: f64| spring(x, v) - 0.4 * v * v.abs();
     let subject = recorded(both, 0.0, &BOTH, &[0.2, 5.0, 0.4, 0.1]);
     let diagnosed = |with: &str| {
-        let mut parts = study(&subject).into_parts();
-        parts.task = DiagnosisTask { with: vec![with.to_owned()], ..DiagnosisTask::default() }.into();
+        let task = DiagnosisTask { with: vec![with.to_owned()], ..DiagnosisTask::default() };
         diagnose(
-            &Study::from_parts(parts),
+            &Parts { task, ..Parts::of(&subject) }.study(&subject),
             &catalogue(&TRIED),
             &Options { max_effects: 2, level: 0.05, ..Options::default() },
             &(),

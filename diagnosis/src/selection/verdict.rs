@@ -78,7 +78,7 @@ pub struct Verdict {
 
 const SOME: f64 = 0.01;
 
-/// Decides on the sets of a sets.
+/// Decides which of the sets that forecast well is chosen, and what is claimed of it.
 pub fn decide(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> Verdict {
     let settings = &sets.refit.subject.settings;
     let nothing = Key::new();

@@ -1,8 +1,6 @@
 //! A bound that is too near looks like an effect that is missing.
 
-use mops_core::Study;
-
-use crate::testing::{Record, integrated, study, subject};
+use crate::testing::{Parts, Record, integrated, subject};
 use crate::{Options, diagnose};
 
 const DECAY: &str = r#"
@@ -16,9 +14,9 @@ fn a_declared_parameter_that_its_bound_stops_is_reported() {
     let states = integrated(|_, x: &[f64; 2]| [-0.5 * x[0], 0.0], [2.0, 0.0], 0.05, 100);
     let subject = subject(DECAY, &[0.35, 2.0], 1, vec![Record::of_first("x", &states, 0.05, 0.01, "decay")]);
     let notes = |largest: f64| {
-        let mut parts = study(&subject).into_parts();
+        let mut parts = Parts::of(&subject);
         parts.tuners[0].bounds = [0.1, largest];
-        let study = Study::from_parts(parts);
+        let study = parts.study(&subject);
         diagnose(&study, &[], &Options { max_effects: 1, level: 0.01, ..Options::default() }, &())
             .expect("it simulates")
             .notes

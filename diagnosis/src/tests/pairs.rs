@@ -5,7 +5,7 @@ use std::sync::Arc;
 use mops_core::{Effect, Role, Study};
 use mops_math as math;
 
-use crate::testing::{Record, catalogue, integrated, study, subject};
+use crate::testing::{Parts, Record, catalogue, integrated, subject};
 use crate::{Options, diagnose};
 use mops_outcome::diagnosis::Diagnosis;
 
@@ -42,10 +42,10 @@ pub fn swings() -> Study {
     for (measurement, start) in subject.measurements.iter_mut().zip([2.4, 1.6, 2.0]) {
         measurement.locals[0].start = start;
     }
-    let mut parts = study(&subject).into_parts();
+    let mut parts = Parts::of(&subject);
     // Friction takes energy: the coefficient is not negative.
     parts.tuners[1].bounds = [0.0, 1.0];
-    Study::from_parts(parts)
+    parts.study(&subject)
 }
 
 #[test]

@@ -508,7 +508,6 @@ pub(super) fn own_usage(row: &Row, study: &Study) -> Usage {
     if study.case_of(row).role() == Role::Calibration { row.usage } else { Usage::Monitor }
 }
 
-/// Returns the dimensions and kinds of the problem, without residuals.
 /// Returns the index of the objective of every minimised row, in the order of the rows.
 pub(super) fn groups(objectives: &[FrontObjective]) -> Vec<usize> {
     let rows = objectives.iter().enumerate().flat_map(|(k, objective)| objective.rows.iter().map(move |&row| (row, k)));
@@ -517,6 +516,7 @@ pub(super) fn groups(objectives: &[FrontObjective]) -> Vec<usize> {
     rows.into_iter().map(|(_, objective)| objective).collect()
 }
 
+/// Returns the dimensions and kinds of the problem, without residuals.
 pub(super) fn shape(study: &Study, active: &[usize], usage: impl Fn(&Row, &Study) -> Usage) -> Shape {
     let rows: Vec<(Usage, f64)> = study.rows.iter().map(|row| (usage(row, study), row.weight)).collect();
     let spacing = active.iter().map(|&i| study.tuners[i].spacing()).collect();

@@ -24,4 +24,4 @@ pub use scenarios::Scenario;
 pub use uncertain::{DistributionBuilder, UncertainBuilder};
 
 pub use rows::{JobPlan, ParameterSource, Row};
-pub use valid::{Study, StudyParts};
+pub use valid::Study;

@@ -155,100 +155,32 @@ impl Study {
         channel.values = values;
     }
 
-    /// Assembles a study from parts that nobody has checked, for tests.
+    /// Assembles a study without criteria from parts that nobody has checked, for tests.
     #[doc(hidden)]
-    pub fn from_parts(parts: StudyParts) -> Self {
-        let StudyParts {
-            name,
-            task,
-            options,
-            uncertain,
-            objective,
-            seed,
-            models,
-            fixed,
-            cases,
-            tuners,
-            rows,
-            jobs,
-            warnings,
-            notes,
-        } = parts;
+    pub fn unchecked(
+        task: Task,
+        models: Vec<(String, Arc<dyn Model>)>,
+        cases: Vec<Case>,
+        tuners: Vec<Tuner>,
+        jobs: Vec<JobPlan>,
+    ) -> Self {
         Self {
-            name,
+            name: String::new(),
             task,
-            options,
-            uncertain,
-            objective,
-            seed,
+            options: Vec::new(),
+            uncertain: Vec::new(),
+            objective: Objective::default(),
+            seed: 1,
             models,
-            fixed,
+            fixed: Vec::new(),
             cases,
             tuners,
-            rows,
+            rows: Vec::new(),
             jobs,
-            warnings,
-            notes,
+            warnings: Vec::new(),
+            notes: Vec::new(),
         }
     }
-
-    /// Returns the parts, to change what has no method, for tests.
-    #[doc(hidden)]
-    pub fn into_parts(self) -> StudyParts {
-        let Self {
-            name,
-            task,
-            options,
-            uncertain,
-            objective,
-            seed,
-            models,
-            fixed,
-            cases,
-            tuners,
-            rows,
-            jobs,
-            warnings,
-            notes,
-        } = self;
-        StudyParts {
-            name,
-            task,
-            options,
-            uncertain,
-            objective,
-            seed,
-            models,
-            fixed,
-            cases,
-            tuners,
-            rows,
-            jobs,
-            warnings,
-            notes,
-        }
-    }
-}
-
-/// Parts of [`Study::from_parts`]; their meaning is that of the methods of [`Study`].
-#[doc(hidden)]
-#[allow(missing_docs)]
-#[derive(Clone, Default)]
-pub struct StudyParts {
-    pub name: String,
-    pub task: Task,
-    pub options: Vec<Task>,
-    pub uncertain: Vec<Uncertain>,
-    pub objective: Objective,
-    pub seed: u64,
-    pub models: Vec<(String, Arc<dyn Model>)>,
-    pub fixed: Vec<Vec<(String, f64)>>,
-    pub cases: Vec<Case>,
-    pub tuners: Vec<Tuner>,
-    pub rows: Vec<Row>,
-    pub jobs: Vec<JobPlan>,
-    pub warnings: Vec<String>,
-    pub notes: Vec<String>,
 }
 
 impl Study {

@@ -20,8 +20,60 @@ pub(super) fn build_tuner(
     tuners: &mut Vec<Tuner>,
 ) -> Result<(), StudyError> {
     let known: Vec<&Parameter> = models.iter().flat_map(|(_, m)| &m.interface().parameters).collect();
-    let parameter = known.iter().find(|p| p.variable.name == name);
-    let unit = match (&draft.unit, parameter) {
+    let parameter = known.iter().find(|p| p.variable.name == name).copied();
+    let unit = unit_of(name, draft, parameter)?;
+    let allowed = Allowed::of(draft, &unit)?;
+    let elsewhere = own_starts(draft, cases, |case, quantity| {
+        let start = in_unit(draft, quantity, &unit).map_err(|m| m.within(case))?;
+        allowed.check_start(case, start, &unit)?;
+        if allowed.is_fixed || allowed.grid.has(start) {
+            return Ok(start);
+        }
+        Err(StudyError::new(case, format!("{} is not an allowed value of the tuner", unit.amount(start)))
+            .with_help("start at an integer, or at one of `values`"))
+    })?;
+    allowed.check_scale(name, draft.scale, &unit)?;
+    if let Some(parameter) = parameter {
+        let factor = unit.factor_to(&parameter.variable.unit).expect("units are compatible");
+        for (key, bound) in ["min", "max"].into_iter().zip(allowed.bounds) {
+            if bound.is_finite() {
+                check_range(bound * factor, parameter).map_err(|m| m.within(key))?;
+            }
+        }
+    }
+    let Allowed { start, bounds, grid, is_fixed } = allowed;
+    let tuner = Tuner {
+        name: name.to_owned(),
+        parameter: name.to_owned(),
+        start,
+        bounds,
+        scale: draft.scale,
+        grid,
+        unit,
+        case: None,
+        active: !is_fixed,
+        tie: None,
+        guessed: [false; 2],
+    };
+    let mut separate = separate_in(draft, cases)?;
+    // A common value of experiments that estimate nothing would be free: each has its own, from its own data.
+    let others = || (0..cases.len()).filter(|case| !separate.contains(case));
+    if !separate.is_empty() && others().all(|case| cases[case].role() != Role::Calibration) {
+        separate.extend(others().collect::<Vec<_>>());
+    }
+    if separate.is_empty() || separate.len() < cases.len() {
+        tuners.push(tuner.clone());
+    }
+    for (index, case) in cases.iter().enumerate().filter(|(index, _)| separate.contains(index)) {
+        let start = elsewhere.iter().find(|(known, _)| *known == index).map_or(start, |&(_, start)| start);
+        tuners.push(Tuner { name: format!("{}/{name}", case.name), case: Some(index), start, ..tuner.clone() });
+    }
+    Ok(())
+}
+
+/// Returns the unit of the tuner of a parameter, if there is one of this name.
+fn unit_of(name: &str, draft: &TunerBuilder, parameter: Option<&Parameter>) -> Result<Unit, StudyError> {
+    Ok(match (&draft.unit, parameter) {
         (Some(unit), Some(p)) if !unit.is_compatible(&p.variable.unit) => {
             return Err(StudyError::new(
                 "unit",
@@ -40,147 +92,146 @@ pub(super) fn build_tuner(
         (Some(unit), None) => unit.clone(),
         (None, Some(p)) => p.variable.unit.clone(),
         (None, None) => Unit::one(),
-    };
-    // A number without a unit is in the unit of the tuner, even on another temperature scale.
-    let converted = |quantity: &Quantity, unit: &Unit| {
-        let own = quantity.unit.clone().or_else(|| draft.unit.clone());
-        converted(&Quantity { unit: own, ..quantity.clone() }, unit)
-    };
-    let value = |key: &str, quantity: &Option<Quantity>| -> Result<Option<f64>, StudyError> {
-        let Some(quantity) = quantity else { return Ok(None) };
-        let value = converted(quantity, &unit).map_err(|m| m.within(key))?;
-        if value.is_finite() {
-            Ok(Some(value))
-        } else {
-            Err(StudyError::new(key, format!("`{key}` must be a finite number, not {value}"))
-                .with_help("every tuner needs finite bounds"))
+    })
+}
+
+/// Returns a quantity in the unit of the tuner. A number without a unit is in the unit that the draft gives, even on
+/// another temperature scale.
+fn in_unit(draft: &TunerBuilder, quantity: &Quantity, unit: &Unit) -> Result<f64, StudyError> {
+    let own = quantity.unit.clone().or_else(|| draft.unit.clone());
+    converted(&Quantity { unit: own, ..quantity.clone() }, unit)
+}
+
+/// Values that a tuner may have.
+struct Allowed {
+    /// Initial guess; NaN for a tied tuner.
+    start: f64,
+    bounds: [f64; 2],
+    grid: Grid,
+    /// True for a tuner that no solver changes.
+    is_fixed: bool,
+}
+
+impl Allowed {
+    /// Returns the values that a draft allows, in the unit of the tuner.
+    fn of(draft: &TunerBuilder, unit: &Unit) -> Result<Self, StudyError> {
+        let value = |key: &str, quantity: &Option<Quantity>| -> Result<Option<f64>, StudyError> {
+            let Some(quantity) = quantity else { return Ok(None) };
+            let value = in_unit(draft, quantity, unit).map_err(|m| m.within(key))?;
+            if value.is_finite() {
+                Ok(Some(value))
+            } else {
+                Err(StudyError::new(key, format!("`{key}` must be a finite number, not {value}"))
+                    .with_help("every tuner needs finite bounds"))
+            }
+        };
+        let (start, mut min, mut max) =
+            (value("start", &draft.start)?, value("min", &draft.min)?, value("max", &draft.max)?);
+        let mut grid = if draft.integer { Grid::Integer } else { Grid::Continuous };
+        if let Some(list) = &draft.values {
+            let values = listed(draft, list, unit)?;
+            (min, max) = (values.first().copied(), values.last().copied());
+            grid = Grid::List(values);
         }
-    };
-    let (start, mut min, mut max) =
-        (value("start", &draft.start)?, value("min", &draft.min)?, value("max", &draft.max)?);
-    let mut grid = if draft.integer { Grid::Integer } else { Grid::Continuous };
-    if let Some(list) = &draft.values {
-        let mut values: Vec<f64> = Vec::new();
-        for quantity in list {
-            values.push(converted(quantity, &unit).map_err(|m| m.within("values"))?);
+        if let (Some(_), Some((key, _))) =
+            (&draft.tie, [("start", start), ("min", min), ("max", max)].iter().find(|(_, v)| v.is_some()))
+        {
+            return Err(StudyError::new(*key, format!("`{key}` is not allowed for a tied tuner"))
+                .with_help(format!("remove `{key}`, or remove `tie`")));
         }
-        values.sort_by(f64::total_cmp);
-        values.dedup();
-        if values.len() < 2 {
-            return Err(StudyError::new("values", "a tuner needs at least two different values")
-                .with_help("add values, or set `active = false` to keep the only one"));
-        }
-        (min, max) = (values.first().copied(), values.last().copied());
-        grid = Grid::List(values);
+        let is_fixed = draft.inactive || draft.tie.is_some();
+        let missing = |fact: &str, help: &str| Err(StudyError::here(fact).with_help(help));
+        let start = match (start, &draft.tie) {
+            (Some(start), _) => start,
+            (None, Some(_)) => f64::NAN,
+            (None, None) => return missing("the tuner has no initial guess", "add `start = ...`"),
+        };
+        let bounds = match (min, max) {
+            (Some(min), Some(max)) => [min, max],
+            _ if is_fixed => [min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)],
+            (None, Some(_)) => return missing("the tuner has no lower bound", "add `min = ...`"),
+            (Some(_), None) => return missing("the tuner has no upper bound", "add `max = ...`"),
+            (None, None) => return missing("the tuner has no bounds", "add `min = ...` and `max = ...`"),
+        };
+        let allowed = Self { start, bounds, grid, is_fixed };
+        allowed.check(unit)?;
+        Ok(allowed)
     }
-    if let (Some(_), Some(key)) =
-        (&draft.tie, [("start", start), ("min", min), ("max", max)].iter().find(|(_, v)| v.is_some()))
-    {
-        return Err(StudyError::new(key.0, format!("`{}` is not allowed for a tied tuner", key.0))
-            .with_help(format!("remove `{}`, or remove `tie`", key.0)));
-    }
-    let fixed = draft.inactive || draft.tie.is_some();
-    let start = match (start, &draft.tie) {
-        (Some(start), _) => start,
-        (None, Some(_)) => f64::NAN,
-        (None, None) => return Err(StudyError::here("the tuner has no initial guess").with_help("add `start = ...`")),
-    };
-    let bounds = match (min, max) {
-        (Some(min), Some(max)) => [min, max],
-        _ if fixed => [min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)],
-        (None, Some(_)) => return Err(StudyError::here("the tuner has no lower bound").with_help("add `min = ...`")),
-        (Some(_), None) => return Err(StudyError::here("the tuner has no upper bound").with_help("add `max = ...`")),
-        (None, None) => {
-            return Err(StudyError::here("the tuner has no bounds").with_help("add `min = ...` and `max = ...`"));
+
+    /// Checks that the range is not empty, and that it contains the initial guess.
+    fn check(&self, unit: &Unit) -> Result<(), StudyError> {
+        let [min, max] = self.bounds;
+        if max <= min {
+            let fact = format!("the range is empty: min is {min}, max is {max}");
+            return Err(StudyError::new("max", fact).with_help(if max < min {
+                "swap the bounds"
+            } else {
+                "widen the range, or set `active = false` to keep the value"
+            }));
         }
-    };
-    let [min, max] = bounds;
-    if max <= min {
-        return Err(StudyError::new("max", format!("the range is empty: min is {min}, max is {max}")).with_help(
-            if max < min { "swap the bounds" } else { "widen the range, or set `active = false` to keep the value" },
-        ));
+        self.check_start("start", self.start, unit)?;
+        let off_grid = match &self.grid {
+            Grid::Continuous => None,
+            Grid::Integer => {
+                let is_fraction = |(_, value): &(&str, f64)| value.fract() != 0.0;
+                let found = [("start", self.start), ("min", min), ("max", max)].into_iter().find(is_fraction);
+                found.map(|(key, value)| {
+                    (key, value, "with `integer = true`, `start`, `min` and `max` must be integers")
+                })
+            }
+            Grid::List(values) => {
+                (!values.contains(&self.start)).then_some(("start", self.start, "start at one of `values`"))
+            }
+        };
+        if let Some((key, value, way_out)) = off_grid.filter(|_| !self.is_fixed) {
+            return Err(StudyError::new(key, format!("{} is not an allowed value of the tuner", unit.amount(value)))
+                .with_help(way_out));
+        }
+        Ok(())
     }
-    let check_start = |key: &str, start: f64| {
-        if fixed || (min..=max).contains(&start) {
+
+    /// Checks that the bounds contain an initial guess, which stands under this key.
+    fn check_start(&self, key: &str, start: f64, unit: &Unit) -> Result<(), StudyError> {
+        let [min, max] = self.bounds;
+        if self.is_fixed || (min..=max).contains(&start) {
             return Ok(());
         }
         let (start, max) = (unit.amount(start), unit.amount(max));
         Err(StudyError::new(key, format!("the initial guess {start} is outside the bounds, {min} to {max}"))
             .with_help("correct it, or widen the bounds"))
-    };
-    check_start("start", start)?;
-    let off_grid = match &grid {
-        Grid::Continuous => None,
-        Grid::Integer => {
-            let is_fraction = |(_, value): &(&str, f64)| value.fract() != 0.0;
-            let found = [("start", start), ("min", min), ("max", max)].into_iter().find(is_fraction);
-            found.map(|(key, value)| (key, value, "with `integer = true`, `start`, `min` and `max` must be integers"))
+    }
+
+    /// Checks that the range has a logarithm if its scale is logarithmic, and a width.
+    fn check_scale(&self, name: &str, scale: Scale, unit: &Unit) -> Result<(), StudyError> {
+        let [min, max] = self.bounds;
+        if scale == Scale::Log && min <= 0.0 && max >= 0.0 {
+            return Err(StudyError::new("scale", format!("a logarithmic range must exclude zero, but `min` is {min}"))
+                .with_help("raise `min`, or omit `scale`"));
         }
-        Grid::List(values) => (!values.contains(&start)).then_some(("start", start, "start at one of `values`")),
-    };
-    if let Some((key, value, way_out)) = off_grid.filter(|_| !fixed) {
-        return Err(StudyError::new(key, format!("{} is not an allowed value of the tuner", unit.amount(value)))
-            .with_help(way_out));
-    }
-    let elsewhere = own_starts(draft, cases, |case, quantity| {
-        let start = converted(quantity, &unit).map_err(|m| m.within(case))?;
-        check_start(case, start)?;
-        if fixed || grid.has(start) {
-            return Ok(start);
+        if scale == Scale::Log && unit.zero() != 0.0 {
+            return Err(StudyError::new("scale", ratio_of_temperatures(name, unit))
+                .with_help("omit `scale`, or declare the parameter in K"));
         }
-        Err(StudyError::new(case, format!("{} is not an allowed value of the tuner", unit.amount(start)))
-            .with_help("start at an integer, or at one of `values`"))
-    })?;
-    if draft.scale == Scale::Log && min <= 0.0 && max >= 0.0 {
-        return Err(StudyError::new("scale", format!("a logarithmic range must exclude zero, but `min` is {min}"))
-            .with_help("raise `min`, or omit `scale`"));
-    }
-    if draft.scale == Scale::Log && unit.zero() != 0.0 {
-        return Err(StudyError::new("scale", ratio_of_temperatures(name, &unit))
-            .with_help("omit `scale`, or declare the parameter in K"));
-    }
-    let width = if draft.scale == Scale::Log { math::ln(max / min) } else { max - min };
-    if !fixed && !width.is_finite() {
-        return Err(StudyError::new("max", format!("the range from {min:e} to {max:e} overflows"))
-            .with_help("narrow the bounds to plausible values"));
-    }
-    if let Some(parameter) = parameter {
-        let factor = unit.factor_to(&parameter.variable.unit).expect("units are compatible");
-        for (key, bound) in [("min", min), ("max", max)] {
-            if bound.is_finite() {
-                check_range(bound * factor, parameter).map_err(|m| m.within(key))?;
-            }
+        let width = if scale == Scale::Log { math::ln(max / min) } else { max - min };
+        if !self.is_fixed && !width.is_finite() {
+            return Err(StudyError::new("max", format!("the range from {min:e} to {max:e} overflows"))
+                .with_help("narrow the bounds to plausible values"));
         }
+        Ok(())
     }
-    let tuner = Tuner {
-        name: name.to_owned(),
-        parameter: name.to_owned(),
-        start,
-        bounds,
-        scale: draft.scale,
-        grid,
-        unit,
-        case: None,
-        active: !fixed,
-        tie: None,
-        guessed: [false; 2],
-    };
-    let mut separate = separate_in(draft, cases)?;
-    // A common value of experiments that estimate nothing would be free: each has its own, from its own data.
-    let others = || (0..cases.len()).filter(|case| !separate.contains(case));
-    if !separate.is_empty() && others().all(|case| cases[case].role() != Role::Calibration) {
-        separate.extend(others().collect::<Vec<_>>());
+}
+
+/// Returns the listed values in ascending order, each once.
+fn listed(draft: &TunerBuilder, list: &[Quantity], unit: &Unit) -> Result<Vec<f64>, StudyError> {
+    let values = list.iter().map(|quantity| in_unit(draft, quantity, unit).map_err(|m| m.within("values")));
+    let mut values: Vec<f64> = values.collect::<Result<_, _>>()?;
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    if values.len() < 2 {
+        return Err(StudyError::new("values", "a tuner needs at least two different values")
+            .with_help("add values, or set `active = false` to keep the only one"));
     }
-    if separate.is_empty() || separate.len() < cases.len() {
-        tuners.push(tuner.clone());
-    }
-    if !separate.is_empty() {
-        for (index, case) in cases.iter().enumerate().filter(|(index, _)| separate.contains(index)) {
-            let start = elsewhere.iter().find(|(known, _)| *known == index).map_or(start, |&(_, start)| start);
-            tuners.push(Tuner { name: format!("{}/{name}", case.name), case: Some(index), start, ..tuner.clone() });
-        }
-    }
-    Ok(())
+    Ok(values)
 }
 
 /// Returns the cases with a separate tuner, by index.
