@@ -206,3 +206,10 @@ fn a_play_behind_a_quantisation_is_refused() {
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(2) && message.contains("cannot follow the staircase"), "{message}");
 }
+
+#[test]
+fn the_readme_says_how_many_effects_there_are() {
+    let readme = std::fs::read_to_string("README.md").unwrap();
+    let count = mops::effects::effects().len();
+    assert!(readme.contains(&format!("screens {count} effects")), "there are {count} effects");
+}

@@ -185,7 +185,7 @@ fn pairs() -> Vec<Setup> {
 fn every_effect_has_an_independent_law() {
     for effect in mops::effects::effects() {
         let (name, parameters) = (effect.name(), effect.parameters().len());
-        assert!(mops_testbed::twins::has_law(name, parameters), "{name}");
+        assert!(mops_testbed::twins::has_law(name, parameters), "`{name}` needs its law in tests/testbed/src/twins");
     }
 }
 

@@ -80,8 +80,10 @@ fn at_joints(effect: &dyn Effect) -> bool {
 
 #[test]
 fn names_are_unique_and_in_kebab_case() {
-    let names: BTreeSet<&str> = effects().iter().map(|e| e.name()).collect();
-    assert_eq!(names.len(), effects().len());
+    let mut names = BTreeSet::new();
+    for effect in effects() {
+        assert!(names.insert(effect.name()), "two effects have the name `{}`", effect.name());
+    }
     let plain = |name: &&str| name.chars().all(|c| c.is_ascii_lowercase() || c == '-') && !name.starts_with('-');
     assert!(names.iter().all(plain), "{names:?}");
 }
@@ -104,7 +106,10 @@ fn only_the_first_strength_has_a_null_value_and_it_is_within_the_bounds() {
         let [first, shapes @ ..] = effect.parameters() else { panic!("{} has no parameter", effect.name()) };
         let neutral = first.null_value.expect("the first parameter makes it vanish");
         assert!(first.bounds[0] <= neutral && neutral <= first.bounds[1], "{}", effect.name());
-        assert!(shapes.iter().all(|shape| shape.null_value.is_none()), "{}", effect.name());
+        for shape in shapes {
+            let fact = "only the first parameter is a strength: make this one a shape, such as a ratio to it";
+            assert!(shape.null_value.is_none(), "{}: `{}`: {fact}", effect.name(), shape.name);
+        }
         let names: BTreeSet<&str> = effect.parameters().iter().map(|s| s.name).collect();
         assert_eq!(names.len(), effect.parameters().len(), "{}", effect.name());
     }

@@ -24,6 +24,7 @@ enum Sort {
     Criteria,
     Solvers,
     Effects,
+    Tasks,
 }
 
 pub(super) fn list(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitCode, CommandError> {
@@ -46,12 +47,14 @@ pub(super) fn list(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     let criteria = catalogue.criteria.iter().map(|k| row(k.name, first_line((k.schema)())));
     let solvers = catalogue.solvers.iter().map(|k| row(k.name, first_line((k.schema)())));
     let effects = catalogue.effects.iter().map(|effect| row(effect.name(), first_statement(effect.about())));
+    let tasks = catalogue.tasks.iter().map(|task| row(task.name, task.about.trim_end_matches('.').to_owned()));
     let tables = [
         (Sort::Studies, "studies (mops run NAME)", studies.collect()),
         (Sort::Models, "models", models.collect()),
         (Sort::Criteria, "criteria", criteria.collect()),
         (Sort::Solvers, "solvers", solvers.collect::<Vec<_>>()),
         (Sort::Effects, "effects (mops diagnose STUDY)", effects.collect()),
+        (Sort::Tasks, "tasks (task = \"NAME\" in [study])", tasks.collect()),
     ];
     let wanted = tables.into_iter().filter(|(sort, ..)| arguments.what.is_none_or(|what| what == *sort));
     let text: Vec<String> = wanted.map(|(_, title, rows)| table(&[title, ""], &[], rows)).collect();

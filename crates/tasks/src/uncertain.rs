@@ -42,10 +42,21 @@ pub struct Subject {
     pub usage: Usage,
     /// Value that scales to 1; null without a demand.
     pub demand: Option<f64>,
+    /// True if the demand is a lower limit.
+    #[serde(skip)]
+    pub at_least: bool,
     /// Unit of the values.
     pub unit: String,
     /// Value for nominal parameters.
     pub nominal: f64,
+}
+
+impl Subject {
+    /// Returns the demand for a reader, without its unit; empty without a demand.
+    pub fn shown_demand(&self) -> String {
+        let limit = if self.at_least { "at least " } else { "" };
+        self.demand.map_or_else(String::new, |demand| format!("{limit}{}", number(demand)))
+    }
 }
 
 /// Worst cases over a box.
@@ -330,6 +341,7 @@ impl Subject {
             case: study.cases()[plan.case].name.clone(),
             usage: row.usage,
             demand: row.demand.limit(),
+            at_least: row.demand.asks_for_more(),
             unit: row.unit.to_string(),
             nominal,
         }

@@ -307,7 +307,8 @@ pub struct EffectParameter {
 }
 
 impl EffectParameter {
-    /// Creates a non-negative factor of the added term, with the null value 0.
+    /// Creates a non-negative factor of the added term, with the null value 0: the strength, which only the first
+    /// parameter of an effect is. At its null value the effect vanishes to the last bit, whatever the others are.
     pub const fn positive(name: &'static str, about: &'static str, dimension: Dimension) -> Self {
         Self {
             name,
@@ -324,7 +325,8 @@ impl EffectParameter {
         }
     }
 
-    /// Creates a factor of the added term of either sign, with the null value 0.
+    /// Creates a factor of the added term of either sign, with the null value 0; only the first parameter of an effect
+    /// is one.
     pub const fn signed(name: &'static str, about: &'static str, dimension: Dimension) -> Self {
         Self { bounds: [f64::NEG_INFINITY, f64::INFINITY], ..Self::positive(name, about, dimension) }
     }

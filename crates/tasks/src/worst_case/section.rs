@@ -63,7 +63,7 @@ pub(crate) fn table(list: &[WorstReport], names: &[UncertainReport]) -> Table {
         let mut row: Vec<Cell> = vec![
             of.criterion.clone().into(),
             of.case.clone().into(),
-            of.demand.map_or_else(String::new, number).into(),
+            of.shown_demand().into(),
             number(of.nominal).into(),
             Cell::strong(number(worst.value)),
             of.unit.clone().into(),
