@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use assert_cmd::cargo::cargo_bin_cmd;
 
-/// Cases of `mops-bench diagnosis` with the options of [`ROW`], 20 of each kind, chosen by their time alone: the first
-/// ones below ten seconds of a core, and the fastest of B.
+/// Cases of `mops-bench diagnosis` with [`OPTIONS`], 20 of each kind, chosen by their time alone: the first ones below
+/// ten seconds of a core, and the fastest of B.
 const CASES: &str = include_str!("rates.txt");
 
 /// Options that make the cases.
-const ROW: [&str; 7] = ["diagnosis", "--kinds", "A,B,C", "--per-kind", "30", "--seed", "1129"];
+const OPTIONS: [&str; 7] = ["diagnosis", "--kinds", "A,B,C", "--per-kind", "30", "--seed", "1129"];
 
 /// Numbers of answers to the cases of a kind.
 #[derive(Debug, Default, PartialEq)]
@@ -28,7 +28,7 @@ fn false_alarms_are_rare_and_missing_effects_are_found_in_class_and_place() {
     let out = folder.path().join("out");
     let names = CASES.lines().collect::<Vec<_>>().join(",");
     let mut bench = cargo_bin_cmd!("mops-bench");
-    bench.args(ROW).args(["--quiet", "--only", &names, "--out", out.to_str().unwrap()]).assert().success();
+    bench.args(OPTIONS).args(["--quiet", "--only", &names, "--out", out.to_str().unwrap()]).assert().success();
     let mut rates: BTreeMap<String, Rates> = BTreeMap::new();
     let mut table = csv::Reader::from_path(out.join("cases.csv")).unwrap();
     for row in table.deserialize::<BTreeMap<String, String>>() {

@@ -47,7 +47,7 @@ pub(super) fn list(catalogue: &Catalogue, arguments: &Arguments) -> Result<ExitC
     let criteria = catalogue.criteria.iter().map(|k| row(k.name, first_line((k.schema)())));
     let solvers = catalogue.solvers.iter().map(|k| row(k.name, first_line((k.schema)())));
     let effects = catalogue.effects.iter().map(|effect| row(effect.name(), first_statement(effect.about())));
-    let tasks = catalogue.tasks.iter().map(|task| row(task.name, task.about.trim_end_matches('.').to_owned()));
+    let tasks = catalogue.tasks.iter().map(|task| row(task.name, first_statement(task.about)));
     let tables = [
         (Sort::Studies, "studies (mops run NAME)", studies.collect()),
         (Sort::Models, "models", models.collect()),

@@ -5,8 +5,6 @@ mod opened;
 mod table;
 mod time_axis;
 
-use std::cell::RefCell;
-
 use mops_core::{
     case::Input,
     study::{CaseBuilder, Free, Measured, matches_pattern},
@@ -29,7 +27,7 @@ use time_axis::TimeAxis;
 /// Reads an experiment and its data: several experiments from several files, or if it is divided into windows.
 pub(super) fn read(name: &str, node: &Node<'_>, files: &dyn Files) -> Result<Vec<CaseBuilder>, Diagnostic> {
     let section: ExperimentSection = node.read()?;
-    let opened = Opened { files, known: RefCell::default() };
+    let opened = Opened::new(files);
     let mut found = Vec::new();
     for (own, path) in paths(name, node, &section, files)? {
         let key = if section.file.is_some() { "file" } else { "files" };
@@ -220,7 +218,7 @@ pub(super) fn recorded(
     column: &InputTable,
     files: &dyn Files,
 ) -> Result<(Input, Option<Unit>), Diagnostic> {
-    let file = Opened { files, known: RefCell::default() }.open(place, "path", path)?;
+    let file = Opened::new(files).open(place, "path", path)?;
     let keys = Elsewhere::of(&None, &column.time, &column.time_unit, &column.sample_time);
     let axis = TimeAxis::new(place, &file, keys.time, keys.unit, keys.sample_time, &column.column)?;
     file.increases(&axis.column, &axis.times, 0)?;

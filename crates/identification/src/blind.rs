@@ -175,26 +175,16 @@ mod tests {
     use nalgebra::DVector;
 
     use super::*;
+    use crate::coordinate::coordinates;
     use crate::sensitivity::{Sensitivity, TANGENTS};
 
     /// Returns the sensitivity of 200 residuals that depend on the tuners through these combinations, one gradient
     /// each.
     fn found(tuners: &[(&str, f64)], gradients: &[Vec<f64>]) -> Sensitivity {
-        let coordinates = tuners
-            .iter()
-            .map(|(name, value)| Coordinate {
-                name: (*name).into(),
-                value: *value,
-                range: 1.0,
-                span: 1.0,
-                unit: "m".into(),
-                counts_from_any_zero: false,
-            })
-            .collect();
         let signals =
             DMatrix::from_fn(200, gradients.len(), |t, i| math::sin(0.01 * (1.0 + i as f64) * t as f64 + i as f64));
         let slopes = DMatrix::from_columns(&gradients.iter().map(|g| DVector::from_vec(g.clone())).collect::<Vec<_>>());
-        Sensitivity::of(&(signals * slopes.transpose()), coordinates, TANGENTS)
+        Sensitivity::of(&(signals * slopes.transpose()), coordinates(tuners), TANGENTS)
     }
 
     fn invariants(tuners: &[(&str, f64)], gradients: &[Vec<f64>]) -> Vec<Invariant> {

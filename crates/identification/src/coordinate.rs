@@ -29,3 +29,17 @@ impl Coordinate {
         if self.is_by_range() { self.range } else { self.value.abs() }
     }
 }
+
+/// Returns dimensionless coordinates with these names and values, for tests.
+#[cfg(test)]
+pub(crate) fn coordinates(values: &[(&str, f64)]) -> Vec<Coordinate> {
+    let of = |(name, value): &(&str, f64)| Coordinate {
+        name: (*name).into(),
+        value: *value,
+        range: value.abs().max(1.0),
+        span: value.abs().max(1.0),
+        unit: "1".into(),
+        counts_from_any_zero: false,
+    };
+    values.iter().map(of).collect()
+}

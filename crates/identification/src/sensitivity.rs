@@ -210,19 +210,8 @@ fn eigen(matrix: &DMatrix<f64>) -> Eigen {
 mod tests {
     use super::*;
     use crate::blind::Invariant;
+    use crate::coordinate::coordinates;
     use mops_math as math;
-
-    pub(crate) fn coordinates(values: &[(&str, f64)]) -> Vec<Coordinate> {
-        let of = |(name, value): &(&str, f64)| Coordinate {
-            name: (*name).into(),
-            value: *value,
-            range: value.abs().max(1.0),
-            span: value.abs().max(1.0),
-            unit: "1".into(),
-            counts_from_any_zero: false,
-        };
-        values.iter().map(of).collect()
-    }
 
     /// Checks the published matrix for the inertia about the centre of mass and the mass of an arm, 0.1225 m apart.
     #[test]

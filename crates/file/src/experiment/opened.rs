@@ -18,11 +18,16 @@ use crate::tree::Node;
 
 /// Data files that an experiment has opened.
 pub(crate) struct Opened<'a> {
-    pub files: &'a dyn Files,
-    pub known: RefCell<Vec<(String, Arc<DataFile>)>>,
+    files: &'a dyn Files,
+    known: RefCell<Vec<(String, Arc<DataFile>)>>,
 }
 
-impl Opened<'_> {
+impl<'a> Opened<'a> {
+    /// Creates an empty list of files that are read from `files`.
+    pub fn new(files: &'a dyn Files) -> Self {
+        Self { files, known: RefCell::default() }
+    }
+
     /// Returns what a reader of the files of an experiment should know.
     pub fn remarks(&self, section: &ExperimentSection, main: &Table) -> Vec<String> {
         let of = |file: &DataFile| {
