@@ -8,7 +8,7 @@ use mops_outcome::diagnosis::Diagnosis;
 use crate::fit::Meter;
 use crate::records::{Subject, task_of};
 use crate::report::Findings;
-use crate::selection::{Forecasts, align, decide, prepare, with_given};
+use crate::selection::{Forecasts, align, decide, prepare, prepare_from, with_given, without_motion};
 use crate::settings::Settings;
 
 /// Options of a diagnosis.
@@ -43,10 +43,10 @@ pub fn diagnose(
     watch: &dyn Watch,
 ) -> Result<Diagnosis, StudyError> {
     let Options { max_effects, level, settings } = options;
-    let subject = Subject::new(study, settings)?;
     let (simulations, given) = (Meter::new(watch), task_of(study).with);
+    let (subject, start) = without_motion(Subject::new(study, settings)?, &simulations);
     // Fit of the nominal model, error models, coverage; screening and fits of single effects and pairs.
-    let (refit, nominal) = prepare(&subject, effects, &simulations)?;
+    let (refit, nominal) = prepare_from(&subject, start, effects, &simulations)?;
     let singles = with_given(&refit, nominal.clone(), &given, *max_effects, *level)?.with_single_effects();
     // Alignment: with inputs that act at other times the search begins again.
     let (aligned, alignment) = align(&singles).unzip();

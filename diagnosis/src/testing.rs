@@ -18,7 +18,7 @@ use crate::estimation::Errors;
 use crate::fit::pieces::{first_locals, pieces};
 use crate::fit::{Fit, Meter, Point, Variant, problem};
 use crate::motion::Trajectory;
-use crate::records::{Local, Measurement, Series, Subject};
+use crate::records::{Local, Measurement, SensorNoise, Series, Subject};
 use crate::selection::{FittedSets, Forecasts, Screening, Verdict, decide, estimation, prepare, with_given};
 use crate::settings::Settings;
 
@@ -81,6 +81,7 @@ pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Recor
             times: record.times.clone(),
             values,
             noise,
+            is_noise_estimated: false,
         });
         measurements.push(Measurement {
             name: case.name.clone(),
@@ -108,6 +109,7 @@ pub fn subject(text: &str, parameters: &[f64], starts: usize, records: Vec<Recor
         globals: (0..globals).collect(),
         measurements,
         notes: Vec::new(),
+        sensor_noise: SensorNoise::default(),
         pace: OnceLock::new(),
         tolerance: 0.0,
         settings: Settings::default(),

@@ -22,6 +22,7 @@ mod signs;
 mod starts;
 mod steps;
 mod stops;
+mod strokes;
 mod switched_on;
 mod tangents;
 mod undefined;

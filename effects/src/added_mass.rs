@@ -20,7 +20,7 @@ impl Definition for AddedMass {
     const FORMULA: &'static str = "-m q''";
     const SOURCE: &'static str = "H. Lamb, Hydrodynamics, 6th edition (Cambridge 1932), chapter VI";
     const CLASS: EffectClass = EffectClass::Inertial;
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::positive(
         "m",
         "mass or inertia",

@@ -28,7 +28,7 @@ impl Definition for AsymmetricFriction {
     // Coulomb friction and a constant force.
     const IS_SUM: bool = true;
     const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("c", "mean of both friction forces", Dimension::OUTPUT),
         EffectParameter::shape(

@@ -30,7 +30,7 @@ impl Definition for BoucWen {
                                   normalised as in M. Ismail, F. Ikhouane, J. Rodellar, The hysteresis Bouc-Wen model, \
                                   a survey, Archives of Computational Methods in Engineering 16 (2009)";
     const CLASS: EffectClass = EffectClass::Elastic;
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const ACTS_BETWEEN: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("c", "yield force", Dimension::OUTPUT),

@@ -20,7 +20,7 @@ impl Definition for ConstantForce {
     const FORMULA: &'static str = "f";
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), chapter 3";
     const CLASS: EffectClass = EffectClass::Bias;
-    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed, PortKind::Process];
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::signed("f", "added force, torque or flow", Dimension::OUTPUT)];
     const RARITY: u8 = 0;

@@ -24,7 +24,7 @@ impl Definition for CoulombFriction {
                                   compensation methods for the control of machines with friction, Automatica 30 (1994), section 2.1";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("c", "friction force", Dimension::OUTPUT)];
     const RARITY: u8 = 0;

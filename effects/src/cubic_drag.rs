@@ -19,7 +19,7 @@ impl Definition for CubicDrag {
     const FORMULA: &'static str = "-k v^3";
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 3";
     const CLASS: EffectClass = EffectClass::Dissipative;
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::positive(
         "k",
         "force per speed to the third power",

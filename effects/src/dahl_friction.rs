@@ -25,7 +25,7 @@ impl Definition for DahlFriction {
         "P. R. Dahl, A solid friction model, report TOR-0158(3107-18)-1, The Aerospace Corporation (1968)";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("c", "friction force", Dimension::OUTPUT),
         EffectParameter::shape(

@@ -21,7 +21,7 @@ impl Definition for DampingDrift {
     const SOURCE: &'static str =
         "R. Isermann, Fault-Diagnosis Systems (Springer 2006), chapter 5 (faults of parameters, abrupt and drifting)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::signed(
         "r",
         "change of force per speed, per time",

@@ -22,6 +22,8 @@ pub trait Definition: Send + Sync + 'static {
     const FORM_OF: Option<&'static str> = None;
     /// Value of [`Effect::ports`].
     const PORTS: &'static [PortKind];
+    /// Value of [`Effect::quantities`].
+    const QUANTITIES: &'static [&'static str] = &[];
     /// Value of [`Effect::second_port`].
     const SECOND_PORT: Option<PortKind> = None;
     /// Value of [`Effect::mutual`].
@@ -79,6 +81,9 @@ impl<D: Definition> Effect for Defined<D> {
     }
     fn form_of(&self) -> Option<&'static str> {
         D::FORM_OF
+    }
+    fn quantities(&self) -> &'static [&'static str] {
+        D::QUANTITIES
     }
     fn second_port(&self) -> Option<PortKind> {
         D::SECOND_PORT

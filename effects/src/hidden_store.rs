@@ -4,7 +4,7 @@ use mops_core::effect::{BoundEffect, Dimension, EffectClass, EffectParameter, In
 use mops_language::Scalar;
 
 use super::Definition;
-use super::terms::NOT_NEGATIVE;
+use super::terms::{NOT_NEGATIVE, STORED};
 
 /// Effect `hidden-store`.
 pub struct HiddenStore;
@@ -24,6 +24,7 @@ impl Definition for HiddenStore {
                                   buildings, Energy and Buildings 43 (2011)";
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const QUANTITIES: &'static [&'static str] = STORED;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("k", "exchange per difference", Dimension::OUTPUT.over(Dimension::POSITION)),
         EffectParameter::shape(

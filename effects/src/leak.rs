@@ -4,7 +4,7 @@ use mops_core::effect::{BoundEffect, Dimension, EffectClass, EffectParameter, In
 use mops_language::Scalar;
 
 use super::Definition;
-use super::terms::NOT_NEGATIVE;
+use super::terms::{CONTENTS, NOT_NEGATIVE};
 
 /// Effect `leak`.
 pub struct Leak;
@@ -22,6 +22,7 @@ impl Definition for Leak {
     const SOURCE: &'static str = "F. M. White, Fluid Mechanics, 7th edition (McGraw-Hill 2011), chapter 3 (Torricelli)";
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const QUANTITIES: &'static [&'static str] = CONTENTS;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("k", "outflow at a level of 1 above the hole", Dimension::OUTPUT),
         EffectParameter::shape(

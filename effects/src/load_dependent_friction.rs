@@ -26,7 +26,7 @@ impl Definition for LoadDependentFriction {
                                   Measurement, and Control 134 (2012)";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const SECOND_PORT: Option<PortKind> = Some(PortKind::Actuator);
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("mu", "friction force per input", Dimension::OUTPUT.over(Dimension::VALUE))];

@@ -29,7 +29,7 @@ impl Definition for LugreFriction {
                                   of systems with friction, IEEE Transactions on Automatic Control 40 (1995)";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("c", "friction force at high speed", Dimension::OUTPUT),
         EffectParameter::shape(

@@ -20,7 +20,7 @@ impl Definition for MassLoss {
     const FORMULA: &'static str = "r t q''; the loss is limited to 95 % of the moving mass";
     const SOURCE: &'static str = "F. O. Eke, Dynamics of variable mass systems, NASA/CR-1998-208246 (1998)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("r", "mass or inertia lost per time", Dimension::OUTPUT.over(Dimension::SPEED))];
     const IS_INERTIAL: bool = true;

@@ -4,7 +4,7 @@ use mops_core::effect::{BoundEffect, Dimension, EffectClass, EffectParameter, In
 use mops_language::Scalar;
 
 use super::Definition;
-use super::terms::power;
+use super::terms::{CONTENTS, power};
 
 /// Effect `orifice-exponent`.
 pub struct OrificeExponent;
@@ -22,6 +22,7 @@ impl Definition for OrificeExponent {
     const SOURCE: &'static str = "F. M. White, Fluid Mechanics, 7th edition (McGraw-Hill 2011), chapter 6 (orifices)";
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const QUANTITIES: &'static [&'static str] = CONTENTS;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("k", "outflow at a level of 1", Dimension::OUTPUT),
         EffectParameter::shape("n", "exponent", Dimension::ONE, [0.2, 3.0], InitialGrid::Plain(&[0.3, 0.75, 1.5])),

@@ -6,7 +6,7 @@ use mops_core::effect::{
 use mops_language::Scalar;
 
 use super::Definition;
-use super::terms::{ANY, over};
+use super::terms::{ANY, CONTENTS, over};
 
 /// Effect `overflow`.
 pub struct Overflow;
@@ -25,6 +25,7 @@ impl Definition for Overflow {
     const SOURCE: &'static str = "V. T. Chow, Open-Channel Hydraulics (McGraw-Hill 1959), chapter 14";
     const CLASS: EffectClass = EffectClass::Flow;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const QUANTITIES: &'static [&'static str] = CONTENTS;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("k", "outflow at a level of 1 above the edge", Dimension::OUTPUT)
             .restarted_from(&[1.0, 10.0]),

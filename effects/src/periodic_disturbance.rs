@@ -22,7 +22,7 @@ impl Definition for PeriodicDisturbance {
     const FORMULA: &'static str = "a sin(w t + phase)";
     const SOURCE: &'static str = "K. Ogata, Modern Control Engineering, 5th edition (Prentice Hall 2010), chapter 7";
     const CLASS: EffectClass = EffectClass::Periodic;
-    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed, PortKind::Process];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("a", "amplitude", Dimension::OUTPUT),
         EffectParameter::shape(

@@ -25,7 +25,7 @@ impl Definition for PowerFriction {
     const SOURCE: &'static str = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley 1979), chapter 3";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("c", "force at a speed of 1", Dimension::OUTPUT),
         EffectParameter::shape("p", "exponent", Dimension::ONE, [0.5, 4.0], InitialGrid::Plain(&[0.5, 1.5, 2.5])),

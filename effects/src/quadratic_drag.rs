@@ -19,7 +19,7 @@ impl Definition for QuadraticDrag {
     const FORMULA: &'static str = "-k v |v|";
     const SOURCE: &'static str = "S. F. Hoerner, Fluid-Dynamic Drag (1965)";
     const CLASS: EffectClass = EffectClass::Dissipative;
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("k", "force per squared speed", Dimension::OUTPUT.over(Dimension::SPEED.power(2)))];
     const RARITY: u8 = 0;

@@ -25,6 +25,7 @@ impl Definition for RadiationExchange {
     const CLASS: EffectClass = EffectClass::Dissipative;
     const FORM_OF: Option<&'static str> = Some("radiation-loss");
     const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const QUANTITIES: &'static [&'static str] = &["K"];
     const SECOND_PORT: Option<PortKind> = Some(PortKind::Actuator);
     const PARAMETERS: &'static [EffectParameter] = &[
         emission(),
@@ -33,7 +34,7 @@ impl Definition for RadiationExchange {
             "offset to the absolute temperature of state and input: 0, or 273.15 for degC",
             Dimension::POSITION,
             NOT_NEGATIVE,
-            InitialGrid::Plain(&[0.0, 273.15]),
+            InitialGrid::Zeros(&[0.0, 273.15]),
         )
         .of_kind(ParameterKind::Zero)
         .kept(),

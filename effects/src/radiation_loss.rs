@@ -25,6 +25,7 @@ impl Definition for RadiationLoss {
     const SOURCE: &'static str = RADIATION;
     const CLASS: EffectClass = EffectClass::Dissipative;
     const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const QUANTITIES: &'static [&'static str] = &["K"];
     const PARAMETERS: &'static [EffectParameter] = &[
         emission(),
         EffectParameter::shape(
@@ -39,7 +40,7 @@ impl Definition for RadiationLoss {
             "offset to the absolute temperature of the state: 0, 273.15 for degC, 293.15 relative to a room",
             Dimension::POSITION,
             NOT_NEGATIVE,
-            InitialGrid::Plain(&[0.0, 273.15, 293.15]),
+            InitialGrid::Zeros(&[0.0, 273.15, 293.15]),
         )
         .of_kind(ParameterKind::Zero)
         .kept(),

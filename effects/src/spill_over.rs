@@ -6,7 +6,7 @@ use mops_core::effect::{
 use mops_language::Scalar;
 
 use super::Definition;
-use super::terms::{ANY, NOT_NEGATIVE, over};
+use super::terms::{ANY, CONTENTS, NOT_NEGATIVE, over};
 
 /// Effect `spill-over`.
 pub struct SpillOver;
@@ -27,6 +27,7 @@ impl Definition for SpillOver {
     const CLASS: EffectClass = EffectClass::Flow;
     const FORM_OF: Option<&'static str> = Some("overflow");
     const PORTS: &'static [PortKind] = &[PortKind::Process];
+    const QUANTITIES: &'static [&'static str] = CONTENTS;
     const SECOND_PORT: Option<PortKind> = Some(PortKind::Process);
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("k", "outflow at a level of 1 above the edge", Dimension::OUTPUT)

@@ -31,7 +31,7 @@ impl Definition for TabulatedFriction {
                                   30 (1994), section 2";
     const CLASS: EffectClass = EffectClass::Dissipative;
     const CHARACTERISTIC: Option<Characteristic> = Some(Characteristic::Friction);
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::positive("c", "friction force at rest", Dimension::OUTPUT),
         EffectParameter::shape(

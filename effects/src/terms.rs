@@ -11,6 +11,12 @@ pub(super) const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 /// Bounds of a parameter that is not negative.
 pub(super) const NOT_NEGATIVE: [f64; 2] = [0.0, f64::INFINITY];
 
+/// Quantities of a store of matter: level, volume, mass, pressure.
+pub(super) const CONTENTS: &[&str] = &["m", "m^3", "kg", "Pa"];
+
+/// Quantities of a store of heat or matter.
+pub(super) const STORED: &[&str] = &["K", "m", "m^3", "kg", "Pa"];
+
 /// Returns the parameter for the phase of a sine, rad, with initial values at every quarter turn. The bounds extend one
 /// turn further, so that no fit stops at the end of the first turn.
 pub(super) const fn phase() -> EffectParameter {

@@ -123,7 +123,7 @@ fn first_trials_are_few_and_allowed() {
             let allowed = |values: &[f64]| values.iter().all(|v| of.bounds[0] <= *v && *v <= of.bounds[1]);
             match of.grid {
                 InitialGrid::Linear => assert!(of.null_value == Some(0.0), "{}: {}", effect.name(), of.name),
-                InitialGrid::Plain(values) | InitialGrid::Jumps(values) => {
+                InitialGrid::Plain(values) | InitialGrid::Jumps(values) | InitialGrid::Zeros(values) => {
                     assert!(allowed(values), "{}", effect.name());
                     count *= values.len();
                 }

@@ -20,7 +20,7 @@ impl Definition for ViscousFriction {
     const SOURCE: &'static str = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and \
                                   compensation methods for the control of machines with friction, Automatica 30 (1994), section 2.1";
     const CLASS: EffectClass = EffectClass::Dissipative;
-    const PORTS: &'static [PortKind] = &[PortKind::Joint];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed];
     const ACTS_BETWEEN: bool = true;
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::positive("d", "force per speed", Dimension::OUTPUT.over(Dimension::SPEED))];

@@ -22,7 +22,7 @@ impl Definition for WindGust {
     const SOURCE: &'static str =
         "Certification Specifications for Large Aeroplanes CS-25 (EASA), section 25.341 (discrete gust)";
     const CLASS: EffectClass = EffectClass::TimeVarying;
-    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Process];
+    const PORTS: &'static [PortKind] = &[PortKind::Joint, PortKind::Speed, PortKind::Process];
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed("a", "peak value", Dimension::OUTPUT),
         from(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]),

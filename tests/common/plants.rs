@@ -120,7 +120,10 @@ fn value(of: &EffectParameter, even: &mut Even) -> f64 {
         InitialGrid::Within(list) | InitialGrid::WithinAndGap(list) | InitialGrid::WithinSize(list) => {
             one_of(list) - 0.2
         }
-        InitialGrid::Plain(list) | InitialGrid::Jumps(list) | InitialGrid::PlainAndScaled(list, _) => one_of(list),
+        InitialGrid::Plain(list)
+        | InitialGrid::Jumps(list)
+        | InitialGrid::Zeros(list)
+        | InitialGrid::PlainAndScaled(list, _) => one_of(list),
         InitialGrid::Moments(list) => HORIZON * one_of(list),
         InitialGrid::Frequencies(_) => 4.0,
         InitialGrid::Steps => 0.05,

@@ -44,7 +44,8 @@ fn site(body: &Body, port: &Port) -> Site {
             let q = index(position);
             Site::Joint(body.joints.iter().position(|joint| joint.q == q).expect("the position is that of a joint"))
         }
-        Port::Process { state, .. } => Site::Process(index(state)),
+        // None of the plants has a speed without a position.
+        Port::Speed { state, .. } | Port::Process { state, .. } => Site::Process(index(state)),
         Port::Actuator { .. } => Site::Actuator,
         Port::Sensor { output } => Site::Sensor(index(output)),
     }

@@ -48,6 +48,7 @@ pub(super) fn facts(effect: &dyn Effect) -> Vec<String> {
 fn place(kind: PortKind) -> &'static str {
     match kind {
         PortKind::Joint => "a joint (position q, speed v; added to its equation, positive forward)",
+        PortKind::Speed => "a speed whose position is no state (v; added to its equation)",
         PortKind::Process => "a first-order state (x; added to its equation)",
         PortKind::Actuator => "an actuator (command u)",
         PortKind::Sensor => "a sensor (signal y)",

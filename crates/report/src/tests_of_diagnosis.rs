@@ -102,7 +102,7 @@ fn what_no_effect_explains_has_a_coordinate_and_a_curve() {
     diagnosis.next_experiment = None;
     let (folder, page) = written(diagnosis);
     assert!(page.contains(
-        "The model lacks something that depends on the position in the equation of <code>x</code>; no effect is claimed"
+        "The model lacks something that depends on the position in the equation of <code>x</code>, and no effect is named"
     ));
     assert!(page.contains("verdict mixed"));
     assert!(!titles(&page).contains(&"Missing effects") && !titles(&page).contains(&"Next experiment"));

@@ -81,7 +81,10 @@ pub fn candidates(subject: &Subject, effects: &[Arc<dyn Effect>]) -> Vec<Candida
     let between = effects.iter().filter_map(Between::of);
     let mut all = Vec::new();
     for effect in effects.iter().cloned().chain(between) {
-        for (index, (port, kind)) in ports.iter().enumerate().filter(|(_, (_, kind))| effect.ports().contains(kind)) {
+        let fits = |(port, kind): (&Port, PortKind)| {
+            effect.ports().contains(&kind) && is_of_quantity(effect.as_ref(), port, interface)
+        };
+        for (index, (port, kind)) in ports.iter().enumerate().filter(|(_, own)| fits(**own)) {
             let companions: Vec<Option<Port>> = match effect.second_port() {
                 None => vec![None],
                 Some(wanted) => {
@@ -116,6 +119,18 @@ pub fn candidates(subject: &Subject, effects: &[Arc<dyn Effect>]) -> Vec<Candida
 pub fn numbered(mut all: Vec<Candidate>) -> Vec<Candidate> {
     all.iter_mut().enumerate().for_each(|(index, candidate)| candidate.index = index);
     all
+}
+
+/// Whether the state of a process may be a quantity that an effect acts on ([`Effect::quantities`]).
+fn is_of_quantity(effect: &dyn Effect, port: &Port, interface: &Interface) -> bool {
+    let Port::Process { state, .. } = port else { return true };
+    let Some(unit) = interface.signals.iter().find(|signal| signal.name == *state).map(|signal| &signal.unit) else {
+        return true;
+    };
+    let mut quantities = effect.quantities().iter();
+    effect.quantities().is_empty()
+        || !unit.is_mechanical_or_thermal()
+        || quantities.any(|quantity| Unit::known(quantity).dimension() == unit.dimension())
 }
 
 /// Whether what a process takes from an input could be what its state is, such as a temperature: both have the same

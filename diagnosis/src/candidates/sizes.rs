@@ -63,6 +63,9 @@ pub struct Sizes {
     pub slew: Option<f64>,
     /// Stiffness of the declared model at a joint, force by position; `None` elsewhere.
     pub stiffness: Option<f64>,
+    /// Absolute temperature at the zero of the scale in which the state of a process is declared, in its unit; `None`
+    /// on no scale.
+    pub zero: Option<f64>,
     /// What the records must show.
     pub coverage: Coverage,
 }
@@ -83,6 +86,7 @@ impl Sizes {
         gap: None,
         slew: None,
         stiffness: None,
+        zero: None,
         coverage: Coverage::DEFAULT,
     };
 
@@ -185,6 +189,7 @@ impl Sizes {
                 shares.iter().map(|s| least + s * (self.largest() - least)).collect()
             }
             InitialGrid::Plain(values) | InitialGrid::Jumps(values) => values.to_vec(),
+            InitialGrid::Zeros(values) => self.zero.map_or_else(|| values.to_vec(), |zero| vec![zero]),
             InitialGrid::Frequencies(share) => {
                 let step = std::f64::consts::TAU / (PER_PERIOD * self.record);
                 let highest = self.highest_frequency();

@@ -38,7 +38,7 @@ const ROUGHLY: f64 = 0.1;
 
 /// Share of the sum of squares by which each of [`LOOK`] iterations in a row must decrease it, or a rough fit ends.
 /// Basis: together they bring less than 5 %, a smaller gain than any effect that is claimed.
-const STALLS: f64 = 0.01;
+pub const STALLS: f64 = 0.01;
 
 /// Gain in log-likelihood, or decrease of a penalty, below which rounds end, nats. Basis: the studies.
 pub const SETTLED: f64 = 0.05;
@@ -368,6 +368,12 @@ impl Estimation<'_> {
     /// Returns the indices of the unknowns that are fitted.
     pub fn free(&self) -> Vec<usize> {
         self.unknowns().iter().enumerate().filter(|(_, unknown)| unknown.2).map(|(k, _)| k).collect()
+    }
+
+    /// Returns for each of the unknowns that are fitted whether it stands at a bound at a point.
+    pub fn at_bounds(&self, point: &Point) -> Vec<bool> {
+        let (unknowns, values) = (self.unknowns(), self.values(point));
+        self.free().iter().map(|&k| unknowns[k].0.contains(&values[k])).collect()
     }
 
     /// Returns the fit with the force of an error model in its records.

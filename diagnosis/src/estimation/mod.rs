@@ -8,7 +8,7 @@ mod steps;
 
 pub(crate) use errors::Observed;
 pub use errors::{Channels, ErrorModel, Errors};
-pub(crate) use estimate::{ALLOWANCE, CLEARLY, ITERATIONS, LOOK, ROUND_ITERATIONS};
+pub(crate) use estimate::{ALLOWANCE, CLEARLY, ITERATIONS, LOOK, ROUND_ITERATIONS, STALLS};
 pub use estimate::{Estimate, Estimation};
 pub(crate) use priors::{log_choices, nominal_rates, priors};
 pub(crate) use scoring::log_determinant;

@@ -93,7 +93,7 @@ pub fn priors(subject: &Subject, fit: &Fit<'_>, variant: &Variant, added: &[Adde
 fn force_of(port: &Port, variant: &Variant) -> Option<usize> {
     let acts_on = match port {
         Port::Joint { velocity, .. } => velocity,
-        Port::Process { state, .. } => state,
+        Port::Speed { state, .. } | Port::Process { state, .. } => state,
         Port::Actuator { .. } | Port::Sensor { .. } => return None,
     };
     let processes = variant.model.model().interface().ports.iter().filter_map(|port| match port {

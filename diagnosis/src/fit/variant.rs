@@ -27,6 +27,10 @@ const FEW_STEPS: f64 = 1000.0;
 /// Multiple of all these for records that no parameter is fitted to. Basis: an assumption.
 const OTHER_RECORDS: f64 = 5.0;
 
+/// Largest initial state of an effect, typical sizes of its place. Basis: an effect within the machine moves as far as
+/// the machine does; a hidden state that starts farther off describes anything that decays.
+const FARTHEST_START: f64 = 2.0;
+
 /// A candidate with strengths to start from.
 #[derive(Clone)]
 pub struct Added {
@@ -242,7 +246,7 @@ pub fn problem<'a>(
                 let parameter = first + effect.parameters().len() + state;
                 let scale = a.sizes.of(dimension);
                 // What has no unit is a share of its limit.
-                let most = if dimension == Dimension::ONE { 1.0 } else { 10.0 * scale };
+                let most = if dimension == Dimension::ONE { 1.0 } else { FARTHEST_START * scale };
                 let bounds = [-most, most];
                 let start = known.map_or(0.0, |known| known[state].clamp(bounds[0], bounds[1]));
                 piece.locals.push(Local { parameter, bounds, start, scale: 0.1 * scale });

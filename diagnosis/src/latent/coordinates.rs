@@ -61,11 +61,12 @@ pub fn coordinates(estimation: &Estimation<'_>, trajectories: &[Trajectory]) -> 
     let states = estimation.model.model().equation_states();
     let (inputs, Some(piece)) = (interface.inputs.len(), estimation.fit.pieces.first()) else { return Vec::new() };
     let mut all = Vec::new();
-    // Joints and stores: place, force, and the states over which it acts.
-    let (mut joints, mut stores) = (Vec::new(), Vec::new());
+    // Joints, speeds and stores: place, force, and the states over which it acts.
+    let (mut joints, mut speeds, mut stores) = (Vec::new(), Vec::new(), Vec::new());
     for port in &interface.ports {
         match port_index(port, estimation.model, piece) {
             Some(PortIndex::Joint(force, position, speed)) => joints.push((port, force, position, speed)),
+            Some(PortIndex::Speed(force, speed)) => speeds.push((port, force, speed)),
             Some(PortIndex::Process(force, state)) => stores.push((port, force, state)),
             Some(PortIndex::Actuator(input)) => {
                 let values = || trajectories.iter().flat_map(|t| &t.moments).map(|m| m.u[input]);
@@ -104,8 +105,12 @@ pub fn coordinates(estimation: &Estimation<'_>, trajectories: &[Trajectory]) -> 
             add("position modulo one turn", *position, Value::Angle(*position));
         }
     }
-    let is_joint = |force: usize| joints.iter().any(|joint| joint.1 == force);
-    for (port, force, state) in stores.iter().filter(|store| !is_joint(store.1)) {
+    for (port, force, speed) in &speeds {
+        let names = names("speed", port, None, &states[*speed].unit, force_unit(port));
+        all.push(Coordinate { names, value: Value::State(*speed), acts: own(*force), sign: sign(*force) });
+    }
+    let is_force = |force: usize| joints.iter().any(|joint| joint.1 == force) || speeds.iter().any(|s| s.1 == force);
+    for (port, force, state) in stores.iter().filter(|store| !is_force(store.1)) {
         let names = names("level", port, None, &states[*state].unit, force_unit(port));
         all.push(Coordinate { names, value: Value::State(*state), acts: own(*force), sign: sign(*force) });
     }
@@ -127,7 +132,7 @@ pub fn coordinates(estimation: &Estimation<'_>, trajectories: &[Trajectory]) -> 
             add("rate of deflection", *speed, Value::Difference(*speed, *other_speed));
         }
     }
-    let stores: Vec<_> = stores.iter().filter(|store| !is_joint(store.1)).collect();
+    let stores: Vec<_> = stores.iter().filter(|store| !is_force(store.1)).collect();
     for (port, force, state) in &stores {
         for (other, other_force, other_state) in stores.iter().filter(|other| other.1 != *force) {
             if states[*state].unit == states[*other_state].unit && same_unit(port, other) != Some(false) {
@@ -160,7 +165,7 @@ fn names(what: &str, place: &Port, other: Option<&Port>, unit: &Unit, signal_uni
 /// Returns the unit of the force at a place, if the model determines it.
 fn force_unit(port: &Port) -> Option<&Unit> {
     match port {
-        Port::Joint { unit, .. } | Port::Process { unit, .. } => unit.as_ref(),
+        Port::Joint { unit, .. } | Port::Speed { unit, .. } | Port::Process { unit, .. } => unit.as_ref(),
         _ => None,
     }
 }

@@ -41,7 +41,7 @@ pub fn latent_inputs(ports: &[&Port], [declared, set]: [&FittedSet<'_>; 2], nomi
 /// the place has none, or the error model of the place was not fitted.
 fn latent_input(set: &FittedSet<'_>, nominal: &[f64], port: &Port, effects: &[usize]) -> Option<LatentInput> {
     let kind = match port {
-        Port::Joint { .. } | Port::Process { .. } => ErrorModel::Force,
+        Port::Joint { .. } | Port::Speed { .. } | Port::Process { .. } => ErrorModel::Force,
         Port::Sensor { .. } => ErrorModel::SmoothOutput,
         Port::Actuator { .. } => return None,
     };
@@ -132,7 +132,7 @@ impl Course<'_, '_> {
     fn unit(&self) -> Option<Unit> {
         let interface = self.set.variant.model.model().interface();
         match self.port {
-            Port::Joint { unit, .. } | Port::Process { unit, .. } => unit.clone(),
+            Port::Joint { unit, .. } | Port::Speed { unit, .. } | Port::Process { unit, .. } => unit.clone(),
             Port::Sensor { output: name } | Port::Actuator { input: name } => {
                 let mut all = interface.signals.iter().chain(&interface.inputs);
                 all.find(|variable| variable.name == *name).map(|variable| variable.unit.clone())
@@ -188,7 +188,10 @@ impl Course<'_, '_> {
     fn remainder(&self, index: usize) -> Option<Remainder> {
         let (piece, trajectory) = (&self.fit.pieces[index], &self.trajectories[index]);
         match (&self.estimate.errors, port_index(self.port, &self.set.variant.model, piece)?) {
-            (Errors::Force(_, motions), PortIndex::Joint(w, ..) | PortIndex::Process(w, _)) => {
+            (
+                Errors::Force(_, motions),
+                PortIndex::Joint(w, ..) | PortIndex::Speed(w, _) | PortIndex::Process(w, _),
+            ) => {
                 let nominal = &self.estimation.nominal;
                 let size = trajectory.forward[w] * nominal[w] / trajectory.mobilities[w];
                 // Forces are kept from sample to sample: they are those of the middle.

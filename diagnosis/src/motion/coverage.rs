@@ -76,7 +76,7 @@ fn is_angle(port: &Port, model: &WithEffects) -> bool {
     let unit = match port {
         Port::Joint { position, .. } => unit(position, &states),
         Port::Sensor { output } => unit(output, &model.model().interface().signals),
-        Port::Process { state, .. } => unit(state, &states),
+        Port::Speed { state, .. } | Port::Process { state, .. } => unit(state, &states),
         Port::Actuator { .. } => None,
     };
     unit.is_none_or(|unit| unit.is_angle() || unit.dimension().is_none())
@@ -179,7 +179,11 @@ fn reverses(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along:
 /// Returns the speeds of a joint, or of a joint relative to another one, in every record.
 fn speeds(candidate: &Candidate, model: &WithEffects, pieces: &[Piece], along: &[Trajectory]) -> Vec<Vec<f64>> {
     let of = |(piece, along): (&Piece, &Trajectory)| {
-        let Some(PortIndex::Joint(_, _, speed)) = port_index(&candidate.port, model, piece) else { return None };
+        let Some(PortIndex::Joint(_, _, speed) | PortIndex::Speed(_, speed)) =
+            port_index(&candidate.port, model, piece)
+        else {
+            return None;
+        };
         let other = match candidate.companion.as_ref().and_then(|port| port_index(port, model, piece)) {
             Some(PortIndex::Joint(_, _, other)) => Some(other),
             _ => None,

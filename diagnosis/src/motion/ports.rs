@@ -10,6 +10,8 @@ use crate::fit::Piece;
 pub enum PortIndex {
     /// Force of an equation, position, speed.
     Joint(usize, usize, usize),
+    /// Force of an equation, speed.
+    Speed(usize, usize),
     /// Force of an equation, state.
     Process(usize, usize),
     /// Input.
@@ -34,6 +36,7 @@ pub fn port_index(port: &Port, model: &WithEffects, piece: &Piece) -> Option<Por
         Port::Joint { position, velocity, .. } => {
             PortIndex::Joint(force(velocity)?, state(position)?, state(velocity)?)
         }
+        Port::Speed { state: name, .. } => PortIndex::Speed(force(name)?, state(name)?),
         Port::Process { state: name, .. } => PortIndex::Process(force(name)?, state(name)?),
         Port::Actuator { input } => PortIndex::Actuator(interface.inputs.iter().position(|i| i.name == *input)?),
         Port::Sensor { output } => PortIndex::Sensor(piece.series.iter().position(|s| s.name == *output)?),

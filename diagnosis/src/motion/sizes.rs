@@ -74,7 +74,17 @@ pub fn sizes(
             let mobility = mobility_of(w);
             Sizes { output, mobility, position, speed, time: position / speed, range, stiffness, ..common }
         }
+        PortIndex::Speed(w, v) => {
+            let inputs = trajectories[0].inputs();
+            let mobility = moments().map(|m| m.b[(v, inputs + w)].abs()).fold(0.0, f64::max);
+            let acceleration = positive(size(moments().map(|m| m.rates[v])));
+            let speed = positive(amplitude(moments().map(|m| m.x[v])));
+            let time = speed / acceleration;
+            let output = acceleration / positive(mobility);
+            Sizes { output, mobility: mobility_of(w), position: speed * time, speed, time, ..common }
+        }
         PortIndex::Process(w, s) => {
+            let unit = &model.model().equation_states()[s].unit;
             let inputs = trajectories[0].inputs();
             let mobility = moments().map(|m| m.b[(s, inputs + w)].abs()).fold(0.0, f64::max);
             let rate = size(moments().map(|m| m.rates[s]));
@@ -87,6 +97,7 @@ pub fn sizes(
                 speed,
                 time: position / speed,
                 range: range(moments().map(|m| m.x[s])),
+                zero: Some(unit).filter(|unit| unit.zero() != 0.0).map(|unit| unit.zero() / unit.factor()),
                 ..common
             }
         }

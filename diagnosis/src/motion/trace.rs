@@ -87,6 +87,7 @@ impl<'a> View<'a> {
         let inertial = self.candidate.effect.is_inertial();
         let (other, other_speed) = match companion {
             Some(PortIndex::Joint(_, q, v)) => (m.x[q], m.x[v]),
+            Some(PortIndex::Speed(_, v)) => (0.0, m.x[v]),
             Some(PortIndex::Process(_, s)) => (m.x[s], 0.0),
             Some(PortIndex::Actuator(i)) => (m.u[i], 0.0),
             Some(PortIndex::Sensor(_)) | None => (0.0, 0.0),
@@ -95,6 +96,10 @@ impl<'a> View<'a> {
             PortIndex::Joint(w, q, v) => {
                 let gain = m.b[(v, inputs + w)] * self.along.forward[w];
                 (0.0, m.x[q], m.x[v], if inertial { m.rates[v] } else { 0.0 }, gain)
+            }
+            PortIndex::Speed(w, v) => {
+                let gain = m.b[(v, inputs + w)] * self.along.forward[w];
+                (0.0, 0.0, m.x[v], if inertial { m.rates[v] } else { 0.0 }, gain)
             }
             PortIndex::Process(_, s) => (0.0, m.x[s], 0.0, 0.0, 0.0),
             PortIndex::Actuator(i) => (m.u[i], m.u[i], 0.0, 0.0, 0.0),
@@ -177,7 +182,7 @@ impl<'a> View<'a> {
                 let (change, noise) = (self.measured(acting.as_ref(), index), self.piece.series[index].noise);
                 return change.iter().all(|c| c.is_finite()).then(|| change.iter().map(|c| c * noise).collect());
             }
-            PortIndex::Joint(w, ..) | PortIndex::Process(w, _) => self.along.forward[w],
+            PortIndex::Joint(w, ..) | PortIndex::Speed(w, _) | PortIndex::Process(w, _) => self.along.forward[w],
             PortIndex::Actuator(_) => 1.0,
         };
         let signal = self.signal(acting.as_ref())?.1;
@@ -207,7 +212,7 @@ impl<'a> View<'a> {
             return None;
         }
         let column = match self.here {
-            PortIndex::Joint(w, ..) | PortIndex::Process(w, _) => {
+            PortIndex::Joint(w, ..) | PortIndex::Speed(w, _) | PortIndex::Process(w, _) => {
                 signal.iter_mut().for_each(|s| *s *= along.forward[w]);
                 inputs + w
             }
@@ -219,7 +224,9 @@ impl<'a> View<'a> {
 
     /// The signal that an effect adds at its second place, and its column; `None` where it adds nothing there.
     fn onward(&self, acting: &dyn BoundEffect<f64>) -> Option<(usize, Vec<f64>)> {
-        let (PortIndex::Joint(w, ..) | PortIndex::Process(w, _)) = self.companion? else { return None };
+        let (PortIndex::Joint(w, ..) | PortIndex::Speed(w, _) | PortIndex::Process(w, _)) = self.companion? else {
+            return None;
+        };
         let forward = self.along.forward[w];
         let signal = self.followed(acting, |_, _| 0.0, |at, _, z| acting.onward(at, z) * forward);
         signal.iter().any(|s| *s != 0.0).then(|| (self.along.inputs() + w, signal))

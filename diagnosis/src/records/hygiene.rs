@@ -9,9 +9,15 @@ const QUANTISED: f64 = 0.9;
 /// Returns the standard deviation of the noise of a sensor from its records: the median of that of each, at least that
 /// of its quantisation. `None` if there are too few samples, or they never change.
 pub fn noise_of(records: &[(&[f64], &[f64])]) -> Option<f64> {
-    let mut all: Vec<f64> = records.iter().filter_map(|(times, values)| noise_of_record(times, values)).collect();
+    noise_beside(records, records)
+}
+
+/// Returns the standard deviation of the noise as [`noise_of`] does, from what a model leaves of the records: fast
+/// motion looks like noise.
+pub fn noise_beside(records: &[(&[f64], &[f64])], left: &[(&[f64], &[f64])]) -> Option<f64> {
+    let mut all: Vec<f64> = left.iter().filter_map(|(times, values)| noise_of_record(times, values)).collect();
     all.sort_by(f64::total_cmp);
-    // Fast motion looks like noise: of two, the smaller one.
+    // Of two, the smaller one.
     let median = *all.get(all.len().checked_sub(1)? / 2)?;
     Some(step(records).map_or(median, |step| median.max(step / 12.0_f64.sqrt())))
 }

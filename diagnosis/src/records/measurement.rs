@@ -24,6 +24,8 @@ pub struct Series {
     pub values: Vec<f64>,
     /// Standard deviation of the noise.
     pub noise: f64,
+    /// True if the study does not give it.
+    pub is_noise_estimated: bool,
 }
 
 /// An unknown of one experiment: a parameter of the model.
@@ -112,7 +114,15 @@ impl Series {
             };
             notes.push(format!("{dropped} {samples} of `{}` in `{}` {are} left out", channel.signal, case.name));
         }
-        Ok(Self { signal, name: channel.signal.clone(), unit: signals[signal].unit.to_string(), times, values, noise })
+        Ok(Self {
+            signal,
+            name: channel.signal.clone(),
+            unit: signals[signal].unit.to_string(),
+            times,
+            values,
+            noise,
+            is_noise_estimated: channel.noise.is_none(),
+        })
     }
 }
 

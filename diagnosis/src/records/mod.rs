@@ -12,4 +12,6 @@ pub(crate) use gap::{Gap, gap};
 pub use hygiene::noise_of;
 pub(crate) use measurement::{Local, Measurement, Series};
 pub(crate) use quantum::quantum;
+#[cfg(test)]
+pub(crate) use sensor_noise::SensorNoise;
 pub(crate) use subject::{Subject, task_of};

@@ -7,7 +7,17 @@ use mops_core::{Case, Interface, Role, Study, case::Channel};
 use super::hygiene::noise_of;
 
 /// Estimated noise of every measured signal.
-pub struct SensorNoise(BTreeMap<String, Option<f64>>);
+#[derive(Debug, Clone, Default)]
+pub struct SensorNoise(BTreeMap<String, Estimate>);
+
+/// Estimated noise of a signal.
+#[derive(Debug, Clone, Copy)]
+struct Estimate {
+    /// Standard deviation; `None` if the samples are too few, or never change.
+    noise: Option<f64>,
+    /// True if the motion of the declared model was taken out of the samples first.
+    is_beside_model: bool,
+}
 
 /// Returns the channels of experiments, each with its case.
 fn channels<'s>(study: &'s Study, jobs: &'s [usize]) -> impl Iterator<Item = (&'s Case, &'s Channel)> {
@@ -28,7 +38,10 @@ impl SensorNoise {
         };
         let mut estimates = BTreeMap::new();
         for (_, Channel { signal, .. }) in channels(study, jobs) {
-            let estimate = || of_roles(signal, false).or_else(|| of_roles(signal, true));
+            let estimate = || Estimate {
+                noise: of_roles(signal, false).or_else(|| of_roles(signal, true)),
+                is_beside_model: false,
+            };
             estimates.entry(signal.clone()).or_insert_with(estimate);
         }
         Self(estimates)
@@ -36,13 +49,23 @@ impl SensorNoise {
 
     /// Returns the estimate for a signal; `None` if its samples are too few, or never change.
     pub fn estimate(&self, signal: &str) -> Option<f64> {
-        *self.0.get(signal)?
+        self.0.get(signal)?.noise
+    }
+
+    /// Takes the estimate for a signal from samples without the motion of the declared model, if it is smaller: what
+    /// the model lacks moves, too.
+    pub fn improve(&mut self, signal: &str, beside_model: Option<f64>) {
+        let Some(estimate) = self.0.get_mut(signal) else { return };
+        if let Some(smaller) = beside_model.filter(|own| estimate.noise.is_some_and(|noise| *own < noise)) {
+            *estimate = Estimate { noise: Some(smaller), is_beside_model: true };
+        }
     }
 
     /// Returns the estimates that are used, a sentence each.
     pub fn notes(&self, study: &Study, jobs: &[usize], model: &Interface) -> Vec<String> {
-        let note = |(signal, noise): (&String, &Option<f64>)| {
-            let noise = (*noise)?;
+        let note = |(signal, estimate): (&String, &Estimate)| {
+            let noise = estimate.noise?;
+            let of = if estimate.is_beside_model { " of what the declared model leaves" } else { "" };
             let without: Vec<&str> = channels(study, jobs)
                 .filter(|(_, channel)| channel.signal == *signal && channel.noise.is_none())
                 .map(|(case, _)| case.name.as_str())
@@ -55,7 +78,7 @@ impl SensorNoise {
                 _ => format!(" of {}", without.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")),
             };
             Some(format!(
-                "the noise of `{signal}` was estimated from neighbouring samples{experiments}: {noise:.3e} {unit}"
+                "the noise of `{signal}` was estimated from neighbouring samples{of}{experiments}: {noise:.3e} {unit}"
             ))
         };
         self.0.iter().filter_map(note).collect()

@@ -1,5 +1,6 @@
 //! What is diagnosed: the model, its unknowns, and the experiments, taken from a study.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 use mops_core::{
@@ -10,6 +11,7 @@ use mops_core::{
 };
 use mops_language::{Dual, Scalar};
 
+use super::hygiene::noise_beside;
 use super::measurement::{Measurement, Series};
 use super::sensor_noise::SensorNoise;
 use crate::settings::Settings;
@@ -34,6 +36,8 @@ pub struct Subject {
     pub measurements: Vec<Measurement>,
     /// What a reader should know of the data.
     pub notes: Vec<String>,
+    /// Noise of the sensors that the study does not give.
+    pub sensor_noise: SensorNoise,
     /// Steps that a simulation of the declared model takes in a second of its time, once that is calibrated.
     pub pace: OnceLock<f64>,
     /// Relative tolerance of simulations.
@@ -120,7 +124,6 @@ impl Subject {
             .iter()
             .map(|&job| Measurement::new(study, job, model.as_ref(), &noise, &mut notes))
             .collect::<Result<_, _>>()?;
-        notes.extend(noise.notes(study, &jobs, model.interface()));
         notes.extend(notes_on_windows(model.as_ref(), &study.parameters(&study.jobs()[jobs[0]], &study.start())));
         if !measurements.iter().any(|m| m.role == Role::Calibration) {
             return Err(StudyError::new("experiments", "no experiment is for calibration")
@@ -133,15 +136,60 @@ impl Subject {
             tolerance: tolerance(&measurements),
             measurements,
             notes,
+            sensor_noise: noise,
             pace: OnceLock::new(),
             settings: settings.clone(),
         })
     }
 
+    /// Returns what a reader should know of the data: all notes.
+    pub fn all_notes(&self) -> Vec<String> {
+        let jobs: Vec<usize> = self.measurements.iter().map(|m| m.job).collect();
+        let of_noise = self.sensor_noise.notes(&self.study, &jobs, self.model.interface());
+        self.notes.iter().cloned().chain(of_noise).collect()
+    }
+
+    /// Whether a noise was estimated.
+    pub fn has_estimated_noise(&self) -> bool {
+        self.measurements.iter().flat_map(|m| &m.series).any(|series| series.is_noise_estimated)
+    }
+
+    /// Returns it with the noise that the study does not give estimated again, from the residuals of the declared model
+    /// in some records, in noises.
+    #[must_use]
+    pub fn with_motion_removed(mut self, residuals: &[(usize, Vec<f64>)]) -> Self {
+        let mut left: BTreeMap<String, Vec<(&Series, Vec<f64>)>> = BTreeMap::new();
+        for (measurement, residuals) in residuals {
+            let mut rest = residuals.as_slice();
+            for series in &self.measurements[*measurement].series {
+                let (own, others) = rest.split_at(series.times.len());
+                let own = own.iter().map(|r| r * series.noise).collect();
+                left.entry(series.name.clone()).or_default().push((series, own));
+                rest = others;
+            }
+        }
+        let mut noise = self.sensor_noise.clone();
+        for (signal, records) in &left {
+            let [samples, left]: [Vec<(&[f64], &[f64])>; 2] = [
+                records.iter().map(|(series, _)| (&series.times[..], &series.values[..])).collect(),
+                records.iter().map(|(series, left)| (&series.times[..], &left[..])).collect(),
+            ];
+            noise.improve(signal, noise_beside(&samples, &left));
+        }
+        for series in self.measurements.iter_mut().flat_map(|m| &mut m.series).filter(|s| s.is_noise_estimated) {
+            series.noise = noise.estimate(&series.name).unwrap_or(series.noise);
+        }
+        self.sensor_noise = noise;
+        self.tolerance = tolerance(&self.measurements);
+        self
+    }
+
     /// Whether the position of a joint, the state of a process, or a signal is measured.
     pub fn is_measured(&self, port: &Port) -> bool {
-        let (Port::Joint { position: name, .. } | Port::Process { state: name, .. } | Port::Sensor { output: name }) =
-            port
+        let (Port::Joint { position: name, .. }
+        | Port::Speed { state: name, .. }
+        | Port::Process { state: name, .. }
+        | Port::Sensor { output: name }) = port
         else {
             return false;
         };

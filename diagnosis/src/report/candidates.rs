@@ -1,6 +1,6 @@
 //! Candidate effects by probability, and the alternatives of an effect that was found.
 
-use mops_outcome::diagnosis::{Ranked, Rival, Rule};
+use mops_outcome::diagnosis::{NamedBy, Ranked, Rival, Rule};
 
 use super::{Findings, first_of_each, parameters};
 use crate::estimation::Errors;
@@ -79,11 +79,13 @@ impl<'a> Findings<'_, 'a> {
             let is_claimed = verdict.stated.iter().any(|stated| stated.entry == entry && stated.is_claimed);
             return match verdict.conclusion {
                 Conclusion::Effect if is_claimed => None,
+                Conclusion::None => Some(Rule::Probability),
                 _ if verdict.is_refused => Some(Rule::Curve),
-                _ => Some(Rule::Probability),
+                _ => Some(Rule::Claim),
             };
         }
         match self.forecasts.is_passed(&set.key) {
+            Some(true) if verdict.named_by == NamedBy::LeastSquares => Some(Rule::Error),
             Some(true) => Some(Rule::Probability),
             Some(false) => Some(Rule::Forecast),
             None => Some(Rule::Evidence),

@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 use mops_core::{Role, effect::Port};
 use mops_math as math;
 use mops_outcome::diagnosis::{
-    Alignment, Change, Dependence, Diagnosis, ForecastOf, Found, HeldOut, LatentInput, Noticeable, Step, StrengthValue,
-    Unexplained, Verdict,
+    Alignment, Change, Dependence, Diagnosis, ExperimentError, ForecastOf, Found, HeldOut, LatentInput, Noticeable,
+    Step, StrengthValue, Unexplained, Verdict, WiderRange, WiderRanges,
 };
 
 use self::records::Records;
@@ -20,10 +20,11 @@ use crate::estimation::CLEARLY;
 use crate::fit::Added;
 use crate::latent::latent_inputs;
 use crate::selection::{
-    Conclusion, FittedSet, FittedSets, Forecasts, Key, Verdict as Decision, WORSE, entry, price, without,
+    Conclusion, FittedSet, FittedSets, Forecasts, Key, Stated, Verdict as Decision, WORSE, entry, price, without,
 };
 
-/// Ratio from which the noise of a sensor is another than the study has. Basis: the studies.
+/// Ratio from which the noise of a sensor is another than the study has, and error of a held-out record from which a
+/// verdict is not sure, noises. Basis: the studies.
 const WRONG_NOISE: f64 = 1.5;
 
 /// Sets of effects with the verdict.
@@ -73,6 +74,8 @@ impl<'a> Findings<'_, 'a> {
         made.forecast_of =
             if self.forecasts.are_of_other_records() { ForecastOf::Selection } else { ForecastOf::EndOfRecords };
         made.is_first = verdict.is_first || verdict.conclusion == Conclusion::None;
+        made.named_by = verdict.named_by;
+        made.wider = self.wider().filter(|_| verdict.is_range);
         made.is_stopped = self.is_stopped;
         made.converged = set.least_squares.converged;
         let aligned = sets.get(&nothing).filter(|_| !self.alignment.is_empty()).map(Records::new);
@@ -95,7 +98,7 @@ impl<'a> Findings<'_, 'a> {
         made.predictions = before.predictions(&after);
         let names: Vec<String> = made.found.iter().map(|found| found.name.clone()).collect();
         made.starts = after.starts(&names);
-        let notes = sets.refit.subject.notes.iter().cloned();
+        let notes = sets.refit.subject.all_notes().into_iter();
         let at_bounds = before.at_bounds(&after, &terms);
         made.is_sure = !after.is_at_bound(&terms) && self.is_sure(&made);
         made.notes = notes.chain(at_bounds).chain(self.notes(set, &made)).collect();
@@ -108,6 +111,17 @@ impl<'a> Findings<'_, 'a> {
         let found = self.sets.get(&Key::new()).filter(|set| set.added.is_empty() && self.alignment.is_empty())?;
         let first = self.nominal.least_squares.log_likelihood;
         (found.least_squares.log_likelihood > first + WORSE).then_some(found)
+    }
+
+    /// Returns the ranges that the declared model leaves where they are wider.
+    fn wider(&self) -> Option<WiderRanges> {
+        let (refit, subject) = (self.sets.refit, self.sets.refit.subject);
+        let widened = refit.widened.as_ref()?;
+        let range = |&(k, end, value): &(usize, f64, f64)| {
+            let tuner = &subject.study.tuners()[subject.globals[k]];
+            WiderRange { parameter: tuner.name.clone(), unit: tuner.unit.to_string(), end, value }
+        };
+        Some(WiderRanges { ranges: widened.moved.iter().map(range).collect(), error: widened.error })
     }
 
     /// Returns the curve with the largest gain if it is significant.
@@ -142,7 +156,9 @@ impl<'a> Findings<'_, 'a> {
             Verdict::None => true,
             Verdict::Unexplained => false,
         };
-        is_supported && made.converged && !made.is_stopped
+        let is_held_out = |error: &&ExperimentError| error.role != Role::Calibration;
+        let is_close = made.after.iter().filter(is_held_out).all(|error| error.normalised <= WRONG_NOISE);
+        is_supported && is_close && made.converged && !made.is_stopped
     }
 
     /// Returns the probability of the verdict: of class and place of the least certain claim, or that nothing is
@@ -158,10 +174,13 @@ impl<'a> Findings<'_, 'a> {
         }
     }
 
-    /// Returns the posterior probability that an effect is missing; NaN if no set that holds it passed, or more is
-    /// missing than what these describe.
+    /// Returns the posterior probability that an effect is missing; NaN if no set that holds it passed, more is missing
+    /// than what these describe, or something else than the probability of its class decides against a claim.
     fn probability_of(&self, index: usize) -> f64 {
-        if self.verdict.is_refused || self.verdict.is_description {
+        let entry = entry(&self.sets, &self.sets.refit.candidates[index]);
+        let is_unstated = |stated: &Stated| stated.entry == entry && stated.probability.is_nan();
+        let is_open = self.verdict.is_refused || self.verdict.is_description;
+        if is_open || self.verdict.stated.iter().any(is_unstated) {
             return f64::NAN;
         }
         let holding: Vec<f64> =
@@ -192,9 +211,7 @@ impl<'a> Findings<'_, 'a> {
             strengths: parameters::strengths(set, index),
             given: !set.key.contains(&position),
             probability: self.probability_of(position),
-            class_probability: stated
-                .filter(|_| !self.verdict.is_refused)
-                .map_or(f64::NAN, |stated| stated.probability),
+            class_probability: stated.map_or(f64::NAN, |stated| stated.probability),
             alike: stated.map_or_else(Vec::new, |stated| {
                 stated.alike.iter().map(|entry| format!("{} at {}", entry.class, entry.place)).collect()
             }),

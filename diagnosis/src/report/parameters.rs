@@ -26,6 +26,7 @@ pub fn strengths(set: &FittedSet<'_>, index: usize) -> Vec<StrengthValue> {
             continue;
         };
         let global = &set.fit.globals[g];
+        value.at_bound = global.bounds.contains(&value.value);
         if global.is_stepped() {
             let output = set.under.iter().find(|(kind, _)| *kind != ErrorModel::Force).map(|(_, estimate)| estimate);
             let ends = output.and_then(|estimate| set.estimation(&[]).stepped_interval(estimate, g));
@@ -39,13 +40,14 @@ pub fn strengths(set: &FittedSet<'_>, index: usize) -> Vec<StrengthValue> {
     all
 }
 
-/// Returns the 95 % confidence interval of a parameter under an error model, widened to the value by least squares;
-/// `None` at a bound, or if the records do not determine it.
+/// Returns the 95 % confidence interval of a parameter under an error model, widened to one as wide about the value by
+/// least squares; `None` at a bound, or if the records do not determine it.
 pub fn interval(global: &Global, value: f64, estimate: &Estimate, index: usize) -> Option<[f64; 2]> {
     let (centre, error) = (estimate.point.globals[index], estimate.deviations[index]);
     let is_at_bound = global.bounds.contains(&centre) || global.bounds.contains(&value);
-    let end = |side: f64| (centre + side * QUANTILE * error).clamp(global.bounds[0], global.bounds[1]);
-    (error > 0.0 && error.is_finite() && !is_at_bound).then(|| [end(-1.0).min(value), end(1.0).max(value)])
+    let end = |from: f64, side: f64| (from + side * QUANTILE * error).clamp(global.bounds[0], global.bounds[1]);
+    (error > 0.0 && error.is_finite() && !is_at_bound)
+        .then(|| [end(centre.min(value), -1.0), end(centre.max(value), 1.0)])
 }
 
 /// Returns the range of the values of a parameter that no fit moves that the records allow, everything else fitted
@@ -87,6 +89,7 @@ fn described(added: &Added, variant: &Variant, index: usize) -> Vec<StrengthValu
         unit: added.candidate.unit(parameter, &parameters[variant.first[index] + k].variable.unit),
         std_error: None,
         interval95: None,
+        at_bound: false,
     };
     added.candidate.effect.parameters().iter().enumerate().map(of).collect()
 }

@@ -172,6 +172,7 @@ impl<'s, 'a> Records<'s, 'a> {
                 after: now[k],
                 std_error: likeliest.map(|likeliest| likeliest.deviations[k]).filter(|error| *error > 0.0),
                 interval95: likeliest.and_then(|likeliest| interval(&after.set.fit.globals[k], now[k], likeliest, k)),
+                at_bound: tuner.at_bound(now[k]).is_some(),
             }
         };
         self.subject().globals.iter().enumerate().map(one).collect()

@@ -9,7 +9,7 @@ use mops_core::{Input, case::Hold};
 use mops_outcome::diagnosis::Alignment;
 use rayon::prelude::*;
 
-use super::fitted_set::{Key, Start};
+use super::fitted_set::{FittedSet, Key, Start};
 use super::forecast::{Forecast, error_of, kinds as forecast_kinds};
 use super::refit::{Refit, Rough, price};
 use super::sets::{FittedSets, kinds, likelier_output};
@@ -34,15 +34,16 @@ impl Subject {
 /// one does with any single effect, and that forecasts better than the declared one; `None` if there is none. The
 /// effects have been added to the declared model one by one.
 pub fn align(sets: &FittedSets<'_, '_>) -> Option<(Subject, Vec<Alignment>)> {
-    let declared = sets.get(&Key::new()).filter(|declared| sets.lacks_something(declared))?;
+    let is_open = |declared: &&FittedSet<'_>| !sets.is_explained_by_ranges() && sets.lacks_something(declared);
+    let declared = sets.get(&Key::new()).filter(is_open)?;
     let likelier = likelier_output(declared)?;
     let starts = [&likelier.point, &declared.least_squares.point].map(|point| declared.start_at(point));
-    let Refit { subject, candidates, nominal, simulations } = sets.refit;
+    let Refit { subject, candidates, nominal, simulations, .. } = sets.refit;
     let alternatives = alternatives(subject);
     let nominal = || nominal.clone();
     let trial = |index: usize| {
         let subject = subject.aligned(&alternatives[index]);
-        let refit = Refit { subject: &subject, candidates: Vec::new(), nominal: nominal(), simulations };
+        let refit = Refit { subject: &subject, candidates: Vec::new(), nominal: nominal(), widened: None, simulations };
         let Rough { start, log_evidence, .. } =
             refit.roughly(&starts[..1], &likelier.errors, likelier.log_likelihood)?;
         Some((log_evidence, index, start))
@@ -52,7 +53,7 @@ pub fn align(sets: &FittedSets<'_, '_>) -> Option<(Subject, Vec<Alignment>)> {
     let inputs = &alternatives[best];
     let aligned = subject.aligned(inputs);
     let is_better = {
-        let refit = Refit { subject: &aligned, candidates: Vec::new(), nominal: nominal(), simulations };
+        let refit = Refit { subject: &aligned, candidates: Vec::new(), nominal: nominal(), widened: None, simulations };
         let mut set = refit.least_squares(&Key::new(), &[start, starts[1].clone()])?;
         let price = price(kinds(candidates) + alternatives.len());
         let singles = sets.sets.iter().filter(|other| other.key.len() < 2);

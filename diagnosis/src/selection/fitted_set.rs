@@ -63,6 +63,8 @@ pub struct FittedSet<'a> {
     pub variant: Variant,
     /// Fit by least squares.
     pub least_squares: Estimate,
+    /// True if a further fit by least squares would not move it any more.
+    pub is_settled: bool,
     /// Fits under the error models; empty until they are needed.
     pub under: Vec<(ErrorModel, Estimate)>,
     /// Whether selection records contradict it, once that was asked.
@@ -143,6 +145,14 @@ impl FittedSet<'_> {
         Some(rms(self.fit.all(&self.least_squares.point)?.iter().flatten()))
     }
 
+    /// Returns the log-likelihood in white noise of the declared size with a share of the root mean square error.
+    pub fn with_share_of_error(&self, share: f64) -> f64 {
+        let samples: usize = self.fit.pieces.iter().flat_map(|piece| &piece.series).map(|s| s.times.len()).sum();
+        #[allow(clippy::cast_precision_loss)]
+        let constant = -0.5 * samples as f64 * math::ln(std::f64::consts::TAU);
+        constant + share * share * (self.least_squares.log_likelihood - constant)
+    }
+
     /// Returns the largest root mean square error of a record by least squares, in noises.
     pub fn largest_error(&self) -> Option<f64> {
         Some(largest(&self.fit.all(&self.least_squares.point)?))
@@ -166,14 +176,14 @@ pub fn largest(residuals: &[Vec<f64>]) -> f64 {
 }
 
 /// Returns the log-likelihood of the residuals of records under white noise, fitted to each channel.
-fn white_log_likelihood(pieces: &[Piece], residuals: &[Vec<f64>]) -> f64 {
+pub fn white_log_likelihood(pieces: &[Piece], residuals: &[Vec<f64>]) -> f64 {
     let of = |(square, count): (f64, f64)| -0.5 * count * (math::ln(std::f64::consts::TAU * square / count) + 1.0);
     squares(pieces, residuals).into_iter().filter(|sum| sum.1 > 0.0).map(of).sum::<f64>()
 }
 
 /// Returns the sum of squared residuals and their number for each channel.
 #[allow(clippy::cast_precision_loss)]
-fn squares(pieces: &[Piece], residuals: &[Vec<f64>]) -> Vec<(f64, f64)> {
+pub fn squares(pieces: &[Piece], residuals: &[Vec<f64>]) -> Vec<(f64, f64)> {
     let channels = Channels::new(pieces);
     let mut sums = vec![(0.0, 0.0); channels.count];
     for (index, (piece, residuals)) in pieces.iter().zip(residuals).enumerate() {

@@ -10,7 +10,7 @@ use super::fitted_set::{FittedSet, Key, estimation};
 use super::sets::{FittedSets, NEGLIGIBLE, without};
 use crate::estimation::{ErrorModel, Errors, Estimate, ITERATIONS, LOOK};
 use crate::fit::{Fit, Piece, Point, pieces, problem};
-use crate::records::Subject;
+use crate::records::{Local, Subject};
 
 /// What is forecast, with whose parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -30,7 +30,7 @@ pub struct Forecasts {
     tested: HashMap<Key, bool>,
     /// Sets that passed, the most probable first.
     pub passed: Vec<Key>,
-    /// Sets that were not tested: an effect of theirs does nothing, or is at a limit.
+    /// Sets that were not tested: an effect of theirs does nothing or is at a limit, or their fit says nothing.
     pub excluded: Vec<Key>,
     /// The most probable set that is more probable than the declared model, whether it passed or not.
     pub first: Option<Key>,
@@ -40,10 +40,11 @@ impl Forecasts {
     /// Forecasts with sets, the most probable first, until what follows does not count; fits those with one effect less
     /// that this needs. Forecasts other records if there are any, else the ends of the calibration records.
     pub fn of<'r, 'a>(mut sets: FittedSets<'r, 'a>) -> (FittedSets<'r, 'a>, Self) {
+        sets.take_up();
         let declared = sets.log_posterior(sets.declared());
         let all = sets.sets.iter().filter(|set| !set.key.is_empty());
         let (excluded, candidates): (Vec<&FittedSet<'_>>, Vec<&FittedSet<'_>>) =
-            all.partition(|set| sets.is_inert(set) || sets.is_at_limit(set));
+            all.partition(|set| sets.is_inert(set) || sets.is_at_limit(set) || sets.is_inconsistent(set));
         let keys = |sets: Vec<&FittedSet<'_>>| sets.into_iter().map(|set| set.key.clone()).collect::<Vec<Key>>();
         let (excluded, candidates) = (keys(excluded), keys(candidates));
         let posterior = |sets: &FittedSets<'_, '_>, key: &Key| {
@@ -190,7 +191,8 @@ pub fn free_run(set: &FittedSet<'_>, point: &Point, pieces: Vec<Piece>) -> Optio
 }
 
 /// Fits the initial states of records, with the parameters of a point, to whole records and to beginnings that grow:
-/// the better of both; `None` if there are none, or they cannot be simulated.
+/// the better of both; `None` if there are none, or they cannot be simulated. Initial states of effects, which no
+/// sensor shows, are fitted to the first part of a record only: what they explain later is a forecast.
 pub fn with_free_starts<'a>(set: &FittedSet<'a>, point: &Point, pieces: Vec<Piece>) -> Option<(Fit<'a>, Point)> {
     if pieces.is_empty() {
         return None;
@@ -204,20 +206,32 @@ pub fn with_free_starts<'a>(set: &FittedSet<'a>, point: &Point, pieces: Vec<Piec
         global.bounds = [*value; 2];
     }
     let fitted = |fit: &Fit<'a>, from: &Point, iterations: usize| {
-        let estimation = estimation(subject, fit, &variant, &start.added, &[], &point);
+        let estimation = estimation(subject, fit, &variant, &start.added, &[], from);
         estimation.with(&Errors::White, from.clone(), iterations)
     };
-    let mut grown = point.clone();
-    let shares = std::iter::successors(Some(2 * WINDOWS), |windows| Some(windows / 2));
-    for windows in shares.take_while(|windows| *windows > 1) {
-        #[allow(clippy::cast_precision_loss)]
-        let beginning = beginning(&fit, 1.0 / windows as f64);
-        if let Some(found) = fitted(&beginning, &grown, LOOK) {
-            grown = found.point;
+    let settled = |fit: &Fit<'a>, from: &Point| {
+        let mut grown = from.clone();
+        let shares = std::iter::successors(Some(2 * WINDOWS), |windows| Some(windows / 2));
+        for windows in shares.take_while(|windows| *windows > 1) {
+            #[allow(clippy::cast_precision_loss)]
+            let beginning = beginning(fit, 1.0 / windows as f64);
+            if let Some(found) = fitted(&beginning, &grown, LOOK) {
+                grown = found.point;
+            }
+        }
+        let ends = [&grown, from].into_iter().filter_map(|start| fitted(fit, start, ITERATIONS));
+        Some(ends.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?.point)
+    };
+    let declared = subject.model.interface().parameters.len();
+    let is_hidden = |local: &Local| local.parameter >= declared;
+    if fit.pieces.iter().flat_map(|piece| &piece.locals).any(is_hidden) {
+        point = settled(&beginning(&fit, 1.0 - subject.settings.beginning), &point)?;
+        for (piece, values) in fit.pieces.iter_mut().zip(&point.locals) {
+            let hidden = piece.locals.iter_mut().zip(values).filter(|(local, _)| is_hidden(local));
+            hidden.for_each(|(local, value)| local.bounds = [*value; 2]);
         }
     }
-    let ends = [&grown, &point].into_iter().filter_map(|start| fitted(&fit, start, ITERATIONS));
-    let best = ends.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?.point;
+    let best = settled(&fit, &point)?;
     Some((fit, best))
 }
 

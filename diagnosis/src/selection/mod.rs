@@ -3,6 +3,7 @@
 mod alignment;
 mod baseline;
 mod contradiction;
+mod entry;
 mod fitted_set;
 mod forecast;
 mod preparation;
@@ -13,14 +14,17 @@ mod sets;
 #[cfg(test)]
 mod tests;
 mod verdict;
+mod voice;
+mod widened;
 
 pub(crate) use alignment::align;
 #[cfg(test)]
 pub(crate) use baseline::baseline;
+pub(crate) use entry::entry;
 pub(crate) use fitted_set::{FittedSet, Key, STRONG, estimation};
 pub(crate) use forecast::{Forecasts, with_free_starts};
-pub(crate) use preparation::{prepare, with_given};
+pub(crate) use preparation::{prepare, prepare_from, with_given, without_motion};
 pub(crate) use refit::{WORSE, price};
 pub(crate) use screening::{Screened, Screening};
 pub(crate) use sets::{FittedSets, without};
-pub(crate) use verdict::{Conclusion, Verdict, decide, entry};
+pub(crate) use verdict::{Conclusion, Stated, Verdict, decide};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mops_core::{Effect, StudyError};
+use mops_core::{Effect, Role, StudyError};
 use mops_language::suggestion;
 
 use super::baseline::baseline;
@@ -10,9 +10,10 @@ use super::fitted_set::{FittedSet, Start, name};
 use super::refit::Refit;
 use super::screening::Screening;
 use super::sets::FittedSets;
+use super::widened::Widened;
 use crate::candidates::{Candidate, candidates, numbered};
 use crate::estimation::{Errors, nominal_rates};
-use crate::fit::{Added, Meter};
+use crate::fit::{Added, Meter, pieces, problem};
 use crate::motion::is_covered;
 use crate::records::Subject;
 
@@ -72,19 +73,56 @@ pub fn prepare<'a>(
     effects: &[Arc<dyn Effect>],
     simulations: &'a Meter<'a>,
 ) -> Result<(Refit<'a>, FittedSet<'a>), StudyError> {
-    fitted(subject, effects, simulations).ok_or_else(|| not_fitted(simulations))
+    prepare_from(subject, None, effects, simulations)
+}
+
+/// Fits the declared model as [`prepare`] does, from a start that is known.
+///
+/// # Errors
+/// The declared model cannot be simulated, or the watch stops it.
+pub fn prepare_from<'a>(
+    subject: &'a Subject,
+    start: Option<Start>,
+    effects: &[Arc<dyn Effect>],
+    simulations: &'a Meter<'a>,
+) -> Result<(Refit<'a>, FittedSet<'a>), StudyError> {
+    fitted(subject, start, effects, simulations).ok_or_else(|| not_fitted(simulations))
+}
+
+/// Returns a subject with the noise that the study does not give estimated without the motion of the declared model,
+/// and the fit that this took, if any.
+pub fn without_motion(subject: Subject, simulations: &Meter<'_>) -> (Subject, Option<Start>) {
+    if !subject.has_estimated_noise() {
+        return (subject, None);
+    }
+    simulations.stage("noise of the sensors", 0.01);
+    let Some(start) = baseline(&subject, simulations) else { return (subject, None) };
+    let residuals = {
+        let pieces = pieces::pieces(&subject, |role| role == Role::Calibration);
+        let measured: Vec<usize> = pieces.iter().map(|piece| piece.measurement).collect();
+        let Start { tuners, locals, .. } = &start;
+        let (fit, point, _) = problem(&subject, &[], pieces, tuners, locals.clone(), &[], simulations);
+        fit.all(&point).map(|residuals| measured.into_iter().zip(residuals).collect::<Vec<_>>())
+    };
+    match residuals {
+        Some(residuals) => (subject.with_motion_removed(&residuals), Some(start)),
+        None => (subject, Some(start)),
+    }
 }
 
 fn fitted<'a>(
     subject: &'a Subject,
+    start: Option<Start>,
     effects: &[Arc<dyn Effect>],
     simulations: &'a Meter<'a>,
 ) -> Option<(Refit<'a>, FittedSet<'a>)> {
     simulations.stage("fit of the declared model", 0.02);
-    let start = baseline(subject, simulations)?;
+    let start = start.map_or_else(|| baseline(subject, simulations), Some)?;
     subject.take_pace(&start.tuners);
-    let mut refit = Refit { subject, candidates: candidates(subject, effects), nominal: Vec::new(), simulations };
+    let candidates = candidates(subject, effects);
+    let mut refit = Refit { subject, candidates, nominal: Vec::new(), widened: None, simulations };
     let declared = refit.least_squares(&Vec::new(), &[start])?;
+    refit.widened = Widened::of(&declared);
     let trajectories = declared.trajectories(&declared.least_squares.point)?;
     refit.nominal = nominal_rates(&declared.variant, &trajectories);
     let (model, pieces, coverage) = (&declared.variant.model, &declared.fit.pieces, subject.settings.coverage);

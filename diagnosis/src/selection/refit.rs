@@ -7,6 +7,7 @@ use mops_math as math;
 use rayon::prelude::*;
 
 use super::fitted_set::{FittedSet, Key, Start, evidence, start_at};
+use super::widened::Widened;
 use crate::candidates::Candidate;
 use crate::estimation::{ErrorModel, Errors, Estimate, Estimation, FOLLOW, LOOK, TURNS};
 use crate::fit::{Fit, Meter, Point, Variant, pieces, problem};
@@ -46,6 +47,8 @@ pub struct Refit<'a> {
     pub candidates: Vec<Candidate>,
     /// Nominal rate of each balance along the motion of the baseline.
     pub nominal: Vec<f64>,
+    /// The declared model with wider ranges, where parameters stand at the ends of theirs.
+    pub widened: Option<Widened>,
     /// Counts simulations, and ends them.
     pub simulations: &'a Meter<'a>,
 }
@@ -78,6 +81,7 @@ impl<'a> Refit<'a> {
             best.least_squares = best.estimation(&[]).least_squares(best.least_squares.point.clone())?;
         }
         best.least_squares = best.estimation(&[]).with_steps(best.least_squares.clone());
+        best.is_settled = best.least_squares.converged;
         Some(best)
     }
 
@@ -96,6 +100,7 @@ impl<'a> Refit<'a> {
             added,
             fit,
             variant,
+            is_settled: least_squares.converged,
             least_squares,
             under: Vec::new(),
             contradicted: OnceLock::new(),
@@ -264,6 +269,7 @@ impl<'a> Refit<'a> {
             };
             under = under.into_par_iter().map(restarted).collect();
         }
+        set.is_settled = least_squares.converged;
         (set.under, set.least_squares) = (under, least_squares);
     }
 
@@ -294,7 +300,9 @@ impl<'a> Refit<'a> {
                 fixed = all;
                 let key = set.key.clone();
                 let under = vec![(kind, under)];
-                set = FittedSet { key, added, fit, variant, least_squares, under, contradicted: OnceLock::new() };
+                let is_settled = least_squares.converged;
+                let contradicted = OnceLock::new();
+                set = FittedSet { key, added, fit, variant, least_squares, is_settled, under, contradicted };
             }
         }
         (set, fixed)

@@ -114,7 +114,11 @@ impl<'s> Screening<'s> {
         let channels = Channels::new(&fit.pieces);
         let estimation = set.estimation(&[]);
         let free = estimation.free();
+        let at_bounds = estimation.at_bounds(point);
         let projection = |errors: &'s Errors| {
+            // In white noise, what stands at a bound takes up nothing: it cannot move. A correlated error takes up most
+            // itself: without the unknowns at bounds, all candidates would look alike.
+            let takes_up = |at: usize| !(matches!(errors, Errors::White) && at_bounds[at]);
             let total = begins[begins.len() - 1];
             let mut columns = vec![vec![0.0; total]; free.len() + 1];
             for (index, piece) in slopes.iter().enumerate() {
@@ -128,7 +132,7 @@ impl<'s> Screening<'s> {
             }
             let mut residuals = columns.pop().expect("the residuals are last");
             let mut basis: Vec<Vec<f64>> = Vec::new();
-            for mut column in columns {
+            for (_, mut column) in columns.into_iter().enumerate().filter(|(at, _)| takes_up(*at)) {
                 let before = dot(&column, &column).sqrt();
                 for _ in 0..2 {
                     basis.iter().for_each(|q| take_out(q, &mut column));

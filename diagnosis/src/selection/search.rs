@@ -14,6 +14,10 @@ use crate::fit::{Added, Point};
 /// Single effects and pairs of an expansion that are fitted under all error models. Basis: an assumption.
 const IN_FULL: [usize; 2] = [4, 3];
 
+/// Candidates of one parameter that leave little of the error by least squares, of which more are not fitted under the
+/// error models. Basis: on the recordings at most seven did.
+const LEAVE_LITTLE: usize = 10;
+
 /// Sets that are fitted roughly before what they have reached decides which others are hopeless. Basis: an assumption.
 const AT_A_TIME: usize = 4;
 
@@ -30,9 +34,13 @@ impl<'a> FittedSets<'_, 'a> {
         both.is_some_and(|(own, declared)| own <= (1.0 - self.settings().explained) * declared)
     }
 
-    /// Adds single effects and pairs to the declared model: screening, then fits of the best.
+    /// Adds single effects and pairs to the declared model: screening, then fits of the best; none where wider ranges
+    /// explain all.
     #[must_use]
     pub fn with_single_effects(mut self) -> Self {
+        if self.is_explained_by_ranges() {
+            return self;
+        }
         self.refit.simulations.stage("single effects and pairs", 0.15);
         self.expand(&Key::new());
         self.note();
@@ -45,7 +53,7 @@ impl<'a> FittedSets<'_, 'a> {
     pub fn searched(mut self) -> Self {
         // Of sets with the same classes at the same places one is expanded.
         let mut expanded: Vec<Vec<(EffectClass, String)>> = vec![Vec::new()];
-        while expanded.len() < self.settings().expansions {
+        while expanded.len() < self.settings().expansions && !self.is_range_at_fault() {
             let first = self.sets.first().map_or(f64::NEG_INFINITY, |set| self.log_posterior(set));
             let best = self.sets.iter().take(self.settings().beam).find(|set| {
                 let is_promising = self.log_posterior(set) > first - NEGLIGIBLE;
@@ -137,6 +145,9 @@ impl<'a> FittedSets<'_, 'a> {
         let pairs: Vec<Vec<&Screened>> =
             pairs.into_iter().filter(|(gain, _)| pays(gain - best)).map(|(_, pair)| pair).collect();
         self.fit_best(&parent, &singles, IN_FULL[0]);
+        if is_missed {
+            self.fit_by_squares(&parent, &screened);
+        }
         self.sort();
         // Where a set is found that lacks nothing, no pair is needed.
         if !pairs.is_empty() && self.sets.first().is_some_and(|set| self.lacks_something(set)) {
@@ -259,6 +270,30 @@ impl<'a> FittedSets<'_, 'a> {
             self.refit.least_squares(key, &[by_squares.start.clone(), rough.start.clone()])
         };
         let sets: Vec<FittedSet<'a>> = trials.par_iter().filter_map(fitted).collect();
+        self.add_all(sets, HOPELESS);
+    }
+
+    /// Fits every candidate of one parameter by least squares, and those that leave little of the error under the error
+    /// models: to first order all are alike where the residual is one smooth stroke, and correlated errors explain it
+    /// without any.
+    fn fit_by_squares(&mut self, parent: &FittedSet<'a>, screened: &[Screened]) {
+        let is_plain = |screened: &&Screened| {
+            let effect = &self.refit.candidates[screened.index].effect;
+            effect.parameters().len() == 1 && !self.is_known(&with(&parent.key, screened.index))
+        };
+        let least = parent.with_share_of_error(self.settings().little);
+        let fitted = |single: &&Screened| {
+            let rough = self.by_squares(parent, &[*single], &[], least)?;
+            (rough.log_likelihood >= least).then_some((with(&parent.key, single.index), rough))
+        };
+        let plain: Vec<&Screened> = screened.iter().filter(is_plain).collect();
+        let mut left: Vec<(Key, Rough)> = plain.par_iter().filter_map(fitted).collect();
+        left.sort_by(|a, b| b.1.log_likelihood.total_cmp(&a.1.log_likelihood));
+        left.truncate(LEAVE_LITTLE);
+        let sets = left
+            .par_iter()
+            .filter_map(|(key, rough)| self.refit.least_squares(key, std::slice::from_ref(&rough.start)));
+        let sets: Vec<FittedSet<'a>> = sets.collect();
         self.add_all(sets, HOPELESS);
     }
 

@@ -11,14 +11,19 @@ use super::contradiction::is_contradicted;
 use super::fitted_set::{FittedSet, Key, Start, evidence};
 use super::refit::{HOPELESS, Refit, WORSE, price};
 use super::screening::Screened;
+use super::widened::Widened;
 use crate::candidates::Candidate;
-use crate::estimation::{ErrorModel, Estimate};
+use crate::estimation::{ErrorModel, Estimate, STALLS};
 use crate::fit::{Added, Sets};
 use crate::motion::sizes_for;
 use crate::settings::Settings;
 
 /// Logarithm of the probability relative to a more probable set below which a set does not count. Basis: less than 1 %.
 pub const NEGLIGIBLE: f64 = 5.0;
+
+/// Times that a fit which has not converged is taken up again. Basis: what three times the iterations of a fit do not
+/// bring to an end is no answer.
+const TRIES: usize = 2;
 
 /// Sets that are fitted under the error models at once. Those before them decide for which of them this is hopeless.
 const TOGETHER: usize = 2;
@@ -151,9 +156,86 @@ impl<'r, 'a> FittedSets<'r, 'a> {
                     names.contains(&candidates[*k].effect.name()) && candidates[*k].port == added.candidate.port
                 };
                 let simpler = (0..candidates.len()).filter(is_simpler).map(|k| with(&rest, k));
-                simpler.into_iter().find(|key| self.get(key).is_some())
+                simpler.into_iter().find(|key| self.get(key).is_some_and(|simpler| self.leaves_as_little(simpler, set)))
             })
         })
+    }
+
+    /// Returns true if a set leaves about as little of the error on calibration records as another one, or little of
+    /// that of the declared model.
+    pub fn leaves_as_little(&self, set: &FittedSet<'_>, other: &FittedSet<'_>) -> bool {
+        let errors = set.error().zip(other.error()).zip(self.declared().error());
+        errors.is_some_and(|((own, other), declared)| {
+            own <= (1.0 + self.settings().least) * other || own <= self.settings().little * declared
+        })
+    }
+
+    /// Returns true if a set describes calibration records worse than the declared model, or its fit by least squares
+    /// still moves: it is not known what it says.
+    pub fn is_inconsistent(&self, set: &FittedSet<'_>) -> bool {
+        let errors = set.error().zip(self.declared().error());
+        !set.is_settled || errors.is_none_or(|(own, declared)| own > declared)
+    }
+
+    /// Returns the declared model with wider ranges if it leaves hardly more than a set, and clearly less than within
+    /// the declared ones.
+    pub fn widened_for(&self, set: &FittedSet<'_>) -> Option<&Widened> {
+        let hardly_more = 1.0 + self.settings().least;
+        let is_as_close = |widened: &&Widened| {
+            let errors = set.error().zip(self.declared().error());
+            errors.is_some_and(|(own, declared)| {
+                widened.error <= hardly_more * own && hardly_more * widened.error < declared
+            })
+        };
+        self.refit.widened.as_ref().filter(is_as_close)
+    }
+
+    /// Returns true if wider ranges leave nothing to be explained.
+    pub fn is_explained_by_ranges(&self) -> bool {
+        let matters = self.settings().matters;
+        self.widened_for(self.declared()).is_some_and(|widened| widened.largest <= matters)
+    }
+
+    /// Returns true if no set that was fitted leaves less than wider ranges do.
+    pub fn is_range_at_fault(&self) -> bool {
+        let leaves_more =
+            |widened: &Widened| self.sets.iter().all(|set| set.error().is_none_or(|error| error >= widened.error));
+        self.widened_for(self.declared()).is_some_and(leaves_more)
+    }
+
+    /// Returns true if wider ranges remove most of the mean square error above noise of calibration records.
+    pub fn ranges_remove_most(&self) -> bool {
+        let above = |error: f64| error * error - 1.0;
+        let declared = self.declared().error().map_or(f64::NAN, above);
+        self.refit.widened.as_ref().is_some_and(|w| above(w.error) <= (1.0 - self.settings().most) * declared)
+    }
+
+    /// Takes fits by least squares that have not converged up again from where they stopped, of the sets that may be
+    /// named: those that are more probable than the declared model, or leave little of its error.
+    pub fn take_up(&mut self) {
+        let declared = self.log_posterior(self.declared());
+        let little = self.declared().with_share_of_error(self.settings().little);
+        let counts =
+            |set: &FittedSet<'a>| self.log_posterior(set) > declared || set.least_squares.log_likelihood >= little;
+        let continued = |set: &FittedSet<'a>| {
+            let mut set = set.clone();
+            for _ in 0..if counts(&set) { TRIES } else { 0 } {
+                if set.is_settled {
+                    break;
+                }
+                let still = set.with_share_of_error((1.0 - STALLS).sqrt());
+                let again = set.estimation(&[]).least_squares(set.least_squares.point.clone())?;
+                set.is_settled = again.converged || again.log_likelihood < still;
+                set.least_squares = again;
+            }
+            Some(set)
+        };
+        let continued: Vec<Option<FittedSet<'a>>> = self.sets.par_iter().map(continued).collect();
+        for (set, again) in self.sets.iter_mut().zip(continued) {
+            if let Some(again) = again {
+                *set = again;
+            }
+        }
     }
 
     /// Returns true if the records allow most values that are tried of a parameter of an effect that no derivative

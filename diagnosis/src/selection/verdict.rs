@@ -2,23 +2,15 @@
 
 use mops_core::Role;
 use mops_math as math;
-use mops_outcome::diagnosis::Dependence;
+use mops_outcome::diagnosis::{Dependence, NamedBy};
 
 use super::contradiction::{fitted_together, is_contradicted};
+use super::entry::{Entry, entries_of, entry};
 use super::fitted_set::{FittedSet, Key, STRONG, correlation, growth, largest};
 use super::forecast::Forecasts;
 use super::sets::FittedSets;
-use crate::candidates::Candidate;
+use super::voice::{Voice, is_in_proportion, of_least_squares};
 use crate::fit::dot;
-
-/// Class of effects at a place.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Entry {
-    /// Class, or `disturbance`.
-    pub class: String,
-    /// Place.
-    pub place: String,
-}
 
 /// Conclusion on the declared model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,17 +30,22 @@ pub struct Stated {
     pub entry: Entry,
     /// Classes and places of effects in its place that the records cannot distinguish from it.
     pub alike: Vec<Entry>,
-    /// Posterior probability of the entry or one that is alike, with a share for what is in no catalogue.
+    /// Posterior probability of the entry or one that is alike, with a share for what is in no catalogue; NaN where
+    /// something else than it decides against a claim.
     pub probability: f64,
-    /// True if the probability suffices for a claim; otherwise the effect is a proposal.
+    /// True if class and place are claimed; otherwise the effect is a proposal.
     pub is_claimed: bool,
 }
 
 /// Result of a selection.
 #[derive(Debug, Clone)]
 pub struct Verdict {
-    /// The first set that passed; empty for the declared model.
+    /// The set that is named; empty for the declared model.
     pub set: Key,
+    /// What named it.
+    pub named_by: NamedBy,
+    /// True if wider ranges of declared parameters explain as much as the effects that would be named.
+    pub is_range: bool,
     /// Sets with an effect that does nothing or is at a limit, and those that are simpler ones in all but name.
     pub excluded: Vec<Key>,
     /// Sets that passed, with their posterior probabilities; those that are simpler ones in all but name under the keys
@@ -78,10 +75,19 @@ pub struct Verdict {
 
 const SOME: f64 = 0.01;
 
-/// Decides which of the sets that forecast well is chosen, and what is claimed of it.
-pub fn decide(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> Verdict {
-    let settings = &sets.refit.subject.settings;
-    let nothing = Key::new();
+/// Set that evidence names.
+struct ByEvidence {
+    set: Key,
+    /// Sets that passed with their posterior probabilities, those that are simpler ones under the keys of these.
+    weights: Vec<(Key, f64)>,
+    /// Posterior probability of the declared model.
+    nothing: f64,
+    /// Sets that are simpler ones in all but name.
+    aliases: Vec<Key>,
+}
+
+/// Names the first of the sets that passed, or a simpler one that says the same, and weighs them all.
+fn by_evidence(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> ByEvidence {
     let declared = sets.log_posterior(sets.declared());
     let mut passed = forecasts.passed.clone();
     // What is a simpler effect in all but name counts for that.
@@ -99,62 +105,66 @@ pub fn decide(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> Verdict {
     let most = passed.iter().map(log).fold(declared, f64::max);
     let weight = |log: f64| math::exp(log - most);
     let total: f64 = weight(declared) + passed.iter().map(|key| weight(log(key))).sum::<f64>();
-    let nothing_probability = weight(declared) / total;
-    let weights: Vec<(Key, f64)> =
-        passed.iter().zip(&named).map(|(key, named)| (named.clone(), weight(log(key)) / total)).collect();
-    let entries = entries_of(sets, &set);
-    let entries: Vec<(Entry, Vec<Entry>, f64)> = entries
-        .into_iter()
+    let weights = passed.iter().zip(&named).map(|(key, named)| (named.clone(), weight(log(key)) / total)).collect();
+    let aliases = passed.into_iter().zip(named).filter(|(a, b)| a != b).map(|(a, _)| a).collect();
+    ByEvidence { set, weights, nothing: weight(declared) / total, aliases }
+}
+
+/// Decides which set is named, and what is claimed of it.
+pub fn decide(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> Verdict {
+    let settings = sets.settings();
+    let ByEvidence { set, weights, nothing, aliases } = by_evidence(sets, forecasts);
+    // Where what evidence names leaves much, least squares is asked. It alone claims nothing.
+    let is_in_proportion = is_in_proportion(sets, forecasts, &set);
+    let voice = if is_in_proportion { None } else { of_least_squares(sets, forecasts) };
+    let is_agreed = |voice: &Voice| set.len() == 1 && entries_of(sets, &set).contains(&voice.entry);
+    let (set, named_by, alone) = match voice {
+        Some(voice) if is_agreed(&voice) => (voice.set, NamedBy::Evidence, None),
+        Some(voice) => (voice.set.clone(), NamedBy::LeastSquares, Some(voice)),
+        None => (set, NamedBy::Evidence, None),
+    };
+    // What wider ranges of declared parameters explain as well is no effect.
+    let is_range = sets.get(&set).and_then(|set| sets.widened_for(set)).is_some()
+        && (!set.is_empty() || sets.ranges_remove_most());
+    let set = if is_range { Key::new() } else { set };
+    let own = entries_of(sets, &set);
+    let entries: Vec<(Entry, Vec<Entry>, f64)> = own
+        .iter()
         .map(|own| {
-            let alike = alike(sets, &set, &own, &weights);
-            let counts = |key: &Key| entries_of(sets, key).iter().any(|e| *e == own || alike.contains(e));
+            if let Some(voice) = &alone {
+                return (own.clone(), voice.alike.clone(), f64::NAN);
+            }
+            let alike = alike(sets, &set, own, &weights);
+            let counts = |key: &Key| entries_of(sets, key).iter().any(|e| e == own || alike.contains(e));
             let probability = weights.iter().filter(|(key, _)| counts(key)).map(|(_, weight)| weight).sum();
-            (own, alike, probability)
+            (own.clone(), alike, probability)
         })
         .collect();
     let of_first = forecasts.first.as_ref().map_or_else(Vec::new, |first| entries_of(sets, first));
-    let own = entries_of(sets, &set);
     let is_first = !own.is_empty() && !of_first.is_empty() && of_first.iter().all(|entry| own.contains(entry));
     // What has higher evidence says the same, and more that forecasts no better.
     let is_within = !own.is_empty()
         && entries.iter().all(|(own, alike, _)| of_first.contains(own) || alike.iter().any(|e| of_first.contains(e)));
-    let remaining = if set.is_empty() { Vec::new() } else { sets.free_curves(&set) };
-    let share = if set.is_empty() { None } else { forecasts.share_of_declared(sets, &set) };
-    let gained = || {
-        let log = |key: &Key| sets.get(key).and_then(|set| set.likeliest()).map_or(0.0, |l| l.1.log_likelihood);
-        log(&set) - log(&nothing)
-    };
-    let fires =
-        remaining.first().is_some_and(|curve| curve.gain >= settings.fires && curve.gain >= settings.small * gained());
-    let contradicted = !set.is_empty() && sets.get(&set).is_some_and(is_contradicted);
+    let remains = Remains::of(sets, forecasts, &set);
     // Where a set of higher evidence says something else, or other records contradict, there is more to it, too.
-    let explains =
-        !fires && !contradicted && (is_first || is_within) || share.is_some_and(|share| share >= settings.most);
+    let explains = remains.is_little() && (is_first || is_within) || remains.is_share_removed;
     let least = if forecasts.are_of_other_records() { settings.claimed } else { settings.most };
     let most = if is_first { 1.0 } else { settings.claimed };
-    // An effect that forecasts hardly better is a proposal.
-    let matters: Vec<Entry> = (0..set.len())
-        .filter(|&index| {
-            // What happens once in one record can be distinguished from what it lacks by another record only.
-            let is_once = sets.refit.candidates[set[index]].only.is_some();
-            (forecasts.are_of_other_records() || !is_once)
-                && forecasts.share_of(sets, &set, index).is_some_and(|share| share >= settings.least)
-        })
-        .map(|index| entry(sets, &sets.refit.candidates[set[index]]))
-        .collect();
-    let state = |(entry, alike, probability): (Entry, Vec<Entry>, f64)| Stated {
-        is_claimed: probability >= least && matters.contains(&entry),
-        probability: (probability * (1.0 - settings.other)).min(most),
-        entry,
-        alike,
-    };
-    let stated: Vec<Stated> = entries.into_iter().map(state).collect();
     let is_supported = forecasts.are_of_other_records()
         || is_first && forecasts.share(sets, &set).is_some_and(|share| share >= settings.most);
-    let is_effect = explains && is_supported && stated.iter().any(|stated| stated.is_claimed);
-    let declared_model = sets.declared();
-    let lacks = lacks(declared_model);
-    let conclusion = if is_effect {
+    let may_claim = explains && is_supported && alone.is_none();
+    let matters = matters(sets, forecasts, &set);
+    let state = |(entry, alike, probability): (Entry, Vec<Entry>, f64)| {
+        let is_probable = probability >= least;
+        let is_claimed = may_claim && is_probable && matters.contains(&entry);
+        // Of what is not claimed although it is probable, something else than the probability says so.
+        let is_stated = is_claimed || probability < least && explains;
+        let probability = if is_stated { (probability * (1.0 - settings.other)).min(most) } else { f64::NAN };
+        Stated { is_claimed, probability, entry, alike }
+    };
+    let stated: Vec<Stated> = entries.into_iter().map(state).collect();
+    let lacks = lacks(sets.declared());
+    let conclusion = if stated.iter().any(|stated| stated.is_claimed) {
         Conclusion::Effect
     } else if lacks.iter().any(|(nats, error)| *nats > sets.significant && *error > settings.matters) {
         Conclusion::Unexplained
@@ -163,23 +173,65 @@ pub fn decide(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> Verdict {
     };
     Verdict {
         conclusion,
+        named_by,
+        is_range,
         stated,
-        nothing: nothing_probability,
-        is_contradicted: contradicted,
+        nothing,
+        is_contradicted: remains.is_contradicted,
         is_refused: !explains,
-        is_description: fires,
-        excluded: forecasts
-            .excluded
-            .iter()
-            .cloned()
-            .chain(passed.into_iter().zip(named).filter(|(a, b)| a != b).map(|(a, _)| a))
-            .collect(),
+        is_description: remains.fires,
+        excluded: forecasts.excluded.iter().cloned().chain(aliases).collect(),
         passed: weights,
         set,
         is_first,
-        remaining,
+        remaining: remains.curves,
         lack_of_fit: lacks[0].0,
     }
+}
+
+/// What remains on top of a set.
+struct Remains {
+    curves: Vec<Dependence>,
+    /// True if a curve on top of the set fires.
+    fires: bool,
+    is_contradicted: bool,
+    /// True if the set removes most of the forecast error of the declared model.
+    is_share_removed: bool,
+}
+
+impl Remains {
+    fn of(sets: &FittedSets<'_, '_>, forecasts: &Forecasts, key: &Key) -> Self {
+        let settings = sets.settings();
+        let Some(set) = sets.get(key).filter(|set| !set.key.is_empty()) else {
+            return Self { curves: Vec::new(), fires: false, is_contradicted: false, is_share_removed: false };
+        };
+        let curves = sets.free_curves(key);
+        let log = |set: &FittedSet<'_>| set.likeliest().map_or(0.0, |likeliest| likeliest.1.log_likelihood);
+        let gained = log(set) - log(sets.declared());
+        let share = forecasts.share_of_declared(sets, key);
+        Self {
+            fires: curves.first().is_some_and(|c| c.gain >= settings.fires && c.gain >= settings.small * gained),
+            is_contradicted: is_contradicted(set),
+            is_share_removed: share.is_some_and(|share| share >= settings.most),
+            curves,
+        }
+    }
+
+    fn is_little(&self) -> bool {
+        !self.fires && !self.is_contradicted
+    }
+}
+
+/// Returns classes and places of the effects of a set without which the forecast is worse by a share that matters: one
+/// that forecasts hardly better is a proposal.
+fn matters(sets: &FittedSets<'_, '_>, forecasts: &Forecasts, set: &Key) -> Vec<Entry> {
+    let matters = |&index: &usize| {
+        // What happens once in one record can be distinguished from what it lacks by another record only.
+        let is_once = sets.refit.candidates[set[index]].only.is_some();
+        (forecasts.are_of_other_records() || !is_once)
+            && forecasts.share_of(sets, set, index).is_some_and(|share| share >= sets.settings().least)
+    };
+    (0..set.len()).filter(matters).map(|index| entry(sets, &sets.refit.candidates[set[index]])).collect()
 }
 
 /// Returns classes and places of effects that the records cannot distinguish from those of an entry of a set: in place
@@ -218,14 +270,6 @@ fn swapped(sets: &FittedSets<'_, '_>, set: &Key, other: &Key) -> Option<[usize; 
     (cosine > sets.refit.subject.settings.alike).then_some([replaced, new])
 }
 
-/// Returns classes and places of the effects of a set, each once.
-fn entries_of(sets: &FittedSets<'_, '_>, key: &Key) -> Vec<Entry> {
-    let mut entries: Vec<Entry> = key.iter().map(|&k| entry(sets, &sets.refit.candidates[k])).collect();
-    entries.sort();
-    entries.dedup();
-    entries
-}
-
 /// Returns the first of the sets that passed, or the simplest one that says the same, unless the evidence for the first
 /// is strong: with the fewest parameters among those of the same classes and places, and those that the records cannot
 /// distinguish from it.
@@ -238,6 +282,7 @@ fn simplest(sets: &FittedSets<'_, '_>, passed: &[Key]) -> Key {
     let is_alike = |key: &&Key| {
         key.len() == first.len()
             && log(key) > log(first) - 0.5 * STRONG
+            && sets.get(key).zip(sets.get(first)).is_some_and(|(own, first)| sets.leaves_as_little(own, first))
             && (entries_of(sets, key) == entries || swapped(sets, first, key).is_some())
     };
     passed.iter().filter(is_alike).min_by_key(|key| parameters(key)).unwrap_or(first).clone()
@@ -260,13 +305,4 @@ fn lacks(set: &FittedSet<'_>) -> Vec<(f64, f64)> {
         Some((correlation(&fit.pieces, &residuals, &set.fit.subject.settings)?.max(grown), largest(&residuals)))
     };
     vec![on_calibration, together().unwrap_or((f64::INFINITY, f64::INFINITY))]
-}
-
-/// Returns class and place of a candidate; what happens once in one record is a disturbance of that record.
-pub fn entry(sets: &FittedSets<'_, '_>, candidate: &Candidate) -> Entry {
-    let class = match candidate.only {
-        Some(only) => format!("disturbance in {}", sets.refit.subject.measurements[only].name),
-        None => candidate.effect.class().name().to_owned(),
-    };
-    Entry { class, place: candidate.places() }
 }

@@ -1,6 +1,6 @@
 //! Where effects are tried, and at which values.
 
-use mops_core::effect::{Dimension, EffectParameter, InitialGrid, ParameterKind};
+use mops_core::effect::{Dimension, EffectParameter, InitialGrid, ParameterKind, Port};
 use mops_effects::effects;
 use mops_math as math;
 
@@ -83,6 +83,42 @@ fn a_room_radiates_to_temperatures_alone() {
     let all = of(ROOM, "radiation-exchange");
     let companions: Vec<String> = all.iter().map(|c| c.companion.as_ref().expect("it has one").to_string()).collect();
     assert_eq!(companions, ["actuator:To"]);
+}
+
+/// Returns the effects that are tried on a store whose state has a unit.
+fn of_store(unit: &str) -> Vec<&'static str> {
+    let text = format!("states = {{ x = \"{unit}\" }}\nparameters = {{ a = \"1/s\" }}\nder = {{ x = \"-a*x\" }}\n");
+    let record = Record { inputs: Vec::new(), times: vec![0.0, 1.0], signals: vec![("x", vec![0.0; 2], 1.0)] };
+    let all = candidates(&subject(&text, &[1.0, 1.0], 1, vec![record]), &effects());
+    all.iter().filter(|c| !matches!(c.port, Port::Sensor { .. })).map(|c| c.effect.name()).collect()
+}
+
+#[test]
+fn the_unit_of_a_state_says_what_it_may_lose() {
+    let tried = |unit: &str, effect: &str| of_store(unit).contains(&effect);
+    for (unit, heat, level, friction) in [
+        ("K", true, false, false),
+        ("m", false, true, false),
+        ("m^3", false, true, false),
+        ("m/s", false, false, true),
+        ("rad/s", false, false, true),
+        ("N", false, false, false),
+        ("V", true, true, false),
+        ("%", true, true, false),
+        ("1", true, true, false),
+    ] {
+        let found = ["radiation-loss", "leak", "coulomb-friction"].map(|effect| tried(unit, effect));
+        assert_eq!(found, [heat, level, friction], "{unit}");
+        assert!(tried(unit, "constant-force"), "{unit}");
+    }
+}
+
+#[test]
+fn the_zero_of_a_temperature_is_that_of_its_scale() {
+    let zeros = InitialGrid::Zeros(&[0.0, 273.15, 293.15]);
+    let tried = |zero| Sizes { zero, ..Sizes::UNKNOWN }.values(Dimension::POSITION, zeros, [0.0, f64::INFINITY]);
+    assert_eq!(tried(Some(273.15)), [273.15]);
+    assert_eq!(tried(None), [0.0, 273.15, 293.15]);
 }
 
 #[test]

@@ -10,11 +10,11 @@ use mops_outcome::diagnosis::StrengthValue;
 use crate::testing::{Record, catalogue, integrated, study, subject};
 use crate::{Options, diagnose};
 
-/// A body that cools: `T' = -h (T - 20)`.
+/// A body that cools: `T' = -h (T - 20)`, on a scale whose zero the study does not say.
 const BODY: &str = r#"
-states     = { T = "degC" }
+states     = { T = "1" }
 parameters = { h = "1/s" }
-der        = { T = "-h*(T - 20 [degC])" }
+der        = { T = "-h*(T - 20)" }
 "#;
 const RADIATED: f64 = 6e-11;
 

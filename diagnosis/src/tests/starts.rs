@@ -37,14 +37,14 @@ fn pulled(pull: f64, label: &str) -> Record {
 
 #[test]
 fn a_motor_with_a_lag_that_pulls_before_the_record_begins_leaves_only_the_noise() {
-    const PULL: f64 = 6.0;
+    const PULL: f64 = 4.0;
     let subject = subject(CART, &[M, D, 0.0, 0.0], 2, vec![pulled(PULL, "pull")]);
     let options = Options { max_effects: 1, level: 0.01, ..Options::default() };
     let found = diagnose(&study(&subject), &catalogue(&["actuator-lag"]), &options, &()).expect("it simulates");
     assert!(found.before[0].normalised > 5.0, "{:?}", found.before);
     assert!(found.after[0].normalised < 1.1, "{:?}", found.after);
     assert!((found.found[0].strengths[0].value - TAU).abs() < 0.05 * TAU, "{:?}", found.found[0].strengths);
-    // The lag begins with what the motor pulled beyond the command, `6 - (-2)`.
+    // The lag begins with what the motor pulled beyond the command, `4 - (-2)`.
     let start = found.starts.iter().find(|(_, name, _)| name == "u-actuator-lag.start1").expect("the lag has a state");
     assert!((start.2 - (PULL - command(0.0))).abs() < 0.4, "{start:?}");
 }

@@ -71,8 +71,8 @@ pub(super) fn parameters(d: &Definition, system: &System) -> Result<(Vec<Paramet
     Ok((parameters, starts))
 }
 
-/// Returns the ports: joints, equations of all continuous states but positions, inputs, states and outputs. `forces`
-/// are the units of the terms in the equations of the states.
+/// Returns the ports: joints, speeds without a position, equations of all continuous states but positions, inputs,
+/// states and outputs. `forces` are the units of the terms in the equations of the states.
 pub(super) fn ports(d: &Definition, system: &System, forces: &[Unit]) -> Result<Vec<Port>, StudyError> {
     let name = |s: usize| d.states[s].name.clone();
     let given = |position: usize| d.ports.iter().find(|(_, joint, _)| *joint == d.states[position].name);
@@ -98,6 +98,9 @@ pub(super) fn ports(d: &Definition, system: &System, forces: &[Unit]) -> Result<
                 velocity: name(s),
                 unit: unit.clone(),
             });
+        }
+        if position.is_none() && d.states[s].unit.is_speed() {
+            ports.push(Port::Speed { state: name(s), unit: unit.clone() });
         }
         ports.push(Port::Process { name: place, state: name(s), unit });
     }

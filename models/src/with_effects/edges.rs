@@ -100,7 +100,7 @@ impl<S: PlantScalar> Affected<'_, S> {
                 self.incoming.borrow()[index]
             }
             Site::Sensor { signal } => self.seen(signal, index, here),
-            Site::Joint { .. } | Site::Process { .. } => S::from(0.0),
+            Site::Joint { .. } | Site::Speed { .. } | Site::Process { .. } => S::from(0.0),
         }
     }
 
@@ -208,7 +208,7 @@ impl<S: PlantScalar> Affected<'_, S> {
             (Site::Process { .. }, false) => "a level falls below an edge",
             (Site::Joint { .. }, true) => "a contact closes",
             (Site::Joint { .. }, false) => "a contact opens",
-            (Site::Actuator { .. } | Site::Sensor { .. }, _) => "",
+            (Site::Speed { .. } | Site::Actuator { .. } | Site::Sensor { .. }, _) => "",
         }
     }
 
@@ -225,7 +225,7 @@ impl<S: PlantScalar> Affected<'_, S> {
             Site::Actuator { .. } | Site::Sensor { .. } => {
                 effect.passed(&self.at(effect, here, &[], self.arriving(index, here)), effect.states(here.at.x))
             }
-            Site::Joint { .. } | Site::Process { .. } => S::from(0.0),
+            Site::Joint { .. } | Site::Speed { .. } | Site::Process { .. } => S::from(0.0),
         }
     }
 
@@ -352,8 +352,8 @@ impl<S: PlantScalar> Affected<'_, S> {
             let mut z = vec![S::from(0.0); count];
             effect.effect.start(&state, &mut z);
             if effect.effect.friction(&state, &z).is_some() {
-                let Site::Joint { w, velocity, .. } = effect.place.site else {
-                    return Err(Failure::Undefined("dry friction acts at a joint".into()));
+                let Some((w, velocity)) = effect.place.site.speed() else {
+                    return Err(Failure::Undefined("dry friction acts at a joint or a speed".into()));
                 };
                 self.contacts.add(index, w, velocity);
             }

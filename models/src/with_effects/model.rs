@@ -279,10 +279,11 @@ pub(super) fn balances(of: &Interface) -> impl Iterator<Item = &String> {
 /// Returns the unit of the position or the state at which an effect acts, on its temperature scale.
 pub(super) fn unit_of_place(port: &Port, companion: Option<&Port>, interface: &Interface) -> Unit {
     let place = match port {
-        Port::Joint { .. } | Port::Process { .. } => port,
+        Port::Joint { .. } | Port::Speed { .. } | Port::Process { .. } => port,
         Port::Actuator { .. } | Port::Sensor { .. } => companion.unwrap_or(port),
     };
     let (Port::Joint { position: name, .. }
+    | Port::Speed { state: name, .. }
     | Port::Process { state: name, .. }
     | Port::Actuator { input: name }
     | Port::Sensor { output: name }) = place;
@@ -305,18 +306,21 @@ pub(super) fn unit(dimension: Dimension, port: &Port, companion: Option<&Port>, 
     };
     let position_and_speed = |port: &Port| match port {
         Port::Joint { position, velocity, .. } => (of(position), of(velocity)),
+        Port::Speed { state, .. } => (of(state).power(1, 1), of(state)),
         Port::Process { state: name, .. } | Port::Actuator { input: name } | Port::Sensor { output: name } => {
             (of(name), of(name).power(1, -1))
         }
     };
     let (output, place) = match port {
-        Port::Joint { unit, .. } | Port::Process { unit, .. } => (unit.clone(), port),
+        Port::Joint { unit, .. } | Port::Speed { unit, .. } | Port::Process { unit, .. } => (unit.clone(), port),
         Port::Actuator { input: name } | Port::Sensor { output: name } => (Some(of(name)), companion.unwrap_or(port)),
     };
     let (position, speed) = position_and_speed(place);
     let value = match (port, companion) {
-        (Port::Joint { .. } | Port::Process { .. }, None) => Unit::one(),
-        (Port::Joint { .. } | Port::Process { .. }, Some(companion)) => position_and_speed(companion).0,
+        (Port::Joint { .. } | Port::Speed { .. } | Port::Process { .. }, None) => Unit::one(),
+        (Port::Joint { .. } | Port::Speed { .. } | Port::Process { .. }, Some(companion)) => {
+            position_and_speed(companion).0
+        }
         _ => position_and_speed(port).0,
     };
     let output = output.unwrap_or_else(Unit::one);

@@ -16,12 +16,29 @@ pub(super) struct Place {
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Site {
     Joint { w: usize, position: usize, velocity: usize },
+    Speed { w: usize, velocity: usize },
     Process { w: usize, state: usize },
     Actuator { input: usize },
     Sensor { signal: usize },
 }
 
 impl Site {
+    /// Returns the force that acts there, if one does.
+    pub(super) fn force(self) -> Option<usize> {
+        match self {
+            Self::Joint { w, .. } | Self::Speed { w, .. } | Self::Process { w, .. } => Some(w),
+            Self::Actuator { .. } | Self::Sensor { .. } => None,
+        }
+    }
+
+    /// Returns the force and the speed that it changes, where there is a speed.
+    pub(super) fn speed(self) -> Option<(usize, usize)> {
+        match self {
+            Self::Joint { w, velocity, .. } | Self::Speed { w, velocity } => Some((w, velocity)),
+            _ => None,
+        }
+    }
+
     /// Returns the place of an effect, and its second port.
     pub(super) fn of_both(
         placement: &Placement,
@@ -77,6 +94,7 @@ impl Site {
             Port::Joint { position, velocity, .. } => {
                 Self::Joint { w: force(velocity)?, position: state(position)?, velocity: state(velocity)? }
             }
+            Port::Speed { state: name, .. } => Self::Speed { w: force(name)?, velocity: state(name)? },
             Port::Process { state: name, .. } => Self::Process { w: force(name)?, state: state(name)? },
             Port::Actuator { input } => {
                 Self::Actuator { input: interface.inputs.iter().position(|i| i.name == *input)? }

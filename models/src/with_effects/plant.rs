@@ -145,11 +145,13 @@ impl<'a, S: PlantScalar> Affected<'a, S> {
         let x = here.at.x;
         let (q, v) = match effect.place.site {
             Site::Joint { position, velocity, .. } => (x[position], x[velocity]),
+            Site::Speed { velocity, .. } => (zero, x[velocity]),
             Site::Process { state, .. } => (x[state], zero),
             _ => (value, zero),
         };
         let (other, other_speed) = match effect.place.companion {
             Some(Site::Joint { position, velocity, .. }) => (x[position], x[velocity]),
+            Some(Site::Speed { velocity, .. }) => (zero, x[velocity]),
             Some(Site::Process { state, .. }) => (x[state], zero),
             Some(Site::Actuator { input }) => (u.get(input).copied().unwrap_or(zero), zero),
             Some(Site::Sensor { signal }) => {
@@ -202,14 +204,14 @@ impl<'a, S: PlantScalar> Affected<'a, S> {
         w.clear();
         w.extend_from_slice(here.at.w);
         for (index, effect) in self.effects.iter().enumerate() {
-            let (Site::Joint { w: k, .. } | Site::Process { w: k, .. }) = effect.place.site else { continue };
+            let Some(k) = effect.place.site.force() else { continue };
             if effect.inertial {
                 continue;
             }
             let at = self.at(effect, here, u, S::from(0.0));
             let z = effect.states(here.at.x);
             w[k] += effect.effect.value(&at, z) * self.forward[k];
-            if let Some(Site::Joint { w: next, .. } | Site::Process { w: next, .. }) = effect.place.companion {
+            if let Some(next) = effect.place.companion.and_then(Site::force) {
                 w[next] += effect.effect.onward(&at, z) * self.forward[next];
             }
             if let Some(direction) = self.contacts.direction(index) {
@@ -235,7 +237,7 @@ impl<'a, S: PlantScalar> Affected<'a, S> {
         self.own_rates(&here.at, u, w, dx);
         let mut joints: Vec<(usize, usize)> = Vec::new();
         for effect in self.effects.iter().filter(|effect| effect.inertial) {
-            let Site::Joint { w: k, velocity, .. } = effect.place.site else { continue };
+            let Some((k, velocity)) = effect.place.site.speed() else { continue };
             if !joints.contains(&(k, velocity)) {
                 joints.push((k, velocity));
             }
@@ -267,7 +269,7 @@ impl<'a, S: PlantScalar> Affected<'a, S> {
     /// Returns the mass that effects add to a joint, where a unit force moves it with this acceleration.
     fn added_mass(&self, k: usize, mobility: S, here: &EventInstant<'_, S>, u: &[S]) -> S {
         let (mut added, mut lost) = (S::from(0.0), S::from(0.0));
-        let at_joint = |e: &&PlacedEffect<S>| e.inertial && matches!(e.place.site, Site::Joint { w, .. } if w == k);
+        let at_joint = |e: &&PlacedEffect<S>| e.inertial && e.place.site.speed().is_some_and(|(w, _)| w == k);
         for effect in self.effects.iter().filter(at_joint) {
             let mass = effect.effect.inertia(&self.at(effect, here, u, S::from(0.0)));
             *(if mass.value() < 0.0 { &mut lost } else { &mut added }) += mass;
@@ -402,7 +404,10 @@ impl<S: PlantScalar> Plant<S> for Affected<'_, S> {
         self.plant.settle(&Instant { x: &x[..self.own], ..inner });
         let sites = self.effects.iter().flat_map(|effect| [Some(effect.place.site), effect.place.companion]);
         for site in sites.flatten() {
-            let (Site::Joint { w: k, velocity: state, .. } | Site::Process { w: k, state }) = site else {
+            let (Site::Joint { w: k, velocity: state, .. }
+            | Site::Speed { w: k, velocity: state }
+            | Site::Process { w: k, state }) = site
+            else {
                 continue;
             };
             let inner = Instant { x: &x[..self.own], ..inner };

@@ -40,7 +40,10 @@ pub(super) struct Arguments {
     /// Number of cases of each of these kinds.
     #[arg(long, default_value_t = 120, value_name = "NUMBER", requires = "kinds")]
     per_kind: usize,
-    /// Plants, separated by commas [default: all; with `--kinds` those without a sampled controller].
+    /// Give the records of selection the role of validation: ends of the calibration records are forecast.
+    #[arg(long, requires = "kinds")]
+    without_selection: bool,
+    /// Plants, separated by commas [default: all; with `--kinds` driven-pendulum, two-masses and cascade].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     plants: Vec<String>,
     /// Effects, by their names in the test bed, separated by commas [default: all].
@@ -219,6 +222,7 @@ fn plan(arguments: &Arguments) -> Result<Plan, Diagnostic> {
         effects: chosen(&arguments.effects, (&all_effects, &[]), "effect")?,
         sizes: arguments.sizes.clone(),
         counts,
+        without_selection: arguments.without_selection,
         seed: arguments.seed,
         only: arguments.only.clone(),
     })

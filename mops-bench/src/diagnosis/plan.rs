@@ -47,6 +47,8 @@ pub(crate) struct Plan {
     pub sizes: Vec<f64>,
     /// Number of cases of each kind.
     pub counts: Vec<(Kind, usize)>,
+    /// True if no case of a setting has a record for selection.
+    pub without_selection: bool,
     /// Seed.
     pub seed: u64,
     /// Names of the selected cases; all if empty.
@@ -173,7 +175,9 @@ impl Plan {
             order.swap(i, draw.below(i + 1));
         }
         let effect = order[number / plants.len() % order.len()];
-        (0..ATTEMPTS).find_map(|attempt| disturbed(setting, plant, effect, self.seed_of(number as u64, attempt)))
+        let seeds = (0..ATTEMPTS).map(|attempt| self.seed_of(number as u64, attempt));
+        let trial = seeds.into_iter().find_map(|seed| disturbed(setting, plant, effect, seed))?;
+        Some(if self.without_selection { trial.without_selection() } else { trial })
     }
 }
 
@@ -187,6 +191,7 @@ mod tests {
             effects: vec!["coulomb-friction".into(), "input-delay".into()],
             sizes: vec![5.0, 2.0],
             counts: vec![(Kind::One, 4), (Kind::Two, 1), (Kind::Nothing, 2), (Kind::Outside, 1)],
+            without_selection: false,
             seed: 1,
             only: Vec::new(),
         }

@@ -41,6 +41,9 @@ impl Effect for Between {
     fn ports(&self) -> &'static [PortKind] {
         &[PortKind::Joint]
     }
+    fn quantities(&self) -> &'static [&'static str] {
+        self.0.quantities()
+    }
     fn second_port(&self) -> Option<PortKind> {
         Some(PortKind::Joint)
     }

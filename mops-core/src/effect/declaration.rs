@@ -53,7 +53,9 @@ impl EffectClass {
 pub enum PortKind {
     /// [`Port::Joint`]: a force against a coordinate of second order.
     Joint,
-    /// [`Port::Process`] of a state that is not the speed of a joint: a rate.
+    /// [`Port::Speed`]: a force against a speed without a position.
+    Speed,
+    /// [`Port::Process`] of a state that is no speed: a rate.
     Process,
     /// [`Port::Actuator`].
     Actuator,
@@ -66,6 +68,7 @@ impl PortKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Joint => "joint",
+            Self::Speed => "speed",
             Self::Process => "process",
             Self::Actuator => "actuator",
             Self::Sensor => "sensor",
@@ -74,13 +77,18 @@ impl PortKind {
 }
 
 impl Port {
-    /// Returns the kind of the port; `None` for the speed equation of a joint, which its [`Port::Joint`] represents.
+    /// Returns the kind of the port; `None` for the equation of a speed, which its [`Port::Joint`] or [`Port::Speed`]
+    /// represents.
     pub fn kind(&self, ports: &[Self]) -> Option<PortKind> {
         match self {
             Self::Joint { .. } => Some(PortKind::Joint),
+            Self::Speed { .. } => Some(PortKind::Speed),
             Self::Process { state, .. } => {
-                let of_joint = |port: &Self| matches!(port, Self::Joint { velocity, .. } if velocity == state);
-                (!ports.iter().any(of_joint)).then_some(PortKind::Process)
+                let is_force = |port: &Self| match port {
+                    Self::Joint { velocity: speed, .. } | Self::Speed { state: speed, .. } => speed == state,
+                    _ => false,
+                };
+                (!ports.iter().any(is_force)).then_some(PortKind::Process)
             }
             Self::Actuator { .. } => Some(PortKind::Actuator),
             Self::Sensor { .. } => Some(PortKind::Sensor),
@@ -162,6 +170,8 @@ pub enum InitialGrid {
     /// Relative positions between the smallest and the largest position (of a process: state; of an actuator or sensor:
     /// value).
     Within(&'static [f64]),
+    /// The zero of the temperature scale in which the state is declared; without one, these values.
+    Zeros(&'static [f64]),
     /// Relative positions as in [`InitialGrid::Within`], and the centre of a dead band visible in the samples of a
     /// sensor.
     WithinAndGap(&'static [f64]),

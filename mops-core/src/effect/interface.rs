@@ -146,6 +146,13 @@ pub trait Effect: Send + Sync {
     /// Returns the kinds of ports that the effect acts at.
     fn ports(&self) -> &'static [PortKind];
 
+    /// Returns units of the quantities that a state of its place may be, the temperature of a store or its level; none
+    /// if it may be any. A state in the unit of another mechanical or thermal quantity is then no place of it; one in
+    /// V, % or without a unit may be any quantity, as sensors show it.
+    fn quantities(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// Returns the kind of the second port, if one is needed: the origin of drag, a sensor with cross-talk.
     fn second_port(&self) -> Option<PortKind> {
         None

@@ -19,6 +19,13 @@ pub enum Port {
         /// Unit of the force, if the model provides it.
         unit: Option<Unit>,
     },
+    /// A force on a speed whose position is no state of the model, before a mass matrix is solved.
+    Speed {
+        /// State that is the speed.
+        state: String,
+        /// Unit of the force, if the model provides it.
+        unit: Option<Unit>,
+    },
     /// A term in the equation of a state, before a mass matrix is solved.
     Process {
         /// Name of the place: the joint or the state.
@@ -45,6 +52,7 @@ impl fmt::Display for Port {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Joint { name, .. } => write!(f, "joint:{name}"),
+            Self::Speed { state, .. } => write!(f, "speed:{state}"),
             Self::Process { name, .. } => write!(f, "process:{name}"),
             Self::Actuator { input } => write!(f, "actuator:{input}"),
             Self::Sensor { output } => write!(f, "sensor:{output}"),

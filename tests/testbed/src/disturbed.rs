@@ -126,6 +126,16 @@ pub const NOMINAL: &[Nominal] = &{
         of("cascade", "periodic-disturbance@process:h2", 3.0, 1),
         of("cascade", "wind-gust@process:h2", 7.0, 1),
         of("sampled-drive", "coulomb-friction@joint:q", 1.0, 1),
+        of("sled", "coulomb-friction@joint:x", 20.0, 2),
+        of("sled", "quadratic-drag@joint:x", 40.0, 2),
+        of("sled", "constant-force@joint:x", 15.0, 2),
+        of("sled", "cubic-stiffness@joint:x", 200.0, 1),
+        of("sled", "actuator-lag@actuator:u", 0.03, 2),
+        of("sled", "input-delay@actuator:u", 0.02, 2),
+        of("sled", "input-saturation@actuator:u", 0.3, 1),
+        of("drop", "quadratic-drag@joint:y", 0.02, 2),
+        of("drop", "coulomb-friction@joint:y", 1.0, 1),
+        of("drop", "constant-force@joint:y", 1.0, 1),
     ]
 };
 

@@ -69,6 +69,13 @@ pub struct TrueEffect {
 }
 
 impl Trial {
+    /// Returns the case with its records of selection as records of validation.
+    #[must_use]
+    pub fn without_selection(mut self) -> Self {
+        self.study = self.study.replace("role     = \"selection\"", "role     = \"validation\"");
+        self
+    }
+
     /// Writes study.toml, the data files and truth.json into a folder, which is created if necessary.
     ///
     /// # Errors

@@ -144,6 +144,18 @@ impl Unit {
         self.turning[0] != 0.0
     }
 
+    /// Returns true if the unit is that of a speed: m/s, rad/s and derived units.
+    pub fn is_speed(&self) -> bool {
+        let [metre, radian] = ["m/s", "rad/s"].map(Self::known);
+        self.dimension == metre.dimension || self.is_angle() && self.dimension == radian.dimension
+    }
+
+    /// Returns true if the unit is of a mechanical or thermal quantity: an angle, or a product of powers of m, kg, s
+    /// and K other than a pure number.
+    pub fn is_mechanical_or_thermal(&self) -> bool {
+        self.is_angle() || self.dimension.is_mechanical_or_thermal()
+    }
+
     /// Returns why a number in this unit has no certain value in `other`, and in which unit it has; `None` if it has
     /// one.
     ///

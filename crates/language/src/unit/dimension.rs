@@ -41,6 +41,11 @@ impl Dimension {
         *self == Self::NONE
     }
 
+    /// Returns true for a product of powers of m, kg, s and K, other than that of a pure number.
+    pub(super) fn is_mechanical_or_thermal(&self) -> bool {
+        !self.is_none() && [3, 5, 6].into_iter().all(|other: usize| self.0[other].abs() < SAME)
+    }
+
     /// Returns the dimension of the product with the power `exponent` of a quantity of dimension `other`.
     #[must_use]
     pub fn times(mut self, other: &Self, exponent: f64) -> Self {

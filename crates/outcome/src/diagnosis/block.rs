@@ -10,8 +10,8 @@ use serde_json::{Map, Value, json};
 use crate::Finding;
 
 use super::{
-    Alignment, Dependence, Diagnosis, ExperimentError, ForecastOf, Found, HeldOut, Noticeable, ParameterMove, Ranked,
-    Removed, Rival, Rule, Step, StrengthValue, Unexplained, Verdict,
+    Alignment, Dependence, Diagnosis, ExperimentError, ForecastOf, Found, HeldOut, NamedBy, Noticeable, ParameterMove,
+    Ranked, Removed, Rival, Rule, Step, StrengthValue, Unexplained, Verdict, WiderRanges,
 };
 
 /// Result of a diagnosis.
@@ -39,6 +39,10 @@ pub struct Block {
     remaining: Option<Dependence>,
     /// Data whose forecast decided.
     forecast_of: ForecastOf,
+    /// What names the effects found; effects that least squares names are proposals.
+    named_by: NamedBy,
+    /// Wider ranges of declared parameters that explain as much as any effect; null if there are none.
+    wider_ranges: Option<WiderRanges>,
     /// True if the effects found are those of highest evidence.
     first_by_evidence: bool,
     /// True if the search was stopped before its end.
@@ -240,6 +244,8 @@ impl Block {
             depends_on: diagnosis.depends_on.clone(),
             remaining: diagnosis.remaining.clone(),
             forecast_of: diagnosis.forecast_of,
+            named_by: diagnosis.named_by,
+            wider_ranges: diagnosis.wider.clone(),
             first_by_evidence: diagnosis.is_first,
             stopped: diagnosis.is_stopped,
             converged: diagnosis.converged,

@@ -35,6 +35,8 @@ pub struct StrengthValue {
     /// 95 % confidence interval. For a discrete shape parameter: the range of the values that the data allow, if there
     /// are several.
     pub interval95: Option<[f64; 2]>,
+    /// True if the estimate stands at a bound of what physics or the records allow; it has no interval then.
+    pub at_bound: bool,
 }
 
 /// Alternative effect that explains the data about as well, or better.
@@ -149,6 +151,10 @@ pub enum Rule {
     Curve,
     /// Another effect is more probable.
     Probability,
+    /// Another effect leaves less of the error.
+    Error,
+    /// The effect describes the records best, but does not suffice for a claim: it is proposed.
+    Claim,
 }
 
 /// Recorded input that acts at other times than its study says, or is interpolated otherwise between its samples.
@@ -190,6 +196,17 @@ impl std::fmt::Display for Dependence {
             None => write!(f, "{coordinate} at {place}"),
         }
     }
+}
+
+/// What names a set of effects.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum NamedBy {
+    /// Evidence: the mean over the error models.
+    #[default]
+    Evidence,
+    /// Least squares, where evidence names nothing that leaves little of the error: a proposal.
+    LeastSquares,
 }
 
 /// Data whose forecast decides which effects are claimed.
@@ -234,6 +251,28 @@ pub struct Ranked {
     /// Rule that the effect failed; `None` for a claimed one.
     #[serde(default)]
     pub failed: Option<Rule>,
+}
+
+/// Ranges of declared parameters that end too early: what the model explains where they are wider.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WiderRanges {
+    /// Parameters that leave their ranges.
+    pub ranges: Vec<WiderRange>,
+    /// Error with them on calibration data, in units of the noise.
+    pub error: f64,
+}
+
+/// Declared parameter that leaves its range.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WiderRange {
+    /// Tuner.
+    pub parameter: String,
+    /// Unit.
+    pub unit: String,
+    /// End of the declared range.
+    pub end: f64,
+    /// Estimate beyond it.
+    pub value: f64,
 }
 
 /// Residual that no effect explains.
@@ -296,9 +335,11 @@ pub struct ParameterMove {
     pub after: f64,
     /// Standard error in the augmented model, under its likeliest error model.
     pub std_error: Option<f64>,
-    /// 95 % confidence interval under the likeliest error model, widened to `after`, which is estimated by least
-    /// squares.
+    /// 95 % confidence interval under the likeliest error model, widened by as much about `after`, which is estimated
+    /// by least squares.
     pub interval95: Option<[f64; 2]>,
+    /// True if `after` stands at a bound of its range; it has no interval then.
+    pub at_bound: bool,
 }
 
 /// Detection limit: the smallest parameter of an effect that would have been detected.
@@ -430,6 +471,10 @@ pub struct Diagnosis {
     pub remaining: Option<Dependence>,
     /// Data whose forecast decided.
     pub forecast_of: ForecastOf,
+    /// What names the effects found.
+    pub named_by: NamedBy,
+    /// Wider ranges of declared parameters that explain as much as any effect; `None` if there are none.
+    pub wider: Option<WiderRanges>,
     /// True if the effects found are those of highest evidence.
     pub is_first: bool,
     /// True if the search was stopped before its end.

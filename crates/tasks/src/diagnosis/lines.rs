@@ -58,8 +58,7 @@ fn found(diagnosis: &Diagnosis) -> Table {
         for (i, strength) in found.strengths.iter().enumerate() {
             // Cells common to all rows are filled in the first only.
             let once = |text: String| if i == 0 { text } else { String::new() };
-            let [low, high] =
-                strength.interval95.map_or_else(Default::default, |ends| ends.map(|end| significant(end, 3)));
+            let [low, high] = words::ends(strength.interval95, strength.at_bound, 3);
             let row = [
                 once(found.effect.clone()),
                 once(found.places()),
@@ -144,7 +143,7 @@ fn ranking(diagnosis: &Diagnosis) -> Table {
 
 fn parameters(diagnosis: &Diagnosis) -> Table {
     let rows = diagnosis.parameters.iter().map(|p| {
-        let [low, high] = p.interval95.map_or_else(Default::default, |ends| ends.map(|end| significant(end, 4)));
+        let [low, high] = words::ends(p.interval95, p.at_bound, 4);
         let change =
             if p.before == 0.0 { String::new() } else { format!("{:+.1} %", 100.0 * (p.after / p.before - 1.0)) };
         let row = [p.name.clone(), precise(p.before), precise(p.after), low, high, p.unit.clone(), change];

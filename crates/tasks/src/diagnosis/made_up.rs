@@ -20,6 +20,7 @@ fn strength(name: &str, value: f64, unit: &str) -> StrengthValue {
         unit: unit.into(),
         std_error: Some(0.02 * value.abs()),
         interval95: Some([value - 0.05 * value.abs(), value + 0.05 * value.abs()]),
+        at_bound: false,
     }
 }
 
@@ -104,6 +105,7 @@ fn moved(name: &str, before: f64, after: f64) -> ParameterMove {
         after,
         std_error: Some(0.01 * after.abs()),
         interval95: Some([0.98 * after, 1.02 * after]),
+        at_bound: false,
     }
 }
 

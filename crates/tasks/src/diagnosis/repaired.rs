@@ -357,8 +357,14 @@ free     = [\"phi\", \"theta\"]
 
     #[test]
     fn a_phase_has_the_value_found_as_initial_guess_in_each_experiment() {
-        let phase =
-            StrengthValue { name: "phase".into(), value: 0.4, unit: "rad".into(), std_error: None, interval95: None };
+        let phase = StrengthValue {
+            name: "phase".into(),
+            value: 0.4,
+            unit: "rad".into(),
+            std_error: None,
+            interval95: None,
+            at_bound: false,
+        };
         let catalogue = crate::testing::catalogue();
         let known = catalogue.effects.iter().flat_map(|effect| effect.parameters());
         let known = known.filter(|known| known.scope == Scope::Experiment).find(|known| known.name == "phase").unwrap();

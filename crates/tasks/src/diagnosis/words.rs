@@ -2,7 +2,8 @@
 
 use mops_core::Role;
 use mops_outcome::diagnosis::{
-    Alignment, Dependence, Diagnosis, Found, HeldOut, Removed, Rival, Rule, StrengthValue, Verdict, together,
+    Alignment, Dependence, Diagnosis, Found, HeldOut, NamedBy, Removed, Rival, Rule, StrengthValue, Verdict,
+    WiderRange, WiderRanges, together,
 };
 
 use mops_content::numbers::significant;
@@ -33,18 +34,39 @@ pub fn verdict(diagnosis: &Diagnosis) -> String {
             let more: String = sentences.into_iter().flatten().map(|sentence| format!(" {sentence}")).collect();
             format!("The model {finding}: {}.{more}", error_change(diagnosis))
         }
+        Verdict::Unexplained if diagnosis.wider.is_some() => wider(diagnosis),
         Verdict::Unexplained => {
-            let what = match &diagnosis.depends_on {
-                Some(dependence) => {
-                    format!("something that depends on {}; no effect is claimed", depends_on(dependence))
-                }
-                None => "something that no tested effect explains".to_owned(),
+            let coordinate = diagnosis.depends_on.as_ref().map(|on| format!("that depends on {}", depends_on(on)));
+            let what = match (coordinate, diagnosis.found.is_empty()) {
+                (Some(coordinate), true) => format!("something {coordinate}, and no effect is named"),
+                (Some(coordinate), false) => format!("something {coordinate}"),
+                (None, true) => "something that no tested effect explains".to_owned(),
+                (None, false) => "something".to_owned(),
             };
-            let sentences = [aligned(diagnosis), proposed(diagnosis)];
+            let sentences = [proposed(diagnosis), aligned(diagnosis)];
             let more: String = sentences.into_iter().flatten().map(|sentence| format!(" {sentence}")).collect();
             format!("The model lacks {what}: {}.{more}", error_change(diagnosis))
         }
     }
+}
+
+/// Returns that ranges of declared parameters end too early.
+fn wider(diagnosis: &Diagnosis) -> String {
+    let Some(WiderRanges { ranges, error }) = &diagnosis.wider else { return String::new() };
+    let of = |range: &WiderRange| {
+        let [value, end] = [range.value, range.end].map(|value| significant(value, 3));
+        let unit = if range.unit == "1" { String::new() } else { format!(" {}", range.unit) };
+        format!("`{}` = {value}{unit}, beyond the end {end}{unit} of its range", range.parameter)
+    };
+    let before = together(&diagnosis.before, Role::Calibration).map_or_else(String::new, times);
+    let range = if ranges.len() == 1 { "range" } else { "ranges" };
+    format!(
+        "No effect is named, as the {range} may be too narrow: with {} the declared model leaves {} times the noise \
+         level on calibration data instead of {before}, no more than with any effect. Widen the {range} if that is \
+         plausible, and diagnose again.",
+        list(&ranges.iter().map(of).collect::<Vec<String>>()),
+        times(*error),
+    )
 }
 
 /// Returns what is claimed: class and place, each with the effect that describes it best; `None` if nothing is.
@@ -59,12 +81,16 @@ fn claims(diagnosis: &Diagnosis) -> Option<String> {
         let certainty =
             certainty.map_or_else(String::new, |f| format!(" (probability {})", probability(f.class_probability)));
         // What the data cannot distinguish is one claim.
-        let alike = own.iter().flat_map(|found| &found.alike).filter_map(|other| other.split_once(" at "));
-        let alike: Vec<String> = alike.map(|(class, place)| format!("{class} {}", at(place))).collect();
-        let alike = if alike.is_empty() { String::new() } else { format!(", or {}", alike.join(", or ")) };
+        let alike: String = own.iter().map(|found| or_alike(found)).collect();
         format!("{} {}{alike}{certainty}, best described by {}", self::class(class), at(place), list(&names))
     };
     (!entries.is_empty()).then(|| list(&entries.iter().map(claim).collect::<Vec<String>>()))
+}
+
+/// Returns the classes and places that the records cannot distinguish from those of an effect, each after `, or`.
+fn or_alike(found: &Found) -> String {
+    let others = found.alike.iter().filter_map(|other| other.split_once(" at "));
+    others.map(|(class, place)| format!(", or {class} {}", at(place))).collect()
 }
 
 /// Returns an effect of a class with its article: `an elastic effect`.
@@ -101,7 +127,14 @@ fn explained(diagnosis: &Diagnosis) -> Option<String> {
     };
     let role = [Role::Validation, Role::Selection].into_iter().find(is_known)?;
     let most = if diagnosis.explains_most() { "" } else { "; most remains unexplained" };
-    Some(format!("The effects found explain {} of the squared error on {} data{most}.", share(explained), role.name()))
+    let left = together(&diagnosis.after, role).map_or_else(String::new, times);
+    let left = format!("; an error of {left} times the noise level is left");
+    Some(format!(
+        "The effects found explain {} of the squared error on {} data{}.",
+        share(explained),
+        role.name(),
+        if diagnosis.explains_most() && explained > NEARLY_ALL { &left } else { most }
+    ))
 }
 
 /// Returns a sentence on the effects that describe the data, but are not claimed.
@@ -110,9 +143,15 @@ fn proposed(diagnosis: &Diagnosis) -> Option<String> {
         .found
         .iter()
         .filter(|found| !found.claimed && !found.given)
-        .map(|found| format!("`{}` {}", found.effect, at(&found.places())))
+        .map(|found| format!("`{}` {}{}", found.effect, at(&found.places()), or_alike(found)))
         .collect();
-    (!proposed.is_empty()).then(|| format!("Not claimed, but the best description: {}.", list(&proposed)))
+    let by = match diagnosis.named_by {
+        NamedBy::Evidence => "Not claimed, but the best description:",
+        NamedBy::LeastSquares => {
+            "Not claimed, as correlated errors explain as much, but the best description by least squares:"
+        }
+    };
+    (!proposed.is_empty()).then(|| format!("{by} {}.", list(&proposed)))
 }
 
 /// Returns a sentence on what remains with the effects found.
@@ -157,6 +196,8 @@ pub fn failed(rule: Rule) -> &'static str {
         Rule::Forecast => "no better forecast",
         Rule::Curve => "most remains",
         Rule::Probability => "less probable",
+        Rule::Error => "leaves more",
+        Rule::Claim => "proposed",
     }
 }
 
@@ -233,6 +274,7 @@ pub fn at(place: &str) -> String {
     }
     match place.split_once(':') {
         Some(("joint", name)) => format!("in the joint `{name}`"),
+        Some(("speed", name)) => format!("against the speed `{name}`"),
         Some(("process", name)) => format!("in the equation of `{name}`"),
         Some(("extra_state", name)) => format!("in an additional state at `{name}`"),
         Some(("actuator", name)) => format!("at the actuator `{name}`"),
@@ -247,14 +289,24 @@ pub fn term(dropped: &Removed) -> String {
     format!("`{}`{place}", dropped.term)
 }
 
+/// Returns the ends of an interval, or that there is none because its parameter stands at a bound.
+pub fn ends(interval: Option<[f64; 2]>, at_bound: bool, digits: usize) -> [String; 2] {
+    match interval {
+        Some(ends) => ends.map(|end| significant(end, digits)),
+        None if at_bound => ["at a bound".to_owned(), String::new()],
+        None => Default::default(),
+    }
+}
+
 /// Returns a parameter of an effect with its interval: `torque = 0.0124 (0.0118 to 0.0130) N m`.
 pub fn strength(strength: &StrengthValue) -> String {
-    let StrengthValue { name, value, unit, interval95, .. } = strength;
+    let StrengthValue { name, value, unit, interval95, at_bound, .. } = strength;
     let range = interval95.filter(|ends| ends.iter().all(|v| v.is_finite()));
     let range =
         range.map_or_else(String::new, |[low, high]| format!(" ({} to {})", significant(low, 3), significant(high, 3)));
     let unit = if unit.is_empty() || unit == "1" { String::new() } else { format!(" {unit}") };
-    format!("{name} = {}{range}{unit}", significant(*value, 4))
+    let bound = if *at_bound { " (at a bound)" } else { "" };
+    format!("{name} = {}{range}{unit}{bound}", significant(*value, 4))
 }
 
 /// Returns sentences on an effect: its only experiment, held-out errors and alternatives.
@@ -326,9 +378,16 @@ pub fn probability(p: f64) -> String {
     }
 }
 
+/// Share above which no number is printed: what is left counts then.
+const NEARLY_ALL: f64 = 0.99;
+
 /// Formats a share in percent.
 pub fn share(share: f64) -> String {
-    if share.is_finite() { format!("{:.0} %", 100.0 * share) } else { "n/a".to_owned() }
+    match share {
+        share if !share.is_finite() => "n/a".to_owned(),
+        share if share > NEARLY_ALL => format!("more than {:.0} %", 100.0 * NEARLY_ALL),
+        share => format!("{:.0} %", 100.0 * share),
+    }
 }
 
 /// Joins parts: `a`, `a and b`, `a, b and c`.
@@ -351,7 +410,7 @@ mod tests {
         for part in [
             "falls from 4.20 to 1.00 times the noise level on calibration data and from 15.40 to 1.02 on validation data",
             "lacks a dissipative effect in the joint `phi` (probability 95 %), best described by `coulomb-friction`",
-            "explain 100 % of the squared error on validation data",
+            "explain more than 99 % of the squared error on validation data; an error of 1.02 times the noise level is left",
         ] {
             assert!(found.contains(part), "{part}: {found}");
         }

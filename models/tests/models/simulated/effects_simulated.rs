@@ -20,6 +20,21 @@ parameters = { m = "kg" }
 der        = { x = "v", v = "m*v' = u" }
 "#;
 
+/// [`BLOCK`] with a damper, with and without its position.
+const DAMPED: &str = r#"
+states     = { x = "m", v = "m/s" }
+inputs     = { u = "N" }
+parameters = { m = "kg", d = "N*s/m" }
+der        = { x = "v", v = "m*v' = u - d*v" }
+"#;
+
+const SPEED: &str = r#"
+states     = { v = "m/s" }
+inputs     = { u = "N" }
+parameters = { m = "kg", d = "N*s/m" }
+der        = { v = "m*v' = u - d*v" }
+"#;
+
 const TANK: &str = r#"
 states     = { h = "m" }
 inputs     = { u = "m^3/s" }
@@ -457,6 +472,7 @@ fn everywhere() -> Vec<(WithEffects, &'static str, bool)> {
             let process = *port == PortKind::Process;
             let place = match port {
                 PortKind::Joint => "joint:x",
+                PortKind::Speed => "speed:v",
                 PortKind::Process => "process:g",
                 PortKind::Actuator => "actuator:u",
                 PortKind::Sensor => "sensor:x",
@@ -464,6 +480,7 @@ fn everywhere() -> Vec<(WithEffects, &'static str, bool)> {
             let coupled = effect.name() == "coupling-play";
             let companion = effect.second_port().map(|kind| match kind {
                 PortKind::Joint if coupled => "joint:y",
+                PortKind::Speed => "speed:v",
                 PortKind::Joint => "joint:x",
                 PortKind::Process => "process:h",
                 PortKind::Actuator => "actuator:u",
@@ -471,6 +488,8 @@ fn everywhere() -> Vec<(WithEffects, &'static str, bool)> {
             });
             let text = if process {
                 PAIR
+            } else if *port == PortKind::Speed {
+                SPEED
             } else if coupled {
                 COUPLED
             } else {
@@ -483,6 +502,36 @@ fn everywhere() -> Vec<(WithEffects, &'static str, bool)> {
         }
     }
     all
+}
+
+#[test]
+fn an_effect_on_a_speed_without_a_position_acts_as_on_one_with_it() {
+    let times: Vec<f64> = (1..40).map(|k| 0.1 * f64::from(k)).collect();
+    let samples: Vec<f64> = (0..40).map(|k| 6.0 * math::sin(0.35 * f64::from(k))).collect();
+    let input =
+        Input::Sampled { times: (0..40).map(|k| 0.1 * f64::from(k)).collect(), values: samples, hold: Hold::First };
+    let on_speeds = effects().into_iter().filter(|effect| effect.ports().contains(&PortKind::Speed));
+    for effect in on_speeds {
+        let strength = |of: &EffectParameter| match of.bounds {
+            [low, high] if high.is_finite() => low + 0.4 * (high - low),
+            [low, _] if low.is_finite() => low + 0.7,
+            _ => 0.7,
+        };
+        let companion = effect.second_port().map(|_| "actuator:u");
+        let speeds =
+            [(DAMPED, "joint:x", vec![0.0, 0.5]), (SPEED, "speed:v", vec![0.5])].map(|(text, place, start)| {
+                let model = with(text, effect.name(), place, companion);
+                let strengths = effect.parameters().iter().map(strength);
+                let mut parameters: Vec<f64> = [2.0, 0.6].into_iter().chain(start).chain(strengths).collect();
+                parameters.resize(model.interface().parameters.len(), 0.0);
+                values(&model, &parameters, input.clone(), "v", &times)
+            });
+        close(&speeds[1], &speeds[0], 1e-6);
+        let without = with(SPEED, "viscous-friction", "speed:v", None);
+        let plain = values(&without, &[2.0, 0.6, 0.5, 0.0], input.clone(), "v", &times);
+        let moved = plain.iter().zip(&speeds[1]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(moved > 1e-3, "{} does something: {moved}", effect.name());
+    }
 }
 
 #[test]

@@ -7,6 +7,7 @@ mod circuit;
 mod crane;
 mod drive;
 mod driven_pendulum;
+mod drop;
 mod furuta;
 mod jacket;
 mod pendulum;
@@ -14,6 +15,7 @@ mod places;
 mod room;
 mod sampled_drive;
 mod servo;
+mod sled;
 mod spring;
 mod tanks;
 mod torsion;
@@ -48,7 +50,8 @@ pub fn disturbed_plants() -> &'static [&'static Plant] {
     &[&driven_pendulum::PLANT, &two_masses::PLANT, &cascade::PLANT]
 }
 
-/// Returns further plants of cases with a model error in the background: one whose controller samples.
+/// Returns further plants of cases with a model error in the background: one whose controller samples, and two of which
+/// a record is one smooth stroke.
 pub fn further_plants() -> &'static [&'static Plant] {
-    &[&sampled_drive::PLANT]
+    &[&sampled_drive::PLANT, &sled::PLANT, &drop::PLANT]
 }

@@ -96,12 +96,13 @@ pub(super) fn parameters(diagnosis: &Diagnosis) -> [Block; 2] {
     ];
     let rows = diagnosis.parameters.iter().map(|p| -> Vec<Cell> {
         let interval = p.interval95.map(|ends| ends.map(|end| significant(end, 4)));
+        let open = if p.at_bound { "at a bound" } else { "not determined" };
         let change = if p.before == 0.0 { String::new() } else { percent(p.after / p.before - 1.0) };
         vec![
             p.name.clone().into(),
             number(p.before).into(),
             Cell::strong(number(p.after)),
-            interval.map_or_else(|| "not determined".to_owned(), |[low, high]| format!("{low} to {high}")).into(),
+            interval.map_or_else(|| open.to_owned(), |[low, high]| format!("{low} to {high}")).into(),
             p.unit.clone().into(),
             change.into(),
             p.std_error.map_or_else(String::new, |error| significant((p.after - p.before) / error, 2)).into(),
