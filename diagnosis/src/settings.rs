@@ -22,8 +22,8 @@ pub struct Settings {
     /// Share of the mean square error above noise of calibration records that a set must explain for other effects of
     /// its classes to be tried in it. Basis: the least share that is called most.
     pub explained: f64,
-    /// Share of the root mean square error of the declared model of which an effect alone leaves little, on calibration
-    /// and on selection records. Basis: falls of balls, a rack; from 0.17 to 0.33 the answers are the same.
+    /// Share of the root mean square error above noise of the declared model of which an effect alone leaves little, on
+    /// calibration and on selection records. Basis: falls of balls, a rack; from 0.17 to 0.33 the answers are the same.
     pub little: f64,
     /// Share of the forecast error without it that an effect must remove to be claimed. Basis: an assumption.
     pub least: f64,

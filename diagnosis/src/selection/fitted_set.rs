@@ -63,7 +63,7 @@ pub struct FittedSet<'a> {
     pub variant: Variant,
     /// Fit by least squares.
     pub least_squares: Estimate,
-    /// True if a further fit by least squares would not move it any more.
+    /// True if its fit by least squares has converged, or gains next to nothing in further tries from where it stopped.
     pub is_settled: bool,
     /// Fits under the error models; empty until they are needed.
     pub under: Vec<(ErrorModel, Estimate)>,
@@ -145,12 +145,14 @@ impl FittedSet<'_> {
         Some(rms(self.fit.all(&self.least_squares.point)?.iter().flatten()))
     }
 
-    /// Returns the log-likelihood in white noise of the declared size with a share of the root mean square error.
-    pub fn with_share_of_error(&self, share: f64) -> f64 {
+    /// Returns the log-likelihood in white noise of the declared size with a share of the mean square error above a
+    /// level, in squared noises.
+    pub fn with_share_of_error(&self, share: f64, level: f64) -> f64 {
         let samples: usize = self.fit.pieces.iter().flat_map(|piece| &piece.series).map(|s| s.times.len()).sum();
         #[allow(clippy::cast_precision_loss)]
-        let constant = -0.5 * samples as f64 * math::ln(std::f64::consts::TAU);
-        constant + share * share * (self.least_squares.log_likelihood - constant)
+        let half = 0.5 * samples as f64;
+        let none = -half * math::ln(std::f64::consts::TAU);
+        none - half * level + share * (self.least_squares.log_likelihood - none + half * level)
     }
 
     /// Returns the largest root mean square error of a record by least squares, in noises.

@@ -166,12 +166,18 @@ impl<'r, 'a> FittedSets<'r, 'a> {
     pub fn leaves_as_little(&self, set: &FittedSet<'_>, other: &FittedSet<'_>) -> bool {
         let errors = set.error().zip(other.error()).zip(self.declared().error());
         errors.is_some_and(|((own, other), declared)| {
-            own <= (1.0 + self.settings().least) * other || own <= self.settings().little * declared
+            own <= (1.0 + self.settings().least) * other || self.is_little(own, declared)
         })
     }
 
+    /// Returns true if an error is little beside another one, both in noises and above the noise.
+    pub fn is_little(&self, own: f64, declared: f64) -> bool {
+        let little = self.settings().little;
+        declared > 1.0 && own * own - 1.0 <= little * little * (declared * declared - 1.0)
+    }
+
     /// Returns true if a set describes calibration records worse than the declared model, or its fit by least squares
-    /// still moves: it is not known what it says.
+    /// still gains in further tries: it is not known what it says.
     pub fn is_inconsistent(&self, set: &FittedSet<'_>) -> bool {
         let errors = set.error().zip(self.declared().error());
         !set.is_settled || errors.is_none_or(|(own, declared)| own > declared)
@@ -214,7 +220,8 @@ impl<'r, 'a> FittedSets<'r, 'a> {
     /// named: those that are more probable than the declared model, or leave little of its error.
     pub fn take_up(&mut self) {
         let declared = self.log_posterior(self.declared());
-        let little = self.declared().with_share_of_error(self.settings().little);
+        let little = self.settings().little;
+        let little = self.declared().with_share_of_error(little * little, 1.0);
         let counts =
             |set: &FittedSet<'a>| self.log_posterior(set) > declared || set.least_squares.log_likelihood >= little;
         let continued = |set: &FittedSet<'a>| {
@@ -223,7 +230,7 @@ impl<'r, 'a> FittedSets<'r, 'a> {
                 if set.is_settled {
                     break;
                 }
-                let still = set.with_share_of_error((1.0 - STALLS).sqrt());
+                let still = set.with_share_of_error(1.0 - STALLS, 0.0);
                 let again = set.estimation(&[]).least_squares(set.least_squares.point.clone())?;
                 set.is_settled = again.converged || again.log_likelihood < still;
                 set.least_squares = again;

@@ -38,7 +38,7 @@ struct Rival<'s, 'a> {
 /// Returns true if a set leaves little of the error of the declared model on calibration records.
 fn leaves_little(sets: &FittedSets<'_, '_>, set: &FittedSet<'_>) -> bool {
     let errors = set.error().zip(sets.declared().error());
-    errors.is_some_and(|(own, declared)| own <= sets.settings().little * declared)
+    errors.is_some_and(|(own, declared)| sets.is_little(own, declared))
 }
 
 /// Returns true if a set leaves little of the forecast error of selection records. Ends of calibration records show
