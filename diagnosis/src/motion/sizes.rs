@@ -84,7 +84,6 @@ pub fn sizes(
             Sizes { output, mobility: mobility_of(w), position: speed * time, speed, time, ..common }
         }
         PortIndex::Process(w, s) => {
-            let unit = &model.model().equation_states()[s].unit;
             let inputs = trajectories[0].inputs();
             let mobility = moments().map(|m| m.b[(s, inputs + w)].abs()).fold(0.0, f64::max);
             let rate = size(moments().map(|m| m.rates[s]));
@@ -97,7 +96,7 @@ pub fn sizes(
                 speed,
                 time: position / speed,
                 range: range(moments().map(|m| m.x[s])),
-                zero: Some(unit).filter(|unit| unit.zero() != 0.0).map(|unit| unit.zero() / unit.factor()),
+                zero: model.model().equation_states()[s].unit.absolute_zero_offset(),
                 ..common
             }
         }

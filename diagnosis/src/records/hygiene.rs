@@ -12,10 +12,10 @@ pub fn noise_of(records: &[(&[f64], &[f64])]) -> Option<f64> {
     noise_beside(records, records)
 }
 
-/// Returns the standard deviation of the noise as [`noise_of`] does, from what a model leaves of the records: fast
-/// motion looks like noise.
-pub fn noise_beside(records: &[(&[f64], &[f64])], left: &[(&[f64], &[f64])]) -> Option<f64> {
-    let mut all: Vec<f64> = left.iter().filter_map(|(times, values)| noise_of_record(times, values)).collect();
+/// Returns the standard deviation of the noise like [`noise_of`], but from the residuals of a model: fast motion would
+/// be taken for noise.
+pub fn noise_beside(records: &[(&[f64], &[f64])], residuals: &[(&[f64], &[f64])]) -> Option<f64> {
+    let mut all: Vec<f64> = residuals.iter().filter_map(|(times, values)| noise_of_record(times, values)).collect();
     all.sort_by(f64::total_cmp);
     // Of two, the smaller one.
     let median = *all.get(all.len().checked_sub(1)? / 2)?;

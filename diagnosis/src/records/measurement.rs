@@ -90,6 +90,16 @@ impl Measurement {
 }
 
 impl Series {
+    /// Returns series, each with its part of values that stand one series after the other.
+    pub fn with_parts<'v>(all: &'v [Self], values: &'v [f64]) -> impl Iterator<Item = (&'v Self, &'v [f64])> {
+        let mut rest = values;
+        all.iter().map(move |series| {
+            let (own, others) = rest.split_at(series.times.len());
+            rest = others;
+            (series, own)
+        })
+    }
+
     fn new(
         channel: &Channel,
         case: &Case,

@@ -65,7 +65,7 @@ impl SensorNoise {
     pub fn notes(&self, study: &Study, jobs: &[usize], model: &Interface) -> Vec<String> {
         let note = |(signal, estimate): (&String, &Estimate)| {
             let noise = estimate.noise?;
-            let of = if estimate.is_beside_model { " of what the declared model leaves" } else { "" };
+            let of = if estimate.is_beside_model { "residuals of the declared model" } else { "samples" };
             let without: Vec<&str> = channels(study, jobs)
                 .filter(|(_, channel)| channel.signal == *signal && channel.noise.is_none())
                 .map(|(case, _)| case.name.as_str())
@@ -78,7 +78,7 @@ impl SensorNoise {
                 _ => format!(" of {}", without.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")),
             };
             Some(format!(
-                "the noise of `{signal}` was estimated from neighbouring samples{of}{experiments}: {noise:.3e} {unit}"
+                "the noise of `{signal}` was estimated from neighbouring {of}{experiments}: {noise:.3e} {unit}"
             ))
         };
         self.0.iter().filter_map(note).collect()

@@ -160,12 +160,9 @@ impl Subject {
     pub fn with_motion_removed(mut self, residuals: &[(usize, Vec<f64>)]) -> Self {
         let mut left: BTreeMap<String, Vec<(&Series, Vec<f64>)>> = BTreeMap::new();
         for (measurement, residuals) in residuals {
-            let mut rest = residuals.as_slice();
-            for series in &self.measurements[*measurement].series {
-                let (own, others) = rest.split_at(series.times.len());
+            for (series, own) in Series::with_parts(&self.measurements[*measurement].series, residuals) {
                 let own = own.iter().map(|r| r * series.noise).collect();
                 left.entry(series.name.clone()).or_default().push((series, own));
-                rest = others;
             }
         }
         let mut noise = self.sensor_noise.clone();

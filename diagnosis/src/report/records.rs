@@ -208,13 +208,8 @@ impl<'s, 'a> Records<'s, 'a> {
 
 fn predicted(fit: &Fit<'_>, point: &Point, piece: usize, m: &Measurement) -> Option<Predicted> {
     let residuals = fit.residuals(piece, point)?;
-    let mut rest = residuals.as_slice();
-    let samples = m.series.iter().map(|s| {
-        let (own, others) = rest.split_at(s.times.len());
-        rest = others;
-        own.iter().zip(&s.values).map(|(r, y)| y + r * s.noise).collect()
-    });
-    let samples = samples.collect();
+    let of = |(s, own): (&Series, &[f64])| own.iter().zip(&s.values).map(|(r, y)| y + r * s.noise).collect();
+    let samples = Series::with_parts(&m.series, &residuals).map(of).collect();
     let names = &fit.model.interface().parameters;
     let locals = fit.pieces[piece].locals.iter().zip(&point.locals[piece]);
     let starts = locals.map(|(local, &value)| (names[local.parameter].variable.name.clone(), value)).collect();

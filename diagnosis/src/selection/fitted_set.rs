@@ -10,7 +10,7 @@ use crate::candidates::Candidate;
 use crate::estimation::{Channels, ErrorModel, Errors, Estimate, Estimation, Observed, log_choices, priors};
 use crate::fit::{Added, Fit, Piece, Point, Variant};
 use crate::motion::Trajectory;
-use crate::records::Subject;
+use crate::records::{Series, Subject};
 use crate::settings::Settings;
 
 /// Twice a difference of log-evidence from which it is strong: of sets that differ less, the simplest is named. Also
@@ -145,6 +145,12 @@ impl FittedSet<'_> {
         Some(rms(self.fit.all(&self.least_squares.point)?.iter().flatten()))
     }
 
+    /// Returns the log-likelihood from which another set leaves little of the error above noise of this one.
+    pub fn with_little_error(&self) -> f64 {
+        let little = self.fit.subject.settings.little;
+        self.with_share_of_error(little * little, 1.0)
+    }
+
     /// Returns the log-likelihood in white noise of the declared size with a share of the mean square error above a
     /// level, in squared noises.
     pub fn with_share_of_error(&self, share: f64, level: f64) -> f64 {
@@ -189,12 +195,9 @@ pub fn squares(pieces: &[Piece], residuals: &[Vec<f64>]) -> Vec<(f64, f64)> {
     let channels = Channels::new(pieces);
     let mut sums = vec![(0.0, 0.0); channels.count];
     for (index, (piece, residuals)) in pieces.iter().zip(residuals).enumerate() {
-        let mut rest = residuals.as_slice();
-        for (k, series) in piece.series.iter().enumerate() {
-            let (own, others) = rest.split_at(series.times.len());
+        for (k, (_, own)) in Series::with_parts(&piece.series, residuals).enumerate() {
             let sum = &mut sums[channels.of(index, k)];
             *sum = (sum.0 + own.iter().map(|r| r * r).sum::<f64>(), sum.1 + own.len() as f64);
-            rest = others;
         }
     }
     sums

@@ -6,6 +6,7 @@ mod contradiction;
 mod entry;
 mod fitted_set;
 mod forecast;
+mod least_squares;
 mod preparation;
 mod refit;
 mod screening;
@@ -14,7 +15,6 @@ mod sets;
 #[cfg(test)]
 mod tests;
 mod verdict;
-mod voice;
 mod widened;
 
 pub(crate) use alignment::align;

@@ -281,8 +281,7 @@ impl<'a> FittedSets<'_, 'a> {
             let effect = &self.refit.candidates[screened.index].effect;
             effect.parameters().len() == 1 && !self.is_known(&with(&parent.key, screened.index))
         };
-        let little = self.settings().little;
-        let least = parent.with_share_of_error(little * little, 1.0);
+        let least = parent.with_little_error();
         let fitted = |single: &&Screened| {
             let rough = self.by_squares(parent, &[*single], &[], least)?;
             (rough.log_likelihood >= least).then_some((with(&parent.key, single.index), rough))

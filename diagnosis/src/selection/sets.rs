@@ -164,23 +164,22 @@ impl<'r, 'a> FittedSets<'r, 'a> {
     /// Returns true if a set leaves about as little of the error on calibration records as another one, or little of
     /// that of the declared model.
     pub fn leaves_as_little(&self, set: &FittedSet<'_>, other: &FittedSet<'_>) -> bool {
-        let errors = set.error().zip(other.error()).zip(self.declared().error());
-        errors.is_some_and(|((own, other), declared)| {
-            own <= (1.0 + self.settings().least) * other || self.is_little(own, declared)
-        })
+        let hardly_more = 1.0 + self.settings().least;
+        set.least_squares.log_likelihood >= other.with_share_of_error(hardly_more * hardly_more, 0.0)
+            || self.leaves_little(set)
     }
 
-    /// Returns true if an error is little beside another one, both in noises and above the noise.
-    pub fn is_little(&self, own: f64, declared: f64) -> bool {
-        let little = self.settings().little;
-        declared > 1.0 && own * own - 1.0 <= little * little * (declared * declared - 1.0)
+    /// Returns true if a set leaves little of the error above noise of the declared model on calibration records.
+    pub fn leaves_little(&self, set: &FittedSet<'_>) -> bool {
+        let declared = self.declared();
+        let is_above_noise = declared.least_squares.log_likelihood < declared.with_share_of_error(0.0, 1.0);
+        is_above_noise && set.least_squares.log_likelihood >= declared.with_little_error()
     }
 
     /// Returns true if a set describes calibration records worse than the declared model, or its fit by least squares
     /// still gains in further tries: it is not known what it says.
     pub fn is_inconsistent(&self, set: &FittedSet<'_>) -> bool {
-        let errors = set.error().zip(self.declared().error());
-        !set.is_settled || errors.is_none_or(|(own, declared)| own > declared)
+        !set.is_settled || set.least_squares.log_likelihood < self.declared().least_squares.log_likelihood
     }
 
     /// Returns the declared model with wider ranges if it leaves hardly more than a set, and clearly less than within
@@ -220,8 +219,7 @@ impl<'r, 'a> FittedSets<'r, 'a> {
     /// named: those that are more probable than the declared model, or leave little of its error.
     pub fn take_up(&mut self) {
         let declared = self.log_posterior(self.declared());
-        let little = self.settings().little;
-        let little = self.declared().with_share_of_error(little * little, 1.0);
+        let little = self.declared().with_little_error();
         let counts =
             |set: &FittedSet<'a>| self.log_posterior(set) > declared || set.least_squares.log_likelihood >= little;
         let continued = |set: &FittedSet<'a>| {

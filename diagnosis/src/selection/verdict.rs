@@ -8,8 +8,8 @@ use super::contradiction::{fitted_together, is_contradicted};
 use super::entry::{Entry, entries_of, entry};
 use super::fitted_set::{FittedSet, Key, STRONG, correlation, growth, largest};
 use super::forecast::Forecasts;
+use super::least_squares::{Proposal, by_least_squares, is_in_proportion};
 use super::sets::FittedSets;
-use super::voice::{Voice, is_in_proportion, of_least_squares};
 use crate::fit::dot;
 
 /// Conclusion on the declared model.
@@ -116,11 +116,11 @@ pub fn decide(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> Verdict {
     let ByEvidence { set, weights, nothing, aliases } = by_evidence(sets, forecasts);
     // Where what evidence names leaves much, least squares is asked. It alone claims nothing.
     let is_in_proportion = is_in_proportion(sets, forecasts, &set);
-    let voice = if is_in_proportion { None } else { of_least_squares(sets, forecasts) };
-    let is_agreed = |voice: &Voice| set.len() == 1 && entries_of(sets, &set).contains(&voice.entry);
-    let (set, named_by, alone) = match voice {
-        Some(voice) if is_agreed(&voice) => (voice.set, NamedBy::Evidence, None),
-        Some(voice) => (voice.set.clone(), NamedBy::LeastSquares, Some(voice)),
+    let proposal = if is_in_proportion { None } else { by_least_squares(sets, forecasts) };
+    let is_agreed = |proposal: &Proposal| set.len() == 1 && entries_of(sets, &set).contains(&proposal.entry);
+    let (set, named_by, alone) = match proposal {
+        Some(proposal) if is_agreed(&proposal) => (proposal.set, NamedBy::Evidence, None),
+        Some(proposal) => (proposal.set.clone(), NamedBy::LeastSquares, Some(proposal)),
         None => (set, NamedBy::Evidence, None),
     };
     // What wider ranges of declared parameters explain as well is no effect.
@@ -131,8 +131,8 @@ pub fn decide(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> Verdict {
     let entries: Vec<(Entry, Vec<Entry>, f64)> = own
         .iter()
         .map(|own| {
-            if let Some(voice) = &alone {
-                return (own.clone(), voice.alike.clone(), f64::NAN);
+            if let Some(proposal) = &alone {
+                return (own.clone(), proposal.alike.clone(), f64::NAN);
             }
             let alike = alike(sets, &set, own, &weights);
             let counts = |key: &Key| entries_of(sets, key).iter().any(|e| e == own || alike.contains(e));

@@ -1,10 +1,8 @@
 //! Declared parameters at the ends of their ranges: what the declared model explains where these are wider.
 
-use mops_core::Role;
-
 use super::fitted_set::{FittedSet, estimation, largest, rms};
 use crate::estimation::{Errors, LOOK};
-use crate::fit::{Fit, Point, pieces, problem};
+use crate::fit::{Fit, Point};
 
 /// Factor by which a range is widened at an end. Basis: an order of magnitude.
 const WIDER: f64 = 10.0;
@@ -30,11 +28,9 @@ impl Widened {
     /// Widens the ranges at whose ends parameters stand, and fits the declared model again; `None` if no parameter
     /// leaves its range.
     pub fn of(declared: &FittedSet<'_>) -> Option<Self> {
-        let (subject, simulations) = (declared.fit.subject, declared.fit.simulations);
-        let start = declared.start_at(&declared.least_squares.point);
-        let pieces = pieces::pieces(subject, |role| role == Role::Calibration);
-        let (mut fit, mut point, variant) =
-            problem(subject, &start.added, pieces, &start.tuners, start.locals, &[], simulations);
+        let FittedSet { variant, added, .. } = declared;
+        let (mut fit, mut point) = (declared.fit.clone(), declared.least_squares.point.clone());
+        let subject = fit.subject;
         let first: Vec<[f64; 2]> = fit.globals.iter().map(|global| global.bounds).collect();
         let count = subject.globals.len();
         for _ in 0..ROUNDS {
@@ -51,14 +47,11 @@ impl Widened {
                 beyond.globals[k] = bounds[end].signum() * (bounds[end] * moved).sqrt();
                 bounds[end] = moved;
             }
-            let fitted = |from: &Point, iterations| {
-                let estimation = estimation(subject, &fit, &variant, &start.added, &[], from);
-                estimation.with(&Errors::White, from.clone(), iterations)
-            };
-            let looks = [&point, &beyond].into_iter().filter_map(|from| fitted(from, LOOK));
-            let best = looks.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
-            point =
-                estimation(subject, &fit, &variant, &start.added, &[], &best.point).least_squares(best.point)?.point;
+            let near = |point: &Point| estimation(subject, &fit, variant, added, &[], point);
+            let look = |from: &Point| near(from).with(&Errors::White, from.clone(), LOOK);
+            let looks = [&point, &beyond].into_iter().filter_map(look);
+            let best = looks.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?.point;
+            point = near(&best).least_squares(best)?.point;
         }
         let beyond = |k: usize| {
             let ([low, high], value) = (first[k], point.globals[k]);

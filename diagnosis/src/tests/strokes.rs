@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use mops_core::{Input, case::Hold};
 use mops_effects::effects;
 use mops_math as math;
-use mops_outcome::diagnosis::{NamedBy, Verdict};
+use mops_outcome::diagnosis::{Diagnosis, NamedBy, Verdict};
 
 use crate::testing::{Record, integrated, study, subject, white};
 use crate::{Options, diagnose};
@@ -40,16 +40,26 @@ fn pushed(friction: f64, error: f64) -> Record {
     Record { inputs, times, signals: vec![("v", values, 4e-4)] }
 }
 
-#[test]
-fn dry_friction_of_a_speed_without_a_position_is_named_whatever_a_smooth_error_explains() {
-    let subject = subject(SLED, &[20.0, 20.0, 0.0], 1, vec![pushed(20.0, 2e-3)]);
-    let found = diagnose(&study(&subject), &effects(), &Options { max_effects: 1, ..Options::default() }, &());
-    let found = found.expect("it simulates");
+/// Diagnoses a push of a sled on a rail with dry friction of 20 N, with a smooth error of the sensor (m/s).
+fn diagnosed(error: f64) -> Diagnosis {
+    let subject = subject(SLED, &[20.0, 20.0, 0.0], 1, vec![pushed(20.0, error)]);
+    let options = Options { max_effects: 1, ..Options::default() };
+    let found = diagnose(&study(&subject), &effects(), &options, &()).expect("it simulates");
     assert!(found.before[0].normalised > 5.0 * found.after[0].normalised, "{:?} {:?}", found.before, found.after);
     let first = found.found.first().expect("friction is named");
-    assert_eq!((first.class.as_str(), first.place.as_str()), ("dissipative", "speed:v"));
-    if found.named_by == NamedBy::LeastSquares {
-        assert_eq!(found.verdict, Verdict::Unexplained, "least squares alone claims nothing");
-        assert!(!first.claimed && first.class_probability.is_nan());
-    }
+    assert_eq!((first.effect.as_str(), first.place.as_str()), ("coulomb-friction", "speed:v"));
+    found
+}
+
+#[test]
+fn dry_friction_of_a_speed_without_a_position_is_claimed() {
+    let found = diagnosed(2e-3);
+    assert_eq!((found.verdict, found.named_by, found.found[0].claimed), (Verdict::Effect, NamedBy::Evidence, true));
+}
+
+#[test]
+fn least_squares_alone_proposes_what_a_larger_smooth_error_hides_from_the_evidence() {
+    let found = diagnosed(4e-3);
+    assert_eq!((found.verdict, found.named_by), (Verdict::Unexplained, NamedBy::LeastSquares));
+    assert!(!found.found[0].claimed && found.found[0].class_probability.is_nan());
 }

@@ -294,8 +294,7 @@ pub(super) fn unit_of_place(port: &Port, companion: Option<&Port>, interface: &I
 /// Returns the absolute temperature at the zero of the scale of a place, in the unit of its differences; `None` if the
 /// place is on no scale.
 pub(super) fn zero_of_scale(port: &Port, interface: &Interface) -> Option<f64> {
-    let unit = unit_of_place(port, None, interface);
-    (unit.zero() != 0.0).then(|| unit.zero() / unit.factor())
+    unit_of_place(port, None, interface).absolute_zero_offset()
 }
 
 /// Returns the unit of an effect parameter at a port, as far as the units of the model determine it.

@@ -139,6 +139,12 @@ impl Unit {
         self.zero
     }
 
+    /// Returns the absolute temperature at the zero of the scale, in the unit itself: 459.67 for degF; `None` unless a
+    /// temperature scale with a zero of its own.
+    pub fn absolute_zero_offset(&self) -> Option<f64> {
+        (self.zero != 0.0).then(|| self.zero / self.factor)
+    }
+
     /// Returns true if the unit counts angles: rad, deg, rev, and derived units.
     pub fn is_angle(&self) -> bool {
         self.turning[0] != 0.0

@@ -1,10 +1,10 @@
-//! The voice of least squares: of the effects that alone leave little of the error, the class that explains it best if
-//! what remains is noise.
+//! Comparison by least squares: of the single effects that leave little of the error, the class that is most probable
+//! if the residuals are noise.
 //!
 //! Where a record is one smooth stroke, a smooth error at the outputs explains any residual at no cost: evidence then
-//! says nothing of an effect that removes nearly all of it. For least squares what an effect leaves is white noise of
-//! fitted size. Its neighbours are correlated, so that `n` samples count as `n (1 - r)/(1 + r)` independent ones, where
-//! `r` is the correlation of neighbours in what the closest set leaves. Source: G. V. Bayley, J. M. Hammersley, The
+//! hardly changes with an effect that removes nearly all of the error. Here the residuals are white noise of fitted
+//! size. Neighbouring residuals are correlated, so that `n` samples count as `n (1 - r)/(1 + r)` independent ones; `r`
+//! is the lag-one autocorrelation of the residuals of the closest set. Source: G. V. Bayley, J. M. Hammersley, The
 //! "effective" number of independent observations in an autocorrelated time series, Supplement to the Journal of the
 //! Royal Statistical Society 8 (1946) 184.
 
@@ -17,9 +17,10 @@ use super::sets::FittedSets;
 use crate::error_models::{Kernel, OutputError};
 use crate::estimation::{Channels, Errors};
 use crate::fit::Piece;
+use crate::records::Series;
 
-/// What least squares says of the sets of one effect that leave little.
-pub struct Voice {
+/// What least squares proposes.
+pub struct Proposal {
     /// The simplest set of the class and place with most weight.
     pub set: Key,
     /// Its class and place.
@@ -32,44 +33,37 @@ pub struct Voice {
 struct Rival<'s, 'a> {
     set: &'s FittedSet<'a>,
     entry: Entry,
+    /// Share of the forecast error of the declared model above noise that the set removes.
+    share: f64,
     log_weight: f64,
 }
 
-/// Returns true if a set leaves little of the error of the declared model on calibration records.
-fn leaves_little(sets: &FittedSets<'_, '_>, set: &FittedSet<'_>) -> bool {
-    let errors = set.error().zip(sets.declared().error());
-    errors.is_some_and(|(own, declared)| sets.is_little(own, declared))
-}
-
-/// Returns true if a set leaves little of the forecast error of selection records. Ends of calibration records show
-/// less: of their error most must go.
-fn forecasts_well(sets: &FittedSets<'_, '_>, forecasts: &Forecasts, key: &Key) -> bool {
+/// Returns the share of the forecast error above noise that a set must remove to leave little: of that of selection
+/// records nearly all. Ends of calibration records show less: of their error most.
+fn wanted_share(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> f64 {
     let settings = sets.settings();
-    let wanted = if forecasts.are_of_other_records() { 1.0 - settings.little * settings.little } else { settings.most };
-    forecasts.share_of_declared(sets, key).is_some_and(|share| share >= wanted)
+    if forecasts.are_of_other_records() { 1.0 - settings.little * settings.little } else { settings.most }
 }
 
 /// Returns true if a set leaves little, on calibration records and where it forecasts.
 pub fn is_in_proportion(sets: &FittedSets<'_, '_>, forecasts: &Forecasts, key: &Key) -> bool {
-    let set = sets.get(key).filter(|set| !set.key.is_empty());
-    set.is_some_and(|set| leaves_little(sets, set)) && forecasts_well(sets, forecasts, key)
+    let leaves_little = sets.get(key).is_some_and(|set| !set.key.is_empty() && sets.leaves_little(set));
+    let share = || forecasts.share_of_declared(sets, key);
+    leaves_little && share().is_some_and(|share| share >= wanted_share(sets, forecasts))
 }
 
-/// Returns the class and place that explain most of the error if what remains is noise; `None` if no effect alone
+/// Returns the class and place that explain most of the error if the residuals are noise; `None` if no effect alone
 /// leaves little, or the leading one does not forecast well.
-pub fn of_least_squares(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> Option<Voice> {
+pub fn by_least_squares(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> Option<Proposal> {
+    let leaves_little = |set: &&FittedSet<'_>| {
+        set.key.len() == 1 && set.is_settled && sets.leaves_little(set) && !sets.is_at_limit(set)
+    };
     // A rival may forecast less well than what is proposed, but better than the declared model by far.
-    let forecasts_mostly = |set: &FittedSet<'_>| {
-        forecasts.share_of_declared(sets, &set.key).is_some_and(|share| share >= sets.settings().most)
-    };
-    let is_rival = |set: &&FittedSet<'_>| {
-        set.key.len() == 1
-            && set.is_settled
-            && leaves_little(sets, set)
-            && !sets.is_at_limit(set)
-            && forecasts_mostly(set)
-    };
-    let rivals = weighed(sets, sets.sets.iter().filter(is_rival).collect())?;
+    let rivals = sets.sets.iter().filter(leaves_little).filter_map(|set| {
+        let share = forecasts.share_of_declared(sets, &set.key)?;
+        (share >= sets.settings().most).then_some((set, share))
+    });
+    let rivals = weighed(sets, rivals.collect())?;
     let weight = |entry: &Entry| -> f64 {
         rivals.iter().filter(|rival| rival.entry == *entry).map(|rival| math::exp(rival.log_weight)).sum()
     };
@@ -87,18 +81,22 @@ pub fn of_least_squares(sets: &FittedSets<'_, '_>, forecasts: &Forecasts) -> Opt
     let simplest = near.min_by_key(|rival| rival.set.parameters())?;
     let is_near = |(_, weight): &&(Entry, f64)| math::ln(most / weight) < 0.5 * STRONG;
     let alike = entries[1..].iter().filter(is_near).map(|(entry, _)| entry.clone()).collect();
-    let forecasts_well = own.iter().any(|rival| forecasts_well(sets, forecasts, &rival.set.key));
-    forecasts_well.then(|| Voice { set: simplest.set.key.clone(), entry: leading, alike })
+    let wanted = wanted_share(sets, forecasts);
+    own.iter().any(|rival| rival.share >= wanted).then(|| Proposal {
+        set: simplest.set.key.clone(),
+        entry: leading,
+        alike,
+    })
 }
 
 /// Returns sets with their weights: likelihood of white noise of fitted size, samples counted by the correlation of
 /// neighbours, times priors and Occam factor. `None` if there are none.
-fn weighed<'s, 'a>(sets: &FittedSets<'_, 'a>, rivals: Vec<&'s FittedSet<'a>>) -> Option<Vec<Rival<'s, 'a>>> {
+fn weighed<'s, 'a>(sets: &FittedSets<'_, 'a>, rivals: Vec<(&'s FittedSet<'a>, f64)>) -> Option<Vec<Rival<'s, 'a>>> {
     let residuals = |set: &FittedSet<'_>| set.fit.all(&set.least_squares.point);
-    let likelihood = |set: &&FittedSet<'_>| set.least_squares.log_likelihood;
-    let closest = rivals.iter().max_by(|a, b| likelihood(a).total_cmp(&likelihood(b)))?;
+    let likelihood = |set: &FittedSet<'_>| set.least_squares.log_likelihood;
+    let (closest, _) = rivals.iter().max_by(|a, b| likelihood(a.0).total_cmp(&likelihood(b.0)))?;
     let counted = independent(&closest.fit.pieces, &residuals(closest)?);
-    let weigh = |set: &'s FittedSet<'a>| {
+    let weigh = |&(set, share): &(&'s FittedSet<'a>, f64)| {
         let residuals = residuals(set)?;
         let size = |(square, count): (f64, f64)| (square / (count.max(1.0) * counted)).sqrt().max(f64::MIN_POSITIVE);
         let white =
@@ -108,9 +106,9 @@ fn weighed<'s, 'a>(sets: &FittedSets<'_, 'a>, rivals: Vec<&'s FittedSet<'a>>) ->
         let there = set.estimation(&[]).with(&errors, set.least_squares.point.clone(), 0)?;
         let occam = there.log_evidence? - there.log_likelihood;
         let log_weight = counted * white_log_likelihood(&set.fit.pieces, &residuals) + occam;
-        Some(Rival { set, entry: entry(sets, &sets.refit.candidates[set.key[0]]), log_weight })
+        Some(Rival { set, share, entry: entry(sets, &sets.refit.candidates[set.key[0]]), log_weight })
     };
-    let mut weighed: Vec<Rival<'s, 'a>> = rivals.iter().filter_map(|set| weigh(set)).collect();
+    let mut weighed: Vec<Rival<'s, 'a>> = rivals.iter().filter_map(weigh).collect();
     let most = weighed.iter().map(|rival| rival.log_weight).fold(f64::NEG_INFINITY, f64::max);
     weighed.iter_mut().for_each(|rival| rival.log_weight -= most);
     Some(weighed)
@@ -127,13 +125,10 @@ fn independent(pieces: &[Piece], residuals: &[Vec<f64>]) -> f64 {
     let sizes: Vec<f64> = squares(pieces, residuals).iter().map(|(square, count)| square / count.max(1.0)).collect();
     let (mut products, mut pairs) = (0.0, 0.0);
     for (index, (piece, residuals)) in pieces.iter().zip(residuals).enumerate() {
-        let mut rest = residuals.as_slice();
-        for (k, series) in piece.series.iter().enumerate() {
-            let (own, others) = rest.split_at(series.times.len());
+        for (k, (_, own)) in Series::with_parts(&piece.series, residuals).enumerate() {
             let size = sizes[channels.of(index, k)].max(f64::MIN_POSITIVE);
             products += own.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / size;
             pairs += own.len().saturating_sub(1) as f64;
-            rest = others;
         }
     }
     let correlation = (products / f64::max(pairs, 1.0)).clamp(0.0, 1.0 - 1.0 / f64::max(pairs, 2.0));
